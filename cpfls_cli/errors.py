@@ -1,0 +1,39 @@
+"""Errors that a user can cause, each with one message that names the file, the key, the value and the remedy."""
+
+from __future__ import annotations
+
+
+class CpflsError(Exception):
+    """Base of every error that ends a command with a message instead of a traceback."""
+
+    exit_code = 1
+
+
+class ComputationError(CpflsError):
+    """A stage ran on valid input and could not produce a result (exit code 1)."""
+
+
+class InputError(CpflsError):
+    """A file, an artifact or an option is not what the command needs (exit code 2)."""
+
+    exit_code = 2
+
+
+class ConfigError(InputError):
+    """One or more keys of a study config are wrong; the message lists all of them (exit code 2)."""
+
+
+class SettingError(ValueError):
+    """Reject a combination of settings, naming the key of the section that is wrong.
+
+    Parameters
+    ----------
+    key : str
+        Key inside the section whose settings are validated.
+    message : str
+        What is wrong and what to do about it.
+    """
+
+    def __init__(self, key: str, message: str) -> None:
+        super().__init__(message)
+        self.key = key
