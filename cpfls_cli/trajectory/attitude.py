@@ -1,0 +1,126 @@
+"""Attitude that a path asks of a multirotor, whose only force besides gravity acts along its body z axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import ComputationError
+
+# Fraction of gravity below which the direction of the thrust is rounding error.
+_NO_THRUST = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlatAttitude:
+    """Attitude along a path, with its derivatives.
+
+    Attributes
+    ----------
+    attitude : array, shape (time, 3), rad
+        Roll, pitch, yaw.
+    attitude_rate : array, shape (time, 3), rad/s
+    attitude_acceleration : array, shape (time, 3), rad/s^2
+    specific_thrust : array, shape (time,), m/s^2
+        Thrust over mass, ``|a + g e3|``.
+    """
+
+    attitude: Array
+    attitude_rate: Array
+    attitude_acceleration: Array
+    specific_thrust: Array
+
+
+def flat_attitude(time: Array, translation: Array, heading: Array, gravity: float) -> FlatAttitude:
+    """Derive roll and pitch from acceleration and yaw, and their derivatives from jerk and snap.
+
+    ``phi = asin((ax sin psi - ay cos psi) / |f|)``, ``theta = atan2(ax cos psi + ay sin psi, az + g)`` with
+    ``f = a + g e3``.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+    translation : array, shape (3, time, 3), world frame, z up
+        Acceleration in m/s^2, jerk in m/s^3, snap in m/s^4.
+    heading : array, shape (3, time)
+        Yaw in rad, its rate in rad/s, its acceleration in rad/s^2.
+    gravity : float, m/s^2
+
+    Returns
+    -------
+    FlatAttitude
+
+    Raises
+    ------
+    ComputationError
+        If the thrust vanishes, reverses between two samples, or points where the pitch is undefined.
+
+    References
+    ----------
+    Equation (18) in its physical form, method.md section 3.
+    """
+    force = translation + np.array([[[0.0, 0.0, gravity]], [[0.0] * 3], [[0.0] * 3]])
+    _refuse_free_fall(time, force[0], gravity)
+    forward, right, up = _in_heading_frame(force, heading)
+    tilted = _length(forward, up)
+    _refuse_sideways(time, tilted[0], gravity)
+    attitude, rate, acceleration = np.stack([_angle(right, tilted), _angle(forward, up), heading], axis=2)
+    return FlatAttitude(
+        attitude=attitude,
+        attitude_rate=rate,
+        attitude_acceleration=acceleration,
+        specific_thrust=np.linalg.norm(force[0], axis=1),
+    )
+
+
+def _in_heading_frame(force: Array, heading: Array) -> tuple[Array, Array, Array]:
+    """Components forward, right and up of the force in the frame that turns with yaw, each (3, time)."""
+    yaw, rate, acceleration = heading
+    sine, cosine = np.sin(yaw), np.cos(yaw)
+    x, y, up = np.moveaxis(force, 2, 0)
+    forward, right = x * cosine + y * sine, x * sine - y * cosine
+    forward_rate = forward[1] - rate * right[0]
+    right_rate = right[1] + rate * forward[0]
+    forward_acceleration = forward[2] - rate * (right[1] + right_rate) - acceleration * right[0]
+    right_acceleration = right[2] + rate * (forward[1] + forward_rate) + acceleration * forward[0]
+    turned_forward = np.stack([forward[0], forward_rate, forward_acceleration])
+    return turned_forward, np.stack([right[0], right_rate, right_acceleration]), up
+
+
+def _length(x: Array, y: Array) -> Array:
+    """Length of (x, y) and its two time derivatives; rows are derivatives."""
+    length = np.hypot(x[0], y[0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = (x[0] * x[1] + y[0] * y[1]) / length
+        second = (x[1] ** 2 + x[0] * x[2] + y[1] ** 2 + y[0] * y[2] - rate**2) / length
+    return np.stack([length, rate, second])
+
+
+def _angle(opposite: Array, adjacent: Array) -> Array:
+    """Angle ``atan2(opposite, adjacent)`` and its two time derivatives; rows are derivatives."""
+    square = opposite[0] ** 2 + adjacent[0] ** 2
+    square_rate = 2 * (opposite[0] * opposite[1] + adjacent[0] * adjacent[1])
+    rate = (adjacent[0] * opposite[1] - opposite[0] * adjacent[1]) / square
+    second = (adjacent[0] * opposite[2] - opposite[0] * adjacent[2] - rate * square_rate) / square
+    return np.stack([np.arctan2(opposite[0], adjacent[0]), rate, second])
+
+
+def _refuse_free_fall(time: Array, force: Array, gravity: float) -> None:
+    weightless = np.linalg.norm(force, axis=1) <= _NO_THRUST * gravity
+    weightless[1:] |= np.einsum("ni,ni->n", force[1:], force[:-1]) <= 0
+    if weightless.any():
+        raise ComputationError(
+            f"free fall at t = {time[weightless.argmax()]:g} s: the thrust vanishes or turns by 90 degrees or "
+            "more within one sample, so the attitude is not defined; lower the acceleration of the path"
+        )
+
+
+def _refuse_sideways(time: Array, tilted: Array, gravity: float) -> None:
+    sideways = tilted <= _NO_THRUST * gravity
+    if sideways.any():
+        raise ComputationError(
+            f"roll of 90 degrees at t = {time[sideways.argmax()]:g} s: the pitch is not defined there; change "
+            "the acceleration of the path or the yaw"
+        )

@@ -1,0 +1,142 @@
+"""Rotation of a rigid body in Euler coordinates (intrinsic ZYX): inertia matrix, torque, regressor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array
+from cpfls_cli.vehicle import inertia as elements
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+def inertia_tensor(vehicle: VehicleSettings) -> Array:
+    """Arrange the inertia tensor of a vehicle.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    array, shape (3, 3), kg m^2, body frame
+    """
+    return elements.tensor(vehicle.inertia_kg_m2)
+
+
+def inertia_matrix(attitude: Array, inertia: Array) -> Array:
+    """Transform the inertia tensor to the Euler coordinates, ``J = W^T I W``.
+
+    Parameters
+    ----------
+    attitude : array, shape (time, 3), rad
+    inertia : array, shape (3, 3), kg m^2, body frame
+
+    Returns
+    -------
+    array, shape (time, 3, 3), kg m^2
+
+    References
+    ----------
+    Equations (14) and (15) of the paper for a diagonal tensor; method.md section 2.
+    """
+    W = rotations.euler_rate_matrix(attitude)
+    matrix: Array = W.swapaxes(1, 2) @ inertia @ W
+    return matrix
+
+
+def inertia_matrix_gradient(attitude: Array, inertia: Array) -> Array:
+    """Differentiate J by each Euler angle, ``dJ/dq_k = (dW/dq_k)^T I W + W^T I (dW/dq_k)``.
+
+    Parameters
+    ----------
+    attitude : array, shape (time, 3), rad
+    inertia : array, shape (3, 3), kg m^2, body frame
+
+    Returns
+    -------
+    array, shape (time, 3, 3, 3), kg m^2/rad
+        Entry [n, k, i, j] is dJ_ij/dq_k at sample n.
+    """
+    W = rotations.euler_rate_matrix(attitude)
+    # The gradient by one angle is the derivative along a motion of unit rate in that angle alone.
+    unit_rates = (np.broadcast_to(axis, attitude.shape) for axis in np.eye(3))
+    dW = np.stack([rotations.euler_rate_matrix_derivative(attitude, rate) for rate in unit_rates], axis=1)
+    half = dW.swapaxes(2, 3) @ inertia @ W[:, None]
+    gradient: Array = half + half.swapaxes(2, 3)
+    return gradient
+
+
+def torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
+    """Compute the generalised torque, ``tau = J qdd + (dJ/dt) qd - 1/2 grad_q (qd^T J qd)``.
+
+    Parameters
+    ----------
+    attitude : array, shape (time, 3), rad
+    attitude_rate : array, shape (time, 3), rad/s
+    attitude_acceleration : array, shape (time, 3), rad/s^2
+    inertia : array, shape (3, 3), kg m^2, body frame
+
+    Returns
+    -------
+    array, shape (time, 3), N m
+        On the Euler coordinates; `rotations.body_torque` turns it into the body's.
+
+    References
+    ----------
+    Equations (2) to (4) of the paper; method.md section 2.
+    """
+    qd = attitude_rate
+    dJ = inertia_matrix_gradient(attitude, inertia)
+    inertial = rotations.multiply(inertia_matrix(attitude, inertia), attitude_acceleration)
+    turning = np.einsum("nkij,nk,nj->ni", dJ, qd, qd)
+    energy_gradient = 0.5 * np.einsum("nkij,ni,nj->nk", dJ, qd, qd)
+    total: Array = inertial + turning - energy_gradient
+    return total
+
+
+def newton_euler_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
+    """Compute the generalised torque from the body rates, ``tau = W^T (I omegad + omega x I omega)``.
+
+    Parameters
+    ----------
+    attitude : array, shape (time, 3), rad
+    attitude_rate : array, shape (time, 3), rad/s
+    attitude_acceleration : array, shape (time, 3), rad/s^2
+    inertia : array, shape (3, 3), kg m^2, body frame
+
+    Returns
+    -------
+    array, shape (time, 3), N m
+        Equal to `torque`, by an independent formula.
+
+    References
+    ----------
+    method.md section 2.
+    """
+    omega = rotations.body_rate(attitude, attitude_rate)
+    alpha = rotations.body_acceleration(attitude, attitude_rate, attitude_acceleration)
+    body_torque = alpha @ inertia.T + np.cross(omega, omega @ inertia.T)
+    return rotations.generalised_torque(attitude, body_torque)
+
+
+def rigid_body_regressor(attitude: Array, attitude_rate: Array, attitude_acceleration: Array) -> Array:
+    """Write the generalised torque as a matrix times the six elements of the inertia tensor.
+
+    Parameters
+    ----------
+    attitude : array, shape (time, 3), rad
+    attitude_rate : array, shape (time, 3), rad/s
+    attitude_acceleration : array, shape (time, 3), rad/s^2
+
+    Returns
+    -------
+    array, shape (time, 3, 6)
+        Multiplies (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) in kg m^2 and gives N m.
+    """
+    omega = rotations.body_rate(attitude, attitude_rate)
+    alpha = rotations.body_acceleration(attitude, attitude_rate, attitude_acceleration)
+    gyroscopic = np.cross(omega[:, :, None], elements.columns(omega), axis=1)
+    body_columns = elements.columns(alpha) + gyroscopic
+    regressor: Array = rotations.euler_rate_matrix(attitude).swapaxes(1, 2) @ body_columns
+    return regressor

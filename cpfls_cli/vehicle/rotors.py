@@ -1,0 +1,149 @@
+"""Rotors: what wrench they give, and what speeds a wrench asks of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, require_columns
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.violations import RotorViolation, feasible, violations
+
+_AXES = ("thrust", "roll", "pitch", "yaw")
+
+
+class BodyWrench(NamedTuple):
+    """What the rotors do to the body.
+
+    Attributes
+    ----------
+    thrust : array, shape (time,), N
+        Along body z.
+    body_torque : array, shape (time, 3), N m, body frame
+        About the centre of mass.
+    """
+
+    thrust: Array
+    body_torque: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotorDemand:
+    """What a wrench asks of the rotors; nothing is clipped.
+
+    Attributes
+    ----------
+    squared_speed : array, shape (time, rotor), rad^2/s^2
+        As the allocation gives it, so it may be negative or too large.
+    speed : array, shape (time, rotor), rad/s
+        NaN where the rotor cannot turn at the demanded speed.
+    violations : tuple of RotorViolation
+        Empty when every rotor can do what is asked.
+    """
+
+    squared_speed: Array
+    speed: Array
+    violations: tuple[RotorViolation, ...]
+
+
+def allocation_matrix(vehicle: VehicleSettings) -> Array:
+    """Map squared rotor speeds to thrust and body torque.
+
+    A rotor at (x, y, z) gives ``(k, y k, -x k, -spin b)``.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    array, shape (4, rotor)
+        Rows are thrust in N, then roll, pitch and yaw torque in N m, for 1 rad^2/s^2.
+
+    References
+    ----------
+    Section 2 of the paper.
+    """
+    return np.array([_effect(rotor) for rotor in vehicle.rotors]).T
+
+
+def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
+    """Compute what the rotors do to the body.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+    rotor_speed : array, shape (time, rotor), rad/s
+
+    Returns
+    -------
+    BodyWrench
+    """
+    require_columns("rotor_speed", rotor_speed, len(vehicle.rotors))
+    wrench = rotor_speed**2 @ allocation_matrix(vehicle).T
+    return BodyWrench(thrust=wrench[:, 0], body_torque=wrench[:, 1:])
+
+
+def rotor_demand(vehicle: VehicleSettings, thrust: Array, body_torque: Array) -> RotorDemand:
+    """Find the rotor speeds that give a wrench, of minimum norm in the squared speeds.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+    thrust : array, shape (time,), N
+        Along body z.
+    body_torque : array, shape (time, 3), N m, body frame
+
+    Returns
+    -------
+    RotorDemand
+        The squared speeds are the minimum-norm solution where more than four rotors leave a choice.
+
+    Raises
+    ------
+    ComputationError
+        If the rotors cannot produce thrust, roll, pitch and yaw independently, or the wrench is not finite.
+    """
+    require_columns("body_torque", body_torque, 3)
+    wrench = np.column_stack([thrust, body_torque])
+    if not np.isfinite(wrench).all():
+        sample = int(np.flatnonzero(~np.isfinite(wrench).all(axis=1))[0])
+        raise ComputationError(f"the demanded thrust or torque is not finite at sample {sample}")
+    squared_speed = wrench @ _allocation_inverse(allocation_matrix(vehicle)).T
+    possible = feasible(squared_speed, vehicle.rotor_speed_max_rad_s)
+    speed = np.sqrt(np.where(possible, np.maximum(squared_speed, 0.0), np.nan))
+    return RotorDemand(
+        squared_speed=squared_speed,
+        speed=speed,
+        violations=violations(squared_speed, vehicle.rotor_speed_max_rad_s),
+    )
+
+
+def _effect(rotor: RotorSettings) -> list[float]:
+    x, y, _ = rotor.position_m
+    k, b = rotor.thrust_factor_n_s2, rotor.drag_factor_n_m_s2
+    return [k, y * k, -x * k, -rotor.spin * b]
+
+
+def _allocation_inverse(allocation: Array) -> Array:
+    # Yaw is weaker than thrust by orders of magnitude; rows of equal length make the rank a matter of geometry.
+    length = np.linalg.norm(allocation, axis=1)
+    scaled = allocation / np.where(length > 0, length, 1.0)[:, None]
+    left, singular_values, _ = np.linalg.svd(scaled)
+    rank = int((singular_values > 1e-9 * singular_values[0]).sum())
+    if rank < 4:
+        _refuse(left[:, rank:])
+    inverse: Array = np.linalg.pinv(scaled) / length
+    return inverse
+
+
+def _refuse(unreachable: Array) -> None:
+    """Name the axes that have a share in the wrenches out of reach."""
+    missing = [axis for axis, row in zip(_AXES, unreachable, strict=True) if np.abs(row).max() > 1e-6]
+    raise ComputationError(
+        f"vehicle.rotors: the rotors cannot produce {', '.join(missing)} independently of the rest; check their "
+        "positions and spins"
+    )
