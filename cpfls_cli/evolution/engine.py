@@ -1,0 +1,153 @@
+"""The genetic algorithm: breed, evaluate, reinsert, migrate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from cpfls_cli.arrays import IntArray
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
+from cpfls_cli.evolution.coding import BITS_PER_GENE, gray_decode, gray_encode
+from cpfls_cli.evolution.migration import migrate
+from cpfls_cli.evolution.operators import mutate, single_point_crossover
+from cpfls_cli.evolution.ranking import rank
+from cpfls_cli.evolution.reinsertion import reinsert
+from cpfls_cli.evolution.selection import linear_ranking_fitness, stochastic_universal_sampling
+from cpfls_cli.evolution.settings import EvolutionSettings
+from cpfls_cli.evolution.state import EvolutionState, Generation
+from cpfls_cli.evolution.subpopulations import members, subpopulation_labels
+
+
+def evolve(
+    evaluate: Evaluate,
+    gene_count: int,
+    settings: EvolutionSettings,
+    rng: np.random.Generator,
+    initial: IntArray | None = None,
+) -> Iterator[Generation]:
+    """Search for non-dominated chromosomes, one generation at a time.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Takes chromosomes, shape (n, genes), never seen before, and returns their `Evaluation`. It may rewrite
+        them (Lamarckian local search); the rewritten genes take their place.
+    gene_count : int
+        Genes of a chromosome, 16 bits each.
+    settings : EvolutionSettings
+    rng : numpy.random.Generator
+    initial : array of int, shape (up to population, genes), optional
+        Chromosomes to start with; the rest of the initial population is random.
+
+    Yields
+    ------
+    Generation
+        First the initial population, then one for each of ``settings.generations``.
+
+    Raises
+    ------
+    ComputationError
+        If `initial` does not fit, or the evaluator's result does not fit the chromosomes.
+
+    References
+    ----------
+    Paper, section 9; method.md section 7.
+    """
+    state = start(evaluate, gene_count, settings, rng, initial)
+    yield state.report()
+    while state.index < settings.generations:
+        state = step(state, evaluate, settings)
+        yield state.report()
+
+
+def start(
+    evaluate: Evaluate,
+    gene_count: int,
+    settings: EvolutionSettings,
+    rng: np.random.Generator,
+    initial: IntArray | None = None,
+) -> EvolutionState:
+    """Evaluate the initial population; the parameters are those of `evolve`.
+
+    Returns
+    -------
+    EvolutionState
+    """
+    genes = rng.integers(0, 2**BITS_PER_GENE, size=(settings.population, gene_count), dtype=np.int64)
+    if initial is not None:
+        _require_chromosomes(initial, genes.shape)
+        genes[: len(initial)] = initial
+    archive = Archive()
+    evaluation = archive.evaluate(genes, _checked(evaluate))
+    labels = subpopulation_labels(settings.population, settings.subpopulations)
+    return EvolutionState(0, evaluation.genes, evaluation.objectives, labels, archive, rng)
+
+
+def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings) -> EvolutionState:
+    """Breed one generation; the parameters are those of `evolve`.
+
+    Returns
+    -------
+    EvolutionState
+        Of the next generation. It shares the archive and the random generator with the given one.
+    """
+    offspring_genes, offspring_labels = _breed(state, settings)
+    offspring = state.archive.evaluate(offspring_genes, _checked(evaluate))
+    genes = np.concatenate([state.genes, offspring.genes])
+    objectives = np.concatenate([state.objectives, offspring.objectives])
+    ranks = rank(objectives, settings.ranking)
+    kept = reinsert(
+        ranks,
+        state.subpopulations,
+        offspring_labels,
+        settings.insertion_rate,
+        settings.reinsertion,
+        state.rng,
+    )
+    index = state.index + 1
+    if index % settings.migration_interval == 0:
+        kept = kept[migrate(state.subpopulations, settings.migration_rate, state.rng)]
+    return replace(state, index=index, genes=genes[kept], objectives=objectives[kept])
+
+
+def _breed(state: EvolutionState, settings: EvolutionSettings) -> tuple[IntArray, IntArray]:
+    ranks = rank(state.objectives, settings.ranking)
+    broods = [_brood(group, ranks, state, settings) for group in members(state.subpopulations)]
+    genes = np.concatenate(broods)
+    labels = np.repeat(np.arange(len(broods)), [len(brood) for brood in broods])
+    return genes, labels
+
+
+def _brood(group: IntArray, ranks: IntArray, state: EvolutionState, settings: EvolutionSettings) -> IntArray:
+    """Breed the offspring of one subpopulation."""
+    count = max(int(settings.generation_gap * len(group) + 0.5), 2)
+    fitness = linear_ranking_fitness(ranks[group], settings.selective_pressure)
+    parents = group[stochastic_universal_sampling(fitness, count, state.rng)]
+    bits = single_point_crossover(gray_encode(state.genes[parents]), settings.crossover_rate, state.rng)
+    return gray_decode(mutate(bits, settings.mutated_individuals, settings.mutated_bits, state.rng))
+
+
+def _checked(evaluate: Evaluate) -> Evaluate:
+    def evaluate_checked(genes: IntArray) -> Evaluation:
+        evaluation = evaluate(genes)
+        _require_range("evaluation.genes", evaluation.genes)
+        return evaluation
+
+    return evaluate_checked
+
+
+def _require_chromosomes(initial: IntArray, shape: tuple[int, ...]) -> None:
+    population, gene_count = shape
+    if initial.ndim != 2 or initial.shape[1] != gene_count or len(initial) > population:
+        raise ComputationError(f"initial: expected shape (up to {population}, {gene_count}), got {initial.shape}")
+    _require_range("initial", initial)
+
+
+def _require_range(name: str, genes: IntArray) -> None:
+    if genes.size and (genes.min() < 0 or genes.max() >= 2**BITS_PER_GENE):
+        raise ComputationError(
+            f"{name}: expected genes from 0 to {2**BITS_PER_GENE - 1}, got {genes.min()} to {genes.max()}"
+        )

@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.evolution import Archive, Evaluation
+
+
+class Recorder:
+    """Evaluate to (sum, -sum) of genes that a local search rounds up to a multiple of ten."""
+
+    def __init__(self):
+        self.calls = []
+
+    def __call__(self, genes):
+        self.calls.append(genes.tolist())
+        refined = -(-genes // 10) * 10
+        total = refined.sum(axis=1, keepdims=True).astype(float)
+        return Evaluation(refined, np.hstack([total, -total]))
+
+
+def test_only_unknown_chromosomes_are_evaluated_once_in_order_of_appearance():
+    archive, recorder = Archive(), Recorder()
+    archive.evaluate(np.array([[13], [2], [13], [31]]), recorder)
+    archive.evaluate(np.array([[5], [2], [5], [31]]), recorder)
+    assert recorder.calls == [[[13], [2], [31]], [[5]]]
+    assert len(archive) == 4
+
+
+def test_a_known_chromosome_recalls_its_refinement_and_so_does_the_refined_one():
+    archive, recorder = Archive(), Recorder()
+    first = archive.evaluate(np.array([[13, 4]]), recorder)
+    again = archive.evaluate(np.array([[20, 10], [13, 4]]), recorder)
+    assert len(recorder.calls) == 1
+    assert first.genes.tolist() == [[20, 10]]
+    assert again.genes.tolist() == [[20, 10], [20, 10]]
+    assert again.objectives.tolist() == [[30.0, -30.0]] * 2
+
+
+def test_an_evaluator_is_not_called_for_nothing():
+    archive, recorder = Archive(), Recorder()
+    archive.evaluate(np.array([[10]]), recorder)
+    archive.evaluate(np.array([[10]]), recorder)
+    assert len(recorder.calls) == 1
+
+
+def test_objectives_that_are_not_finite_are_kept_as_worst():
+    archive = Archive()
+    archive.store(np.array([[1], [2]]), Evaluation(np.array([[1], [2]]), np.array([[np.nan, -np.inf], [1, 2]])))
+    assert archive.results.objectives.tolist() == [[np.inf, np.inf], [1.0, 2.0]]
+    assert archive.front.genes.tolist() == [[2]]
+
+
+def test_the_front_grows_and_forgets_the_dominated():
+    archive = Archive()
+    genes = np.arange(5)[:, np.newaxis]
+    objectives = np.array([[3.0, 3.0], [1.0, 5.0], [2.0, 2.0], [2.0, 2.0], [5.0, 1.0]])
+    fronts = []
+    for row in range(5):
+        archive.store(genes[[row]], Evaluation(genes[[row]], objectives[[row]]))
+        fronts.append(archive.front.genes[:, 0].tolist())
+    assert fronts == [[0], [0, 1], [1, 2], [1, 2], [1, 2, 4]]
+
+
+def test_an_archive_is_restored_from_its_records():
+    archive, recorder = Archive(), Recorder()
+    archive.evaluate(np.array([[13], [2], [31]]), recorder)
+    restored = Archive()
+    restored.store(archive.submitted, archive.results)
+    recalled = restored.evaluate(np.array([[40], [2], [13]]), recorder)
+    assert len(recorder.calls) == 1
+    assert recalled.genes.tolist() == [[40], [10], [20]]
+
+
+@pytest.mark.parametrize(
+    ("genes", "objectives", "name"),
+    [
+        (np.zeros((2, 2), dtype=int), np.zeros((3, 1)), "genes"),
+        (np.zeros((3, 2)), np.zeros((3, 1)), "genes"),
+        (np.zeros((3, 2), dtype=int), np.zeros((2, 1)), "objectives"),
+        (np.zeros((3, 2), dtype=int), np.zeros(3), "objectives"),
+    ],
+)
+def test_an_evaluation_that_does_not_fit_is_refused(genes, objectives, name):
+    with pytest.raises(ComputationError, match=f"evaluation.{name}: expected"):
+        Archive().evaluate(np.arange(6).reshape(3, 2), lambda _: Evaluation(genes, objectives))

@@ -1,0 +1,51 @@
+import numpy as np
+
+from cpfls_cli.evolution.operators import mutate, single_point_crossover
+
+
+def alternating(individuals, length):
+    return np.tile([[False], [True]], (individuals, 1))[:individuals] & np.ones(length, dtype=bool)
+
+
+def test_each_pair_exchanges_one_tail_and_an_odd_last_row_stays():
+    bits = alternating(2001, 9)
+    offspring = single_point_crossover(bits, 1.0, np.random.default_rng(3))
+    kept = np.count_nonzero(~offspring[0:2000:2], axis=1)
+    expected = np.arange(9) >= kept[:, np.newaxis]
+    np.testing.assert_array_equal(offspring[0:2000:2], expected)
+    np.testing.assert_array_equal(offspring[1:2000:2], ~expected)
+    np.testing.assert_array_equal(offspring[2000], bits[2000])
+    # Points 1 to 8 are equally likely: 125 of 1000 each, standard deviation 10.5.
+    assert np.unique(kept).tolist() == list(range(1, 9))
+    assert np.all(np.abs(np.bincount(kept)[1:] - 125) < 50)
+
+
+def test_crossover_rate_is_the_share_of_crossed_pairs():
+    bits = alternating(10000, 16)
+    offspring = single_point_crossover(bits, 0.8, np.random.default_rng(4))
+    crossed = np.any(offspring != bits, axis=1)[::2]
+    assert abs(crossed.mean() - 0.8) < 0.025
+
+
+def test_crossover_rate_zero_changes_nothing():
+    bits = alternating(10, 16)
+    np.testing.assert_array_equal(single_point_crossover(bits, 0.0, np.random.default_rng(5)), bits)
+
+
+def test_a_single_bit_has_no_point_to_cross_at():
+    bits = alternating(4, 1)
+    np.testing.assert_array_equal(single_point_crossover(bits, 1.0, np.random.default_rng(6)), bits)
+
+
+def test_mutation_shares_are_those_asked_for():
+    bits = np.random.default_rng(7).random((20000, 384)) < 0.5
+    changed = mutate(bits, 0.04, 0.01, np.random.default_rng(8)) != bits
+    mutated = np.any(changed, axis=1)
+    # 0.04 (1 - 0.99^384) = 0.0392; standard deviations 0.0014 and 0.0002.
+    assert abs(mutated.mean() - 0.0392) < 0.006
+    assert abs(changed[mutated].mean() - 0.0102) < 0.001
+
+
+def test_mutation_of_every_bit_is_the_complement():
+    bits = np.random.default_rng(9).random((5, 7)) < 0.5
+    np.testing.assert_array_equal(mutate(bits, 1.0, 1.0, np.random.default_rng(10)), ~bits)

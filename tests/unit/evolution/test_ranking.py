@@ -1,0 +1,28 @@
+import numpy as np
+import pytest
+
+from cpfls_cli.evolution import rank
+
+# a, b and c do not dominate one another; d is dominated by b; e by all four.
+HAND_WORKED = np.array([[1.0, 4.0], [2.0, 2.0], [4.0, 1.0], [3.0, 3.0], [4.0, 4.0]])
+
+
+@pytest.mark.parametrize(
+    ("method", "expected"),
+    [
+        # first objective: smaller minus larger is -4 -2 3 0 3; second: 3 -2 -4 0 3
+        ("quantity-dominance", [-1, -4, -1, 0, 6]),
+        ("pareto-count", [1, 1, 1, 2, 5]),
+        ("pareto-fronts", [1, 1, 1, 2, 3]),
+    ],
+)
+def test_ranks_of_a_hand_worked_example(method, expected):
+    assert rank(HAND_WORKED, method).tolist() == expected
+
+
+@pytest.mark.parametrize("method", ["quantity-dominance", "pareto-count", "pareto-fronts"])
+def test_a_failed_individual_ranks_last_and_failures_tie(method):
+    failed = [[np.nan, np.nan], [np.inf, -np.inf], [np.nan, np.inf]]
+    ranks = rank(np.vstack([HAND_WORKED, failed]), method)
+    assert len(set(ranks[5:].tolist())) == 1
+    assert ranks[5] > ranks[:5].max()
