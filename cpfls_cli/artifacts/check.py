@@ -1,0 +1,63 @@
+"""Check an artifact against its format: one small rule after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from cpfls_cli.artifacts.spec import DatasetSpec
+from cpfls_cli.artifacts.store import Artifact
+
+_FIXED = {"axis": 3}
+
+
+def check_artifact(artifact: Artifact) -> list[str]:
+    """Find everything in an artifact that its format does not allow.
+
+    Parameters
+    ----------
+    artifact : Artifact
+
+    Returns
+    -------
+    list of str
+        One sentence per finding; empty for a good artifact.
+    """
+    return [finding for rule in _RULES for finding in rule(artifact)]
+
+
+def _dimensions(artifact: Artifact) -> Iterator[str]:
+    lengths: dict[str, tuple[int, str]] = {}
+    for spec, values in _present(artifact):
+        if values.ndim != len(spec.dimensions):
+            yield f"{spec.path}: has {values.ndim} dimensions, expected {len(spec.dimensions)} {spec.dimensions}"
+            continue
+        for label, length in zip(spec.dimensions, values.shape, strict=True):
+            fixed = int(label) if label.isdigit() else _FIXED.get(label)
+            known, where = (fixed, "the format") if fixed else lengths.setdefault(label, (length, spec.path))
+            if length != known:
+                yield f"{spec.path}: {length} along '{label}', but {known} by {where}"
+
+
+def _finite(artifact: Artifact) -> Iterator[str]:
+    for spec, values in _present(artifact):
+        if values.dtype.kind == "f" and not spec.gaps:
+            bad = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1) if values.ndim else values).all(axis=-1))
+            if bad.size:
+                yield f"{spec.path}: {bad.size} samples are not finite, the first at index {bad[0]}"
+
+
+def _time_ascends(artifact: Artifact) -> Iterator[str]:
+    time = artifact.data.get("time")
+    if time is not None and np.any(np.diff(time) <= 0):
+        yield f"time: does not ascend at index {int(np.argmax(np.diff(time) <= 0)) + 1}"
+
+
+def _present(artifact: Artifact) -> Iterator[tuple[DatasetSpec, np.ndarray]]:
+    for spec in artifact.spec.datasets:
+        if spec.path in artifact.data:
+            yield spec, np.asarray(artifact.data[spec.path])
+
+
+_RULES: tuple[Callable[[Artifact], Iterator[str]], ...] = (_dimensions, _finite, _time_ascends)

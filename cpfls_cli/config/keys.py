@@ -1,0 +1,98 @@
+"""The keys of a config, read off the settings classes: names, defaults and one line on each."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+from typing_extensions import Doc
+
+from cpfls_cli.config.study import Study
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a config.
+
+    Attributes
+    ----------
+    name : str
+    doc : str
+        One line; empty where none is declared.
+    section : type or None
+        The settings class below this key.
+    """
+
+    name: str
+    doc: str
+    section: type | None
+
+
+@cache
+def keys_of(settings: type) -> tuple[Key, ...]:
+    """List the keys of a settings class.
+
+    Parameters
+    ----------
+    settings : type
+        A settings dataclass, or `Study`.
+
+    Returns
+    -------
+    tuple of Key
+    """
+    hints = get_type_hints(settings, include_extras=True)
+    if settings is Study:
+        names = {name: field.alias or name for name, field in Study.model_fields.items()}
+    else:
+        names = {field.name: field.name for field in fields(settings)}
+    return tuple(Key(shown, _doc(hints[name]), _section(hints[name])) for name, shown in names.items())
+
+
+def known_keys(location: Sequence[str], deep: bool = False) -> list[str]:
+    """List the valid keys at a place of a config.
+
+    Parameters
+    ----------
+    location : sequence of str
+        Keys down from the root; list indices are passed over.
+    deep : bool
+        List dotted paths of everything below instead.
+
+    Returns
+    -------
+    list of str
+        Empty where the place is no section.
+    """
+    settings: type | None = Study
+    for part in location:
+        if settings is not None and not part.isdigit():
+            settings = next((key.section for key in keys_of(settings) if key.name == part), None)
+    if settings is None:
+        return []
+    return list(_paths(settings)) if deep else [key.name for key in keys_of(settings)]
+
+
+def _paths(settings: type, prefix: str = "") -> Iterator[str]:
+    for key in keys_of(settings):
+        yield prefix + key.name
+        if key.section is not None:
+            yield from _paths(key.section, f"{prefix}{key.name}.")
+
+
+def _doc(hint: Any) -> str:
+    if get_origin(hint) is not Annotated:
+        return ""
+    return next((note.documentation for note in get_args(hint)[1:] if isinstance(note, Doc)), "")
+
+
+def _section(hint: Any) -> type | None:
+    """Find the settings class inside a hint such as ``Annotated[tuple[RotorSettings, ...], ...]``."""
+    if is_dataclass(hint) and isinstance(hint, type):
+        return hint
+    if get_origin(hint) in {Annotated, tuple, dict, Union, types.UnionType}:
+        return next((found for part in get_args(hint) if (found := _section(part)) is not None), None)
+    return None

@@ -1,0 +1,90 @@
+"""A study written out again: resolved, in parts, hashed, and as a commented default."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from cpfls_cli.config.keys import keys_of
+from cpfls_cli.config.study import SECTIONS, Study
+from cpfls_cli.config.yaml_text import to_yaml
+from cpfls_cli.errors import ConfigError
+
+
+def resolved(study: Study, sections: Sequence[str] = ()) -> dict[str, Any]:
+    """Write a study as plain data with every default filled in.
+
+    Parameters
+    ----------
+    study : Study
+    sections : sequence of str
+        Only these sections, and the seed; all if empty.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ConfigError
+        If a section does not exist.
+    """
+    unknown = sorted(set(sections) - set(SECTIONS))
+    if unknown:
+        raise ConfigError(f"--section {unknown[0]}: no such section; there are {', '.join(SECTIONS)}")
+    data: dict[str, Any] = study.model_dump(mode="json", by_alias=True)
+    return {key: value for key, value in data.items() if not sections or key in {*sections, "seed"}}
+
+
+def resolved_yaml(study: Study, sections: Sequence[str] = ()) -> str:
+    """Write a study as YAML with every default filled in.
+
+    Parameters
+    ----------
+    study, sections
+        See `resolved`.
+
+    Returns
+    -------
+    str
+    """
+    return to_yaml(resolved(study, sections))
+
+
+def sha256_of(text: str) -> str:
+    """Hash a text.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+        Hexadecimal SHA-256.
+    """
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def commented_default() -> str:
+    """Write the default study as YAML with a line of comment on every key.
+
+    Returns
+    -------
+    str
+    """
+    return "\n".join(_commented(Study, resolved(Study()), 0)) + "\n"
+
+
+def _commented(settings: type, data: dict[str, Any], depth: int) -> Iterator[str]:
+    indent = "  " * depth
+    for key in keys_of(settings):
+        value = data[key.name]
+        if key.section is not None and isinstance(value, dict) and set(value) == {k.name for k in keys_of(key.section)}:
+            yield f"{indent}{key.name}:  # {key.doc}" if key.doc else f"{indent}{key.name}:"
+            yield from _commented(key.section, value, depth + 1)
+            continue
+        if key.doc:
+            yield f"{indent}# {key.doc}"
+        yield from (indent + line for line in to_yaml({key.name: value}).rstrip("\n").split("\n"))

@@ -1,0 +1,103 @@
+"""YAML that means what it says: `1e-3` is a number, `on` is a word, and equal keys are refused."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import yaml
+
+from cpfls_cli.errors import ConfigError
+
+
+class _StudyLoader(yaml.SafeLoader):
+    """A safe loader with YAML 1.2 floats and booleans, no dates, and no duplicate keys."""
+
+
+_StudyLoader.yaml_implicit_resolvers = {
+    first: [
+        (tag, pattern) for tag, pattern in resolvers if tag.rsplit(":", 1)[-1] not in {"float", "bool", "timestamp"}
+    ]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_StudyLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$"),
+    list("-+0123456789."),
+)
+_StudyLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:bool", re.compile(r"^(true|True|TRUE|false|False|FALSE)$"), list("tTfF")
+)
+
+
+def _mapping_without_duplicates(loader: _StudyLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+    loader.flatten_mapping(node)
+    mapping: dict[Any, Any] = {}
+    for key_node, value_node in node.value:
+        key = loader.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]
+        if not isinstance(key, str):
+            raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is not text", key_node.start_mark)
+        if key in mapping:
+            raise yaml.constructor.ConstructorError(None, None, f"key '{key}' stands twice", key_node.start_mark)
+        mapping[key] = loader.construct_object(value_node, deep=True)  # type: ignore[no-untyped-call]
+    return mapping
+
+
+_StudyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping_without_duplicates)
+
+
+def parse_yaml(text: str, source: str) -> Any:
+    """Parse one YAML document.
+
+    Parameters
+    ----------
+    text : str
+        The document.
+    source : str
+        Name of the file, for messages.
+
+    Returns
+    -------
+    object
+        Built of dict, list, str, int, float, bool and None.
+
+    Raises
+    ------
+    ConfigError
+        If the text is not YAML or a key stands twice; the message names line and column.
+    """
+    try:
+        return yaml.load(text, Loader=_StudyLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
+        raise ConfigError(f"{source}{where}: not valid YAML: {error.problem}") from None
+    except (yaml.YAMLError, RecursionError) as error:
+        raise ConfigError(f"{source}: not valid YAML: {error}") from None
+
+
+def to_yaml(data: Any) -> str:
+    """Write plain data as YAML, keys in their given order.
+
+    Parameters
+    ----------
+    data : object
+        Built of dict, list, str, int, float, bool and None.
+
+    Returns
+    -------
+    str
+    """
+    return str(yaml.dump(data, Dumper=_StudyDumper, sort_keys=False, default_flow_style=False, width=100))
+
+
+class _StudyDumper(yaml.SafeDumper):
+    """Writes short lists on one line and floats that read back as floats."""
+
+
+def _represent_list(dumper: _StudyDumper, data: list[Any]) -> yaml.Node:
+    flat = not any(isinstance(item, dict | list) for item in data)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=flat)
+
+
+_StudyDumper.add_representer(list, _represent_list)

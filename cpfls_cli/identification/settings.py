@@ -1,0 +1,58 @@
+"""Settings of the identification: structure, search, base, validation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Gt, Le
+from typing_extensions import Doc
+
+from cpfls_cli.evolution.settings import EvolutionSettings
+from cpfls_cli.regressor.structure import StructureSettings
+from cpfls_cli.settings import Settings
+
+Base = Literal["none", "rigid-body"]
+Choice = Literal["mse-below-median-condition", "mse", "max-error"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RidgeSettings(Settings):
+    """How the ridge weight of the fuzzy part is chosen (base: rigid-body)."""
+
+    folds: Annotated[int, Ge(2), Le(20), Doc("contiguous blocks of the cross-validation")] = 5
+    embargo_s: Annotated[float, Ge(0), Doc("time left out on both sides of a block, for the memory of filters")] = 0.1
+    smallest: Annotated[float, Gt(0), Doc("smallest weight tried, per row of the scaled regressor")] = 1e-6
+    largest: Annotated[float, Gt(0), Doc("largest weight tried below 'fuzzy part off'")] = 1e2
+    count: Annotated[int, Ge(2), Le(200), Doc("number of weights tried")] = 17
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalSearchSettings(Settings):
+    """Local refinement of every new chromosome by variable projection."""
+
+    enabled: Annotated[bool, Doc("refine the partition weights of every new chromosome by nonlinear least squares")] = (
+        True
+    )
+    evaluations: Annotated[int, Ge(1), Le(1000), Doc("model evaluations that one local search may spend")] = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentificationSettings(StructureSettings, EvolutionSettings):
+    """Structure of the model, search for its partitions, and how it is judged."""
+
+    base: Annotated[
+        Base, Doc("none: fuzzy part only, the paper; rigid-body: six inertia parameters under a ridge-held fuzzy part")
+    ] = "rigid-body"
+    choice: Annotated[Choice, Doc("which member of the Pareto front becomes the model")] = "mse-below-median-condition"
+    rank_tolerance: Annotated[
+        float, Gt(0), Le(1e-2), Doc("singular values below this share of the largest count as zero")
+    ] = 1e-10
+    training_share: Annotated[
+        float, Gt(0), Le(1), Doc("leading share of the flight that trains; the rest is held out")
+    ] = 1.0
+    embargo_s: Annotated[float, Ge(0), Doc("time between training and held-out part that is used by neither")] = 0.1
+    local_search: Annotated[LocalSearchSettings, Doc("local refinement inside the genetic algorithm")] = (
+        LocalSearchSettings()
+    )
+    ridge: Annotated[RidgeSettings, Doc("ridge weight of the fuzzy part (base: rigid-body)")] = RidgeSettings()

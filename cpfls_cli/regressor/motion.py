@@ -1,0 +1,86 @@
+"""What a motion contributes to the regressor before any fuzzy system is evaluated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, require_columns
+from cpfls_cli.regressor.structure import InertiaFunction
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Attitude motion at samples.
+
+    Attributes
+    ----------
+    attitude : array, shape (samples, 3), rad
+        Roll, pitch, yaw.
+    rate : array, shape (samples, 3), rad/s
+        Euler rates.
+    acceleration : array, shape (samples, 3), rad/s^2
+        Euler accelerations.
+    """
+
+    attitude: Array
+    rate: Array
+    acceleration: Array
+
+    def __post_init__(self) -> None:
+        """Check the shapes."""
+        for name in ("attitude", "rate", "acceleration"):
+            require_columns(name, getattr(self, name), 3)
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        return len(self.attitude)
+
+    def __getitem__(self, samples: slice | Array) -> Motion:
+        """Take some of the samples."""
+        return Motion(self.attitude[samples], self.rate[samples], self.acceleration[samples])
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """How one inertia function enters the torque.
+
+    With E the symmetric matrix that has ones in the function's places, a function f(q) there gives the torque
+    ``E qdd f + E qd (df/dt) - 1/2 (qd^T E qd) grad f``: the Christoffel form of equations (3) and (4).
+
+    Attributes
+    ----------
+    acceleration : array, shape (samples, 3)
+        E qdd.
+    rate : array, shape (samples, 3)
+        E qd.
+    energy : array, shape (samples,)
+        qd^T E qd / 2.
+    """
+
+    acceleration: Array
+    rate: Array
+    energy: Array
+
+
+def carrier(function: InertiaFunction, motion: Motion) -> Carrier:
+    """Evaluate how an inertia function enters the torque along a motion.
+
+    Parameters
+    ----------
+    function : InertiaFunction
+    motion : Motion
+
+    Returns
+    -------
+    Carrier
+
+    References
+    ----------
+    method.md section 2: ``tau = J qdd + (dJ/dt) qd - 1/2 grad_q (qd^T J qd)``.
+    """
+    places = np.zeros((3, 3))
+    places[function.row, function.column] = places[function.column, function.row] = 1.0
+    rate = motion.rate @ places
+    return Carrier(motion.acceleration @ places, rate, 0.5 * np.sum(motion.rate * rate, axis=1))

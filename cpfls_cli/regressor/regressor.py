@@ -1,0 +1,205 @@
+"""The regressor Q(q, qd, qdd): torque is Q times the linear parameters of the fuzzy inertia functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.fuzzy.basis import Antecedent, Basis, antecedent, basis, rule_firing
+from cpfls_cli.fuzzy.consequents import Features, features
+from cpfls_cli.fuzzy.inputs import InputRange, MappedInput, input_range, map_input
+from cpfls_cli.fuzzy.partition import breakpoints, uniform_weights
+from cpfls_cli.regressor.motion import Carrier, Motion, carrier
+from cpfls_cli.regressor.structure import PITCH, ROLL, Block, ModelStructure
+
+Breakpoints = Sequence[Array]
+
+
+@dataclass(frozen=True)
+class InertiaValues:
+    """Inertia matrix and its gradient at samples.
+
+    Attributes
+    ----------
+    value : array, shape (samples, 3, 3), kg m^2
+        J(q), symmetric.
+    gradient : array, shape (samples, 3, 3, 3), kg m^2/rad
+        The first index after the sample is the angle by which J is differentiated.
+    """
+
+    value: Array
+    gradient: Array
+
+
+def uniform_breakpoints(structure: ModelStructure) -> tuple[Array, ...]:
+    """Give the equidistant partitions of a model.
+
+    Parameters
+    ----------
+    structure : ModelStructure
+
+    Returns
+    -------
+    tuple of array, shape (functions,)
+    """
+    return tuple(breakpoints(uniform_weights(partition.functions)) for partition in structure.partitions)
+
+
+def data_ranges(structure: ModelStructure, attitude: Array) -> tuple[InputRange, InputRange]:
+    """Find the ranges of roll and pitch over training data, for the input map `data-range`.
+
+    Parameters
+    ----------
+    structure : ModelStructure
+    attitude : array, shape (samples, 3), rad
+
+    Returns
+    -------
+    tuple of InputRange
+        Roll and pitch.
+    """
+    roll, pitch = (input_range(attitude[:, angle], structure.circular) for angle in (ROLL, PITCH))
+    return roll, pitch
+
+
+class Regressor:
+    """The regressor of one motion for any partitions of one model structure.
+
+    What does not depend on the partitions is computed once; an optimiser then asks for matrices by breakpoints.
+
+    Parameters
+    ----------
+    structure : ModelStructure
+    motion : Motion
+    ranges : tuple of InputRange
+        Of roll and pitch over the training data.
+    """
+
+    def __init__(self, structure: ModelStructure, motion: Motion, ranges: tuple[InputRange, InputRange]) -> None:
+        self.structure = structure
+        self.motion = motion
+        self.mapped: tuple[MappedInput, ...] = tuple(
+            map_input(motion.attitude[:, angle], structure.settings.input_map, structure.circular, ranges[angle])
+            for angle in (ROLL, PITCH)
+        )
+        self.carriers: tuple[Carrier, ...] = tuple(carrier(block.function, motion) for block in structure.blocks)
+        self.features: tuple[Features | None, ...] = tuple(self._features(block) for block in structure.blocks)
+
+    def matrix(self, partitions: Breakpoints) -> Array:
+        """Build Q for given partitions.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+            Breakpoints in the order of `ModelStructure.partitions`.
+
+        Returns
+        -------
+        array, shape (samples, 3, parameters)
+
+        References
+        ----------
+        Equation (17).
+        """
+        Q = np.empty((len(self.motion), 3, self.structure.parameters))
+        for index, block in enumerate(self.structure.blocks):
+            terms = self._torque_terms(block, self.carriers[index], self.basis(index, partitions))
+            Q[:, :, block.columns] = terms
+        return Q
+
+    def basis(self, index: int, partitions: Breakpoints) -> Basis:
+        """Evaluate the basis of one inertia function.
+
+        Parameters
+        ----------
+        index : int
+            Index of the block.
+        partitions : sequence of array
+
+        Returns
+        -------
+        Basis
+        """
+        consequent = self.features[index]
+        if consequent is None:
+            return Basis(np.ones((len(self.motion), 1)), np.zeros((0, len(self.motion), 1)))
+        return basis(self.antecedents(index, partitions), consequent)
+
+    def antecedents(self, index: int, partitions: Breakpoints) -> list[Antecedent]:
+        """Evaluate the antecedents of one inertia function, one per input.
+
+        Parameters
+        ----------
+        index : int
+            Index of the block.
+        partitions : sequence of array
+
+        Returns
+        -------
+        list of Antecedent
+        """
+        block = self.structure.blocks[index]
+        return [
+            antecedent(self.mapped[angle], partitions[i], self.structure.circular)
+            for angle, i in zip(block.function.inputs, block.partitions, strict=True)
+        ]
+
+    def firing(self, index: int, partitions: Breakpoints) -> Array:
+        """Evaluate how strongly each rule of one inertia function fires.
+
+        Parameters
+        ----------
+        index : int
+            Index of the block.
+        partitions : sequence of array
+
+        Returns
+        -------
+        array, shape (samples, rules)
+        """
+        if self.features[index] is None:
+            return np.ones((len(self.motion), 1))
+        return rule_firing(self.antecedents(index, partitions))[0]
+
+    def inertia(self, partitions: Breakpoints, coefficients: Array) -> InertiaValues:
+        """Evaluate the fuzzy inertia matrix and its gradient.
+
+        Parameters
+        ----------
+        partitions : sequence of array
+        coefficients : array, shape (parameters,)
+
+        Returns
+        -------
+        InertiaValues
+        """
+        J = np.zeros((len(self.motion), 3, 3))
+        dJ = np.zeros((len(self.motion), 3, 3, 3))
+        for index, block in enumerate(self.structure.blocks):
+            function, own = block.function, coefficients[block.columns]
+            evaluated = self.basis(index, partitions)
+            for row, column in {(function.row, function.column), (function.column, function.row)}:
+                J[:, row, column] = evaluated.value @ own
+                for angle, gradient in zip(function.inputs, evaluated.gradient, strict=True):
+                    dJ[:, angle, row, column] = gradient @ own
+        return InertiaValues(J, dJ)
+
+    def _features(self, block: Block) -> Features | None:
+        if not block.partitions:
+            return None
+        settings = self.structure.settings
+        angles = [self.motion.attitude[:, angle] for angle in block.function.inputs]
+        mapped = [self.mapped[angle] for angle in block.function.inputs]
+        return features(angles, mapped, settings.consequents, settings.harmonic_order, settings.products)
+
+    def _torque_terms(self, block: Block, carried: Carrier, evaluated: Basis) -> Array:
+        terms = carried.acceleration[:, :, None] * evaluated.value[:, None, :]
+        along = np.zeros_like(evaluated.value)
+        for angle, gradient in zip(block.function.inputs, evaluated.gradient, strict=True):
+            along += gradient * self.motion.rate[:, angle, None]
+            terms[:, angle, :] -= carried.energy[:, None] * gradient
+        terms += carried.rate[:, :, None] * along[:, None, :]
+        return terms

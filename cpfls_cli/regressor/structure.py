@@ -1,0 +1,212 @@
+"""What a model consists of: which inertia function has which inputs, partitions, rules and coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Le
+from typing_extensions import Doc
+
+from cpfls_cli.errors import SettingError
+from cpfls_cli.fuzzy.consequents import Consequents, Products, feature_count
+from cpfls_cli.fuzzy.inputs import InputMap
+from cpfls_cli.settings import Settings
+
+ROLL, PITCH = 0, 1
+FunctionCount = Annotated[int, Ge(1), Le(15)]
+
+
+@dataclass(frozen=True)
+class InertiaFunction:
+    """One unknown function of the inertia matrix.
+
+    Attributes
+    ----------
+    name : str
+        ``D13`` and so on.
+    row, column : int
+        Its place in J; the transposed place holds the same function.
+    inputs : tuple of int
+        Angles it depends on: 0 roll, 1 pitch; none for a constant.
+    """
+
+    name: str
+    row: int
+    column: int
+    inputs: tuple[int, ...]
+
+
+INERTIA_FUNCTIONS = (
+    InertiaFunction("D11", 0, 0, ()),
+    InertiaFunction("D13", 0, 2, (PITCH,)),
+    InertiaFunction("D22", 1, 1, (ROLL,)),
+    InertiaFunction("D23", 1, 2, (ROLL, PITCH)),
+    InertiaFunction("D33", 2, 2, (ROLL, PITCH)),
+)
+"""Equations (14) and (15); D12 is zero."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StructureSettings(Settings):
+    """Structure of the fuzzy part of a model."""
+
+    structure: Annotated[
+        Literal["cpfls", "fls"], Doc("cpfls: continuous periodic (first and last rule joined); fls: classic TSK system")
+    ] = "cpfls"
+    input_map: Annotated[
+        InputMap, Doc("full-circle: angle modulo 2 pi; data-range: seesaw scaled over the training data")
+    ] = "full-circle"
+    consequents: Annotated[Consequents, Doc("seesaw: the paper's triangle wave; harmonic: sines and cosines")] = (
+        "harmonic"
+    )
+    harmonic_order: Annotated[int, Ge(1), Le(8), Doc("highest harmonic of harmonic consequents")] = 2
+    products: Annotated[Products, Doc("additive: features of two inputs side by side; tensor: all their products")] = (
+        "tensor"
+    )
+    membership_functions: Annotated[
+        FunctionCount | tuple[FunctionCount, FunctionCount, FunctionCount, FunctionCount, FunctionCount, FunctionCount],
+        Doc("per input, 1 to 15; or six numbers for D13(pitch) D22(roll) D23(roll) D23(pitch) D33(roll) D33(pitch)"),
+    ] = 1
+
+    def __post_init__(self) -> None:
+        """Refuse combinations that no system has."""
+        if self.structure == "fls" and self.consequents == "harmonic":
+            raise SettingError("consequents", "the classic system (structure: fls) has linear consequents; use seesaw")
+
+
+@dataclass(frozen=True)
+class Partition:
+    """One fuzzy partition of a model.
+
+    Attributes
+    ----------
+    function : str
+        Inertia function that it serves.
+    input : int
+        0 roll, 1 pitch.
+    functions : int
+        Number of membership functions.
+    """
+
+    function: str
+    input: int
+    functions: int
+
+    @property
+    def name(self) -> str:
+        """Name such as ``D23(pitch)``."""
+        return f"{self.function}({('roll', 'pitch')[self.input]})"
+
+    @property
+    def weights(self) -> int:
+        """Number of weights, that is genes, that encode it."""
+        return self.functions - 1
+
+
+@dataclass(frozen=True)
+class Block:
+    """Coefficients of one inertia function.
+
+    Attributes
+    ----------
+    function : InertiaFunction
+    partitions : tuple of int
+        Indices of its partitions, in the order of its inputs.
+    rules : int
+    features : int
+        Coefficients per rule.
+    columns : slice
+        Where its coefficients stand among all.
+    """
+
+    function: InertiaFunction
+    partitions: tuple[int, ...]
+    rules: int
+    features: int
+    columns: slice
+
+
+@dataclass(frozen=True)
+class ModelStructure:
+    """The fuzzy part of a model, counted out.
+
+    Attributes
+    ----------
+    settings : StructureSettings
+    partitions : tuple of Partition
+        In the order of the genes: D13(pitch), D22(roll), D23(roll), D23(pitch), D33(roll), D33(pitch).
+    blocks : tuple of Block
+        In the order of the coefficients: D11, D13, D22, D23, D33.
+    """
+
+    settings: StructureSettings
+    partitions: tuple[Partition, ...]
+    blocks: tuple[Block, ...]
+
+    @property
+    def parameters(self) -> int:
+        """Number of linear parameters."""
+        return sum(block.rules * block.features for block in self.blocks)
+
+    @property
+    def genes(self) -> int:
+        """Number of weights of all partitions."""
+        return sum(partition.weights for partition in self.partitions)
+
+    @property
+    def circular(self) -> bool:
+        """Whether the first and the last rule are one."""
+        return self.settings.structure == "cpfls"
+
+    def weight_slices(self) -> Iterator[slice]:
+        """Yield where each partition's weights stand among the genes."""
+        start = 0
+        for partition in self.partitions:
+            yield slice(start, start + partition.weights)
+            start += partition.weights
+
+
+def model_structure(settings: StructureSettings) -> ModelStructure:
+    """Count out the partitions, rules and coefficients of a model.
+
+    Parameters
+    ----------
+    settings : StructureSettings
+
+    Returns
+    -------
+    ModelStructure
+
+    References
+    ----------
+    Paper section 5; method.md section 5: 113 parameters for five functions, circular, seesaw consequents.
+    """
+    places = [(f.name, angle) for f in INERTIA_FUNCTIONS for angle in f.inputs]
+    counts = settings.membership_functions
+    numbers = (counts,) * len(places) if isinstance(counts, int) else counts
+    partitions = tuple(Partition(name, angle, n) for (name, angle), n in zip(places, numbers, strict=True))
+    return ModelStructure(settings, partitions, tuple(_blocks(settings, partitions)))
+
+
+def _blocks(settings: StructureSettings, partitions: tuple[Partition, ...]) -> Iterator[Block]:
+    start = 0
+    for function in INERTIA_FUNCTIONS:
+        own = tuple(i for i, partition in enumerate(partitions) if partition.function == function.name)
+        rules = 1
+        for i in own:
+            rules *= _rules(partitions[i].functions, settings.structure == "cpfls")
+        features = _features(len(own), settings)
+        yield Block(function, own, rules, features, slice(start, start + rules * features))
+        start += rules * features
+
+
+def _rules(functions: int, circular: bool) -> int:
+    return max(functions - 1, 1) if circular else functions
+
+
+def _features(inputs: int, settings: StructureSettings) -> int:
+    if inputs == 0:
+        return 1
+    return feature_count(inputs, settings.consequents, settings.harmonic_order, settings.products)
