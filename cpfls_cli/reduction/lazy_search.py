@@ -1,0 +1,79 @@
+"""Find the best of many samples exactly while evaluating only the few that can be best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.reduction.row_space import project
+
+Predicate = Callable[[Array, float], BoolArray]
+
+# Samples evaluated first, to get a level that most others can be shown not to reach.
+_SCOUTS = 16
+_LEVEL_TOLERANCE = 1e-3
+_TIE_TOLERANCE = 1e-12
+
+
+def lazy_best(
+    rows: Array,
+    vectors: Array,
+    bounds: Array,
+    floor: float,
+    exceeds: Predicate,
+    bound_vectors: tuple[int, ...] = (),
+) -> int:
+    """Find the sample with the largest score, the lowest index among equals.
+
+    The best few by their bounds are evaluated; the level they reach discards most other samples by their
+    bounds, then by sharper bounds; only the rest are compared exactly.
+
+    Parameters
+    ----------
+    rows : array, shape (samples, 3, columns)
+    vectors : array, shape (columns, columns)
+        Basis in which samples are compared.
+    bounds : array, shape (samples,)
+        Upper bounds of the scores; minus infinity excludes a sample.
+    floor : float
+        A level that every score reaches.
+    exceeds : callable
+        Says of projections, array of shape (samples, 3, vectors), which samples' scores exceed a level. Given
+        the first few vectors only, it may err in favour of a sample, never against one.
+    bound_vectors : tuple of int
+        Counts of vectors for the sharper bounds.
+
+    Returns
+    -------
+    int
+    """
+    highest = float(bounds.max())
+    scouts = _highest(bounds)
+    _, level = _raise_level(exceeds, project(rows[scouts], vectors), (floor, highest), _LEVEL_TOLERANCE)
+    candidates = np.flatnonzero(bounds >= level)
+    for count in bound_vectors:
+        reached = exceeds(project(rows[candidates], vectors[:, :count]), level)
+        candidates = candidates[reached] if reached.any() else candidates
+    best, _ = _raise_level(exceeds, project(rows[candidates], vectors), (level, highest), _TIE_TOLERANCE)
+    return int(candidates[best].min())
+
+
+def _highest(bounds: Array) -> IntArray:
+    count = min(_SCOUTS, int(np.count_nonzero(np.isfinite(bounds))))
+    return np.argpartition(-bounds, count - 1)[:count]
+
+
+def _raise_level(
+    exceeds: Predicate, projections: Array, interval: tuple[float, float], tolerance: float
+) -> tuple[IntArray, float]:
+    """Bisect for the highest level that a sample still exceeds; return the samples left and that level."""
+    best, (low, high) = np.arange(len(projections)), interval
+    while high - low > tolerance * abs(high):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        above = best[exceeds(projections[best], middle)]
+        best, low, high = (above, middle, high) if len(above) else (best, low, middle)
+    return best, low

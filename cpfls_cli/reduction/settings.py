@@ -1,0 +1,41 @@
+"""Settings of the data reduction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Gt, Lt
+from typing_extensions import Doc
+
+from cpfls_cli.errors import SettingError
+from cpfls_cli.settings import Settings
+
+CriterionName = Literal["sigma_min", "A", "D", "paper-literal"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReductionSettings(Settings):
+    """How many samples to keep, and what makes a sample worth keeping."""
+
+    size: Annotated[
+        Annotated[int, Ge(1)] | None, Doc("samples to keep, three rows each; null: only the condition number stops")
+    ] = 685
+    condition_number: Annotated[
+        Annotated[float, Gt(1)] | None,
+        Doc("stop as soon as the kept samples have full rank and at most this condition number; null: only the size"),
+    ] = None
+    criterion: Annotated[
+        CriterionName,
+        Doc(
+            "what the next sample must improve most: sigma_min (smallest singular value), A (sum of the parameter "
+            "variances), D (their volume), paper-literal (the printed rule, which stalls below full rank)"
+        ),
+    ] = "sigma_min"
+    rank_tolerance: Annotated[
+        float, Gt(0), Lt(1), Doc("singular values below this fraction of the largest one count as zero")
+    ] = 1e-10
+
+    def __post_init__(self) -> None:
+        if self.size is None and self.condition_number is None:
+            raise SettingError("size", "give a size, a condition_number or both: nothing would stop the reduction")
