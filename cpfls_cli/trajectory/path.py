@@ -101,7 +101,7 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
 
 
 def _sample_times(settings: TrajectorySettings) -> Array:
-    # A duration of 54.86 s holds 5486 steps of 0.01 s although their quotient is below 5486 by rounding.
+    # A duration of 0.7 s holds 7 steps of 0.1 s although the quotient is below 7 by rounding.
     steps = int(settings.duration_s / settings.sample_time_s + 1e-6)
     time: Array = np.arange(steps + 1, dtype=np.float64) * settings.sample_time_s
     return time
