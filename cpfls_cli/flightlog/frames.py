@@ -1,0 +1,128 @@
+"""Frames: from the axes of a log to body FLU and world ENU, through rotation matrices."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from scipy.constants import g as standard_gravity
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.flightlog.repair import without_jumps
+from cpfls_cli.rotations import multiply, rotation_matrix
+
+BodyFrame = Literal["FLU", "FRD"]
+WorldFrame = Literal["ENU", "NED"]
+
+_BODY = {"FLU": np.eye(3), "FRD": np.diag([1.0, -1.0, -1.0])}
+_WORLD = {"ENU": np.eye(3), "NED": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])}
+
+
+def body_to_flu(vectors: Array, frame: BodyFrame) -> Array:
+    """Turn body vectors into front, left, up.
+
+    Parameters
+    ----------
+    vectors : array, shape (time, 3), body frame `frame`
+    frame : {"FLU", "FRD"}
+
+    Returns
+    -------
+    array, shape (time, 3), body frame FLU
+    """
+    turned: Array = vectors @ _BODY[frame].T
+    return turned
+
+
+def world_to_enu(vectors: Array, frame: WorldFrame) -> Array:
+    """Turn world vectors into east, north, up.
+
+    Parameters
+    ----------
+    vectors : array, shape (time, 3), world frame `frame`
+    frame : {"ENU", "NED"}
+
+    Returns
+    -------
+    array, shape (time, 3), world frame ENU
+    """
+    turned: Array = vectors @ _WORLD[frame].T
+    return turned
+
+
+def attitude_to_enu_flu(attitude: Array, body: BodyFrame, world: WorldFrame) -> Array:
+    """Convert roll, pitch, yaw between frames, ``R_enu,flu = R_enu,world R R_body,flu``.
+
+    Parameters
+    ----------
+    attitude : array, shape (time, 3), rad
+        Roll, pitch and yaw (intrinsic ZYX) of the log's body frame in the log's world frame.
+    body : {"FLU", "FRD"}
+    world : {"ENU", "NED"}
+
+    Returns
+    -------
+    array, shape (time, 3), rad
+        Of body FLU in world ENU, roll and yaw without jumps. A vehicle that heads north has yaw 0 in NED and
+        a quarter turn in ENU.
+    """
+    if (body, world) == ("FLU", "ENU"):
+        return attitude
+    return euler_angles(_WORLD[world] @ rotation_matrix(attitude) @ _BODY[body].T)
+
+
+def attitude_from_quaternion(quaternion: Array, order: Literal["wxyz", "xyzw"]) -> Array:
+    """Convert quaternions to roll, pitch, yaw in the same frames.
+
+    Parameters
+    ----------
+    quaternion : array, shape (time, 4)
+        Rotation from body to world; its length does not matter.
+    order : {"wxyz", "xyzw"}
+        Whether the scalar part stands first or last.
+
+    Returns
+    -------
+    array, shape (time, 3), rad
+        Roll and yaw without jumps.
+    """
+    scalar_last = np.roll(quaternion, -1, axis=1) if order == "wxyz" else quaternion
+    return euler_angles(Rotation.from_quat(scalar_last).as_matrix())
+
+
+def euler_angles(rotation: Array) -> Array:
+    """Read roll, pitch, yaw (intrinsic ZYX) off rotation matrices.
+
+    Parameters
+    ----------
+    rotation : array, shape (time, 3, 3)
+        From body to world.
+
+    Returns
+    -------
+    array, shape (time, 3), rad
+        Roll and yaw without jumps; both arbitrary where the pitch is +-90 degrees.
+    """
+    roll = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
+    pitch = -np.arcsin(np.clip(rotation[:, 2, 0], -1.0, 1.0))
+    yaw = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    return np.column_stack([without_jumps(roll), pitch, without_jumps(yaw)])
+
+
+def acceleration_from_specific_force(attitude: Array, specific_force: Array) -> Array:
+    """Convert what an accelerometer senses to acceleration, ``a = R f - g e_z``.
+
+    Parameters
+    ----------
+    attitude : array, shape (time, 3), rad
+        Of body FLU in world ENU.
+    specific_force : array, shape (time, 3), m/s^2, body frame FLU
+
+    Returns
+    -------
+    array, shape (time, 3), m/s^2, world frame ENU
+    """
+    acceleration: Array = multiply(rotation_matrix(attitude), specific_force)
+    acceleration[:, 2] -= standard_gravity
+    return acceleration

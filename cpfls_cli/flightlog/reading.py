@@ -1,0 +1,95 @@
+"""From the columns of a log to signals on one uniform clock, in SI and the program's frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.flightlog.clock import longest_stretch
+from cpfls_cli.flightlog.columns import select_columns
+from cpfls_cli.flightlog.conversion import to_program_frames
+from cpfls_cli.flightlog.repair import fill
+from cpfls_cli.flightlog.results import ImportReport, LogSignals
+from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.flightlog.table import (
+    Table,
+    count_missing,
+    count_stuck,
+    in_order_and_cropped,
+    made_continuous,
+    without_spikes,
+)
+
+
+def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogSignals:
+    """Read the mapped columns of a log, drop and repair what is bad, and put all on one uniform clock.
+
+    Parameters
+    ----------
+    columns : mapping from str to array, shape (sample,)
+        The log.
+    settings : ImportSettings
+        The section `import`.
+
+    Returns
+    -------
+    LogSignals
+        At the log's median rate, time from 0; neither shifted nor filtered. A torque that the rotors are to
+        give is still None.
+
+    Raises
+    ------
+    InputError
+        If columns are missing, or a gap is too long.
+    """
+    read = Table(*select_columns(columns, settings))
+    table, dropped = in_order_and_cropped(read, settings)
+    table = made_continuous(table)
+    missing, saturated = count_missing(table, settings), count_stuck(table, settings)
+    table, spikes = without_spikes(table, settings)
+    stretch = longest_stretch(table.time, np.isfinite(table.columns()), settings)
+    table = table.rows(stretch.rows)
+    clock, rate_hz = _uniform_clock(table.time)
+    on_clock = {name: fill(table.time, values, clock) for name, values in table.signals.items()}
+    steps = np.diff(table.time)
+    report = ImportReport(
+        samples_read=len(read.time),
+        samples=len(clock),
+        dropped=dropped | {"incomplete_ends": stretch.incomplete_ends, "gap": stretch.beyond_gap},
+        missing=missing,
+        spikes=spikes,
+        saturated=saturated,
+        gaps=int((steps > 1.5 * np.median(steps)).sum()),
+        longest_gap_s=float(steps.max()),
+        span_s=(float(clock[0]), float(clock[-1])),
+        log_rate_hz=rate_hz,
+        rate_hz=rate_hz,
+        warnings=(*_warn_of_saturation(saturated), *_warn_of_gap(stretch.beyond_gap), *_warn_of_pitch(on_clock)),
+    )
+    return LogSignals(time=clock - clock[0], report=report, **to_program_frames(on_clock, settings))
+
+
+def _uniform_clock(time: Array) -> tuple[Array, float]:
+    period = float(np.median(np.diff(time)))
+    # A whole number of periods that rounding made a little short must not lose its last sample.
+    samples = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1
+    return time[0] + period * np.arange(samples), 1 / period
+
+
+def _warn_of_saturation(saturated: Mapping[str, int]) -> list[str]:
+    return [
+        f"{column} stands at its extreme for {count} samples in all: saturated?" for column, count in saturated.items()
+    ]
+
+
+def _warn_of_gap(rows: int) -> list[str]:
+    return [f"{rows} rows beyond a gap are not used"] if rows else []
+
+
+def _warn_of_pitch(signals: Mapping[str, Array]) -> list[str]:
+    if "attitude" not in signals or np.abs(signals["attitude"][:, 1]).max() <= pi / 2:
+        return []
+    return ["the pitch exceeds 90 degrees, which roll, pitch, yaw never do: check the unit and the order of attitude"]

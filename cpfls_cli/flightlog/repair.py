@@ -1,0 +1,108 @@
+"""Bad values of a channel: absent, spikes, stuck at an extreme."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from cpfls_cli.arrays import Array, BoolArray
+
+_DEVIATION_OF_MEDIAN = 1.4826
+
+
+def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
+    """Find spikes by Hampel's identifier, ``|x - median| > deviations * 1.4826 MAD``.
+
+    The scale is the larger one of the running window's and the whole channel's, so that a quiet or a held stretch
+    does not make every step a spike; where more than half of the channel follows its running median exactly, it is
+    the root mean square of the departures.
+
+    Parameters
+    ----------
+    values : array, shape (sample,)
+        One channel; values that are not finite are no spikes.
+    deviations : float
+        Threshold in robust standard deviations.
+    window : int
+        Samples of the running median.
+
+    Returns
+    -------
+    array of bool, shape (sample,)
+        True at a spike.
+
+    References
+    ----------
+    F. R. Hampel, The influence curve and its role in robust estimation, 1974.
+    """
+    spikes = np.zeros(len(values), dtype=bool)
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) == 0:
+        return spikes
+    departure = np.abs(values[known] - median_filter(values[known], size=window, mode="nearest"))
+    overall = np.median(departure) or np.sqrt(np.mean(departure**2)) / _DEVIATION_OF_MEDIAN
+    local = median_filter(departure, size=window, mode="nearest")
+    spikes[known] = departure > deviations * _DEVIATION_OF_MEDIAN * np.maximum(local, overall)
+    return spikes
+
+
+def count_saturated(values: Array, samples: int) -> int:
+    """Count the values in runs at the channel's smallest or largest value.
+
+    Parameters
+    ----------
+    values : array, shape (sample,)
+        One channel.
+    samples : int
+        Length from which a run counts.
+
+    Returns
+    -------
+    int
+        Values in such runs; 0 for a channel that is constant throughout.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) == 0 or known.min() == known.max():
+        return 0
+    return sum(_values_in_runs(known == extreme, samples) for extreme in (known.min(), known.max()))
+
+
+def fill(time: Array, values: Array, target: Array) -> Array:
+    """Interpolate the values that are present linearly at other times.
+
+    Parameters
+    ----------
+    time : array, shape (sample,), s
+    values : array, shape (sample, column)
+        Values that are not finite are absent.
+    target : array, shape (time,), s
+
+    Returns
+    -------
+    array, shape (time, column)
+    """
+    known = np.isfinite(values)
+    return np.column_stack([np.interp(target, time[k], v[k]) for k, v in zip(known.T, values.T, strict=True)])
+
+
+def without_jumps(angles: Array) -> Array:
+    """Remove the jumps of full turns from angles, over absent values.
+
+    Parameters
+    ----------
+    angles : array, shape (sample,), rad
+
+    Returns
+    -------
+    array, shape (sample,), rad
+    """
+    known = np.isfinite(angles)
+    continuous = angles.copy()
+    continuous[known] = np.unwrap(angles[known])
+    return continuous
+
+
+def _values_in_runs(marked: BoolArray, samples: int) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
+    lengths = np.diff(edges.reshape(-1, 2), axis=1)
+    return int(lengths[lengths >= samples].sum())

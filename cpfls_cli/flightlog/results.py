@@ -1,0 +1,143 @@
+"""Results of an import: the signals on one clock, the flight derived from them, and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from cpfls_cli.arrays import Array
+
+
+@dataclass(frozen=True)
+class DelayEstimate:
+    """Delay between the torque command and the motion.
+
+    Attributes
+    ----------
+    delay_s : float
+        The delay whose rigid-body regression explains most of the torque.
+    r2 : array, shape (3,)
+        Share of the torque explained about each body axis, at that delay.
+    pooled_r2 : float
+        The same, all axes together, each scaled by its own variance.
+    inertia : array, shape (6,), kg m^2
+        Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the regression at that delay.
+    delays : array, shape (delay,), s
+        The delays tried.
+    curve : array, shape (delay,)
+        Pooled R2 at each of them.
+    at_bound : bool
+        True where the best delay is the longest one tried, so the true one may be longer.
+    """
+
+    delay_s: float
+    r2: Array
+    pooled_r2: float
+    inertia: Array
+    delays: Array
+    curve: Array
+    at_bound: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportReport:
+    """What an import read, dropped, repaired and chose.
+
+    Attributes
+    ----------
+    samples_read : int
+        Rows of the log.
+    samples : int
+        Samples of the result.
+    dropped : mapping from str to int
+        Rows dropped, by reason: `time_not_finite`, `repeated_time`, `backward_time`, `crop`, `incomplete_ends`
+        (before the first or after the last value of some column), `gap` (outside the part that is kept).
+    missing, spikes : mapping from str to int
+        Values of each column that were absent or found to be spikes, and interpolated; columns without are left out.
+    saturated : mapping from str to int
+        Values of each column in long runs at its extremes; reported only, not changed.
+    gaps : int
+        Gaps in the time stamps (more than 1.5 times the median step) that were interpolated.
+    longest_gap_s : float
+        Longest step between time stamps in the part that is kept, s.
+    span_s : tuple of float
+        Begin and end of what is kept, s from the log's first time stamp.
+    log_rate_hz, rate_hz : float
+        Median rate of the log, and rate of the result.
+    lowpass_hz : float or None
+        Cut-off of the zero-phase filter that all signals went through.
+    delay_s : float
+        Delay by which the commands were shifted.
+    delay : DelayEstimate or None
+        How the delay was found, where it was estimated.
+    warnings : tuple of str
+        Plain sentences for the user.
+    """
+
+    samples_read: int
+    samples: int
+    dropped: Mapping[str, int]
+    missing: Mapping[str, int]
+    spikes: Mapping[str, int]
+    saturated: Mapping[str, int]
+    gaps: int
+    longest_gap_s: float
+    span_s: tuple[float, float]
+    log_rate_hz: float
+    rate_hz: float
+    lowpass_hz: float | None = None
+    delay_s: float = 0.0
+    delay: DelayEstimate | None = None
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogSignals:
+    """Signals of a log on a uniform clock, in SI, body frame FLU, world frame ENU.
+
+    Attributes
+    ----------
+    time : array, shape (time,), s
+        Uniform, from 0.
+    attitude : array, shape (time, 3), rad, or None
+        Roll, pitch, yaw; roll and yaw without jumps of a full turn.
+    body_rate : array, shape (time, 3), rad/s, body frame, or None
+    body_torque : array, shape (time, 3), N m, body frame, or None
+    position, velocity, acceleration : array, shape (time, 3), m, m/s, m/s^2, world frame, or None
+    rotor_speed : array, shape (time, rotor), rad/s, or None
+    rotor_command : array, shape (time, rotor), or None
+    report : ImportReport
+    """
+
+    time: Array
+    attitude: Array | None = None
+    body_rate: Array | None = None
+    body_torque: Array | None = None
+    position: Array | None = None
+    velocity: Array | None = None
+    acceleration: Array | None = None
+    rotor_speed: Array | None = None
+    rotor_command: Array | None = None
+    report: ImportReport = field(repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportedFlight(LogSignals):
+    """A flight: the signals of the log, aligned and filtered, and what is derived from them.
+
+    Attributes
+    ----------
+    attitude_rate : array, shape (time, 3), rad/s, or None
+        Euler rates, ``W^-1 omega``; None without attitude.
+    attitude_acceleration : array, shape (time, 3), rad/s^2, or None
+        Derivative of the Euler rates.
+    body_acceleration : array, shape (time, 3), rad/s^2, body frame, or None
+        Derivative of the body rates.
+    torque : array, shape (time, 3), N m, or None
+        Generalised torque on the Euler coordinates, ``W^T tau_body``; None without attitude.
+    """
+
+    attitude_rate: Array | None = None
+    attitude_acceleration: Array | None = None
+    body_acceleration: Array | None = None
+    torque: Array | None = None

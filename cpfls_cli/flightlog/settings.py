@@ -1,0 +1,156 @@
+"""Settings of the section `import`: how the columns of a log become the signals of a flight."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Annotated, Final, Literal
+
+from annotated_types import Ge, Gt, Le, MinLen
+from typing_extensions import Doc
+
+from cpfls_cli.errors import SettingError
+from cpfls_cli.settings import Settings
+from cpfls_cli.units import KNOWN_UNITS, UnitName
+
+SignalName = Literal[
+    "attitude",
+    "quaternion",
+    "body_rate",
+    "attitude_rate",
+    "position",
+    "velocity",
+    "acceleration",
+    "torque",
+    "body_torque",
+    "rotor_speed",
+    "rotor_command",
+]
+
+_UNITS_OF_SIGNAL: Final = MappingProxyType(
+    {
+        "attitude": ("rad",),
+        "quaternion": ("1",),
+        "body_rate": ("rad/s",),
+        "attitude_rate": ("rad/s",),
+        "position": ("m",),
+        "velocity": ("m/s",),
+        "acceleration": ("m/s^2",),
+        "torque": ("N m",),
+        "body_torque": ("N m",),
+        "rotor_speed": ("rad/s",),
+        "rotor_command": ("1", "s", "rad/s"),
+    }
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalMap(Settings):
+    """Where one signal stands in the log: ``signal = sign * (scale * column + offset)`` in `unit`."""
+
+    columns: Annotated[tuple[str, ...], MinLen(1), Doc("names of the columns, in the order of the axes")]
+    unit: Annotated[UnitName, Doc("unit of the columns after scale and offset")]
+    sign: Annotated[tuple[float, ...] | None, Doc("+1 or -1 for each column; null: all +1")] = None
+    scale: Annotated[float, Doc("factor on the logged numbers")] = 1.0
+    offset: Annotated[float, Doc("added after the factor, in the unit above")] = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the signs against the columns."""
+        if len(set(self.columns)) < len(self.columns):
+            raise SettingError("columns", "a column is named twice")
+        if self.scale == 0:
+            raise SettingError("scale", "must not be 0")
+        if self.sign is not None and (len(self.sign) != len(self.columns) or {abs(s) for s in self.sign} != {1}):
+            raise SettingError("sign", f"needs {len(self.columns)} numbers, one for each column, each +1 or -1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportSettings(Settings):
+    """Settings of the import of a flight log."""
+
+    time_column: Annotated[str, Doc("name of the column of time stamps")] = "t"
+    time_unit: Annotated[Literal["s", "ms", "us", "ns"], Doc("unit of the time stamps")] = "s"
+    signals: Annotated[
+        Mapping[SignalName, SignalMap], Doc("for each signal of the log: its columns and their unit")
+    ] = field(default_factory=dict)
+    quaternion_order: Annotated[Literal["wxyz", "xyzw"], Doc("order of the quaternion's columns")] = "wxyz"
+    body_frame: Annotated[Literal["FLU", "FRD"], Doc("body axes of the log; converted to FLU")] = "FLU"
+    world_frame: Annotated[Literal["ENU", "NED"], Doc("world axes of the log; converted to ENU")] = "ENU"
+    acceleration_frame: Annotated[
+        Literal["world", "body-specific-force"], Doc("acceleration in the world, or what an accelerometer senses")
+    ] = "world"
+    torque_source: Annotated[
+        Literal["column", "rotor-speed", "rotor-command"] | None,
+        Doc("where the body torque comes from: a column, or the rotors through the vehicle; null: no torque"),
+    ] = "column"
+    crop_s: Annotated[tuple[float, float] | None, Doc("begin and end that are kept, s from the first stamp")] = None
+    rate_hz: Annotated[
+        Annotated[float, Gt(0)] | None, Doc("sampling rate of the flight, Hz; null: the log's median rate")
+    ] = None
+    lowpass_hz: Annotated[
+        Annotated[float, Gt(0)] | None,
+        Doc("cut-off (-6 dB) of the zero-phase low-pass filter of all signals, Hz; null: none"),
+    ] = None
+    lowpass_order: Annotated[int, Ge(1), Le(12), Doc("order of the Butterworth filter, run in both directions")] = 4
+    gap_s: Annotated[float, Gt(0), Doc("longest gap that is interpolated, s")] = 0.1
+    gap_rule: Annotated[
+        Literal["stop", "longest-part"], Doc("at a longer gap: stop with a message, or keep the longest part")
+    ] = "stop"
+    spike_deviations: Annotated[
+        Annotated[float, Gt(0)] | None,
+        Doc("departure from the running median that is a spike, in robust standard deviations; null: no test"),
+    ] = None
+    spike_window_samples: Annotated[int, Ge(3), Doc("window of the running median of the spike test")] = 7
+    saturation_samples: Annotated[int, Ge(2), Doc("equal extreme values in a row that count as saturated")] = 20
+    delay_s: Annotated[
+        Annotated[float, Ge(0)] | Literal["estimate"], Doc("time from command to motion, s, or estimate")
+    ] = 0.0
+    delay_max_s: Annotated[float, Gt(0), Doc("longest delay that the estimate tries, s")] = 0.2
+
+    def __post_init__(self) -> None:
+        """Check the rules between keys."""
+        if self.crop_s is not None and not 0 <= self.crop_s[0] < self.crop_s[1]:
+            raise SettingError("crop_s", "needs 0 <= begin < end")
+        for name, signal in self.signals.items():
+            _check_signal(name, signal)
+        if self.signals:
+            _check_attitude(self)
+            _check_torque(self)
+
+
+def _check_signal(name: SignalName, signal: SignalMap) -> None:
+    expected = 4 if name == "quaternion" else 3
+    if not name.startswith("rotor") and len(signal.columns) != expected:
+        raise SettingError(f"signals.{name}.columns", f"needs {expected} columns, got {len(signal.columns)}")
+    if KNOWN_UNITS[signal.unit].si not in _UNITS_OF_SIGNAL[name]:
+        wanted = [unit for unit, entry in KNOWN_UNITS.items() if entry.si in _UNITS_OF_SIGNAL[name]]
+        raise SettingError(f"signals.{name}.unit", f"{signal.unit!r} does not measure it; one of {', '.join(wanted)}")
+
+
+def _check_attitude(settings: ImportSettings) -> None:
+    names = settings.signals.keys()
+    if {"attitude", "quaternion"} <= names:
+        raise SettingError("signals", "attitude and quaternion are both given; keep one")
+    if {"body_rate", "attitude_rate"} <= names:
+        raise SettingError("signals", "body_rate and attitude_rate are both given; keep one")
+    needing: list[str] = [name for name in ("attitude_rate", "torque") if name in names]
+    if settings.acceleration_frame == "body-specific-force" and "acceleration" in names:
+        needing.append("acceleration")
+    if needing and not {"attitude", "quaternion"} & names:
+        raise SettingError("signals", f"{', '.join(needing)} needs attitude or quaternion to be converted")
+
+
+def _check_torque(settings: ImportSettings) -> None:
+    names = settings.signals.keys()
+    needed: dict[str | None, set[SignalName]] = {
+        "column": {"torque", "body_torque"},
+        "rotor-speed": {"rotor_speed"},
+        "rotor-command": {"rotor_command"},
+    }
+    wanted = needed.get(settings.torque_source)
+    if wanted is not None and not wanted & names:
+        missing = " or ".join(sorted(wanted))
+        raise SettingError("torque_source", f"{settings.torque_source!r} needs the signal {missing}")
+    if {"torque", "body_torque"} <= names:
+        raise SettingError("signals", "torque and body_torque are both given; keep one")

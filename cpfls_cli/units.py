@@ -1,0 +1,125 @@
+"""Units that a flight log may use, and their conversion to SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from difflib import get_close_matches
+from math import pi
+from types import MappingProxyType
+from typing import Final, Literal
+
+from scipy.constants import g as standard_gravity
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+
+UnitName = Literal[
+    "1",
+    "s",
+    "ms",
+    "us",
+    "ns",
+    "rad",
+    "deg",
+    "rad/s",
+    "deg/s",
+    "rpm",
+    "m",
+    "mm",
+    "m/s",
+    "mm/s",
+    "m/s^2",
+    "g",
+    "N·m",
+    "N m",
+    "N mm",
+]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of measurement.
+
+    Attributes
+    ----------
+    factor : float
+        Value in SI of one of this unit.
+    si : str
+        The SI unit of the same quantity; two units are comparable where it is equal.
+    """
+
+    factor: float
+    si: str
+
+
+KNOWN_UNITS: Final = MappingProxyType[str, Unit](
+    {
+        "1": Unit(1.0, "1"),
+        "s": Unit(1.0, "s"),
+        "ms": Unit(1e-3, "s"),
+        "us": Unit(1e-6, "s"),
+        "ns": Unit(1e-9, "s"),
+        "rad": Unit(1.0, "rad"),
+        "deg": Unit(pi / 180, "rad"),
+        "rad/s": Unit(1.0, "rad/s"),
+        "deg/s": Unit(pi / 180, "rad/s"),
+        "rpm": Unit(2 * pi / 60, "rad/s"),
+        "m": Unit(1.0, "m"),
+        "mm": Unit(1e-3, "m"),
+        "m/s": Unit(1.0, "m/s"),
+        "mm/s": Unit(1e-3, "m/s"),
+        "m/s^2": Unit(1.0, "m/s^2"),
+        "g": Unit(standard_gravity, "m/s^2"),
+        "N·m": Unit(1.0, "N m"),
+        "N m": Unit(1.0, "N m"),
+        "N mm": Unit(1e-3, "N m"),
+    }
+)
+
+
+def to_si(values: Array, unit: str) -> Array:
+    """Convert values to the SI unit of their quantity.
+
+    Parameters
+    ----------
+    values : array, any shape
+        Values in `unit`.
+    unit : str
+        One of `KNOWN_UNITS`; ``g`` is the standard acceleration of free fall.
+
+    Returns
+    -------
+    array, same shape
+        Values in SI.
+
+    Raises
+    ------
+    InputError
+        If the unit is not known; the message offers the nearest known one.
+    """
+    return values * known_unit(unit).factor
+
+
+def known_unit(unit: str) -> Unit:
+    """Find a unit by its name.
+
+    Parameters
+    ----------
+    unit : str
+        One of `KNOWN_UNITS`.
+
+    Returns
+    -------
+    Unit
+        Its factor and its SI unit.
+
+    Raises
+    ------
+    InputError
+        If the unit is not known; the message offers the nearest known one.
+    """
+    if unit in KNOWN_UNITS:
+        return KNOWN_UNITS[unit]
+    nearest = get_close_matches(unit, KNOWN_UNITS, n=1, cutoff=0.3)
+    hint = f"did you mean {nearest[0]!r}?" if nearest else f"known units: {', '.join(KNOWN_UNITS)}"
+    raise InputError(f"unknown unit {unit!r}: {hint}")
