@@ -24,9 +24,10 @@ def eigenvalues_below(eigenvalues: Array, projections: Array, shift: float) -> I
     -------
     array of int, shape (samples,)
     """
-    tiny = np.finfo(float).tiny
     distance = eigenvalues - shift
-    distance = np.where(np.abs(distance) < tiny, tiny, distance)
+    # A shift on an eigenvalue moves off it by less than the eigenvalue's own rounding, so that nothing overflows.
+    rounding = np.finfo(float).eps * max(float(np.abs(eigenvalues).max()), abs(shift)) or np.finfo(float).tiny
+    distance = np.copysign(np.maximum(np.abs(distance), rounding), distance)
     schur = np.eye(3) + (projections / distance) @ projections.swapaxes(1, 2)
     negative = np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0, axis=1)
     return np.asarray(np.count_nonzero(distance < 0.0) - negative, dtype=np.int64)
