@@ -95,7 +95,7 @@ def to_si(values: Array, unit: str) -> Array:
     Raises
     ------
     InputError
-        If the unit is not known; the message offers the nearest known one.
+        If the unit is not known; the message offers the nearest known ones.
     """
     return values * known_unit(unit).factor
 
@@ -116,10 +116,10 @@ def known_unit(unit: str) -> Unit:
     Raises
     ------
     InputError
-        If the unit is not known; the message offers the nearest known one.
+        If the unit is not known; the message offers the nearest known ones.
     """
     if unit in KNOWN_UNITS:
         return KNOWN_UNITS[unit]
-    nearest = get_close_matches(unit, KNOWN_UNITS, n=1, cutoff=0.3)
-    hint = f"did you mean {nearest[0]!r}?" if nearest else f"known units: {', '.join(KNOWN_UNITS)}"
+    nearest = [repr(name) for name in get_close_matches(unit, KNOWN_UNITS, n=2, cutoff=0.4)]
+    hint = f"did you mean {' or '.join(nearest)}?" if nearest else f"known units: {', '.join(KNOWN_UNITS)}"
     raise InputError(f"unknown unit {unit!r}: {hint}")

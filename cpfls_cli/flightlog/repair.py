@@ -11,11 +11,11 @@ _DEVIATION_OF_MEDIAN = 1.4826
 
 
 def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
-    """Find spikes by Hampel's identifier, ``|x - median| > deviations * 1.4826 MAD``.
+    """Find spikes by Hampel's identifier, ``|x - median| > deviations * scale``.
 
-    The scale is the larger one of the running window's and the whole channel's, so that a quiet or a held stretch
-    does not make every step a spike; where more than half of the channel follows its running median exactly, it is
-    the root mean square of the departures.
+    The scale is the largest of 1.4826 times the median departure in the running window, the same over the whole
+    channel, and the channel's mean step. The last two keep a quiet stretch, and the crest of a signal without noise,
+    from being taken for spikes.
 
     Parameters
     ----------
@@ -37,12 +37,12 @@ def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
     """
     spikes = np.zeros(len(values), dtype=bool)
     known = np.flatnonzero(np.isfinite(values))
-    if len(known) == 0:
+    if len(known) < 2:
         return spikes
     departure = np.abs(values[known] - median_filter(values[known], size=window, mode="nearest"))
-    overall = np.median(departure) or np.sqrt(np.mean(departure**2)) / _DEVIATION_OF_MEDIAN
     local = median_filter(departure, size=window, mode="nearest")
-    spikes[known] = departure > deviations * _DEVIATION_OF_MEDIAN * np.maximum(local, overall)
+    scale = _DEVIATION_OF_MEDIAN * np.maximum(local, np.median(departure))
+    spikes[known] = departure > deviations * np.maximum(scale, np.abs(np.diff(values[known])).mean())
     return spikes
 
 

@@ -89,7 +89,7 @@ def made_continuous(table: Table) -> Table:
 
 
 def without_spikes(table: Table, settings: ImportSettings) -> tuple[Table, dict[str, int]]:
-    """Make spikes absent values.
+    """Make spikes absent values; commands of the rotors may jump and are left alone.
 
     Parameters
     ----------
@@ -110,6 +110,8 @@ def without_spikes(table: Table, settings: ImportSettings) -> tuple[Table, dict[
         name: np.column_stack([find_spikes(column, deviations, window) for column in values.T])
         for name, values in table.signals.items()
     }
+    if "rotor_command" in spikes:
+        spikes["rotor_command"][:] = False
     cleaned = {name: np.where(spikes[name], np.nan, values) for name, values in table.signals.items()}
     return Table(table.time, cleaned), _by_column(spikes, settings, lambda column: int(column.sum()))
 

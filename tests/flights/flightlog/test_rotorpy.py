@@ -1,0 +1,54 @@
+"""A flight of the simulator RotorPy, whose vehicle is known: the other team's equations close on ours."""
+
+import csv
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
+
+PATH = Path(os.environ.get("CPFLS_FLIGHTS", "../shared/data")) / "rotorpy" / "none.csv"
+INERTIA = np.array([0.00365, 0.00368, 0.00703])
+ARM, THRUST, DRAG = 0.1202081528, 5.57e-6, 1.36e-7
+MIXER = np.array([[1, -1, -1, 1], [-1, -1, 1, 1], [1, -1, 1, -1]]) * [[THRUST * ARM], [THRUST * ARM], [DRAG]]
+
+
+def body_torque(signals):
+    speed = signals.rotor_command if signals.rotor_speed is None else signals.rotor_speed
+    return speed**2 @ MIXER.T
+
+
+def imported(source, **changes):
+    if not PATH.exists():
+        pytest.skip(f"{PATH} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
+    with PATH.open() as stream:
+        header, *rows = csv.reader(stream)
+    columns = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+    rotors = {"rotor-speed": ("rotor_speed", "om"), "rotor-command": ("rotor_command", "omcmd")}
+    name, column = rotors[source]
+    signals = {
+        "attitude": SignalMap(columns=("phi", "theta", "psi"), unit="rad"),
+        "body_rate": SignalMap(columns=("wx", "wy", "wz"), unit="rad/s"),
+        name: SignalMap(columns=tuple(f"{column}{rotor}" for rotor in range(1, 5)), unit="rad/s"),
+    }
+    return import_log(
+        columns, ImportSettings(signals=signals, torque_source=source, **changes), rotor_torque=body_torque
+    )
+
+
+def test_the_torque_of_the_rotors_is_that_of_the_motion():
+    flight = imported("rotor-speed")
+    momentum = INERTIA * flight.body_rate
+    needed = INERTIA * flight.body_acceleration + np.cross(flight.body_rate, momentum)
+    error = (needed - flight.body_torque)[50:-50]
+    assert (error.std(axis=0) < 1e-3 * flight.body_torque.std(axis=0)).all()
+
+
+@pytest.mark.parametrize(("source", "delay_s"), [("rotor-speed", 0.0), ("rotor-command", 0.006)])
+def test_the_delay_is_the_motors_lag_and_nothing_for_measured_speeds(source, delay_s):
+    """The motors lag by 5 ms, and the logged command is up to one controller step of 2 ms old."""
+    estimate = imported(source, delay_s="estimate", lowpass_hz=10.0).report.delay
+    assert estimate.delay_s == pytest.approx(delay_s, abs=1e-3)
+    np.testing.assert_allclose(estimate.inertia[:3], INERTIA, rtol=1e-3)

@@ -1,0 +1,55 @@
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from cpfls_cli.flightlog.clock import increasing_rows
+from cpfls_cli.flightlog.repair import count_saturated, fill, find_spikes
+
+STAMPS = hnp.arrays(float, st.integers(2, 40), elements=st.one_of(st.integers(0, 20).map(float), st.just(np.nan)))
+
+
+@given(STAMPS)
+def test_kept_time_stamps_increase_and_every_other_row_has_one_reason(stamps):
+    kept, dropped = increasing_rows(stamps)
+    assert (np.diff(stamps[kept]) > 0).all()
+    assert len(kept) + sum(dropped.values()) == len(stamps)
+
+
+@given(STAMPS)
+def test_rows_are_kept_as_a_plain_loop_keeps_them(stamps):
+    latest, expected = -np.inf, []
+    for row, stamp in enumerate(stamps):
+        if stamp > latest:
+            latest = stamp
+            expected.append(row)
+    np.testing.assert_array_equal(increasing_rows(stamps)[0], expected)
+
+
+@given(hnp.arrays(float, 30, elements=st.sampled_from([0.0, 1.0, 2.0])), st.integers(2, 6))
+def test_saturated_values_are_counted_as_a_plain_loop_counts_them(values, samples):
+    count, run = 0, 0
+    for row, value in enumerate(values):
+        run = run + 1 if row and value == values[row - 1] else 1
+        ends = row == len(values) - 1 or values[row + 1] != value
+        if ends and run >= samples and value in (values.min(), values.max()):
+            count += run
+    assert count_saturated(values, samples) == (0 if values.min() == values.max() else count)
+
+
+@given(st.floats(-5, 5), st.floats(-5, 5), st.sets(st.integers(1, 18), max_size=8))
+def test_absent_values_on_a_straight_line_come_back_exactly(slope, start, absent):
+    time = np.arange(20.0)
+    line = (start + slope * time)[:, None]
+    holed = line.copy()
+    holed[list(absent)] = np.nan
+    np.testing.assert_allclose(fill(time, holed, time), line, atol=1e-9)
+
+
+@given(st.floats(0.01, 100), st.floats(-100, 100), st.integers(0, 1000))
+def test_spikes_do_not_depend_on_scale_and_offset(scale, offset, seed):
+    values = np.random.default_rng(seed).standard_normal(60)
+    values[30] += 50
+    spikes = find_spikes(values, 8.0, 7)
+    assert spikes[30]
+    np.testing.assert_array_equal(find_spikes(scale * values + offset, 8.0, 7), spikes)

@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+
+from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
+from cpfls_cli.flightlog.frames import acceleration_from_specific_force, attitude_to_enu_flu
+
+NAMES = ("roll", "pitch", "yaw")
+
+
+def columns(attitude, **others):
+    time = 0.01 * np.arange(len(attitude))
+    return {"t": time} | dict(zip(NAMES, attitude.T, strict=True)) | others
+
+
+@pytest.mark.parametrize(
+    ("ned", "enu"),
+    [
+        ((0, 0, 0), (0, 0, 90)),
+        ((0, 0, 90), (0, 0, 0)),
+        ((10, 0, 90), (10, 0, 0)),
+        ((0, 10, 90), (0, -10, 0)),
+        ((5, -7, 30), (5, 7, 60)),
+    ],
+)
+def test_forward_right_down_in_north_east_down_gives_the_known_angles(ned, enu):
+    """North is yaw 90 in ENU; nose up is a positive pitch in FRD and a negative one in FLU."""
+    converted = np.rad2deg(attitude_to_enu_flu(np.deg2rad([ned]), "FRD", "NED"))
+    np.testing.assert_allclose(converted, [enu], atol=1e-9)
+
+
+def test_rates_of_a_flight_in_frd_ned_agree_with_its_converted_attitude():
+    """Without a gyroscope and with one, in other axes, the same flight comes out."""
+    time = 0.01 * np.arange(500)
+    attitude = np.column_stack([0.4 * np.sin(time), 0.3 * np.cos(1.3 * time), 0.9 * time])
+    rates = np.gradient(attitude, 0.01, axis=0, edge_order=2)
+    roll, pitch = attitude[:, 0], attitude[:, 1]
+    gyro = np.column_stack(
+        [
+            rates[:, 0] - np.sin(pitch) * rates[:, 2],
+            np.cos(roll) * rates[:, 1] + np.sin(roll) * np.cos(pitch) * rates[:, 2],
+            -np.sin(roll) * rates[:, 1] + np.cos(roll) * np.cos(pitch) * rates[:, 2],
+        ]
+    )
+    log = columns(attitude, p=gyro[:, 0], q=gyro[:, 1], r=gyro[:, 2])
+    frames = {"body_frame": "FRD", "world_frame": "NED", "torque_source": None}
+    euler = {"attitude": SignalMap(columns=NAMES, unit="rad")}
+    both = euler | {"body_rate": SignalMap(columns=("p", "q", "r"), unit="rad/s")}
+    from_attitude = import_log(log, ImportSettings(signals=euler, **frames))
+    from_gyro = import_log(log, ImportSettings(signals=both, **frames))
+    np.testing.assert_allclose(from_attitude.body_rate, from_gyro.body_rate, atol=2e-4)
+    np.testing.assert_allclose(from_gyro.body_rate, gyro * [1, -1, -1], atol=1e-12)
+    derived = np.gradient(from_gyro.attitude, 0.01, axis=0)
+    np.testing.assert_allclose(from_gyro.attitude_rate[1:-1], derived[1:-1], atol=2e-4)
+
+
+def test_a_resting_accelerometer_means_no_acceleration():
+    attitude = np.deg2rad([[0.0, 0.0, 40.0], [30.0, 0.0, 0.0], [0.0, 20.0, 10.0]])
+    g = 9.80665
+    sensed = g * np.array(
+        [
+            [0, 0, 1],
+            [0, np.sin(attitude[1, 0]), np.cos(attitude[1, 0])],
+            [-np.sin(attitude[2, 1]), 0, np.cos(attitude[2, 1])],
+        ]
+    )
+    np.testing.assert_allclose(acceleration_from_specific_force(attitude, sensed), 0, atol=1e-12)
+
+
+def test_positions_in_ned_become_enu():
+    log = columns(np.zeros((100, 3)), n=np.full(100, 1.0), e=np.full(100, 2.0), d=np.full(100, -3.0))
+    mapped = {"position": SignalMap(columns=("n", "e", "d"), unit="m")}
+    flight = import_log(log, ImportSettings(signals=mapped, world_frame="NED", torque_source=None))
+    np.testing.assert_allclose(flight.position[0], [2, 1, 3])

@@ -1,0 +1,201 @@
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog import ImportSettings, SignalMap, read_signals
+
+RATE = {"body_rate": SignalMap(columns=("p", "q", "r"), unit="rad/s")}
+
+
+def settings(**changes):
+    return ImportSettings(**({"signals": RATE, "torque_source": None} | changes))
+
+
+def log(samples=201, period=0.01):
+    time = period * np.arange(samples)
+    return {"t": time, "p": np.sin(time), "q": np.cos(2 * time), "r": 0.3 * time}
+
+
+def without(columns, rows):
+    return {name: np.delete(values, rows) for name, values in columns.items()}
+
+
+def test_a_clean_log_comes_back_as_it_is():
+    signals = read_signals(log(), settings())
+    np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time), atol=1e-12)
+    assert signals.report.samples_read == signals.report.samples == 201
+    assert signals.report.log_rate_hz == pytest.approx(100)
+    assert not any(signals.report.dropped.values())
+
+
+def test_time_stamps_in_microseconds_from_any_start_give_time_from_zero():
+    columns = log()
+    columns["t"] = 1e6 * columns["t"] + 5e12
+    signals = read_signals(columns, settings(time_unit="us"))
+    assert signals.time[0] == 0
+    assert signals.time[-1] == pytest.approx(2.0)
+
+
+def test_missing_columns_are_all_named_with_key_and_nearest_name():
+    columns = log()
+    columns["gyro.q"] = columns.pop("q")
+    columns["stamp"] = columns.pop("t")
+    mapped = {"body_rate": SignalMap(columns=("p", "gyro_q", "r"), unit="rad/s")}
+    with pytest.raises(InputError) as caught:
+        read_signals(columns, settings(signals=mapped, time_column="stmp"))
+    assert "import.time_column: the log has no column 'stmp' (nearest: stamp)" in str(caught.value)
+    assert "import.signals.body_rate.columns: the log has no column 'gyro_q' (nearest: gyro.q)" in str(caught.value)
+
+
+def test_of_repeated_time_stamps_the_first_counts():
+    columns = {name: np.insert(values, 100, values[100]) for name, values in log().items()}
+    columns["p"][101] = 99.0
+    signals = read_signals(columns, settings())
+    assert signals.report.dropped["repeated_time"] == 1
+    assert signals.body_rate[:, 0].max() <= 1
+
+
+def test_samples_that_go_backward_are_dropped():
+    columns = log()
+    columns["t"][50:53] = 0.1
+    columns["p"][50:53] = 99.0
+    signals = read_signals(columns, settings())
+    assert signals.report.dropped["backward_time"] == 3
+    np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time), atol=1e-4)
+
+
+def test_a_time_stamp_that_is_not_a_number_drops_its_row():
+    columns = log()
+    columns["t"][50] = np.nan
+    assert read_signals(columns, settings()).report.dropped["time_not_finite"] == 1
+
+
+def test_a_short_gap_is_interpolated_and_counted():
+    signals = read_signals(without(log(), slice(100, 105)), settings())
+    assert signals.report.gaps == 1
+    assert signals.report.longest_gap_s == pytest.approx(0.06)
+    np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time), atol=1e-3)
+
+
+def test_a_gap_of_exactly_the_allowed_length_passes():
+    assert read_signals(without(log(), slice(100, 105)), settings(gap_s=0.06)).report.gaps == 1
+
+
+def test_a_long_gap_stops_and_says_where():
+    with pytest.raises(InputError, match=r"gap of 0\.31 s at 0\.990 s"):
+        read_signals(without(log(), slice(100, 130)), settings())
+
+
+def test_or_the_longest_part_is_kept():
+    signals = read_signals(without(log(), slice(120, 150)), settings(gap_rule="longest-part"))
+    assert signals.report.dropped["gap"] == 51
+    assert signals.time[-1] == pytest.approx(1.19)
+    assert any("gap" in sentence for sentence in signals.report.warnings)
+
+
+def test_absent_values_are_interpolated_and_counted_by_column():
+    columns = log()
+    columns["q"][[40, 41, 42]] = np.nan
+    columns["r"][7] = np.inf
+    signals = read_signals(columns, settings())
+    assert signals.report.missing == {"q": 3, "r": 1}
+    np.testing.assert_allclose(signals.body_rate[:, 1], np.cos(2 * signals.time), atol=2e-3)
+
+
+def test_absent_values_for_longer_than_the_gap_are_a_gap():
+    columns = log()
+    columns["q"][40:60] = np.nan
+    with pytest.raises(InputError, match=r"gap of 0\.21 s"):
+        read_signals(columns, settings())
+
+
+def test_a_column_that_begins_late_and_ends_early_sets_the_span():
+    columns = log()
+    columns["r"][:20] = np.nan
+    columns["r"][-5:] = np.nan
+    signals = read_signals(columns, settings())
+    assert signals.report.dropped["incomplete_ends"] == 25
+    assert signals.report.span_s == pytest.approx((0.2, 1.95))
+    np.testing.assert_allclose(signals.body_rate[:, 2], 0.3 * (signals.time + 0.2), atol=1e-12)
+
+
+def test_a_sensor_of_a_lower_rate_is_interpolated():
+    columns = log()
+    columns["r"][np.arange(201) % 4 != 0] = np.nan
+    np.testing.assert_allclose(read_signals(columns, settings()).body_rate[:, 2], 0.3 * log()["t"], atol=1e-12)
+
+
+def test_spikes_are_found_counted_and_interpolated():
+    columns = log()
+    columns["p"] = columns["p"] + 1e-3 * np.random.default_rng(1).standard_normal(201)
+    columns["p"][[60, 150]] += [5.0, -4.0]
+    signals = read_signals(columns, settings(spike_deviations=8.0))
+    assert signals.report.spikes == {"p": 2}
+    np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time), atol=6e-3)
+
+
+def test_a_spike_in_a_signal_without_noise_is_found_and_nothing_else():
+    columns = log()
+    columns["r"][80] += 1.0
+    assert read_signals(columns, settings(spike_deviations=6.0)).report.spikes == {"r": 1}
+
+
+def test_jumps_of_a_rotor_command_are_no_spikes():
+    columns = log() | {"u": np.where(np.arange(201) == 90, 1.0, 0.2)}
+    mapped = RATE | {"rotor_command": SignalMap(columns=("u",), unit="1")}
+    signals = read_signals(columns, settings(signals=mapped, spike_deviations=6.0))
+    assert signals.report.spikes == {}
+    assert signals.rotor_command[90, 0] == 1
+
+
+def test_without_the_test_spikes_stay():
+    columns = log()
+    columns["p"][60] += 5.0
+    signals = read_signals(columns, settings())
+    assert signals.report.spikes == {}
+    assert signals.body_rate[60, 0] > 4
+
+
+def test_saturated_values_are_counted_and_left_alone():
+    columns = log()
+    columns["q"] = np.clip(columns["q"], -0.5, 0.5)
+    signals = read_signals(columns, settings())
+    assert signals.report.saturated == {"q": int((np.abs(columns["q"]) == 0.5).sum())}
+    assert any(sentence.startswith("q stands at its extreme") for sentence in signals.report.warnings)
+    np.testing.assert_allclose(signals.body_rate[:, 1], columns["q"], atol=1e-12)
+
+
+def test_a_constant_column_is_not_called_saturated():
+    columns = log()
+    columns["q"] = np.zeros(201)
+    assert read_signals(columns, settings()).report.saturated == {}
+
+
+def test_the_crop_counts_from_the_first_time_stamp():
+    columns = log()
+    columns["t"] = columns["t"] + 100
+    signals = read_signals(columns, settings(crop_s=(0.5, 1.5)))
+    assert signals.report.dropped["crop"] == 100
+    np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time + 0.5), atol=1e-12)
+
+
+def test_scale_offset_and_sign_apply_before_the_unit():
+    mapped = {"body_rate": SignalMap(columns=("p", "q", "r"), unit="deg/s", sign=(1, -1, 1), scale=2.0, offset=3.0)}
+    signals = read_signals(log(), settings(signals=mapped))
+    np.testing.assert_allclose(signals.body_rate[:, 1], -np.deg2rad(2 * log()["q"] + 3), atol=1e-12)
+
+
+def test_yaw_logged_between_minus_and_plus_180_degrees_turns_on():
+    columns = log()
+    yaw = 400 * columns["t"]
+    columns |= {"roll": 0 * yaw, "pitch": 0 * yaw, "yaw": (yaw + 180) % 360 - 180}
+    mapped = {"attitude": SignalMap(columns=("roll", "pitch", "yaw"), unit="deg")}
+    signals = read_signals(without(columns, slice(45, 48)), settings(signals=mapped))
+    np.testing.assert_allclose(signals.attitude[:, 2], np.deg2rad(400 * signals.time), atol=1e-9)
+
+
+def test_degrees_taken_for_radians_are_noticed():
+    mapped = {"attitude": SignalMap(columns=("p", "angle", "r"), unit="rad")}
+    columns = log()
+    columns["angle"] = 20 * columns["p"]
+    assert any("check the unit" in text for text in read_signals(columns, settings(signals=mapped)).report.warnings)
