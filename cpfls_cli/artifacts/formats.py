@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from cpfls_cli.artifacts.spec import BODY, EULER, NO_FRAME, WORLD, ArtifactSpec, DatasetSpec
 
 _TIME = DatasetSpec("time", ("time",), "s", NO_FRAME, "time from the first sample")
@@ -43,7 +45,7 @@ FLIGHT = ArtifactSpec(
     "simulate, import",
     (
         _TIME,
-        *_ATTITUDE,
+        *(replace(spec, required=False) for spec in _ATTITUDE),
         _vector("body_rate", "rad/s", BODY, "body rates p, q, r", required=False),
         _vector("torque", "N m", EULER, "generalised torque, W^T body_torque", required=False),
         _vector("body_torque", "N m", BODY, "torque about the body axes", required=False),
@@ -143,6 +145,7 @@ MODEL = ArtifactSpec(
         DatasetSpec("ridge/error", ("tried",), "1", NO_FRAME, "cross-validated error", required=False),
         DatasetSpec("ridge/standard_error", ("tried",), "1", NO_FRAME, "its standard error", required=False),
         DatasetSpec("training/indices", ("sample",), "1", NO_FRAME, "samples of the flight that trained"),
+        DatasetSpec("findings", ("finding",), "text", NO_FRAME, "what failed or was not excited, in words"),
     ),
     ("flight", "selection", "validate"),
 )

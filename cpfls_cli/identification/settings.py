@@ -56,3 +56,8 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         LocalSearchSettings()
     )
     ridge: Annotated[RidgeSettings, Doc("ridge weight of the fuzzy part (base: rigid-body)")] = RidgeSettings()
+
+    def __post_init__(self) -> None:
+        """Apply the rules of both parents."""
+        StructureSettings.__post_init__(self)
+        EvolutionSettings.__post_init__(self)

@@ -8,13 +8,16 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.reduction.row_space import project
+from cpfls_cli.reduction.ties import TIE_TOLERANCE
 
 Predicate = Callable[[Array, float], BoolArray]
 
 # Samples evaluated first, to get a level that most others can be shown not to reach.
 _SCOUTS = 16
-_LEVEL_TOLERANCE = 1e-3
-_TIE_TOLERANCE = 1e-12
+# The level they reach need not be exact: this fraction of the gain over the floor is enough.
+_SCOUT_TOLERANCE = 1e-2
+# Counting eigenvalues loses its accuracy where the level is closer than this to the floor, an eigenvalue.
+_SAFE_DISTANCE = 1e-6
 
 
 def lazy_best(
@@ -51,12 +54,12 @@ def lazy_best(
     """
     highest = float(bounds.max())
     scouts = _highest(bounds)
-    _, level = _raise_level(exceeds, project(rows[scouts], vectors), (floor, highest), _LEVEL_TOLERANCE)
+    _, level = _raise_level(exceeds, project(rows[scouts], vectors), (floor, highest), _SCOUT_TOLERANCE)
     candidates = np.flatnonzero(bounds >= level)
-    for count in bound_vectors:
+    for count in bound_vectors if level - floor > _SAFE_DISTANCE * abs(level) else ():
         reached = exceeds(project(rows[candidates], vectors[:, :count]), level)
         candidates = candidates[reached] if reached.any() else candidates
-    best, _ = _raise_level(exceeds, project(rows[candidates], vectors), (level, highest), _TIE_TOLERANCE)
+    best, _ = _raise_level(exceeds, project(rows[candidates], vectors), (level, highest), 0.0)
     return int(candidates[best].min())
 
 
@@ -66,14 +69,12 @@ def _highest(bounds: Array) -> IntArray:
 
 
 def _raise_level(
-    exceeds: Predicate, projections: Array, interval: tuple[float, float], tolerance: float
+    exceeds: Predicate, projections: Array, interval: tuple[float, float], gain_tolerance: float
 ) -> tuple[IntArray, float]:
     """Bisect for the highest level that a sample still exceeds; return the samples left and that level."""
     best, (low, high) = np.arange(len(projections)), interval
-    while high - low > tolerance * abs(high):
+    while high - low > max(TIE_TOLERANCE * abs(high), gain_tolerance * (high - interval[0])):
         middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
         above = best[exceeds(projections[best], middle)]
         best, low, high = (above, middle, high) if len(above) else (best, low, middle)
     return best, low

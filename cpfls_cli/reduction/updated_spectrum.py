@@ -25,8 +25,8 @@ def eigenvalues_below(eigenvalues: Array, projections: Array, shift: float) -> I
     array of int, shape (samples,)
     """
     distance = eigenvalues - shift
-    # A shift on an eigenvalue moves off it by less than the eigenvalue's own rounding, so that nothing overflows.
-    rounding = np.finfo(float).eps * max(float(np.abs(eigenvalues).max()), abs(shift)) or np.finfo(float).tiny
+    # A shift on an eigenvalue moves off it by no more than that eigenvalue's own rounding, so nothing overflows.
+    rounding = np.finfo(float).eps * np.maximum(np.abs(eigenvalues), abs(shift)) + np.finfo(float).tiny
     distance = np.copysign(np.maximum(np.abs(distance), rounding), distance)
     schur = np.eye(3) + (projections / distance) @ projections.swapaxes(1, 2)
     negative = np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0, axis=1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, require_columns
+from cpfls_cli.arrays import Array, IntArray, require_columns
 from cpfls_cli.regressor.structure import InertiaFunction
 
 
@@ -37,7 +37,7 @@ class Motion:
         """Count the samples."""
         return len(self.attitude)
 
-    def __getitem__(self, samples: slice | Array) -> Motion:
+    def __getitem__(self, samples: slice | IntArray) -> Motion:
         """Take some of the samples."""
         return Motion(self.attitude[samples], self.rate[samples], self.acceleration[samples])
 

@@ -135,3 +135,16 @@ def test_progress_counts_to_the_size():
     calls = []
     reduce(problem(1), ReductionSettings(size=10), lambda done, total: calls.append((done, total)))
     assert calls == [(count, 10) for count in range(1, 11)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_nearly_equal_small_eigenvalues_do_not_hide_the_best_sample(seed):
+    columns = 30
+    blocks = np.diag(1 + 1e-9 * np.arange(columns)).reshape(10, 3, columns)
+    blocks[2:] *= 1.5
+    faint = np.random.default_rng(seed).standard_normal((150, 3, columns)) * 1e-2
+    Q = np.concatenate([blocks, faint * np.geomspace(1, 1e-3, 150)[:, None, None]])
+    chosen = reduce(Q, ReductionSettings(size=16)).indices.tolist()
+    for step in range(10, 16):
+        scores = {i: score("sigma_min", Q, chosen[:step], i) for i in range(160) if i not in chosen[:step]}
+        assert scores[chosen[step]] >= max(scores.values()) * (1 - 1e-11)

@@ -1,0 +1,77 @@
+"""Options that every command takes, declared once."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+
+import typer
+
+if TYPE_CHECKING:
+    from cpfls_cli.config.study import Study
+
+ConfigArgument = Annotated[Path, typer.Argument(metavar="CONFIG", help="Study config (YAML).", show_default=False)]
+OutputOption = Annotated[Path, typer.Option("--output", "-o", help="File to write.", show_default=False)]
+
+
+@dataclass(frozen=True)
+class Common:
+    """Values of the options that every command takes."""
+
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")] = False
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override a key of the config; may be repeated."),
+    ] = None
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Override the seed of the config.")] = None
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing output.")] = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Say more on standard error.")] = False
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check config, inputs and output; compute and write nothing.")
+    ] = False
+
+    def study(self, config: Path) -> Study:
+        """Load a study with the overrides given on the command line."""
+        from cpfls_cli.config.load import load_study
+
+        return load_study(config, self.overrides or (), self.seed)
+
+
+def with_common(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the common options; it receives them as its keyword argument `common`.
+
+    Parameters
+    ----------
+    command : callable
+
+    Returns
+    -------
+    callable
+        With a signature that the command-line library reads.
+    """
+    hints = get_type_hints(command, include_extras=True)
+    common_hints = get_type_hints(Common, include_extras=True)
+    own = [
+        parameter.replace(annotation=hints[name])
+        for name, parameter in inspect.signature(command).parameters.items()
+        if name != "common"
+    ]
+    shared = [
+        inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default, annotation=common_hints[f.name])
+        for f in fields(Common)
+    ]
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> None:
+        common = Common(**{f.name: kwargs.pop(f.name) for f in fields(Common)})
+        command(*args, common=common, **kwargs)
+
+    parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own] + shared
+    wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return wrapped

@@ -1,0 +1,127 @@
+"""What the program says: results on standard output, progress and messages on standard error."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from cpfls_cli.cli.options import Common
+from cpfls_cli.errors import CpflsError
+
+if TYPE_CHECKING:
+    from cpfls_cli.stages.job import Outcome
+
+INTERRUPTED = 130
+
+
+@contextmanager
+def messages_for_errors() -> Iterator[None]:
+    """End a command with one message and its exit code where a user can cause the error.
+
+    Yields
+    ------
+    None
+    """
+    try:
+        yield
+    except CpflsError as error:
+        _complain(str(error))
+        raise typer.Exit(error.exit_code) from None
+    except KeyboardInterrupt:
+        _complain("interrupted: nothing was written")
+        raise typer.Exit(INTERRUPTED) from None
+    except MemoryError:
+        _complain("not enough memory for this flight and structure; reduce the flight or the number of functions")
+        raise typer.Exit(1) from None
+
+
+def tell(outcome: Outcome, common: Common) -> None:
+    """Print what a stage has to say.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    common : Common
+    """
+    if common.as_json:
+        print(json.dumps(_plain(outcome.summary), allow_nan=False))
+    elif not common.quiet:
+        print("\n".join(outcome.lines))
+    if not common.quiet:
+        for warning in outcome.warnings:
+            _complain(warning, "note")
+
+
+@contextmanager
+def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
+    """Show the progress of long work on a terminal, with the time left.
+
+    Parameters
+    ----------
+    title : str
+    common : Common
+
+    Yields
+    ------
+    callable
+        Takes steps done, steps in all, and a note; does nothing where standard error is not a terminal.
+    """
+    if common.quiet or not sys.stderr.isatty():
+        yield _log_progress(title) if common.verbose and not common.quiet else _silent
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn(title),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=None, note="")
+
+        def show(done: int, total: int, note: str = "") -> None:
+            bar.update(task, completed=done, total=total, note=note)
+
+        yield show
+
+
+def _silent(done: int, total: int, note: str = "") -> None:
+    """Show nothing."""
+
+
+def _log_progress(title: str) -> Callable[..., None]:
+    """Write a line at most once a second, for logs."""
+    last = [time.monotonic()]
+
+    def show(done: int, total: int, note: str = "") -> None:
+        if time.monotonic() - last[0] >= 1.0 or done == total:
+            last[0] = time.monotonic()
+            print(f"{title}: {done} of {total}  {note}", file=sys.stderr)
+
+    return show
+
+
+def _complain(text: str, kind: str = "error") -> None:
+    for line in text.splitlines() or [""]:
+        print(f"cpfls: {kind}: {line}", file=sys.stderr)
+
+
+def _plain(value: Any) -> Any:
+    """Replace what JSON has no word for: numbers that are not finite become null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value.item() if hasattr(value, "item") else value

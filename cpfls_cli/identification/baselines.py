@@ -1,0 +1,100 @@
+"""Models that any other must beat: rigid body, constant inertia, no torque at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.least_squares import solve
+from cpfls_cli.identification.rigid_base import rigid_columns
+from cpfls_cli.regressor.motion import Motion
+
+Columns = Callable[[Motion], Array]
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A linear model with few parameters.
+
+    Attributes
+    ----------
+    name : str
+    columns : callable
+        Motion to columns, shape (samples, 3, parameters).
+    parameters : array, shape (parameters,)
+    """
+
+    name: str
+    columns: Columns
+    parameters: Array
+
+    def torque(self, motion: Motion) -> Array:
+        """Predict the generalised torque, shape (samples, 3), N m."""
+        return np.asarray(self.columns(motion) @ self.parameters)
+
+
+def constant_inertia_columns(motion: Motion) -> Array:
+    """Columns of a constant symmetric J in ``J qdd``: J11, J22, J33, J12, J13, J23.
+
+    Parameters
+    ----------
+    motion : Motion
+
+    Returns
+    -------
+    array, shape (samples, 3, 6)
+    """
+    columns = np.zeros((len(motion), 3, 6))
+    for parameter, (row, column) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
+        columns[:, row, parameter] = motion.acceleration[:, column]
+        columns[:, column, parameter] = motion.acceleration[:, row]
+    return columns
+
+
+def no_torque_columns(motion: Motion) -> Array:
+    """Columns of the prediction that no torque acts: none.
+
+    Parameters
+    ----------
+    motion : Motion
+
+    Returns
+    -------
+    array, shape (samples, 3, 0)
+    """
+    return np.zeros((len(motion), 3, 0))
+
+
+def fit_baselines(data: TorqueData, row_scale: Array, rank_tolerance: float) -> tuple[Baseline, ...]:
+    """Fit all baselines to the samples that a model is trained on.
+
+    Parameters
+    ----------
+    data : TorqueData
+    row_scale : array, shape (3,)
+        Weight of each axis, the model's own.
+    rank_tolerance : float
+
+    Returns
+    -------
+    tuple of Baseline
+        Rigid body, constant inertia, torque zero.
+    """
+    kinds: tuple[tuple[str, Columns], ...] = (
+        ("rigid-body", rigid_columns),
+        ("constant-inertia", constant_inertia_columns),
+        ("torque-zero", no_torque_columns),
+    )
+    return tuple(Baseline(name, columns, _fit(columns, data, row_scale, rank_tolerance)) for name, columns in kinds)
+
+
+def _fit(columns: Columns, data: TorqueData, row_scale: Array, rank_tolerance: float) -> Array:
+    matrix = columns(data.motion) * row_scale[:, None]
+    parameters = matrix.shape[2]
+    if parameters == 0:
+        return np.empty(0)
+    return solve(matrix.reshape(-1, parameters), (data.torque * row_scale).reshape(-1), rank_tolerance).coefficients

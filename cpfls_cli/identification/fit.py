@@ -1,0 +1,105 @@
+"""The linear parameters of a model for given partitions: one interface, with and without a rigid body underneath."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.identification.least_squares import LeastSquares, solve
+
+NO_RIGID_BODY = np.zeros(6)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Linear parameters of a model, and the problem whose solution they are.
+
+    Attributes
+    ----------
+    coefficients : array, shape (parameters,), kg m^2
+        Of the fuzzy inertia functions.
+    rigid_body : array, shape (6,), kg m^2
+        Inertia parameters under them; zero without a rigid-body base.
+    ridge_weight : float
+        0 without a ridge; infinite where the fuzzy part is off.
+    mean_squared_error : float
+        First objective: of the torque in (N m)^2, or cross-validated and scaled by axis for a rigid-body base.
+    largest_error : float, N m
+        Second objective.
+    system : LeastSquares
+        The solved system; its condition number is the third objective.
+    row_scale : array, shape (3,), 1/(N m)
+        What the rows of each axis were multiplied with.
+    """
+
+    coefficients: Array
+    rigid_body: Array
+    ridge_weight: float
+    mean_squared_error: float
+    largest_error: float
+    system: LeastSquares
+    row_scale: Array
+
+    @property
+    def objectives(self) -> Array:
+        """Mean squared error, largest error, condition number."""
+        return np.array([self.mean_squared_error, self.largest_error, self.system.condition_number])
+
+
+class CoefficientSolver(Protocol):
+    """Finds the linear parameters for a regressor."""
+
+    def fit(self, Q: Array) -> Fit:
+        """Solve for the linear parameters and judge them.
+
+        Parameters
+        ----------
+        Q : array, shape (samples, 3, parameters)
+
+        Returns
+        -------
+        Fit
+        """
+        ...
+
+    def refit(self, Q: Array, start: Fit) -> Fit:
+        """Solve again with the hyperparameters of an earlier fit, for a local search.
+
+        Parameters
+        ----------
+        Q : array, shape (samples, 3, parameters)
+        start : Fit
+
+        Returns
+        -------
+        Fit
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class PlainSolver:
+    """The paper's: all torque from the fuzzy inertia functions, minimum-norm least squares.
+
+    Attributes
+    ----------
+    torque : array, shape (samples, 3), N m
+    rank_tolerance : float
+    """
+
+    torque: Array
+    rank_tolerance: float
+
+    def fit(self, Q: Array) -> Fit:
+        """Solve for the coefficients; see `CoefficientSolver.fit`."""
+        system = solve(Q.reshape(-1, Q.shape[2]), self.torque.reshape(-1), self.rank_tolerance)
+        mean_squared = float(np.mean(system.residual**2))
+        largest = float(np.max(np.abs(system.residual)))
+        return Fit(system.coefficients, NO_RIGID_BODY, 0.0, mean_squared, largest, system, np.ones(3))
+
+    def refit(self, Q: Array, start: Fit) -> Fit:  # noqa: ARG002 - there are no hyperparameters to keep
+        """Solve for the coefficients; see `CoefficientSolver.refit`."""
+        return self.fit(Q)

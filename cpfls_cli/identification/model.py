@@ -1,0 +1,146 @@
+"""An identified model: torque, inertia matrix and Coriolis matrix for any motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.identification.excitation import outside_visited
+from cpfls_cli.identification.rigid_base import rigid_columns
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import InertiaValues, Regressor
+from cpfls_cli.regressor.structure import ModelStructure
+from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient
+
+_BATCH = 8192
+
+
+@dataclass(frozen=True)
+class Model:
+    """A grey-box model of rotational dynamics.
+
+    Attributes
+    ----------
+    structure : ModelStructure
+    ranges : tuple of InputRange
+        Of roll and pitch over the training data.
+    partitions : tuple of array, shape (functions,)
+        Breakpoints.
+    coefficients : array, shape (parameters,), kg m^2
+    rigid_body : array, shape (6,), kg m^2
+        Ixx, Iyy, Izz, Ixy, Ixz, Iyz under the fuzzy part.
+    visited : array of bool, shape (cells, cells)
+        Cells of roll and pitch that the training data visited.
+    """
+
+    structure: ModelStructure
+    ranges: tuple[InputRange, InputRange]
+    partitions: tuple[Array, ...]
+    coefficients: Array
+    rigid_body: Array
+    visited: BoolArray
+
+    def torque(self, motion: Motion) -> Array:
+        """Predict the generalised torque, ``J qdd + C qd``.
+
+        Parameters
+        ----------
+        motion : Motion
+
+        Returns
+        -------
+        array, shape (samples, 3), N m
+        """
+        starts = range(0, len(motion), _BATCH)
+        return np.concatenate([self._torque(motion[slice(start, start + _BATCH)]) for start in starts])
+
+    def inertia(self, attitude: Array) -> InertiaValues:
+        """Evaluate J(q) and its gradient.
+
+        Parameters
+        ----------
+        attitude : array, shape (samples, 3), rad
+
+        Returns
+        -------
+        InertiaValues
+        """
+        still = Motion(attitude, np.zeros_like(attitude), np.zeros_like(attitude))
+        fuzzy = Regressor(self.structure, still, self.ranges).inertia(self.partitions, self.coefficients)
+        tensor = symmetric(self.rigid_body)
+        return InertiaValues(
+            fuzzy.value + inertia_matrix(attitude, tensor), fuzzy.gradient + inertia_matrix_gradient(attitude, tensor)
+        )
+
+    def coriolis(self, attitude: Array, rate: Array) -> Array:
+        """Evaluate C(q, qd) by Christoffel symbols, so that the torque is ``J qdd + C qd``.
+
+        Parameters
+        ----------
+        attitude : array, shape (samples, 3), rad
+        rate : array, shape (samples, 3), rad/s
+
+        Returns
+        -------
+        array, shape (samples, 3, 3), kg m^2/s
+        """
+        return coriolis_matrix(self.inertia(attitude), rate)
+
+    def outside(self, attitude: Array) -> BoolArray:
+        """Flag attitudes outside the region that the training data visited.
+
+        Parameters
+        ----------
+        attitude : array, shape (samples, 3), rad
+
+        Returns
+        -------
+        array of bool, shape (samples,)
+        """
+        return outside_visited(self.visited, attitude)
+
+    def _torque(self, motion: Motion) -> Array:
+        Q = Regressor(self.structure, motion, self.ranges).matrix(self.partitions)
+        return np.asarray(Q @ self.coefficients + rigid_columns(motion) @ self.rigid_body)
+
+
+def symmetric(parameters: Array) -> Array:
+    """Arrange six parameters as a symmetric matrix.
+
+    Parameters
+    ----------
+    parameters : array, shape (6,)
+        xx, yy, zz, xy, xz, yz.
+
+    Returns
+    -------
+    array, shape (3, 3)
+    """
+    xx, yy, zz, xy, xz, yz = parameters
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def coriolis_matrix(inertia: InertiaValues, rate: Array) -> Array:
+    """Build C(q, qd) from the gradient of the inertia matrix.
+
+    ``C_ij = 1/2 sum_k (dJ_ij/dq_k + dJ_ik/dq_j - dJ_jk/dq_i) qd_k``
+
+    Parameters
+    ----------
+    inertia : InertiaValues
+    rate : array, shape (samples, 3), rad/s
+
+    Returns
+    -------
+    array, shape (samples, 3, 3), kg m^2/s
+
+    References
+    ----------
+    Equation (4).
+    """
+    along = np.einsum("nkij,nk->nij", inertia.gradient, rate)
+    towards = np.einsum("njik,nk->nij", inertia.gradient, rate)
+    return np.asarray(0.5 * (along + towards - towards.swapaxes(1, 2)))

@@ -1,0 +1,1 @@
+"""One module per command: read artifacts, call the numerics, write an artifact."""

@@ -1,0 +1,145 @@
+"""Stage `identify`: find a model in a flight and judge it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.identify import Identification, identify
+from cpfls_cli.identification.judge import Score
+from cpfls_cli.stages.job import Job, Outcome, begin, finish, generator
+from cpfls_cli.stages.model_file import model_data
+from cpfls_cli.stages.training import TrainingData, read_torque_data, read_training
+
+REST = "held-out rest"
+
+
+def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]) -> Outcome:
+    """Identify a model and write it.
+
+    Parameters
+    ----------
+    job : Job
+    flight : Path
+    selection : Path or None
+        Samples to learn from; all of the training part if None.
+    validate : sequence of Path
+        Other flights to judge the model on; nothing is learned from them.
+
+    Returns
+    -------
+    Outcome
+    """
+    inputs = [flight, *([selection] if selection else []), *validate]
+    early = begin(job, *inputs)
+    data = read_training(flight, selection, job.study)
+    held_out = _held_out(data, validate)
+    if early is not None:
+        return early
+    started = time.perf_counter()
+    try:
+        with threadpool_limits(limits=1):
+            result = identify(
+                data.flight[data.split.training],
+                data.flight[data.learned],
+                held_out,
+                job.study.identification,
+                generator(job.study, "identify"),
+                lambda done, total, best: job.progress(done, total, _note(best)),
+            )
+    except ComputationError as error:
+        raise ComputationError(f"{flight}: {error}") from None
+    roles = {"flight": flight, **({"selection": selection} if selection else {})}
+    roles |= {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
+    finish(job, MODEL, model_data(result, job.study.identification.base, data.learned), roles)
+    return _outcome(result, len(data.learned), time.perf_counter() - started)
+
+
+def _held_out(data: TrainingData, validate: Sequence[Path]) -> dict[str, TorqueData]:
+    rest = data.flight[data.split.held_out]
+    parts = {REST: rest} if len(rest) else {}
+    for path in validate:
+        name, number = path.name, 2
+        while name in parts:
+            name, number = f"{path.name} ({number})", number + 1
+        parts[name] = read_torque_data(path)
+    return parts
+
+
+def _note(best: Array) -> str:
+    return "MSE {:.3g}  largest error {:.3g} N m  condition {:.4g}".format(*best)
+
+
+def _outcome(result: Identification, learned: int, seconds: float) -> Outcome:
+    training = result.scores["training"]
+    held_out = {part: scores for part, scores in result.scores.items() if part != "training"}
+    system = result.fit.system
+    baselines = [b.name for b in result.baselines]
+    summary = {
+        **_score_summary(training["model"]),
+        "condition_number": system.condition_number,
+        "rank": system.rank,
+        "parameters": _parameters(result),
+        "generations": len(result.history.evaluations) - 1,
+        "evaluations": int(result.history.evaluations[-1]),
+        "front": len(result.front.objectives),
+        "samples": result.samples["training"],
+        "learned": learned,
+        "ridge_weight": result.fit.ridge_weight,
+        "baselines": {name: _score_summary(training[name]) for name in baselines},
+        "held_out": {
+            part: {
+                **_score_summary(scores["model"]),
+                "samples": result.samples[part],
+                "baselines": {name: _score_summary(scores[name]) for name in baselines},
+            }
+            for part, scores in held_out.items()
+        },
+        "findings": list(result.findings),
+        "seconds": round(seconds, 3),
+    }
+    return Outcome(summary, tuple(_lines(result, learned)), result.findings)
+
+
+def _parameters(result: Identification) -> int:
+    return len(result.model.coefficients) + (6 if np.any(result.model.rigid_body) else 0)
+
+
+def _score_summary(score: Score) -> dict[str, Any]:
+    return {
+        "mse": float(np.mean(score.mse)),
+        "max_error": float(np.max(score.max_error)),
+        "relative_error": _worst(score.relative_error),
+        "mse_by_axis": [float(value) for value in score.mse],
+        "r2": [float(value) for value in score.r2],
+        "r2_body": [float(value) for value in score.r2_body],
+    }
+
+
+def _worst(values: Array) -> float:
+    return float(np.max(values[np.isfinite(values)], initial=0.0))
+
+
+def _lines(result: Identification, learned: int) -> list[str]:
+    system = result.fit.system
+    lines = [
+        f"{_parameters(result)} parameters from {learned} samples; rank {system.rank}, "
+        f"condition number {system.condition_number:.5g}; {result.history.evaluations[-1]} evaluations"
+    ]
+    width = max(len(part) for part in result.scores)
+    for part, scores in result.scores.items():
+        for name, score in scores.items():
+            r2 = " ".join(f"{value:8.4f}" for value in score.r2_body)
+            errors = f"MSE {np.mean(score.mse):9.3g}  largest error {np.max(score.max_error):9.3g} N m"
+            relative = f"relative {_worst(score.relative_error):8.3%}"
+            lines.append(f"{part:{width}}  {name:16}  {errors}  {relative}  R2 roll pitch yaw {r2}")
+    return lines

@@ -1,0 +1,154 @@
+"""Stage `import`: turn a log of somebody's flight into a flight artifact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.formats import FLIGHT
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import CpflsError, InputError
+from cpfls_cli.flightlog.importing import import_log
+from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
+from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.stages.job import Job, Outcome, begin, finish
+from cpfls_cli.stages.table import read_csv
+from cpfls_cli.vehicle.rotors import body_wrench
+
+
+def run(job: Job, log: Path) -> Outcome:
+    """Import a log and write it as a flight.
+
+    Parameters
+    ----------
+    job : Job
+    log : Path
+        CSV, plain or gzip-compressed.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read or lacks columns that the config names.
+    """
+    early = begin(job, log)
+    settings = job.study.import_
+    columns = read_csv(log, _wanted(settings))
+    if early is not None:
+        return early
+    flight = _import(log, columns, job.study)
+    finish(job, FLIGHT, {**_signals(flight), **_quality(flight), **_delay(flight)}, {"log": log})
+    return _outcome(flight)
+
+
+def _import(log: Path, columns: dict[str, Array], study: Study) -> ImportedFlight:
+    try:
+        return import_log(
+            columns,
+            study.import_,
+            rotor_torque=_rotor_torque(study),
+            # The delay is a parameter too: the part of the flight that is held out must not choose it.
+            delay_share=study.identification.training_share,
+        )
+    except CpflsError as error:
+        raise type(error)("\n".join(f"{log}: {line}" for line in str(error).splitlines())) from None
+
+
+def _wanted(settings: ImportSettings) -> set[str]:
+    return {settings.time_column} | {column for signal in settings.signals.values() for column in signal.columns}
+
+
+def _rotor_torque(study: Study) -> Callable[[LogSignals], Array]:
+    """Make the body torque of the rotors from their speeds, or from commands taken for speeds."""
+
+    def torque(signals: LogSignals) -> Array:
+        if study.import_.torque_source == "rotor-speed":
+            speed = signals.rotor_speed
+        else:
+            unit = study.import_.signals["rotor_command"].unit
+            speed = _commanded_speed(signals.rotor_command, unit, study.vehicle.rotor_speed_max_rad_s)
+        rotors = len(study.vehicle.rotors)
+        if speed is None or speed.shape[1] != rotors:
+            raise InputError(
+                f"import.signals names {0 if speed is None else speed.shape[1]} rotors, vehicle.rotors has {rotors}"
+            )
+        return body_wrench(study.vehicle, speed).body_torque
+
+    return torque
+
+
+def _commanded_speed(command: Array | None, unit: str, speed_max: float) -> Array | None:
+    """Take a command in 0..1 as a share of the largest rotor speed; speeds are taken as they are."""
+    if command is None or unit in {"rad/s", "rpm"}:
+        return command
+    if unit != "1":
+        raise InputError(
+            f"import.signals.rotor_command.unit = {unit}: torque_source rotor-command needs commands in 0..1 (unit 1, "
+            "with scale and offset) or rotor speeds (rad/s, rpm)"
+        )
+    return command * speed_max
+
+
+def _signals(flight: ImportedFlight) -> dict[str, Array]:
+    names = [spec.path for spec in FLIGHT.datasets if "/" not in spec.path]
+    return {name: values for name in names if (values := getattr(flight, name)) is not None}
+
+
+def _quality(flight: ImportedFlight) -> dict[str, Any]:
+    counts = _counts(flight)
+    quality: dict[str, Any] = {}
+    if counts:
+        quality["quality/reason"] = np.array(list(counts))
+        quality["quality/dropped"] = np.array(list(counts.values()), dtype=np.int64)
+    if flight.report.warnings:
+        quality["quality/warning"] = np.array(flight.report.warnings)
+    return quality
+
+
+def _counts(flight: ImportedFlight) -> dict[str, int]:
+    """Rows dropped by reason, then values repaired or found saturated."""
+    report = flight.report
+    repaired = {
+        "missing": report.missing,
+        "spikes": report.spikes,
+        "saturated": report.saturated,
+    }
+    counts = {reason: count for reason, count in report.dropped.items() if count}
+    return counts | {kind: sum(by_column.values()) for kind, by_column in repaired.items() if by_column}
+
+
+def _delay(flight: ImportedFlight) -> dict[str, Any]:
+    delay: dict[str, Any] = {"delay/value": flight.report.delay_s}
+    if flight.report.delay is not None:
+        delay |= {"delay/tried": flight.report.delay.delays, "delay/r2": flight.report.delay.curve}
+    return delay
+
+
+def _outcome(flight: ImportedFlight) -> Outcome:
+    report = flight.report
+    estimate = report.delay
+    summary = {
+        "samples": report.samples,
+        "samples_read": report.samples_read,
+        "rate_hz": report.rate_hz,
+        "dropped": {reason: count for reason, count in report.dropped.items() if count},
+        "missing": dict(report.missing),
+        "spikes": dict(report.spikes),
+        "saturated": dict(report.saturated),
+        "delay_s": report.delay_s,
+        "delay_r2": None if estimate is None else [float(value) for value in estimate.r2],
+        "signals": [name for name in _signals(flight) if name != "time"],
+    }
+    lines = [f"{report.samples} samples at {report.rate_hz:.4g} Hz from {report.samples_read} rows"]
+    lines += [f"{reason.replace('_', ' ')}: {count}" for reason, count in _counts(flight).items()]
+    if estimate is not None:
+        r2 = " ".join(f"{value:.3f}" for value in estimate.r2)
+        lines.append(f"delay of motion behind command: {1e3 * report.delay_s:.1f} ms (R2 about body axes {r2})")
+    return Outcome(summary, tuple(lines), report.warnings)

@@ -1,0 +1,73 @@
+"""Stage `predict`: torque, inertia and Coriolis matrices of a stored model along a flight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION
+from cpfls_cli.artifacts.store import Artifact, read_artifact
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.judge import score
+from cpfls_cli.identification.model import Model
+from cpfls_cli.stages.job import Job, Outcome, begin, finish, read_with
+from cpfls_cli.stages.model_file import read_model
+from cpfls_cli.stages.training import MOTION, flight_motion
+
+
+def run(job: Job, model: Path, flight: Path) -> Outcome:
+    """Predict along a flight and write it.
+
+    Parameters
+    ----------
+    job : Job
+    model : Path
+    flight : Path
+
+    Returns
+    -------
+    Outcome
+    """
+    early = begin(job, model, flight)
+    identified = read_model(read_artifact(model, MODEL), model)
+    source = read_with(flight, FLIGHT, "time", *MOTION)
+    if early is not None:
+        return early
+    data = _predict(identified, source)
+    finish(job, PREDICTION, data, {"model": model, "flight": flight})
+    return _outcome(source, data)
+
+
+def _predict(model: Model, flight: Artifact) -> dict[str, Any]:
+    motion = flight_motion(flight)
+    torque = model.torque(motion)
+    data = {
+        "time": flight.array("time"),
+        "attitude": motion.attitude,
+        "torque": torque,
+        "body_torque": rotations.body_torque(motion.attitude, torque),
+        "inertia": model.inertia(motion.attitude).value,
+        "coriolis": model.coriolis(motion.attitude, motion.rate),
+        "outside": model.outside(motion.attitude).astype(np.uint8),
+    }
+    if "torque" in flight.data:
+        data |= {"measured_torque": flight.array("torque"), "error": flight.array("torque") - torque}
+    return data
+
+
+def _outcome(flight: Artifact, data: dict[str, Any]) -> Outcome:
+    samples, outside = len(data["time"]), int(np.sum(data["outside"]))
+    summary: dict[str, Any] = {"samples": samples, "mse": None, "relative_error": None, "outside": outside}
+    lines = [f"{samples} samples, {outside} outside the region that the training data visited"]
+    if "error" in data:
+        measured = TorqueData(data["time"], flight_motion(flight), data["measured_torque"])
+        judged = score(measured, data["torque"])
+        worst = float(np.max(judged.relative_error[np.isfinite(judged.relative_error)], initial=0.0))
+        summary |= {"mse": float(np.mean(judged.mse)), "relative_error": worst}
+        summary |= {"r2": judged.r2.tolist(), "r2_body": judged.r2_body.tolist()}
+        lines.append(f"MSE {summary['mse']:.4g} (N m)^2, relative error {worst:.3%} (worst axis)")
+    warnings = (f"{outside} of {samples} samples are extrapolated: do not trust the model there",) if outside else ()
+    return Outcome(summary, tuple(lines), warnings)

@@ -1,0 +1,106 @@
+"""Stage `reduce`: pick the samples of a flight that are worth learning from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.formats import FLIGHT, SELECTION
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import ComputationError, CpflsError
+from cpfls_cli.identification.data import split_flight
+from cpfls_cli.reduction.baseline import random_selection
+from cpfls_cli.reduction.greedy import reduce
+from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.stages.job import Job, Outcome, begin, finish, generator, read_with
+from cpfls_cli.stages.training import MOTION, flight_motion
+
+RANDOM_DRAWS = 20
+
+
+def run(job: Job, flight: Path) -> Outcome:
+    """Select samples of a flight and write their indices.
+
+    Parameters
+    ----------
+    job : Job
+    flight : Path
+
+    Returns
+    -------
+    Outcome
+    """
+    early = begin(job, flight)
+    source = read_with(flight, FLIGHT, "time", *MOTION)
+    if early is not None:
+        return early
+    end = split_flight(source.array("time"), job.study.identification.training_share, 0.0).training.stop
+    motion = flight_motion(source)[slice(0, end)]
+    structure = model_structure(job.study.identification)
+    regressor = Regressor(structure, motion, data_ranges(structure, motion.attitude))
+    Q = regressor.matrix(uniform_breakpoints(structure))
+    try:
+        with threadpool_limits(limits=1):
+            selection = reduce(Q, job.study.reduction, job.progress)
+            random = _random(Q, len(selection.indices), job.study)
+    except CpflsError as error:
+        raise ComputationError(f"{flight}: {error}") from None
+    finish(job, SELECTION, _data(selection, len(Q), random), {"flight": flight})
+    return _outcome(selection, len(Q), random)
+
+
+def _random(Q: Array, size: int, study: Study) -> Array:
+    """Condition numbers of random choices of equal size: what any rule must beat."""
+    rng = generator(study, "reduce")
+    tolerance = study.reduction.rank_tolerance
+    return np.array([random_selection(Q, size, rng, tolerance).condition_number for _ in range(RANDOM_DRAWS)])
+
+
+def _data(selection: Selection, candidates: int, random: Array) -> dict[str, Any]:
+    return {
+        "indices": selection.indices,
+        "trace/condition_number": selection.condition_number_trace,
+        "trace/singular_value_min": selection.singular_value_min_trace,
+        "trace/singular_value_max": selection.singular_value_max_trace,
+        "rank": selection.rank,
+        "rank_full": selection.rank_full,
+        "condition_number": selection.condition_number,
+        "condition_number_full": selection.condition_number_full,
+        "candidates": candidates,
+        "criterion": np.array(selection.criterion),
+        "stop_reason": np.array(selection.stop_reason),
+        "random/condition_number": random,
+    }
+
+
+def _outcome(selection: Selection, candidates: int, random: Array) -> Outcome:
+    summary = {
+        "samples": candidates,
+        "selected": len(selection.indices),
+        "criterion": selection.criterion,
+        "rank": selection.rank,
+        "rank_full": selection.rank_full,
+        "condition_number": selection.condition_number,
+        "condition_number_full": selection.condition_number_full,
+        "condition_number_random": float(np.median(random)),
+        "stop_reason": selection.stop_reason,
+        "stalled": selection.stalled,
+    }
+    lines = (
+        f"{len(selection.indices)} of {candidates} samples by {selection.criterion}, rank {selection.rank} of "
+        f"{selection.rank_full}",
+        f"condition number {selection.condition_number:.5g} (all samples {selection.condition_number_full:.5g}, random "
+        f"choice of equal size {np.median(random):.5g})",
+    )
+    warnings = (
+        ("the rule stalled below full rank: do not train on this selection; use sigma_min, A or D",)
+        if selection.stalled
+        else ()
+    )
+    return Outcome(summary, lines, warnings)
