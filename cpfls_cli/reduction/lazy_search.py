@@ -16,8 +16,6 @@ Predicate = Callable[[Array, float], BoolArray]
 _SCOUTS = 16
 # The level they reach need not be exact: this fraction of the gain over the floor is enough.
 _SCOUT_TOLERANCE = 1e-2
-# Counting eigenvalues loses its accuracy where the level is closer than this to the floor, an eigenvalue.
-_SAFE_DISTANCE = 1e-6
 
 
 def lazy_best(
@@ -56,7 +54,8 @@ def lazy_best(
     scouts = _highest(bounds)
     _, level = _raise_level(exceeds, project(rows[scouts], vectors), (floor, highest), _SCOUT_TOLERANCE)
     candidates = np.flatnonzero(bounds >= level)
-    for count in bound_vectors if level - floor > _SAFE_DISTANCE * abs(level) else ():
+    # At the floor itself nothing can be discarded, and it is an eigenvalue, where counting has no accuracy.
+    for count in (*bound_vectors, vectors.shape[1]) if level > floor else ():
         reached = exceeds(project(rows[candidates], vectors[:, :count]), level)
         candidates = candidates[reached] if reached.any() else candidates
     best, _ = _raise_level(exceeds, project(rows[candidates], vectors), (level, highest), 0.0)
