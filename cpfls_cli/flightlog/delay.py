@@ -35,7 +35,11 @@ class _Fit:
         torque = self.scaled_torque(delay)
         fitted = (self.basis @ (self.basis.T @ torque.ravel())).reshape(torque.shape)
         left, whole = ((torque - fitted) ** 2).sum(axis=0), (torque**2).sum(axis=0)
-        return float(1 - left.sum() / whole.sum()), 1 - left / np.where(whole > 0, whole, np.inf)
+        acting = whole > 0
+        unexplained = left[acting] / whole[acting]
+        r2 = np.ones(3)
+        r2[acting] = 1 - unexplained
+        return float(1 - np.prod(unexplained) ** (1 / len(unexplained))), r2
 
     def inertia(self, delay: float) -> Array:
         solution = np.linalg.lstsq(self.regressor, self.scaled_torque(delay).ravel(), rcond=None)[0]
@@ -56,8 +60,10 @@ def estimate_delay(
 
     Both sides of ``tau(t - delay) = I omegad + omega x I omega + constant`` go through the same low-pass filter.
     For every delay, the six inertia parameters and a constant torque about each axis are regressed on one common
-    window, each axis scaled by its own standard deviation. The best delay on a grid of one sample is refined between
-    its neighbours.
+    window, each axis scaled by its own standard deviation. Delays are judged by the geometric mean, over the axes, of
+    the share of torque that stays unexplained: the likelihood where every axis has noise of its own size, so that an
+    axis which the motion hardly explains does not move the delay of the others. The best delay on a grid of one
+    sample is refined between its neighbours.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ class DelayEstimate:
     r2 : array, shape (3,)
         Share of the torque explained about each body axis, at that delay.
     pooled_r2 : float
-        The same, all axes together, each scaled by its own variance.
+        All axes together: 1 minus the geometric mean of what stays unexplained about each.
     inertia : array, shape (6,), kg m^2
         Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the regression at that delay.
     delays : array, shape (delay,), s
