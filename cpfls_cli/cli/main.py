@@ -180,7 +180,7 @@ def check(file: FileArgument, *, common: Common) -> None:
 @with_common
 def config_(
     config: Annotated[Path | None, typer.Argument(metavar="[CONFIG]", help="Study config (YAML).")] = None,
-    section: Annotated[list[str] | None, typer.Option("--section", help="Only this section; may be repeated.")] = None,
+    section: Annotated[list[str] | None, typer.Option("--section", help="Only this section, or section.key; may be repeated.")] = None,
     *,
     common: Common,
 ) -> None:

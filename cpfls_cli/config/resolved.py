@@ -19,7 +19,7 @@ def resolved(study: Study, sections: Sequence[str] = ()) -> dict[str, Any]:
     ----------
     study : Study
     sections : sequence of str
-        Only these sections, and the seed; all if empty.
+        Only these sections or single keys (``section.key``), and the seed; all if empty.
 
     Returns
     -------
@@ -28,13 +28,25 @@ def resolved(study: Study, sections: Sequence[str] = ()) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        If a section does not exist.
+        If a section or key does not exist.
     """
-    unknown = sorted(set(sections) - set(SECTIONS))
-    if unknown:
-        raise ConfigError(f"--section {unknown[0]}: no such section; there are {', '.join(SECTIONS)}")
     data: dict[str, Any] = study.model_dump(mode="json", by_alias=True)
-    return {key: value for key, value in data.items() if not sections or key in {*sections, "seed"}}
+    if not sections:
+        return data
+    kept: dict[str, Any] = {"seed": data["seed"]}
+    for section in sections:
+        _copy(section.split("."), data, kept, section)
+    return kept
+
+
+def _copy(keys: list[str], source: Any, target: dict[str, Any], asked: str) -> None:
+    first, *rest = keys
+    if not isinstance(source, dict) or first not in source:
+        raise ConfigError(f"--section {asked}: no such section or key; the sections are {', '.join(SECTIONS)}")
+    if rest:
+        _copy(rest, source[first], target.setdefault(first, {}), asked)
+    else:
+        target[first] = source[first]
 
 
 def resolved_yaml(study: Study, sections: Sequence[str] = ()) -> str:

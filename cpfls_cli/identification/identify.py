@@ -288,8 +288,8 @@ def findings(fit: Fit, excitation: RuleExcitation, scores: Mapping[str, Mapping[
     for axis, explained in zip(("roll", "pitch", "yaw"), rigid, strict=True):
         if not explained > 0.5:
             found.append(
-                f"{axis} is hardly excited: the rigid body explains {explained:.2f} of the variance of its torque in "
-                "training; do not trust this axis"
+                f"{axis} is hardly excited: the motion explains less than half of its torque in training (R2 of the "
+                f"rigid body {explained:.2f}); do not trust this axis"
             )
     for part, by_model in scores.items():
         worse = by_model["model"].mse.sum() > by_model["rigid-body"].mse.sum() * (1 + 1e-9)

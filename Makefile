@@ -1,0 +1,96 @@
+# Two commands work alone on a fresh machine with Python 3.11 or newer, git and make:
+#   make reproduce   the paper's study through all stages, to data/paper/report.html
+#   make test        the tests
+PYTHON ?= python3
+BIN := .venv/bin
+CPFLS := $(BIN)/cpfls
+INSTALLED := .venv/.installed
+INSTALLED_DEV := .venv/.installed-dev
+export OPENBLAS_NUM_THREADS := 1
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: help reproduce quick hexarotor test lint bench clean FORCE
+
+help:
+	@sed -n 's/^# \{0,1\}//p' Makefile | head -4
+	@echo "  make quick       the same study with a small search, in a minute"
+	@echo "  make hexarotor   a six-rotor study with a rigid body under the fuzzy part"
+	@echo "  make lint        formatting, lint, types, import contracts"
+	@echo "  make bench       benchmarks, as Markdown tables"
+	@echo "  make clean       remove what studies produced"
+
+reproduce: data/paper/report.html
+	@echo "open data/paper/report.html"
+
+quick: data/quick/report.html
+	@echo "open data/quick/report.html"
+
+hexarotor: data/hexarotor/report.html
+	@echo "open data/hexarotor/report.html"
+
+$(INSTALLED): pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(INSTALLED_DEV): pyproject.toml | $(INSTALLED)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
+	@touch $@
+
+# Each artifact depends on its inputs and on its own part of the config, written out with all defaults; a part that
+# comes out the same leaves its file, and so everything made from it, untouched.
+STRUCTURE := structure input_map consequents harmonic_order products membership_functions training_share
+PART_trajectory := trajectory vehicle.gravity_m_s2
+PART_simulate := vehicle simulation
+PART_reduce := reduction $(addprefix identification.,$(STRUCTURE))
+PART_identify := identification
+PART_report := vehicle report
+
+define part
+data/%/.part/$(1).yaml: configs/%.yaml FORCE | $(INSTALLED)
+	@mkdir -p $$(@D)
+	@$(CPFLS) config $$< $(foreach key,$(PART_$(1)),--section $(key)) > $$@.new
+	@if cmp --silent $$@.new $$@; then rm $$@.new; else mv $$@.new $$@; fi
+endef
+$(foreach stage,trajectory simulate reduce identify report,$(eval $(call part,$(stage))))
+
+data/%/trajectory.h5: data/%/.part/trajectory.yaml
+	$(CPFLS) trajectory configs/$*.yaml -o $@ --force
+
+data/%/flight.h5: data/%/trajectory.h5 data/%/.part/simulate.yaml
+	$(CPFLS) simulate configs/$*.yaml $< -o $@ --force
+
+data/%/selection.h5: data/%/flight.h5 data/%/.part/reduce.yaml
+	$(CPFLS) reduce configs/$*.yaml $< -o $@ --force
+
+data/%/model.h5: data/%/flight.h5 data/%/selection.h5 data/%/.part/identify.yaml
+	$(CPFLS) identify configs/$*.yaml $< --selection data/$*/selection.h5 -o $@ --force
+
+data/%/prediction.h5: data/%/model.h5 data/%/flight.h5
+	$(CPFLS) predict configs/$*.yaml $^ -o $@ --force
+
+ARTIFACTS := trajectory flight selection model prediction
+
+data/%/report.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
+	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) -o $@ --force
+
+test: $(INSTALLED_DEV)
+	$(BIN)/python -m pytest -n 2
+
+lint: $(INSTALLED_DEV)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(INSTALLED_DEV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[bench]"
+	$(BIN)/python benchmarks/evolution_hypervolume.py
+	$(BIN)/python benchmarks/reduction.py
+
+clean:
+	rm -rf data/paper data/quick data/hexarotor
+
+FORCE:
