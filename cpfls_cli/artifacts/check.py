@@ -40,17 +40,24 @@ def _dimensions(artifact: Artifact) -> Iterator[str]:
                 yield f"{spec.path}: {length} along '{label}', but {known} by {where}"
 
 
+def _kinds(artifact: Artifact) -> Iterator[str]:
+    for spec, values in _present(artifact):
+        wanted = "text" if spec.units == "text" else "numbers"
+        if (values.dtype.kind == "U") != (wanted == "text") or values.dtype.kind not in "Uiuf":
+            yield f"{spec.path}: holds {values.dtype}, expected {wanted}"
+
+
 def _finite(artifact: Artifact) -> Iterator[str]:
     for spec, values in _present(artifact):
         if values.dtype.kind == "f" and not spec.gaps:
-            bad = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1) if values.ndim else values).all(axis=-1))
+            bad = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
             if bad.size:
                 yield f"{spec.path}: {bad.size} samples are not finite, the first at index {bad[0]}"
 
 
 def _time_ascends(artifact: Artifact) -> Iterator[str]:
-    time = artifact.data.get("time")
-    if time is not None and np.any(np.diff(time) <= 0):
+    time = np.asarray(artifact.data.get("time", ()))
+    if time.ndim == 1 and time.dtype.kind in "iuf" and np.any(np.diff(time) <= 0):
         yield f"time: does not ascend at index {int(np.argmax(np.diff(time) <= 0)) + 1}"
 
 
@@ -60,4 +67,4 @@ def _present(artifact: Artifact) -> Iterator[tuple[DatasetSpec, np.ndarray]]:
             yield spec, np.asarray(artifact.data[spec.path])
 
 
-_RULES: tuple[Callable[[Artifact], Iterator[str]], ...] = (_dimensions, _finite, _time_ascends)
+_RULES: tuple[Callable[[Artifact], Iterator[str]], ...] = (_dimensions, _kinds, _finite, _time_ascends)

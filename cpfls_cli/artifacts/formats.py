@@ -59,7 +59,9 @@ FLIGHT = ArtifactSpec(
         DatasetSpec("quality/warning", ("warning",), "text", NO_FRAME, "what to know about the log", required=False),
         DatasetSpec("delay/value", (), "s", NO_FRAME, "delay of motion behind command, taken out", required=False),
         DatasetSpec("delay/tried", ("tried",), "s", NO_FRAME, "delays tried by the estimate", required=False),
-        DatasetSpec("delay/r2", ("tried",), "1", NO_FRAME, "R2 of the rigid body by delay, axes together", required=False),
+        DatasetSpec(
+            "delay/r2", ("tried",), "1", NO_FRAME, "R2 of the rigid body by delay, axes together", required=False
+        ),
         DatasetSpec("noise/signal", ("noisy",), "text", NO_FRAME, "signals with added noise", required=False),
         DatasetSpec("noise/std", ("noisy", "axis"), "SI", NO_FRAME, "standard deviation added", required=False),
     ),

@@ -125,12 +125,13 @@ def check_output(path: Path, force: bool) -> None:
     InputError
         If the file exists, its folder does not, or the folder cannot be written.
     """
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; -o names a file")
-    if path.exists() and not force:
-        raise InputError(f"{path}: exists already; --force replaces it")
     with atomic_path(path):
-        pass
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; -o names a file")
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: is a device or a pipe; -o names a file")
+        if path.exists() and not force:
+            raise InputError(f"{path}: exists already; --force replaces it")
 
 
 @contextmanager
@@ -155,13 +156,13 @@ def atomic_path(path: Path) -> Iterator[Path]:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     except OSError as error:
         raise InputError(f"{path}: cannot write into the folder {path.parent}: {error.strerror}") from None
-    os.close(handle)
     temporary = Path(name)
-    # mkstemp makes private files; an artifact gets the permissions any new file would.
-    mask = os.umask(0)
-    os.umask(mask)
-    temporary.chmod(0o666 & ~mask)
     try:
+        os.close(handle)
+        # mkstemp makes private files; an artifact gets the permissions any new file would.
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
         yield temporary
     finally:
         temporary.unlink(missing_ok=True)
@@ -232,18 +233,18 @@ def read_artifact(path: Path, *wanted: ArtifactSpec) -> Artifact:
         If the file is missing, truncated, foreign, of another stage or of a newer schema.
     """
     with _open(path) as file:
-        spec = _identify(path, file)
-        if wanted and spec not in wanted:
-            asked = " or ".join(f"{w.format} (made by `cpfls {w.made_by}`)" for w in wanted)
-            raise InputError(f"{path}: is a {spec.format}; this command needs a {asked}")
-        missing = [d.path for d in spec.datasets if d.required and d.path not in file]
-        if missing:
-            raise InputError(f"{path}: the {spec.format} lacks {', '.join(missing)}; make it again")
         try:
+            spec = _identify(path, file)
+            if wanted and spec not in wanted:
+                asked = " or ".join(f"{w.format} (made by `cpfls {w.made_by}`)" for w in wanted)
+                raise InputError(f"{path}: is a {spec.format}; this command needs a {asked}")
+            missing = [d.path for d in spec.datasets if d.required and d.path not in file]
+            if missing:
+                raise InputError(f"{path}: the {spec.format} lacks {_some(missing)}; make it again")
             data = {d.path: _read(file[d.path]) for d in spec.datasets if d.path in file}
             return Artifact(spec, _read_header(file), data)
-        except (OSError, KeyError, RuntimeError, ValueError, TypeError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: damaged: {error}") from None
+        except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError) as error:
+            raise InputError(f"{path}: damaged: {_one_line(error)}") from None
 
 
 def format_name(path: Path) -> str | None:
@@ -261,7 +262,7 @@ def format_name(path: Path) -> str | None:
     try:
         with h5py.File(path, "r") as file:
             return _text_attribute(file, "format")
-    except OSError:
+    except (OSError, RuntimeError, ValueError):
         return None
 
 
@@ -271,6 +272,8 @@ def _open(path: Path) -> Iterator[h5py.File]:
         raise InputError(f"{path}: no such file")
     if path.is_dir():
         raise InputError(f"{path}: is a folder, not an artifact")
+    if not path.is_file():
+        raise InputError(f"{path}: is a device or a pipe, not a file")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: is empty")
     try:
@@ -312,7 +315,7 @@ def _write_header(file: h5py.File, artifact: Artifact) -> None:
     file.attrs["schema_version"] = SCHEMA_VERSION
     file.attrs["cpfls_version"] = header.version
     file.attrs["seed"] = header.seed
-    file.attrs["config_sha256"] = hashlib.sha256(header.config.encode()).hexdigest()
+    file.attrs["config_sha256"] = _sha256(header.config)
     file.create_dataset(CONFIG, data=np.bytes_(header.config.encode()))
     for role, source in header.inputs.items():
         group = file.create_group(f"{INPUTS}/{role}")
@@ -326,7 +329,13 @@ def _read_header(file: h5py.File) -> Header:
         for role, group in file.get(INPUTS, {}).items()
     }
     config = bytes(file[CONFIG][()]).decode()
+    if _sha256(config) != file.attrs["config_sha256"]:
+        raise ValueError(f"/{CONFIG} was changed after the file was written (config_sha256 differs)")
     return Header(str(file.attrs["cpfls_version"]), int(file.attrs["seed"]), config, inputs)
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _write_dataset(file: h5py.File, spec: DatasetSpec, value: Any) -> None:
@@ -346,6 +355,15 @@ def _read(dataset: h5py.Dataset) -> Any:
     if dataset.dtype.kind == "S":
         return np.char.decode(np.asarray(value), "utf-8")
     return value
+
+
+def _some(names: list[str], most: int = 5) -> str:
+    rest = len(names) - most
+    return ", ".join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error.args[0] if error.args else error).split())
 
 
 def _text_attribute(file: h5py.File, name: str) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
@@ -11,6 +11,8 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 from typing_extensions import Doc
 
 from cpfls_cli.config.study import Study
+
+_ENTRIES = {tuple, list, dict, Mapping}
 
 
 @dataclass(frozen=True)
@@ -24,11 +26,14 @@ class Key:
         One line; empty where none is declared.
     section : type or None
         The settings class below this key.
+    many : bool
+        Whether the key holds a list or a mapping of such sections.
     """
 
     name: str
     doc: str
     section: type | None
+    many: bool
 
 
 @cache
@@ -49,7 +54,7 @@ def keys_of(settings: type) -> tuple[Key, ...]:
         names = {name: field.alias or name for name, field in Study.model_fields.items()}
     else:
         names = {field.name: field.name for field in fields(settings)}
-    return tuple(Key(shown, _doc(hints[name]), _section(hints[name])) for name, shown in names.items())
+    return tuple(Key(shown, _doc(hints[name]), *_section(hints[name])) for name, shown in names.items())
 
 
 def known_keys(location: Sequence[str], deep: bool = False) -> list[str]:
@@ -58,7 +63,7 @@ def known_keys(location: Sequence[str], deep: bool = False) -> list[str]:
     Parameters
     ----------
     location : sequence of str
-        Keys down from the root; list indices are passed over.
+        Keys down from the root; the index or name of an entry is passed over.
     deep : bool
         List dotted paths of everything below instead.
 
@@ -68,9 +73,12 @@ def known_keys(location: Sequence[str], deep: bool = False) -> list[str]:
         Empty where the place is no section.
     """
     settings: type | None = Study
-    for part in location:
-        if settings is not None and not part.isdigit():
-            settings = next((key.section for key in keys_of(settings) if key.name == part), None)
+    parts = iter(location)
+    for part in parts:
+        key = next((key for key in keys_of(settings) if key.name == part), None) if settings else None
+        settings = key.section if key else None
+        if key is not None and key.many and next(parts, None) is None:
+            return []
     if settings is None:
         return []
     return list(_paths(settings)) if deep else [key.name for key in keys_of(settings)]
@@ -89,10 +97,12 @@ def _doc(hint: Any) -> str:
     return next((note.documentation for note in get_args(hint)[1:] if isinstance(note, Doc)), "")
 
 
-def _section(hint: Any) -> type | None:
+def _section(hint: Any, many: bool = False) -> tuple[type | None, bool]:
     """Find the settings class inside a hint such as ``Annotated[tuple[RotorSettings, ...], ...]``."""
     if is_dataclass(hint) and isinstance(hint, type):
-        return hint
-    if get_origin(hint) in {Annotated, tuple, dict, Union, types.UnionType}:
-        return next((found for part in get_args(hint) if (found := _section(part)) is not None), None)
-    return None
+        return hint, many
+    origin = get_origin(hint)
+    if origin in {Annotated, Union, types.UnionType} or origin in _ENTRIES:
+        found = (_section(part, many or origin in _ENTRIES) for part in get_args(hint))
+        return next((pair for pair in found if pair[0] is not None), (None, False))
+    return None, False

@@ -99,4 +99,6 @@ def _commented(settings: type, data: dict[str, Any], depth: int) -> Iterator[str
             continue
         if key.doc:
             yield f"{indent}# {key.doc}"
+        if key.section is not None:
+            yield from (f"{indent}#   {below.name}: {below.doc}" for below in keys_of(key.section))
         yield from (indent + line for line in to_yaml({key.name: value}).rstrip("\n").split("\n"))

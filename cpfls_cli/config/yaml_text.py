@@ -9,25 +9,27 @@ import yaml
 
 from cpfls_cli.errors import ConfigError
 
+_TAG = "tag:yaml.org,2002:"
+_FLOAT = re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$")
+_INT = re.compile(r"^[-+]?(0|[1-9][0-9]*)$")
+
 
 class _StudyLoader(yaml.SafeLoader):
-    """A safe loader with YAML 1.2 floats and booleans, no dates, and no duplicate keys."""
+    """A safe loader with YAML 1.2 numbers and booleans, no dates, no duplicate keys, and nothing that JSON lacks."""
 
 
 _StudyLoader.yaml_implicit_resolvers = {
-    first: [
-        (tag, pattern) for tag, pattern in resolvers if tag.rsplit(":", 1)[-1] not in {"float", "bool", "timestamp"}
-    ]
+    first: [(tag, pattern) for tag, pattern in resolvers if tag in {_TAG + "null", _TAG + "merge"}]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
-_StudyLoader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$"),
-    list("-+0123456789."),
-)
-_StudyLoader.add_implicit_resolver(
-    "tag:yaml.org,2002:bool", re.compile(r"^(true|True|TRUE|false|False|FALSE)$"), list("tTfF")
-)
+_StudyLoader.yaml_constructors = {
+    tag: construct
+    for tag, construct in yaml.SafeLoader.yaml_constructors.items()
+    if tag is None or tag.removeprefix(_TAG) in {"null", "bool", "int", "float", "str", "seq", "map"}
+}
+_StudyLoader.add_implicit_resolver(_TAG + "int", _INT, list("-+0123456789"))
+_StudyLoader.add_implicit_resolver(_TAG + "float", _FLOAT, list("-+0123456789."))
+_StudyLoader.add_implicit_resolver(_TAG + "bool", re.compile(r"^(true|True|TRUE|false|False|FALSE)$"), list("tTfF"))
 
 
 def _mapping_without_duplicates(loader: _StudyLoader, node: yaml.MappingNode) -> dict[Any, Any]:
@@ -72,8 +74,8 @@ def parse_yaml(text: str, source: str) -> Any:
         mark = error.problem_mark
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         raise ConfigError(f"{source}{where}: not valid YAML: {error.problem}") from None
-    except (yaml.YAMLError, RecursionError) as error:
-        raise ConfigError(f"{source}: not valid YAML: {error}") from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise ConfigError(f"{source}: not valid YAML: {str(error).splitlines()[0]}") from None
 
 
 def to_yaml(data: Any) -> str:
@@ -101,3 +103,5 @@ def _represent_list(dumper: _StudyDumper, data: list[Any]) -> yaml.Node:
 
 
 _StudyDumper.add_representer(list, _represent_list)
+# Text such as 1e-3 is quoted, because the loader above takes it for a number.
+_StudyDumper.add_implicit_resolver(_TAG + "float", _FLOAT, list("-+0123456789."))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from cpfls_cli.artifacts.formats import FLIGHT
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.importing import import_log
+from cpfls_cli.flightlog.reading import read_signals
 from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.stages.job import Job, Outcome, begin, finish
@@ -41,24 +43,31 @@ def run(job: Job, log: Path) -> Outcome:
     early = begin(job, log)
     settings = job.study.import_
     columns = read_csv(log, _wanted(settings))
-    if early is not None:
-        return early
-    flight = _import(log, columns, job.study)
+    with _naming(log):
+        if early is not None:
+            read_signals(columns, settings)
+            return early
+        flight = _import(columns, job.study)
     finish(job, FLIGHT, {**_signals(flight), **_quality(flight), **_delay(flight)}, {"log": log})
     return _outcome(flight)
 
 
-def _import(log: Path, columns: dict[str, Array], study: Study) -> ImportedFlight:
+@contextmanager
+def _naming(log: Path) -> Iterator[None]:
     try:
-        return import_log(
-            columns,
-            study.import_,
-            rotor_torque=_rotor_torque(study),
-            # The delay is a parameter too: the part of the flight that is held out must not choose it.
-            delay_share=study.identification.training_share,
-        )
+        yield
     except CpflsError as error:
         raise type(error)("\n".join(f"{log}: {line}" for line in str(error).splitlines())) from None
+
+
+def _import(columns: dict[str, Array], study: Study) -> ImportedFlight:
+    return import_log(
+        columns,
+        study.import_,
+        rotor_torque=_rotor_torque(study),
+        # The delay is a parameter too: the part of the flight that is held out must not choose it.
+        delay_share=study.identification.training_share,
+    )
 
 
 def _wanted(settings: ImportSettings) -> set[str]:

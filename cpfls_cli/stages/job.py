@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 import cpfls_cli
+from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.spec import ArtifactSpec
 from cpfls_cli.artifacts.store import (
     Artifact,
@@ -96,8 +97,8 @@ def begin(job: Job, *inputs: Path) -> Outcome | None:
     for path in inputs:
         if not path.exists():
             raise InputError(f"{path}: no such file")
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder, not a file")
+        if not path.is_file():
+            raise InputError(f"{path}: is a {'folder' if path.is_dir() else 'device or a pipe'}, not a file")
         if job.output.exists() and path.samefile(job.output):
             raise InputError(f"{job.output}: is an input of this command; -o must name another file")
     check_output(job.output, job.force)
@@ -158,19 +159,38 @@ def read_with(path: Path, spec: ArtifactSpec, *needed: str) -> Artifact:
     Raises
     ------
     InputError
-        If one is missing or not finite; the message names the file and the signal.
+        If one is missing or breaks the format; the message names the file and the signal.
     """
-    artifact = read_artifact(path, spec)
+    artifact = read_good(path, spec)
     missing = [name for name in needed if name not in artifact.data]
     if missing:
         raise InputError(f"{path}: lacks {', '.join(missing)}; this stage needs {', '.join(needed)}")
-    for name in needed:
-        values = artifact.array(name)
-        if len(values) != len(artifact.array(needed[0])) or len(values) == 0:
-            raise InputError(f"{path}: {name} has {len(values)} samples, {needed[0]} {len(artifact.array(needed[0]))}")
-        if not np.isfinite(values).all():
-            first = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
-            raise InputError(f"{path}: {name} is not finite at sample {first}")
+    if any(artifact.array(name).size == 0 for name in needed):
+        raise InputError(f"{path}: holds no samples")
+    return artifact
+
+
+def read_good(path: Path, spec: ArtifactSpec) -> Artifact:
+    """Read an artifact that keeps to its format.
+
+    Parameters
+    ----------
+    path : Path
+    spec : ArtifactSpec
+
+    Returns
+    -------
+    Artifact
+
+    Raises
+    ------
+    InputError
+        Naming every dataset that has a wrong shape or kind, or is not finite where it must be.
+    """
+    artifact = read_artifact(path, spec)
+    findings = check_artifact(artifact)
+    if findings:
+        raise InputError("\n".join(f"{path}: {finding}" for finding in findings))
     return artifact
 
 

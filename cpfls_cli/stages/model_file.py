@@ -9,8 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.store import Artifact
-from cpfls_cli.config.load import validate
-from cpfls_cli.config.yaml_text import parse_yaml
+from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.chromosome import decode
@@ -62,7 +61,8 @@ def read_model(artifact: Artifact, path: object) -> Model:
     InputError
         If the artifact's own config and its numbers do not fit each other.
     """
-    study = validate(parse_yaml(artifact.header.config, f"{path}: /config"), f"{path}: /config")
+    source = f"{path}: /config"
+    study = validate(parse_config(artifact.header.config, source), source)
     structure = model_structure(study.identification)
     weights, coefficients = artifact.array("model/weights"), artifact.array("model/coefficients")
     if len(weights) != structure.genes or len(coefficients) != structure.parameters:

@@ -9,11 +9,11 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION
-from cpfls_cli.artifacts.store import Artifact, read_artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import score
 from cpfls_cli.identification.model import Model
-from cpfls_cli.stages.job import Job, Outcome, begin, finish, read_with
+from cpfls_cli.stages.job import Job, Outcome, begin, finish, read_good, read_with
 from cpfls_cli.stages.model_file import read_model
 from cpfls_cli.stages.training import MOTION, flight_motion
 
@@ -32,7 +32,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     Outcome
     """
     early = begin(job, model, flight)
-    identified = read_model(read_artifact(model, MODEL), model)
+    identified = read_model(read_good(model, MODEL), model)
     source = read_with(flight, FLIGHT, "time", *MOTION)
     if early is not None:
         return early

@@ -9,12 +9,12 @@ import numpy as np
 
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.artifacts.formats import FLIGHT, SELECTION
-from cpfls_cli.artifacts.store import Artifact, file_sha256, read_artifact
+from cpfls_cli.artifacts.store import Artifact, file_sha256
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.identification.data import Split, TorqueData, split_flight
 from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.stages.job import read_with
+from cpfls_cli.stages.job import read_good, read_with
 
 MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
 
@@ -95,7 +95,7 @@ def read_training(path: Path, selection: Path | None, study: Study) -> TrainingD
 
 
 def _selected(path: Path, selection: Path, training_end: int) -> IntArray:
-    artifact = read_artifact(selection, SELECTION)
+    artifact = read_good(selection, SELECTION)
     source = artifact.header.inputs.get("flight")
     if source is None or source.sha256 != file_sha256(path):
         name = source.name if source else "an unknown flight"
@@ -103,8 +103,10 @@ def _selected(path: Path, selection: Path, training_end: int) -> IntArray:
             f"{selection}: was made from another flight ({name}, sha256 differs from {path}); "
             f"run `cpfls reduce` on {path}"
         )
-    indices = np.sort(artifact.array("indices").astype(np.int64))
-    if len(indices) == 0 or indices[0] < 0 or indices[-1] >= training_end:
+    indices = np.unique(artifact.array("indices").astype(np.int64))
+    if len(indices) == 0 or indices[0] < 0 or len(indices) != len(artifact.array("indices")):
+        raise InputError(f"{selection}: indices is empty, negative or repeats itself; run `cpfls reduce` again")
+    if indices[-1] >= training_end:
         raise InputError(
             f"{selection}: selects samples beyond the first {training_end} that train; "
             "identification.training_share has changed since: run `cpfls reduce` again"

@@ -1,0 +1,129 @@
+"""What is wrong with a config, in one line for each key."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from pydantic_core import ErrorDetails
+
+from cpfls_cli.config.keys import known_keys
+from cpfls_cli.errors import SettingError
+
+_UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
+_LENGTH = {"too_short", "too_long"}
+_LONGEST_VALUE = 60
+_PLAIN_WORDS = {
+    "must be a valid array": "must be a list",
+    "must be an object": "must be a section of keys",
+    "must be a valid dictionary": "must be a section of keys",
+    "must be a valid string": "must be text",
+    "must be a valid boolean": "must be true or false",
+    "must be a valid integer": "must be a whole number",
+    "must be a valid number": "must be a number",
+    "Field required": "is missing",
+}
+
+Location = tuple[str, ...]
+
+
+def describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], source: str) -> list[str]:
+    """Describe every wrong key of a config.
+
+    Parameters
+    ----------
+    errors : iterable of ErrorDetails
+        From the validating library.
+    data : dict
+        What was validated.
+    source : str
+        Name of the file.
+
+    Returns
+    -------
+    list of str
+        One line for each key: ``file: dotted.key = value: what is wrong (did you mean ...?)``.
+    """
+    # Where a key allows several types, each of them has its own complaint; a line joins them.
+    reasons: dict[Location, dict[Sequence[int | str], str]] = {}
+    for detail in errors:
+        alternative = detail["loc"]
+        location = _location(detail, data)
+        if _lacks_entry(detail):
+            alternative, location = alternative[:-1], location[:-1]
+        if (reason := _reason(detail, location, data)) is not None:
+            reasons.setdefault(location, {})[alternative] = reason
+    return [_line(location, found.values(), data, source) for location, found in reasons.items()]
+
+
+def _line(location: Location, reasons: Iterable[str], data: dict[str, Any], source: str) -> str:
+    known, value = _value(data, location)
+    text = json.dumps(value)
+    if len(text) > _LONGEST_VALUE:
+        text = text[:_LONGEST_VALUE] + " ..."
+    shown = f" = {text}" if known and not isinstance(value, dict) else ""
+    return f"{source}: {'.'.join(location)}{shown}: {' or '.join(dict.fromkeys(reasons))}"
+
+
+def _location(detail: ErrorDetails, data: dict[str, Any]) -> Location:
+    """Drop the parts of a location that name alternatives of a type, and add the key of a combination rule."""
+    location: list[str] = []
+    place: Any = data
+    for part in detail["loc"]:
+        if isinstance(part, int):
+            place = place[part] if isinstance(place, list) and part < len(place) else None
+        elif isinstance(place, dict) and (part in place or detail["type"] == "missing"):
+            place = place.get(part)
+        else:
+            continue
+        location.append(str(part))
+    cause = detail.get("ctx", {}).get("error")
+    return (*location, *(cause.key.split(".") if isinstance(cause, SettingError) else ()))
+
+
+def _lacks_entry(detail: ErrorDetails) -> bool:
+    return detail["type"] == "missing" and isinstance(detail["loc"][-1], int)
+
+
+def _value(data: Any, location: Location) -> tuple[bool, Any]:
+    for part in location:
+        if isinstance(data, dict) and part in data:
+            data = data[part]
+        elif isinstance(data, list) and part.isdecimal() and int(part) < len(data):
+            data = data[int(part)]
+        else:
+            return False, None
+    return True, data
+
+
+def _reason(detail: ErrorDetails, location: Location, data: dict[str, Any]) -> str | None:
+    if detail["type"] in _UNKNOWN:
+        return "unknown key" + _nearest(location)
+    if _lacks_entry(detail):
+        return f"needs {int(detail['loc'][-1]) + 1} entries"
+    if detail["type"] in _LENGTH:
+        return _length(detail, _value(data, location)[1])
+    message = detail["msg"].removeprefix("Value error, ")
+    message = message.replace("Input should be ", "must be ", 1) if message.startswith("Input should be ") else message
+    return _PLAIN_WORDS.get(message, message)
+
+
+def _length(detail: ErrorDetails, value: Any) -> str | None:
+    """Say what length is wanted; None where entries only count as lacking because they are wrong themselves."""
+    context = detail.get("ctx", {})
+    if detail["type"] == "too_long":
+        return f"needs {context.get('max_length')} entries at most"
+    least = int(context.get("min_length", 0))
+    return None if isinstance(value, list) and len(value) >= least else f"needs {least} entries at least"
+
+
+def _nearest(location: Location) -> str:
+    """Suggest the key that was meant: of this name in another section, or of a similar name in this one."""
+    keys = known_keys(location[:-1])
+    elsewhere = [path for path in known_keys([], deep=True) if path.rsplit(".", 1)[-1] == location[-1]]
+    near = difflib.get_close_matches(location[-1], keys, n=1, cutoff=0.5)
+    if elsewhere or near:
+        return f" (did you mean '{[*elsewhere, *near][0]}'?)"
+    return f" (valid here: {', '.join(keys)})" if keys else ""
