@@ -1,0 +1,75 @@
+"""Ridge weight by blocked cross-validation against a refit for every block and weight."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.identification.cross_validation import contiguous_blocks, ridge_curve
+
+RIGID = 6
+WEIGHTS = np.geomspace(1e-6, 1e2, 5)
+
+
+def problem(fuzzy=9, samples=60, share=0.3, noise=0.5):
+    """Rows of a rigid part and of a fuzzy part that matters by its share."""
+    rng = np.random.default_rng(13)
+    rows = rng.standard_normal((samples, 3, RIGID + fuzzy))
+    truth = rng.standard_normal(RIGID + fuzzy) * np.where(np.arange(RIGID + fuzzy) < RIGID, 1.0, share)
+    return rows, rows @ truth + noise * rng.standard_normal((samples, 3)), 0.01 * np.arange(samples)
+
+
+def brute_force(rows, right_side, blocks, weight):
+    """Errors by block of a dense least-squares fit, the ridge as extra rows on the fuzzy columns."""
+    errors = []
+    for validation, left_out in zip(blocks.validation, blocks.left_out, strict=True):
+        A, y = rows[~left_out].reshape(-1, rows.shape[2]), right_side[~left_out].ravel()
+        if np.isinf(weight):
+            A, penalty = A[:, :RIGID], np.empty((0, RIGID))
+        else:
+            penalty = np.sqrt(weight * len(y)) * np.eye(A.shape[1])[RIGID:]
+        c = np.linalg.lstsq(np.vstack([A, penalty]), np.concatenate([y, np.zeros(len(penalty))]), rcond=None)[0]
+        errors.append(np.mean((right_side[validation] - rows[validation][:, :, : len(c)] @ c) ** 2))
+    return np.array(errors)
+
+
+@pytest.mark.parametrize("fuzzy", [9, 150])
+@pytest.mark.parametrize(("samples", "folds", "embargo"), [(60, 5, 0.0), (61, 4, 0.05), (40, 2, 0.03)])
+def test_curve_is_that_of_a_refit_per_block_and_weight(fuzzy, samples, folds, embargo):
+    rows, right_side, time = problem(fuzzy, samples)
+    blocks = contiguous_blocks(time, folds, embargo)
+    curve = ridge_curve(rows, right_side, blocks, WEIGHTS)
+    np.testing.assert_array_equal(curve.weight, [*WEIGHTS, np.inf])
+    errors = np.array([brute_force(rows, right_side, blocks, weight) for weight in curve.weight])
+    size = blocks.validation.sum(axis=1)
+    # A tiny ridge on fewer rows than columns is where normal equations lose digits.
+    np.testing.assert_allclose(curve.error, errors @ size / size.sum(), rtol=1e-6)
+    np.testing.assert_allclose(curve.standard_error, errors.std(axis=1, ddof=1) / np.sqrt(folds), rtol=1e-5)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.05, 0.3])
+def test_chosen_weight_is_the_largest_within_one_standard_error(share):
+    rows, right_side, time = problem(share=share)
+    curve = ridge_curve(rows, right_side, contiguous_blocks(time, 5, 0.0), WEIGHTS)
+    best = np.argmin(curve.error)
+    good = [
+        w for w, e in zip(curve.weight, curve.error, strict=True) if e <= curve.error[best] + curve.standard_error[best]
+    ]
+    assert curve.weight[curve.chosen] == max(good)
+
+
+def test_a_useless_fuzzy_part_is_switched_off_and_a_useful_one_is_not():
+    chosen = []
+    for share in (0.0, 1.0):
+        rows, right_side, time = problem(share=share)
+        curve = ridge_curve(rows, right_side, contiguous_blocks(time, 5, 0.0), WEIGHTS)
+        chosen.append(curve.weight[curve.chosen])
+    assert chosen[0] == np.inf
+    assert chosen[1] < 1
+
+
+def test_dependent_rigid_columns_are_allowed():
+    rows, right_side, time = problem()
+    rows[:, :, 5] = rows[:, :, 0]
+    blocks = contiguous_blocks(time, 5, 0.0)
+    curve = ridge_curve(rows, right_side, blocks, WEIGHTS)
+    errors = np.array([brute_force(rows, right_side, blocks, weight).mean() for weight in curve.weight])
+    np.testing.assert_allclose(curve.error, errors, rtol=1e-6)

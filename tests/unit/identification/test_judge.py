@@ -1,0 +1,49 @@
+"""Scores worked by hand."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.identification import TorqueData
+from cpfls_cli.identification.judge import score
+from cpfls_cli.regressor import Motion
+
+
+def level(torque, attitude=None):
+    torque = np.asarray(torque, dtype=float)
+    zero = np.zeros_like(torque)
+    return TorqueData(np.arange(len(torque)), Motion(zero if attitude is None else attitude, zero, zero), torque)
+
+
+def test_by_hand():
+    data = level([[1, 0, 2], [3, 0, 2], [5, 0, 2]])
+    predicted = np.array([[1, 1, 2], [2, 0, 2], [7, 0, 1]])
+    judged = score(data, predicted)
+    np.testing.assert_allclose(judged.mse, [5 / 3, 1 / 3, 1 / 3])
+    np.testing.assert_allclose(judged.max_error, [2, 1, 1])
+    np.testing.assert_allclose(judged.relative_error, [2 / 5, np.nan, 1 / 2])
+    # Sum of squares about the mean is 8 for roll; pitch and yaw do not vary.
+    np.testing.assert_allclose(judged.r2, [1 - 5 / 8, np.nan, np.nan])
+    np.testing.assert_allclose(judged.r2_body, judged.r2)
+
+
+def test_body_axes():
+    """At 90 degrees of roll the Euler pitch torque is the body's negative yaw torque."""
+    torque = [[1, 2, 5], [2, -3, 4], [4, 9, 1]]
+    rolled = np.tile([np.pi / 2, 0.0, 0.0], (3, 1))
+    judged = score(level(torque, rolled), np.add(torque, [[0, 1, 0], [0, 0, 0], [0, 0, 2]]))
+    np.testing.assert_allclose(judged.r2_body, judged.r2[[0, 2, 1]], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("torque", "samples", "message"),
+    [
+        (np.zeros((3, 2)), 3, r"torque: expected shape \(time, 3\)"),
+        (np.zeros((3, 3)), 4, "have 4, 4 and 3 samples"),
+        (np.full((3, 3), np.nan), 3, "not finite"),
+    ],
+)
+def test_data_that_do_not_fit_are_refused(torque, samples, message):
+    zero = np.zeros((samples, 3))
+    with pytest.raises(ComputationError, match=message):
+        TorqueData(np.arange(samples), Motion(zero, zero, zero), torque)
