@@ -26,13 +26,14 @@ class Fit:
     ridge_weight : float
         0 without a ridge; infinite where the fuzzy part is off.
     mean_squared_error : float
-        First objective: of the torque in (N m)^2, or cross-validated and scaled by axis for a rigid-body base.
-    largest_error : float, N m
-        Second objective.
+        What the solver minimised, on the samples it learned from: of the torque in (N m)^2, or cross-validated and
+        scaled by axis for a rigid-body base.
     system : LeastSquares
-        The solved system; its condition number is the third objective.
+        The solved system.
     row_scale : array, shape (3,), 1/(N m)
         What the rows of each axis were multiplied with.
+    column_size : array, shape (parameters,)
+        What the columns were divided by before the ridge held their coefficients; 1 without a ridge.
     """
 
     coefficients: Array
@@ -42,6 +43,7 @@ class Fit:
     largest_error: float
     system: LeastSquares
     row_scale: Array
+    column_size: Array
 
     @property
     def objectives(self) -> Array:
@@ -98,7 +100,8 @@ class PlainSolver:
         system = solve(Q.reshape(-1, Q.shape[2]), self.torque.reshape(-1), self.rank_tolerance)
         mean_squared = float(np.mean(system.residual**2))
         largest = float(np.max(np.abs(system.residual)))
-        return Fit(system.coefficients, NO_RIGID_BODY, 0.0, mean_squared, largest, system, np.ones(3))
+        unscaled = np.ones(3), np.ones(Q.shape[2])
+        return Fit(system.coefficients, NO_RIGID_BODY, 0.0, mean_squared, largest, system, *unscaled)
 
     def refit(self, Q: Array, start: Fit) -> Fit:  # noqa: ARG002 - there are no hyperparameters to keep
         """Solve for the coefficients; see `CoefficientSolver.refit`."""

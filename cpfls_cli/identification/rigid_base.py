@@ -63,11 +63,15 @@ class RigidBaseSolver:
     def fit(self, Q: Array) -> Fit:
         """Choose the ridge weight and solve; see `CoefficientSolver.fit`."""
         curve = self.curve(Q)
-        return self._solve(Q, float(curve.weight[curve.chosen]), float(curve.error[curve.chosen]))
+        size = column_size(Q * self.row_scale[:, None])
+        return self._solve(Q, size, float(curve.weight[curve.chosen]), float(curve.error[curve.chosen]))
 
     def refit(self, Q: Array, start: Fit) -> Fit:
-        """Solve with the ridge weight of an earlier fit; see `CoefficientSolver.refit`."""
-        return self._solve(Q, start.ridge_weight, start.mean_squared_error)
+        """Solve with the ridge weight and column sizes of an earlier fit; see `CoefficientSolver.refit`.
+
+        A penalty that moved with the columns would add a term to the gradient that variable projection leaves out.
+        """
+        return self._solve(Q, start.column_size, start.ridge_weight, start.mean_squared_error)
 
     def curve(self, Q: Array) -> RidgeCurve:
         """Cross-validate the ridge weight.
@@ -84,23 +88,22 @@ class RigidBaseSolver:
         rows = np.concatenate([self.rigid, scaled / column_size(scaled)], axis=2)
         return ridge_curve(rows, self.torque, self.blocks, self.weights)
 
-    def _solve(self, Q: Array, ridge_weight: float, cross_validated: float) -> Fit:
+    def _solve(self, Q: Array, size: Array, ridge_weight: float, cross_validated: float) -> Fit:
         """Solve the augmented system in full precision."""
         parameters = Q.shape[2]
         if np.isinf(ridge_weight):
             system = solve(self.rigid.reshape(-1, RIGID), self.torque.reshape(-1), self.rank_tolerance)
             rigid_body, coefficients = system.coefficients, np.zeros(parameters)
         else:
-            scaled = Q * self.row_scale[:, None]
-            size = column_size(scaled)
-            matrix = np.concatenate([self.rigid, scaled / size], axis=2).reshape(-1, RIGID + parameters)
+            scaled = Q * self.row_scale[:, None] / size
+            matrix = np.concatenate([self.rigid, scaled], axis=2).reshape(-1, RIGID + parameters)
             penalty = np.sqrt(ridge_weight * len(matrix)) * np.eye(parameters, RIGID + parameters, RIGID)
             right_side = np.concatenate([self.torque.reshape(-1), np.zeros(parameters)])
             system = solve(np.vstack([matrix, penalty]), right_side, self.rank_tolerance)
             rigid_body, coefficients = system.coefficients[:RIGID], system.coefficients[RIGID:] / size
         error = system.residual[: self.torque.size].reshape(-1, 3) / self.row_scale
         largest = float(np.max(np.abs(error)))
-        return Fit(coefficients, rigid_body, ridge_weight, cross_validated, largest, system, self.row_scale)
+        return Fit(coefficients, rigid_body, ridge_weight, cross_validated, largest, system, self.row_scale, size)
 
 
 def rigid_columns(motion: Motion) -> Array:
