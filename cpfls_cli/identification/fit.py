@@ -40,15 +40,9 @@ class Fit:
     rigid_body: Array
     ridge_weight: float
     mean_squared_error: float
-    largest_error: float
     system: LeastSquares
     row_scale: Array
     column_size: Array
-
-    @property
-    def objectives(self) -> Array:
-        """Mean squared error, largest error, condition number."""
-        return np.array([self.mean_squared_error, self.largest_error, self.system.condition_number])
 
 
 class CoefficientSolver(Protocol):
@@ -99,9 +93,8 @@ class PlainSolver:
         """Solve for the coefficients; see `CoefficientSolver.fit`."""
         system = solve(Q.reshape(-1, Q.shape[2]), self.torque.reshape(-1), self.rank_tolerance)
         mean_squared = float(np.mean(system.residual**2))
-        largest = float(np.max(np.abs(system.residual)))
         unscaled = np.ones(3), np.ones(Q.shape[2])
-        return Fit(system.coefficients, NO_RIGID_BODY, 0.0, mean_squared, largest, system, *unscaled)
+        return Fit(system.coefficients, NO_RIGID_BODY, 0.0, mean_squared, system, *unscaled)
 
     def refit(self, Q: Array, start: Fit) -> Fit:  # noqa: ARG002 - there are no hyperparameters to keep
         """Solve for the coefficients; see `CoefficientSolver.refit`."""

@@ -11,12 +11,13 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.engine import evolve
 from cpfls_cli.evolution.state import Generation
+from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.baselines import Baseline, fit_baselines
 from cpfls_cli.identification.choice import choose
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.cross_validation import RIGID, RidgeCurve
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.evaluator import Evaluator, Judge
 from cpfls_cli.identification.excitation import RuleExcitation, rule_excitation, visited_cells
 from cpfls_cli.identification.fit import CoefficientSolver, Fit, PlainSolver
 from cpfls_cli.identification.judge import Score, score
@@ -24,6 +25,7 @@ from cpfls_cli.identification.least_squares import LeastSquares, solve
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.rigid_base import RigidBaseSolver
 from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import Regressor, data_ranges
 from cpfls_cli.regressor.structure import model_structure
 
@@ -83,7 +85,8 @@ class Identification:
     baselines : tuple of Baseline
         Fitted to the same samples.
     scores : mapping of str to mapping of str to Score
-        By part of the data, then by model: ``model`` and the baselines' names.
+        By part of the data, then by model: ``model``, the baselines' names, and ``uniform-partitions``: the same
+        structure without any search.
     samples : mapping of str to int
         Samples judged by part.
     findings : tuple of str
@@ -139,23 +142,21 @@ def identify(
     Paper section 9; method.md sections 4, 5, 7 and 8.
     """
     structure = model_structure(settings)
-    regressor = Regressor(structure, learned.motion, data_ranges(structure, training.motion.attitude))
-    solver = coefficient_solver(learned, settings)
-    evaluator = Evaluator(regressor, solver, settings.local_search)
-    front, history = search(evaluator, settings, rng, progress)
-    chromosome = front.chromosomes[front.chosen]
-    fit = evaluator.fit(chromosome)
-    if fit is None:
-        raise ComputationError("no chromosome gave a finite model; the data may not move at all")
-    partitions = decode(structure, chromosome.astype(float))
     ranges = data_ranges(structure, training.motion.attitude)
-    visited = visited_cells(training.motion.attitude)
-    model = Model(structure, ranges, partitions, fit.coefficients, fit.rigid_body, visited)
+    regressor = Regressor(structure, learned.motion, ranges)
+    solver = coefficient_solver(learned, settings)
+    judge = Judge.of(training, Regressor(structure, training.motion, ranges))
+    evaluator = Evaluator(regressor, solver, judge, settings.local_search, settings.base == "rigid-body")
+    front, history = search(evaluator, settings, rng, progress)
+    model, fit = _model(evaluator, front.chromosomes[front.chosen], training, ranges)
     baselines = fit_baselines(learned, fit.row_scale, settings.rank_tolerance)
     parts = {"training": training, **held_out}
-    scores = {name: _scores(model, baselines, data) for name, data in parts.items()}
-    excitation = rule_excitation(regressor, partitions, _fuzzy_system(regressor, partitions, settings))
-    ridge = solver.curve(regressor.matrix(partitions)) if isinstance(solver, RigidBaseSolver) else None
+    predictors = {"model": model.torque} | {baseline.name: baseline.torque for baseline in baselines}
+    if structure.genes > 0:
+        predictors["uniform-partitions"] = _model(evaluator, uniform_chromosome(structure), training, ranges)[0].torque
+    scores = {part: _scores(predictors, data) for part, data in parts.items()}
+    excitation = rule_excitation(regressor, model.partitions, _fuzzy_system(regressor, model.partitions, settings))
+    ridge = solver.curve(regressor.matrix(model.partitions)) if isinstance(solver, RigidBaseSolver) else None
     return Identification(
         model=model,
         fit=fit,
@@ -226,7 +227,8 @@ def search(
         history = History(np.array([1]), objectives, np.array([1]))
         return Front(only.genes, objectives, 0), history
     generations: list[Generation] = []
-    for generation in evolve(evaluator, structure.genes, settings, rng):
+    initial = uniform_chromosome(structure)[None] if settings.start == "with-uniform" else None
+    for generation in evolve(evaluator, structure.genes, settings, rng, initial):
         generations.append(generation)
         if progress is not None:
             progress(generation.index, settings.generations, _best(generation))
@@ -248,9 +250,21 @@ def _best(generation: Generation) -> Array:
     return np.asarray(np.min(generation.front_objectives, axis=0))
 
 
-def _scores(model: Model, baselines: tuple[Baseline, ...], data: TorqueData) -> dict[str, Score]:
-    predictions = {"model": model.torque(data.motion)} | {b.name: b.torque(data.motion) for b in baselines}
-    return {name: score(data, torque) for name, torque in predictions.items()}
+def _model(
+    evaluator: Evaluator, chromosome: IntArray, training: TorqueData, ranges: tuple[InputRange, InputRange]
+) -> tuple[Model, Fit]:
+    """Solve one chromosome in full precision."""
+    structure = evaluator.regressor.structure
+    fit = evaluator.fit(chromosome)
+    if fit is None:
+        raise ComputationError("no chromosome gave a finite model; the data may not move at all")
+    partitions = decode(structure, chromosome.astype(float))
+    visited = visited_cells(training.motion.attitude)
+    return Model(structure, ranges, partitions, fit.coefficients, fit.rigid_body, visited), fit
+
+
+def _scores(predictors: Mapping[str, Callable[[Motion], Array]], data: TorqueData) -> dict[str, Score]:
+    return {name: score(data, torque(data.motion)) for name, torque in predictors.items()}
 
 
 def _fuzzy_system(

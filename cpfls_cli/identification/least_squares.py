@@ -28,6 +28,8 @@ class LeastSquares:
         Orthonormal basis of what the columns span.
     row_space : array, shape (rank, parameters)
         Orthonormal basis of the directions that the data determine.
+    rank_tolerance : float
+        Singular values below this share of the largest counted as zero.
     """
 
     coefficients: Array
@@ -36,6 +38,7 @@ class LeastSquares:
     rank: int
     range_basis: Array
     row_space: Array
+    rank_tolerance: float
 
     @property
     def condition_number(self) -> float:
@@ -43,6 +46,15 @@ class LeastSquares:
         if self.rank == 0:
             return float("inf")
         return float(self.singular_values[0] / self.singular_values[self.rank - 1])
+
+    @property
+    def conditioning(self) -> float:
+        """Condition number for comparing systems: one of smaller rank is always worse, and finite.
+
+        Over the kept singular values alone, a system would gain by losing rank.
+        """
+        missing = len(self.singular_values) - self.rank
+        return self.condition_number if missing == 0 else (1.0 + missing) / self.rank_tolerance
 
     def reject(self, columns: Array) -> Array:
         """Project columns off what the regressor spans.
@@ -83,4 +95,4 @@ def solve(matrix: Array, right_side: Array, rank_tolerance: float) -> LeastSquar
     projected = range_basis.T @ right_side
     coefficients = row_space.T @ (projected / singular_values[:rank])
     residual = right_side - range_basis @ projected
-    return LeastSquares(coefficients, residual, singular_values, rank, range_basis, row_space)
+    return LeastSquares(coefficients, residual, singular_values, rank, range_basis, row_space, rank_tolerance)

@@ -103,8 +103,8 @@ class Model:
         return outside_visited(self.visited, attitude)
 
     def _torque(self, motion: Motion) -> Array:
-        Q = Regressor(self.structure, motion, self.ranges).matrix(self.partitions)
-        return np.asarray(Q @ self.coefficients + rigid_columns(motion) @ self.rigid_body)
+        fuzzy = Regressor(self.structure, motion, self.ranges).torque(self.partitions, self.coefficients)
+        return np.asarray(fuzzy + rigid_columns(motion) @ self.rigid_body)
 
 
 def symmetric(parameters: Array) -> Array:

@@ -101,9 +101,7 @@ class RigidBaseSolver:
             right_side = np.concatenate([self.torque.reshape(-1), np.zeros(parameters)])
             system = solve(np.vstack([matrix, penalty]), right_side, self.rank_tolerance)
             rigid_body, coefficients = system.coefficients[:RIGID], system.coefficients[RIGID:] / size
-        error = system.residual[: self.torque.size].reshape(-1, 3) / self.row_scale
-        largest = float(np.max(np.abs(error)))
-        return Fit(coefficients, rigid_body, ridge_weight, cross_validated, largest, system, self.row_scale, size)
+        return Fit(coefficients, rigid_body, ridge_weight, cross_validated, system, self.row_scale, size)
 
 
 def rigid_columns(motion: Motion) -> Array:

@@ -45,6 +45,10 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         Base, Doc("none: fuzzy part only, the paper; rigid-body: six inertia parameters under a ridge-held fuzzy part")
     ] = "rigid-body"
     choice: Annotated[Choice, Doc("which member of the Pareto front becomes the model")] = "mse-below-median-condition"
+    start: Annotated[
+        Literal["random", "with-uniform"],
+        Doc("initial population: all random, or random with the equidistant partitions among them"),
+    ] = "with-uniform"
     rank_tolerance: Annotated[
         float, Gt(0), Le(1e-2), Doc("singular values below this share of the largest count as zero")
     ] = 1e-10

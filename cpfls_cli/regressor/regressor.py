@@ -110,6 +110,30 @@ class Regressor:
             Q[:, :, block.columns] = terms
         return Q
 
+    def torque(self, partitions: Breakpoints, coefficients: Array) -> Array:
+        """Evaluate ``Q c`` without building Q.
+
+        Parameters
+        ----------
+        partitions : sequence of array
+        coefficients : array, shape (parameters,)
+
+        Returns
+        -------
+        array, shape (samples, 3), N m
+        """
+        torque = np.zeros((len(self.motion), 3))
+        for index, block in enumerate(self.structure.blocks):
+            carried, evaluated = self.carriers[index], self.basis(index, partitions)
+            own = coefficients[block.columns]
+            along = np.zeros(len(self.motion))
+            for angle, gradient in zip(block.function.inputs, evaluated.gradient, strict=True):
+                slope = gradient @ own
+                along += slope * self.motion.rate[:, angle]
+                torque[:, angle] -= carried.energy * slope
+            torque += carried.acceleration * (evaluated.value @ own)[:, None] + carried.rate * along[:, None]
+        return torque
+
     def basis(self, index: int, partitions: Breakpoints) -> Basis:
         """Evaluate the basis of one inertia function.
 

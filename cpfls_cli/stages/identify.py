@@ -83,7 +83,7 @@ def _outcome(result: Identification, learned: int, seconds: float) -> Outcome:
     training = result.scores["training"]
     held_out = {part: scores for part, scores in result.scores.items() if part != "training"}
     system = result.fit.system
-    baselines = [b.name for b in result.baselines]
+    baselines = [name for name in training if name != "model"]
     summary = {
         **_score_summary(training["model"]),
         "condition_number": system.condition_number,

@@ -138,7 +138,7 @@ def _search(result: Identification) -> dict[str, Any]:
 
 def _judged(result: Identification) -> dict[str, Any]:
     parts = list(result.scores)
-    models = ["model", *(baseline.name for baseline in result.baselines)]
+    models = list(result.scores["training"])
     by_name = {baseline.name: baseline.parameters for baseline in result.baselines}
 
     def table(measure: str) -> Array:
