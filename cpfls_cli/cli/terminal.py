@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -13,12 +14,10 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cpfls_cli.cli.options import Common
-from cpfls_cli.errors import CpflsError
+from cpfls_cli.errors import CpflsError, InputError
 
 if TYPE_CHECKING:
     from cpfls_cli.stages.job import Outcome
-
-INTERRUPTED = 130
 
 
 @contextmanager
@@ -34,12 +33,18 @@ def messages_for_errors() -> Iterator[None]:
     except CpflsError as error:
         _complain(str(error))
         raise typer.Exit(error.exit_code) from None
-    except KeyboardInterrupt:
-        _complain("interrupted: nothing was written")
-        raise typer.Exit(INTERRUPTED) from None
     except MemoryError:
         _complain("not enough memory for this flight and structure; reduce the flight or the number of functions")
         raise typer.Exit(1) from None
+    except BrokenPipeError:
+        # Whoever reads the output has seen enough, as in `cpfls config | head -1`.
+        _mute_output()
+        raise typer.Exit(1) from None
+    except OSError as error:
+        if error.filename is None:
+            _mute_output()
+        _complain(f"{error.filename or 'output'}: {error.strerror or error}")
+        raise typer.Exit(InputError.exit_code) from None
 
 
 def tell(outcome: Outcome, common: Common) -> None:
@@ -51,9 +56,9 @@ def tell(outcome: Outcome, common: Common) -> None:
     common : Common
     """
     if common.as_json:
-        print(json.dumps(_plain(outcome.summary), allow_nan=False))
+        print(json.dumps(_plain(outcome.summary), allow_nan=False), flush=True)
     elif not common.quiet:
-        print("\n".join(outcome.lines))
+        print("\n".join(outcome.lines), flush=True)
     if not common.quiet:
         for warning in outcome.warnings:
             _complain(warning, "note")
@@ -109,6 +114,11 @@ def _log_progress(title: str) -> Callable[..., None]:
             print(f"{title}: {done} of {total}  {note}", file=sys.stderr)
 
     return show
+
+
+def _mute_output() -> None:
+    """Send what is still to be printed nowhere, or the interpreter would stumble over it when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(text: str, kind: str = "error") -> None:

@@ -1,0 +1,205 @@
+"""The commands: parse, load, one call, print. Numerics are imported only by the command that needs them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cpfls_cli import __version__
+from cpfls_cli.cli.options import Common, ConfigArgument, OutputOption, with_common
+from cpfls_cli.cli.terminal import messages_for_errors, progress_bar, tell
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cpfls_cli.stages.job import Job, Outcome
+
+app = typer.Typer(
+    name="cpfls",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Identify a multirotor's rotational dynamics from flights.",
+)
+
+TrajectoryArgument = Annotated[Path, typer.Argument(metavar="TRAJECTORY", help="Made by `cpfls trajectory`.")]
+FlightArgument = Annotated[Path, typer.Argument(metavar="FLIGHT", help="Made by `cpfls simulate` or `cpfls import`.")]
+LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help="Flight log, .csv or .csv.gz.")]
+ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`.")]
+FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
+ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        with messages_for_errors():
+            print(f"cpfls {__version__}", flush=True)
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Take the options that stand before a command."""
+
+
+@app.command()
+@with_common
+def trajectory(config: ConfigArgument, output: OutputOption, *, common: Common) -> None:
+    """Plan a smooth training path."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import trajectory as stage
+
+        return stage.run(job)
+
+    _run("trajectory", config, output, common, call)
+
+
+@app.command()
+@with_common
+def simulate(config: ConfigArgument, trajectory: TrajectoryArgument, output: OutputOption, *, common: Common) -> None:
+    """Fly a trajectory with the exact vehicle."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import simulate as stage
+
+        return stage.run(job, trajectory)
+
+    _run("simulate", config, output, common, call)
+
+
+@app.command("import")
+@with_common
+def import_(config: ConfigArgument, log: LogArgument, output: OutputOption, *, common: Common) -> None:
+    """Turn a flight log into a flight."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import import_log as stage
+
+        return stage.run(job, log)
+
+    _run("import", config, output, common, call)
+
+
+@app.command()
+@with_common
+def reduce(config: ConfigArgument, flight: FlightArgument, output: OutputOption, *, common: Common) -> None:
+    """Pick the samples of a flight that are worth learning from."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import reduce as stage
+
+        return stage.run(job, flight)
+
+    _run("reduce", config, output, common, call)
+
+
+@app.command()
+@with_common
+def identify(
+    config: ConfigArgument,
+    flight: FlightArgument,
+    output: OutputOption,
+    selection: Annotated[
+        Path | None, typer.Option("--selection", help="Learn from these samples only (made by `cpfls reduce`).")
+    ] = None,
+    validate: Annotated[
+        list[Path] | None, typer.Option("--validate", help="Judge on another flight too; may be repeated.")
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Identify a model from a flight and judge it beside its baselines."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import identify as stage
+
+        return stage.run(job, flight, selection, validate or [])
+
+    _run("identify", config, output, common, call)
+
+
+@app.command()
+@with_common
+def predict(
+    config: ConfigArgument, model: ModelArgument, flight: FlightArgument, output: OutputOption, *, common: Common
+) -> None:
+    """Predict torque, inertia and Coriolis matrices of a model along a flight."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import predict as stage
+
+        return stage.run(job, model, flight)
+
+    _run("predict", config, output, common, call)
+
+
+@app.command()
+@with_common
+def report(config: ConfigArgument, artifacts: ArtifactsArgument, output: OutputOption, *, common: Common) -> None:
+    """Write one self-contained HTML page about artifacts."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import report as stage
+
+        return stage.run(job, artifacts)
+
+    _run("report", config, output, common, call)
+
+
+@app.command()
+@with_common
+def info(file: FileArgument, *, common: Common) -> None:
+    """Show what an artifact holds and where it comes from."""
+    with messages_for_errors():
+        from cpfls_cli.stages.inspect import info as describe
+
+        tell(describe(file), common)
+
+
+@app.command()
+@with_common
+def check(file: FileArgument, *, common: Common) -> None:
+    """Check an artifact against its format; exit code 1 where it does not keep to it."""
+    with messages_for_errors():
+        from cpfls_cli.stages.inspect import check as examine
+
+        outcome, good = examine(file)
+        tell(outcome, common)
+        if not good:
+            raise typer.Exit(1)
+
+
+@app.command("config")
+@with_common
+def config_(
+    config: Annotated[Path | None, typer.Argument(metavar="[CONFIG]", help="Study config (YAML).")] = None,
+    section: Annotated[
+        list[str] | None, typer.Option("--section", help="Only this section, or section.key; may be repeated.")
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Print the resolved config; without CONFIG, a commented default."""
+    with messages_for_errors():
+        from cpfls_cli.stages.config import show
+
+        tell(show(config, section or [], common.overrides or [], common.seed), common)
+
+
+def _run(title: str, config: Path, output: Path, common: Common, call: Callable[[Job], Outcome]) -> None:
+    """Load the study, run one stage with a progress bar, and print what it says."""
+    with messages_for_errors():
+        from cpfls_cli.stages.job import Job
+
+        study = common.study(config)
+        with progress_bar(title, common) as progress:
+            outcome = call(Job(study, output, common.force, common.dry_run, progress))
+        tell(outcome, common)

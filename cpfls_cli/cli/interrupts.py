@@ -1,0 +1,61 @@
+"""Interrupts: one line and an exit code, never a traceback, whatever the program was doing."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_MESSAGE = b"cpfls: error: interrupted: no half-written file is left\n"
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_Handler = Callable[[int, FrameType | None], None]
+
+
+def leave_on_interrupt() -> None:
+    """Leave at once at an interrupt: for the time of loading, when there is nothing to tidy up."""
+    _install(_leave)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Turn an interrupt into `KeyboardInterrupt`, and whatever comes of it into an exit code.
+
+    The exit code is 128 plus the number of the signal: 130 after Ctrl-C, 143 after a request to terminate.
+
+    Yields
+    ------
+    None
+    """
+    received: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        if received:
+            _leave(number, frame)
+        received.append(number)
+        raise KeyboardInterrupt(number)
+
+    _install(stop)
+    try:
+        yield
+    except BaseException:
+        # A compiled module whose import is interrupted may raise an error of its own in place of the interrupt.
+        if received:
+            _leave(received[0], None)
+        raise
+    finally:
+        _install(signal.SIG_DFL)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+    os.write(2, _MESSAGE)
+    os._exit(128 + number)
+
+
+def _install(handler: _Handler | signal.Handlers) -> None:
+    for number in _SIGNALS:
+        # A shell starts background work with interrupts ignored; that is the user's wish.
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
