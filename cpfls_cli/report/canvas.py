@@ -1,0 +1,137 @@
+"""One style for all figures, and the one way to draw them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.report.content import Plot
+from cpfls_cli.report.decimation import kept_samples
+from cpfls_cli.report.svg import inline_svg
+
+WIDTH = 7.6
+GREY = "#767676"
+STYLES: tuple[dict[str, Any], ...] = (
+    {"color": "#1b4f8a", "linestyle": "-"},
+    {"color": "#c4570a", "linestyle": (0, (5, 1.6))},
+    {"color": "#12805c", "linestyle": (0, (6, 1.5, 1.2, 1.5))},
+    {"color": "#8b2f7f", "linestyle": (0, (1.3, 1.3))},
+    {"color": "#7a5c00", "linestyle": (0, (8, 2))},
+    {"color": "#3d3d3d", "linestyle": (0, (4, 1.4, 1.2, 1.4, 1.2, 1.4))},
+)
+"""Colour and dashes together, so that a print in black and white can be read."""
+
+BASELINE: dict[str, Any] = {"color": GREY, "linestyle": (0, (3, 2)), "linewidth": 1.2}
+"""Whatever a result is compared with."""
+
+_STYLE: dict[str, Any] = {
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.size": 9.5,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.5,
+    "axes.edgecolor": "#555555",
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.unicode_minus": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.3,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "legend.handlelength": 2.8,
+    "xtick.color": "#333333",
+    "ytick.color": "#333333",
+}
+
+
+def plot(name: str, caption: str, description: str, height: float, draw: Callable[[Figure], None]) -> Plot:
+    """Draw a figure.
+
+    Parameters
+    ----------
+    name : str
+        Unique on the page.
+    caption : str
+    description : str
+        What the figure shows, for those who do not see it.
+    height : float
+        Inches, at a width of 7.6.
+    draw : callable
+        Fills an empty figure.
+
+    Returns
+    -------
+    Plot
+    """
+    style: Any = {**_STYLE, "svg.hashsalt": name}
+    with matplotlib.rc_context():
+        # A reader's own matplotlib settings must not change the page.
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(style)
+        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+        draw(figure)
+        return Plot(name, caption, inline_svg(figure, name, description))
+
+
+def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
+    """Draw a curve, thinned out so that no peak is lost.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    x, y : array, shape (samples,)
+    **style
+        As `Axes.plot` takes it.
+    """
+    kept = kept_samples(y)
+    axes.plot(x[kept], y[kept], **style)
+
+
+def stacked(figure: Figure, rows: int) -> list[Axes]:
+    """Make plots one above the other with one x axis.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    rows : int
+
+    Returns
+    -------
+    list of matplotlib.axes.Axes
+    """
+    return list(figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0])
+
+
+def legend_above(axes: Axes, columns: int = 4) -> None:
+    """Put a legend above a plot, where it hides no curve.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    columns : int
+    """
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1)
+
+
+def style_of(index: int) -> dict[str, Any]:
+    """Get the style of the curve with this number; styles repeat after six.
+
+    Parameters
+    ----------
+    index : int
+
+    Returns
+    -------
+    dict
+    """
+    return STYLES[index % len(STYLES)]

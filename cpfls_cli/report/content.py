@@ -1,0 +1,173 @@
+"""What a page is made of: sections of text, facts, tables, plots and details."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+Tone = Literal["plain", "note", "good", "warning"]
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph.
+
+    Attributes
+    ----------
+    text : str
+    tone : {"plain", "note", "good", "warning"}
+        How much it stands out.
+    """
+
+    text: str
+    tone: Tone = "plain"
+    kind: ClassVar[str] = "text"
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Terms and what they are here.
+
+    Attributes
+    ----------
+    rows : sequence of (str, str)
+    """
+
+    rows: Sequence[tuple[str, str]]
+    kind: ClassVar[str] = "facts"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table that stands out.
+
+    Attributes
+    ----------
+    text : str
+    tone : {"plain", "note", "good", "warning"}
+    """
+
+    text: str
+    tone: Tone = "plain"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; its first column names the rows.
+
+    Attributes
+    ----------
+    name : str
+        Unique on the page.
+    caption : str
+    header : sequence of str
+    rows : sequence of sequence of (str or Cell)
+    words : frozenset of int
+        Columns that hold words and are aligned left; all others hold numbers.
+    """
+
+    name: str
+    caption: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str | Cell]]
+    words: frozenset[int] = frozenset({0})
+    kind: ClassVar[str] = "table"
+
+    @property
+    def cells(self) -> list[list[Cell]]:
+        """All rows with every entry as a cell."""
+        return [[entry if isinstance(entry, Cell) else Cell(entry) for entry in row] for row in self.rows]
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure as SVG.
+
+    Attributes
+    ----------
+    name : str
+        Unique on the page.
+    caption : str
+    svg : str
+        One ``svg`` element without external references.
+    """
+
+    name: str
+    caption: str
+    svg: str
+    kind: ClassVar[str] = "plot"
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Verbatim text, folded away.
+
+    Attributes
+    ----------
+    summary : str
+    text : str
+    """
+
+    summary: str
+    text: str
+    kind: ClassVar[str] = "listing"
+
+
+@dataclass(frozen=True)
+class Folded:
+    """Tables that only some readers want, folded away.
+
+    Attributes
+    ----------
+    summary : str
+    tables : sequence of Table
+    """
+
+    summary: str
+    tables: Sequence[Table]
+    kind: ClassVar[str] = "folded"
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading inside a section.
+
+    Attributes
+    ----------
+    text : str
+    """
+
+    text: str
+    kind: ClassVar[str] = "heading"
+
+
+Block = Text | Facts | Table | Plot | Listing | Folded | Heading
+
+
+@dataclass(frozen=True)
+class Section:
+    """One section of the page.
+
+    Attributes
+    ----------
+    name : str
+        Unique on the page; its anchor.
+    title : str
+    blocks : sequence of Block
+    """
+
+    name: str
+    title: str
+    blocks: Sequence[Block]
+
+    @property
+    def plots(self) -> list[str]:
+        """Names of its plots."""
+        return [block.name for block in self.blocks if isinstance(block, Plot)]
+
+    @property
+    def tables(self) -> list[str]:
+        """Names of its tables, also of those folded away."""
+        names = [block.name for block in self.blocks if isinstance(block, Table)]
+        return names + [table.name for block in self.blocks if isinstance(block, Folded) for table in block.tables]

@@ -1,0 +1,50 @@
+"""Convergence of the search: the best of each objective by generation."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from cpfls_cli.report.canvas import plot, stacked, style_of
+from cpfls_cli.report.content import Plot
+from cpfls_cli.report.source import Source
+
+OBJECTIVES = (
+    ("smallest mean squared error", "(N m)²"),
+    ("smallest largest error", "N m"),
+    ("smallest condition number", ""),
+)
+
+
+def convergence_figure(name: str, model: Source) -> Plot:
+    """Draw the best of each objective found so far, by generation.
+
+    Parameters
+    ----------
+    name : str
+    model : Source
+
+    Returns
+    -------
+    Plot
+    """
+    best = model.artifact.array("history/best")
+    generation = np.arange(len(best))
+    evaluations = int(model.artifact.array("history/evaluations")[-1])
+
+    def draw(figure: Figure) -> None:
+        panels = stacked(figure, len(OBJECTIVES))
+        for index, (axes, (title, unit)) in enumerate(zip(panels, OBJECTIVES, strict=True)):
+            finite = np.where(np.isfinite(best[:, index]), best[:, index], np.nan)
+            axes.plot(generation, finite, marker="o", markersize=3, **style_of(0))
+            axes.set_title(title)
+            axes.set_ylabel(unit)
+        panels[-1].set_xlabel("generation")
+        panels[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+
+    caption = (
+        f"Search of {model.label}: the best value of each objective found so far, each possibly by another chromosome; "
+        f"{evaluations} chromosomes were evaluated."
+    )
+    return plot(name, caption, "Best mean squared error, largest error and condition number by generation", 4.6, draw)

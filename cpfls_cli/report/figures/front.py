@@ -1,0 +1,56 @@
+"""The Pareto front: mean squared error against condition number."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cpfls_cli.report.canvas import legend_above, plot, style_of
+from cpfls_cli.report.content import Plot
+from cpfls_cli.report.source import Source
+
+
+def front_figure(name: str, model: Source) -> Plot:
+    """Draw the members of the Pareto front and mark the chosen one.
+
+    Parameters
+    ----------
+    name : str
+    model : Source
+
+    Returns
+    -------
+    Plot
+    """
+    objectives = model.artifact.array("front/objectives")
+    chosen = int(model.artifact.number("front/chosen"))
+    others = np.arange(len(objectives)) != chosen
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        axes.plot(
+            objectives[others, 2], objectives[others, 0], "o", color="#1b4f8a", markersize=5, label="not dominated"
+        )
+        axes.plot(
+            *objectives[chosen, [2, 0]],
+            "D",
+            color=style_of(1)["color"],
+            markersize=9,
+            markerfacecolor="none",
+            markeredgewidth=2,
+            label="chosen",
+        )
+        axes.set_xlabel("condition number")
+        axes.set_ylabel("mean squared error")
+        axes.set_xscale("log")
+        legend_above(axes)
+
+    rule = model.config["identification"]["choice"]
+    caption = (
+        f"Pareto front of {model.label}, {len(objectives)} members: mean squared error against condition number on the "
+        f"samples that trained. The third objective, the largest error, is not shown, so a member may look dominated "
+        f"here. The chosen one follows the rule {rule}."
+    )
+    return plot(
+        name, caption, "Scatter of mean squared error against condition number, the chosen member marked", 3.0, draw
+    )

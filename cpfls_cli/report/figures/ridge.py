@@ -1,0 +1,71 @@
+"""The ridge curve: cross-validated error over the weight that holds the fuzzy part."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.report.canvas import legend_above, plot, style_of
+from cpfls_cli.report.content import Plot
+from cpfls_cli.report.source import Source
+
+
+def ridge_figure(name: str, model: Source) -> Plot:
+    """Draw the cross-validated error with its standard error; the last point has no fuzzy part at all.
+
+    Parameters
+    ----------
+    name : str
+    model : Source
+
+    Returns
+    -------
+    Plot
+
+    References
+    ----------
+    method.md section 8.
+    """
+    weight, error = model.artifact.array("ridge/weight"), model.artifact.array("ridge/error")
+    deviation = model.artifact.array("ridge/standard_error")
+    chosen = _chosen(weight, model.artifact.number("model/ridge_weight"))
+    place = np.arange(len(weight))
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        style = {"color": style_of(0)["color"], "markersize": 4, "capsize": 3, "linewidth": 1.2}
+        axes.errorbar(place, error, deviation, fmt="o-", label="error ± one standard error", **style)
+        axes.plot(
+            [chosen],
+            [error[chosen]],
+            "D",
+            color=style_of(1)["color"],
+            markersize=10,
+            markerfacecolor="none",
+            markeredgewidth=2,
+            label="chosen",
+        )
+        shown = [*range(0, len(weight) - 1, max((len(weight) - 1) // 6, 1)), len(weight) - 1]
+        axes.set_xticks(shown, [_word(weight[index]) for index in shown])
+        axes.set_xlabel("ridge weight on the fuzzy part")
+        axes.set_ylabel("error, scaled torque squared")
+        legend_above(axes)
+
+    caption = (
+        f"Ridge curve of {model.label}: error on blocks of the training flight that were left out in turn. The last "
+        "point is the rigid body alone (fuzzy part off). The largest weight within one standard error of the best is "
+        "taken."
+    )
+    return plot(name, caption, "Cross-validated error over the ridge weight, the chosen weight marked", 3.0, draw)
+
+
+def _chosen(weight: Array, value: float) -> int:
+    if np.isinf(value):
+        return len(weight) - 1
+    finite = np.where(np.isfinite(weight), weight, np.finfo(float).max)
+    return int(np.argmin(np.abs(finite - value)))
+
+
+def _word(weight: float) -> str:
+    return "off" if np.isinf(weight) else f"{weight:.0e}"

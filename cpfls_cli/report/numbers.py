@@ -1,0 +1,122 @@
+"""Numbers as people read them: sensible digits, no false zeros, no false ones."""
+
+from __future__ import annotations
+
+import math
+
+UNKNOWN = "—"
+ROUNDING = 1e-12
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number(value: float, digits: int = 4) -> str:
+    """Write a number with so many significant digits.
+
+    Parameters
+    ----------
+    value : float
+    digits : int
+
+    Returns
+    -------
+    str
+        ``—`` where the number is not known, ``∞`` where it has no bound; powers of ten outside 1e-3 .. 1e6.
+    """
+    if math.isnan(value):
+        return UNKNOWN
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    power = int(exponent)
+    if value == 0 or -4 <= power < 6:
+        decimals = max(digits - 1 - power, 0) if value else 0
+        text = f"{value:.{decimals}f}"
+    else:
+        text = f"{mantissa} × 10{str(power).translate(_SUPERSCRIPT)}"
+    return text.replace("-", "−")
+
+
+def plain(value: float) -> str:
+    """Write a setting the way it was given: no trailing zeros.
+
+    Parameters
+    ----------
+    value : float
+
+    Returns
+    -------
+    str
+    """
+    text = f"{value:.6g}"
+    if "e" not in text:
+        return text.replace("-", "−")
+    mantissa, exponent = text.split("e")
+    return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", "−")
+
+
+def count(value: float) -> str:
+    """Write a whole number.
+
+    Parameters
+    ----------
+    value : float
+
+    Returns
+    -------
+    str
+    """
+    return UNKNOWN if math.isnan(value) else str(round(value))
+
+
+def percent(share: float, digits: int = 3) -> str:
+    """Write a share as per cent; what only rounding leaves is written as zero.
+
+    Parameters
+    ----------
+    share : float
+    digits : int
+
+    Returns
+    -------
+    str
+    """
+    if math.isnan(share) or math.isinf(share):
+        return number(share)
+    return "0 %" if abs(share) < ROUNDING else f"{number(100 * share, digits)} %"
+
+
+def change(share: float) -> str:
+    """Write a relative change as per cent with its sign.
+
+    Parameters
+    ----------
+    share : float
+
+    Returns
+    -------
+    str
+    """
+    if not math.isfinite(share):
+        return UNKNOWN
+    text = f"{100 * share:+.2f} %"
+    return "0 %" if text in ("+0.00 %", "-0.00 %") else text.replace("-", "−")
+
+
+def r_squared(value: float) -> str:
+    """Write a share of variance explained; it reads 1 only where nothing but rounding is missing.
+
+    Parameters
+    ----------
+    value : float
+
+    Returns
+    -------
+    str
+    """
+    if not math.isfinite(value):
+        return UNKNOWN
+    if 1.0 - value < ROUNDING:
+        return "1"
+    if value > 0.99995:
+        return "> 0.9999"
+    return (f"{value:.4f}" if abs(value) < 100 else number(value, 4)).replace("-", "−")

@@ -1,0 +1,56 @@
+"""Where everything comes from."""
+
+from __future__ import annotations
+
+import hashlib
+
+from cpfls_cli.report.content import Block, Listing, Section, Table
+from cpfls_cli.report.source import Source, Sources
+
+
+def provenance_section(sources: Sources) -> Section:
+    """List the artifacts with their hashes, inputs and configs.
+
+    Parameters
+    ----------
+    sources : Sources
+
+    Returns
+    -------
+    Section
+    """
+    blocks: list[Block] = [
+        Table(
+            "artifacts",
+            "The artifacts of this report, by the SHA-256 of the file.",
+            ("File", "Format", "cpfls", "Seed", "SHA-256 of the file", "SHA-256 of the config"),
+            [_artifact(source) for source in sources.all],
+            frozenset({0, 1, 2, 4, 5}),
+        )
+    ]
+    inputs = [row for source in sources.all for row in _inputs(source, sources)]
+    if inputs:
+        header = ("File", "Role", "Made from", "Format", "SHA-256", "In this report")
+        caption = "The files that they were made from."
+        blocks.append(Table("inputs", caption, header, inputs, frozenset(range(6))))
+    for config in dict.fromkeys(source.artifact.header.config for source in sources.all):
+        users = [source.label for source in sources.all if source.artifact.header.config == config]
+        blocks.append(Listing(f"Config of {', '.join(users)} (SHA-256 {_hash(config)[:12]})", config))
+    return Section("provenance", "Provenance", blocks)
+
+
+def _artifact(source: Source) -> list[str]:
+    header = source.artifact.header
+    name = source.artifact.spec.format
+    return [source.label, name, header.version, str(header.seed), source.sha256, _hash(header.config)]
+
+
+def _inputs(source: Source, sources: Sources) -> list[list[str]]:
+    return [
+        [source.label, role, file.name, file.format, file.sha256, "yes" if sources.by_hash(file.sha256) else "no"]
+        for role, file in source.artifact.header.inputs.items()
+    ]
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,138 @@
+"""Table 4 and Figure 5: what the reduced training sets keep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cpfls_cli.report.content import Block, Cell, Section, Table, Text
+from cpfls_cli.report.figures.reduction import reduction_figure
+from cpfls_cli.report.numbers import change, count, number, percent
+from cpfls_cli.report.source import Source, Sources
+
+_HEADER = (
+    "Set",
+    "Samples",
+    "Share",
+    "Rank",
+    "Condition number",
+    "Change",
+    "Random choice of equal size",
+)
+_PAPER = ((5487, 56254, 0.0), (2743, 56805, 0.0098), (1170, 59771, 0.0625), (685, 68934, 0.2254))
+"""Table 4: samples, condition number, printed change."""
+
+
+def reduction_section(sources: Sources) -> Section | None:
+    """Show the reduced training sets, beside the paper's where that is asked for.
+
+    Parameters
+    ----------
+    sources : Sources
+
+    Returns
+    -------
+    Section or None
+        None where no selection was given.
+
+    References
+    ----------
+    Table 4 and Figure 5 of the paper.
+    """
+    if not sources.selections:
+        return None
+    blocks: list[Block] = list(_deficient(sources))
+    blocks += [_table(sources), *_comments(sources)]
+    flights = list(dict.fromkeys(selection.made_from("flight") for selection in sources.selections))
+    for index, flight in enumerate(flights, start=1):
+        group = [selection for selection in sources.selections if selection.made_from("flight") == flight]
+        blocks.append(reduction_figure(f"figure-5-reduction-{index}", group))
+    return Section("reduction", "Reduced training set", blocks)
+
+
+def _deficient(sources: Sources) -> Iterator[Text]:
+    for selection in sources.selections:
+        rank, full = (int(selection.artifact.number(key)) for key in ("rank", "rank_full"))
+        if rank < full:
+            yield Text(
+                f"{selection.label} is rank deficient: rank {rank}, where all samples reach {full}. Its condition "
+                "number covers only the directions that it keeps. Do not train on it; use another criterion or more samples.",
+                "warning",
+            )
+        if full < selection.parameters:
+            yield Text(
+                f"The flight behind {selection.label} determines only {full} of {selection.parameters} parameters, "
+                "however many samples are kept: condition numbers cover the determined directions only.",
+                "warning",
+            )
+
+
+def _table(sources: Sources) -> Table:
+    paper = sources.settings.paper
+    rows = [row for selection in sources.selections for row in _rows(selection)]
+    if paper:
+        rows += [
+            [
+                f"Paper, {'full set' if samples == _PAPER[0][0] else 'reduced'}",
+                str(samples),
+                percent(samples / _PAPER[0][0]),
+                "",
+                str(condition),
+                change(grown),
+                "",
+            ]
+            for samples, condition, grown in _PAPER
+        ]
+    caption = (
+        "Table 4. Condition number of the regressor with uniform partitions, all samples against reduced sets. Change "
+        "is against the full set of the same flight; random is the median of random choices."
+    )
+    return Table("table-4-reduction", caption, _HEADER, rows)
+
+
+def _rows(selection: Source) -> Iterator[list[str | Cell]]:
+    artifact = selection.artifact
+    candidates, kept = artifact.number("candidates"), len(artifact.array("indices"))
+    condition, full = artifact.number("condition_number"), artifact.number("condition_number_full")
+    rank, rank_full = artifact.number("rank"), artifact.number("rank_full")
+    yield [
+        f"{selection.input_name('flight')}, full set",
+        count(candidates),
+        "100 %",
+        f"{count(rank_full)} of {selection.parameters}",
+        number(full, 5),
+        "",
+        "",
+    ]
+    yield [
+        f"{selection.label}, {artifact.text('criterion')}",
+        str(kept),
+        percent(kept / candidates if candidates else float("nan")),
+        Cell(f"{count(rank)} of {selection.parameters}", "warning" if rank < rank_full else "plain"),
+        number(condition, 5),
+        change(condition / full - 1) if rank == rank_full else "not comparable",
+        number(_random(selection), 5),
+    ]
+
+
+def _random(selection: Source) -> float:
+    draws = selection.artifact.array("random/condition_number")
+    return float(np.median(draws)) if len(draws) else float("nan")
+
+
+def _comments(sources: Sources) -> Iterator[Text]:
+    for selection in sources.selections:
+        artifact = selection.artifact
+        condition, full = artifact.number("condition_number"), artifact.number("condition_number_full")
+        if artifact.number("rank") < artifact.number("rank_full"):
+            continue
+        if condition < full:
+            yield Text(
+                f"{selection.label} is better conditioned than the full set: the paper's statement that a reduced set "
+                "cannot be is refuted by it."
+                if sources.settings.paper
+                else f"{selection.label} is better conditioned than the full set."
+            )
+        if condition >= _random(selection):
+            yield Text(f"{selection.label} is no better than a random choice of equal size.", "warning")

@@ -1,0 +1,45 @@
+"""The search: convergence, Pareto front, ridge curve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cpfls_cli.report.content import Block, Section, Text
+from cpfls_cli.report.figures.convergence import convergence_figure
+from cpfls_cli.report.figures.front import front_figure
+from cpfls_cli.report.figures.ridge import ridge_figure
+from cpfls_cli.report.source import Source, Sources
+from cpfls_cli.report.verdict import fuzzy_part_off
+
+
+def search_section(sources: Sources) -> Section | None:
+    """Show how the models were found.
+
+    Parameters
+    ----------
+    sources : Sources
+
+    Returns
+    -------
+    Section or None
+        None where no model was given.
+    """
+    if not sources.models:
+        return None
+    blocks = [block for index, model in enumerate(sources.models, start=1) for block in _search(model, index)]
+    return Section("search", "Search", blocks)
+
+
+def _search(model: Source, index: int) -> Iterator[Block]:
+    if model.artifact.array("model/weights").size == 0:
+        yield Text(f"{model.label} has one rule per input, so there is no partition to search for.", "note")
+    elif fuzzy_part_off(model):
+        yield Text(
+            f"The fuzzy part of {model.label} is off, so all chromosomes may give one and the same model, and the "
+            "search decides nothing.",
+            "note",
+        )
+    yield convergence_figure(f"convergence-{index}", model)
+    yield front_figure(f"pareto-front-{index}", model)
+    if "ridge/weight" in model.artifact.data:
+        yield ridge_figure(f"ridge-curve-{index}", model)

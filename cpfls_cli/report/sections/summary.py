@@ -1,0 +1,134 @@
+"""The first section: what was done, what came out, what to distrust."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cpfls_cli.report.content import Block, Cell, Facts, Heading, Section, Table, Text
+from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, TRAINING, Judged, judged
+from cpfls_cli.report.missing import missing
+from cpfls_cli.report.numbers import count, percent, plain, r_squared
+from cpfls_cli.report.source import Source, Sources
+from cpfls_cli.report.verdict import fuzzy_part_off, verdict
+
+
+def summary_section(sources: Sources) -> Section:
+    """Say in plain words what ran on what and how it ended.
+
+    Parameters
+    ----------
+    sources : Sources
+
+    Returns
+    -------
+    Section
+    """
+    blocks: list[Block] = []
+    for number, model in enumerate(sources.models, start=1):
+        blocks += _model(model, sources, number)
+    if not sources.models:
+        blocks.append(Text("No model was given, so there is nothing to judge yet.", "note"))
+    for flight in sources.flights:
+        blocks += _flight_warnings(flight)
+    blocks += [Text(sentence, "note") for sentence in missing(sources).values()]
+    return Section("summary", "Summary", blocks)
+
+
+def _model(model: Source, sources: Sources, number: int) -> Iterator[Block]:
+    yield Heading(f"Model {model.label}")
+    yield Facts(_facts(model))
+    yield from verdict(model, sources)
+    yield _scores(model, number)
+    found = model.artifact.texts("findings")
+    yield Heading("Findings")
+    yield from [Text(f"{finding[:1].upper()}{finding[1:]}.", "warning") for finding in found]
+    if not found:
+        yield Text("None: rank, rules and axes are excited, and the rigid body is not better on held-out data.")
+
+
+def _facts(model: Source) -> list[tuple[str, str]]:
+    artifact, settings = model.artifact, model.config["identification"]
+    learned = len(artifact.array("training/indices"))
+    training = int(artifact.array("judged/samples")[0])
+    source = artifact.header.inputs.get("flight")
+    flight = f"{source.name} (sha256 {source.sha256[:12]})" if source else "unknown"
+    chosen = f", chosen in {model.input_name('selection')}" if model.made_from("selection") else ""
+    return [
+        ("Learned from", f"{flight}: {learned} of {training} training samples{chosen}"),
+        ("Structure", structure(model)),
+        ("Parameters", parameters(model)),
+        ("Search", f"population {settings['population']}, {settings['generations']} generations"),
+        ("Made by", f"cpfls {artifact.header.version}, seed {artifact.header.seed}"),
+    ]
+
+
+def structure(model: Source) -> str:
+    """Describe the structure of a model in words.
+
+    Parameters
+    ----------
+    model : Source
+
+    Returns
+    -------
+    str
+    """
+    settings = model.config["identification"]
+    kind = {"cpfls": "continuous periodic fuzzy system", "fls": "classic TSK fuzzy system"}[settings["structure"]]
+    functions = settings["membership_functions"]
+    counted = f"{functions}" if isinstance(functions, int) else ", ".join(str(n) for n in functions)
+    consequents = settings["consequents"]
+    if consequents == "harmonic":
+        consequents = f"harmonic, order {settings['harmonic_order']}"
+    base = "on a rigid body" if settings["base"] == "rigid-body" else "alone, without a rigid body underneath"
+    noun = "function" if counted == "1" else "functions"
+    return (
+        f"{kind} {base}; {counted} membership {noun} per input, input map {settings['input_map']}, {consequents} "
+        f"consequents ({settings['products']})"
+    )
+
+
+def parameters(model: Source) -> str:
+    """Count the parameters of a model in words.
+
+    Parameters
+    ----------
+    model : Source
+
+    Returns
+    -------
+    str
+    """
+    artifact = model.artifact
+    fuzzy = count(artifact.number("solve/parameters"))
+    if artifact.text("model/base") != "rigid-body":
+        return f"{fuzzy} linear parameters, rank {count(artifact.number('solve/rank'))}"
+    off = ", all zero because the fuzzy part is off" if fuzzy_part_off(model) else ""
+    held = f", held by a ridge of {plain(artifact.number('model/ridge_weight'))}" if not off else ""
+    return f"6 of inertia and {fuzzy} of the fuzzy part{off}{held}"
+
+
+def _scores(model: Source, number: int) -> Table:
+    scores = judged(model)
+    return Table(
+        f"headline-{number}",
+        f"{model.label} beside the rigid body with six inertia parameters. Relative error: largest error over largest "
+        "torque, worst axis. R²: share of the variance of the body torque explained.",
+        ("Judged on", "Model", "Relative error", *(f"R² {axis}" for axis in AXES)),
+        [row for part in scores.parts for row in _rows(scores, part)],
+        frozenset({0, 1}),
+    )
+
+
+def _rows(scores: Judged, part: str) -> Iterator[list[str | Cell]]:
+    for name, shown in ((MODEL, "model"), (RIGID_BODY, "rigid body")):
+        relative, axis = scores.worst(name, part)
+        r2 = [Cell(r_squared(value), "warning" if value < 0 else "plain") for value in scores.of("r2_body", name, part)]
+        where = part if part != TRAINING else "training"
+        yield [where if name == MODEL else "", shown, f"{percent(relative)} ({axis})", *r2]
+
+
+def _flight_warnings(flight: Source) -> Iterator[Block]:
+    if "quality/warning" in flight.artifact.data:
+        for warning in flight.artifact.texts("quality/warning"):
+            yield Text(f"{flight.label}: {warning}.", "warning")

@@ -1,0 +1,77 @@
+"""Stage `report`: one self-contained HTML page about artifacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cpfls_cli
+from cpfls_cli.artifacts.store import file_sha256, read_artifact, write_text
+from cpfls_cli.config.load import validate
+from cpfls_cli.config.resolved import resolved
+from cpfls_cli.config.yaml_text import parse_yaml
+from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.report.page import Page, report_page
+from cpfls_cli.report.source import Source, Sources, unique_labels
+from cpfls_cli.stages.job import Job, Outcome, begin
+
+
+def run(job: Job, artifacts: Sequence[Path]) -> Outcome:
+    """Write a report about artifacts.
+
+    Parameters
+    ----------
+    job : Job
+    artifacts : sequence of Path
+        Of any format and from any flights; a file given twice counts once.
+
+    Returns
+    -------
+    Outcome
+    """
+    early = begin(job, *artifacts)
+    files = {path: file_sha256(path) for path in artifacts}
+    distinct = {sha256: path for path, sha256 in reversed(files.items())}
+    kept = [path for path, sha256 in files.items() if distinct[sha256] == path]
+    sources = _sources(kept, [files[path] for path in kept])
+    if early is not None:
+        return early
+    page = report_page(Sources(sources, job.study.vehicle, job.study.report), cpfls_cli.__version__)
+    write_text(job.output, page.html)
+    repeated = tuple(
+        f"{path}: holds the same as {distinct[files[path]]}; shown once" for path in files if path not in kept
+    )
+    return _outcome(job.output, page, repeated)
+
+
+def _sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
+    labels = unique_labels([_printable(path.name) for path in paths], hashes)
+    return [_source(path, label, sha256) for path, label, sha256 in zip(paths, labels, hashes, strict=True)]
+
+
+def _source(path: Path, label: str, sha256: str) -> Source:
+    artifact = read_artifact(path)
+    study = validate(parse_yaml(artifact.header.config, f"{path}: /config"), f"{path}: /config")
+    parameters = model_structure(study.identification).parameters
+    return Source(label, sha256, artifact, resolved(study), study.vehicle, parameters)
+
+
+def _printable(name: str) -> str:
+    """Replace what a page cannot show: control characters, and bytes that are not text."""
+    return "".join(character if character.isprintable() else "\N{REPLACEMENT CHARACTER}" for character in name)
+
+
+def _outcome(output: Path, page: Page, repeated: Sequence[str]) -> Outcome:
+    size = len(page.html.encode())
+    summary = {
+        "output": str(output),
+        "figures": list(page.figures),
+        "tables": list(page.tables),
+        "sections": list(page.sections),
+        "missing": list(page.missing),
+        "bytes": size,
+    }
+    lines = [f"{len(page.sections)} sections, {len(page.figures)} figures, {len(page.tables)} tables, {size} bytes"]
+    if page.missing:
+        lines.append(f"not given: {', '.join(page.missing)}")
+    return Outcome(summary, tuple(lines), tuple(f"{note}; shown once" for note in repeated))
