@@ -30,6 +30,17 @@ def test_condition_number_counts_kept_singular_values_only():
     assert solve(graded, right_side, 1e-2).condition_number == pytest.approx(4.0)
 
 
+def test_losing_rank_never_improves_the_conditioning():
+    """Systems whose last singular value falls through the tolerance: the condition number drops, conditioning rises."""
+    U, _, Vt = np.linalg.svd(low_rank(40, 4, 4)[0], full_matrices=False)
+    systems = [
+        solve((U * [8.0, 4.0, third, last]) @ Vt, np.ones(40), 1e-6) for third, last in ((2, 1), (2, 1e-9), (0, 0))
+    ]
+    assert [system.rank for system in systems] == [4, 3, 2]
+    assert [system.condition_number for system in systems] == pytest.approx([8, 4, 2])
+    assert [system.conditioning for system in systems] == pytest.approx([8, 2e6, 3e6])
+
+
 def test_bases_span_rows_and_columns():
     matrix, right_side = low_rank(30, 8, 5)
     system = solve(matrix, right_side, 1e-10)

@@ -1,5 +1,6 @@
 """Refinement of partition weights: its Jacobian, and what it does to a chromosome."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from cpfls_cli.identification import IdentificationSettings, TorqueData, local_search
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, uniform_chromosome
-from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.evaluator import Evaluator, Judge
 from cpfls_cli.identification.identify import coefficient_solver
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure
@@ -31,7 +32,14 @@ def problem(structure, base, samples=120):
     settings = IdentificationSettings(**STRUCTURES[structure], base=base)
     counted = model_structure(settings)
     regressor = Regressor(counted, motion, data_ranges(counted, motion.attitude))
-    return regressor, coefficient_solver(data, settings), rng
+    evaluator = Evaluator(
+        regressor,
+        coefficient_solver(data, settings),
+        Judge.of(data, regressor),
+        LocalSearchSettings(enabled=False),
+        base == "rigid-body",
+    )
+    return evaluator, rng
 
 
 def captured(monkeypatch, regressor, solver, weights):
@@ -51,7 +59,8 @@ def captured(monkeypatch, regressor, solver, weights):
 @pytest.mark.parametrize("structure", STRUCTURES)
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 def test_gradient_of_the_reduced_cost(monkeypatch, structure, base):
-    regressor, solver, rng = problem(structure, base)
+    evaluator, rng = problem(structure, base)
+    regressor, solver = evaluator.regressor, evaluator.solver
     weights = rng.uniform(0.3, 0.9, regressor.structure.genes)
     residual, jacobian, start = captured(monkeypatch, regressor, solver, weights)
     assert np.isfinite(start.ridge_weight)
@@ -63,40 +72,37 @@ def test_gradient_of_the_reduced_cost(monkeypatch, structure, base):
 
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 def test_never_a_worse_chromosome(base):
-    regressor, solver, rng = problem("seesaw", base)
-    chromosomes = rng.integers(0, LARGEST_GENE + 1, (12, regressor.structure.genes))
+    evaluator, rng = problem("seesaw", base)
+    chromosomes = rng.integers(0, LARGEST_GENE + 1, (12, evaluator.regressor.structure.genes))
     chromosomes[0] = 0
     chromosomes[1, 2:5] = 0
     chromosomes[2, ::2] = 0
-    plain, refined = (
-        Evaluator(regressor, solver, LocalSearchSettings(enabled=enabled, evaluations=6))(chromosomes)
-        for enabled in (False, True)
-    )
+    refining = replace(evaluator, local_search=LocalSearchSettings(evaluations=6))
+    plain, refined = evaluator(chromosomes), refining(chromosomes)
     np.testing.assert_array_equal(plain.genes, chromosomes)
     usable = np.isfinite(plain.objectives).all(axis=1)
     assert np.all(refined.objectives[usable, 0] <= plain.objectives[usable, 0])
     better = refined.objectives[usable, 0] < plain.objectives[usable, 0]
     # The rigid-body base is judged by cross-validation, which not every smaller training error improves.
     assert better.sum() > 3
-    again = Evaluator(regressor, solver, LocalSearchSettings(enabled=False))(refined.genes)
-    np.testing.assert_array_equal(again.objectives, refined.objectives)
+    np.testing.assert_array_equal(evaluator(refined.genes).objectives, refined.objectives)
 
 
 def test_undefined_chromosomes_get_the_worst_objectives():
-    regressor, solver, _ = problem("seesaw", "none")
-    chromosomes = np.array(
-        [np.zeros(regressor.structure.genes, dtype=np.int64), uniform_chromosome(regressor.structure)]
-    )
-    evaluated = Evaluator(regressor, solver, LocalSearchSettings())(chromosomes)
+    evaluator, _ = problem("seesaw", "none")
+    structure = evaluator.regressor.structure
+    chromosomes = np.array([np.zeros(structure.genes, dtype=np.int64), uniform_chromosome(structure)])
+    evaluated = replace(evaluator, local_search=LocalSearchSettings())(chromosomes)
     np.testing.assert_array_equal(evaluated.objectives[0], [np.inf] * 3)
     np.testing.assert_array_equal(evaluated.genes[0], chromosomes[0])
     assert np.isfinite(evaluated.objectives[1]).all()
 
 
 def test_objectives_are_those_of_a_plain_least_squares_fit():
-    regressor, solver, rng = problem("seesaw", "none")
+    evaluator, rng = problem("seesaw", "none")
+    regressor, solver = evaluator.regressor, evaluator.solver
     chromosome = rng.integers(20000, LARGEST_GENE, regressor.structure.genes)
-    evaluated = Evaluator(regressor, solver, LocalSearchSettings(enabled=False))(chromosome[None])
+    evaluated = evaluator(chromosome[None])
     Q = regressor.matrix(decode(regressor.structure, chromosome.astype(float))).reshape(360, -1)
     error = solver.torque.ravel() - Q @ (np.linalg.pinv(Q, rcond=1e-10) @ solver.torque.ravel())
     singular = np.linalg.svd(Q, compute_uv=False)

@@ -1,0 +1,100 @@
+"""Rigid body under a ridge-held fuzzy part: off where it is not needed, on where data speak for it."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.identification.baselines import fit_baselines
+from cpfls_cli.identification.data import axis_scale
+from cpfls_cli.identification.rigid_base import RigidBaseSolver, rigid_columns
+from cpfls_cli.identification.settings import RidgeSettings
+from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.vehicle import newton_euler_torque
+
+PARAMETERS = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
+TENSOR = np.array([[0.6, 0.03, -0.02], [0.03, 0.7, 0.04], [-0.02, 0.04, 1.2]])
+
+
+def motion(seed, samples=400):
+    """Full rotations: attitudes anywhere on the circle."""
+    rng = np.random.default_rng(seed)
+    return Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
+
+
+def rigid_torque(m):
+    return newton_euler_torque(m.attitude, m.rate, m.acceleration, TENSOR)
+
+
+def bent_torque(m):
+    """Torque with 0.3 cos(roll) on top of D22, which no rigid body has, worked from its Lagrangian by hand.
+
+    L = 1/2 f(roll) pitch_rate^2 gives -1/2 f' pitch_rate^2 about roll and f pitch_acc + f' roll_rate pitch_rate
+    about pitch.
+    """
+    roll = m.attitude[:, 0]
+    f, slope = 0.3 * np.cos(roll), -0.3 * np.sin(roll)
+    torque = rigid_torque(m)
+    torque[:, 0] -= 0.5 * slope * m.rate[:, 1] ** 2
+    torque[:, 1] += f * m.acceleration[:, 1] + slope * m.rate[:, 0] * m.rate[:, 1]
+    return torque
+
+
+def fitted(torque_of, noise):
+    """A fit, its regressor's structure, and the training data."""
+    m = motion(27)
+    torque = torque_of(m)
+    torque = torque + noise * torque.std(axis=0) * np.random.default_rng(28).standard_normal(torque.shape)
+    data = TorqueData(0.01 * np.arange(len(m)), m, torque)
+    return RigidBaseSolver.of(data, RidgeSettings(), 1e-10).fit(columns(m)), data
+
+
+def columns(m):
+    structure = model_structure(StructureSettings(harmonic_order=2, products="tensor", membership_functions=1))
+    return Regressor(structure, m, data_ranges(structure, m.attitude)).matrix(uniform_breakpoints(structure))
+
+
+def predicted(fit, m):
+    return columns(m) @ fit.coefficients + rigid_columns(m) @ fit.rigid_body
+
+
+def test_exact_rigid_data_leave_nothing_to_the_fuzzy_part():
+    fit, data = fitted(rigid_torque, noise=0.0)
+    np.testing.assert_allclose(fit.rigid_body, PARAMETERS, atol=1e-9)
+    assert np.abs(columns(data.motion) @ fit.coefficients).max() < 1e-9
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.3])
+def test_noisy_rigid_data_switch_the_fuzzy_part_off(noise):
+    fit, data = fitted(rigid_torque, noise)
+    assert fit.ridge_weight == np.inf
+    np.testing.assert_array_equal(fit.coefficients, np.zeros(61))
+    rigid = fit_baselines(data, 1 / axis_scale(data.torque), 1e-10)[0]
+    np.testing.assert_allclose(fit.rigid_body, rigid.parameters, atol=1e-12)
+    np.testing.assert_allclose(fit.rigid_body, PARAMETERS, atol=noise)
+
+
+def test_inertia_that_depends_on_attitude_switches_it_on_and_beats_the_rigid_body():
+    fit, data = fitted(bent_torque, noise=0.05)
+    assert fit.ridge_weight < 0.1
+    rigid = fit_baselines(data, 1 / axis_scale(data.torque), 1e-10)[0]
+    held_out = motion(29)
+    ours, theirs = (
+        np.mean((p - bent_torque(held_out)) ** 2) for p in (predicted(fit, held_out), rigid.torque(held_out))
+    )
+    assert ours < 0.02 * theirs
+
+
+def test_coefficients_solve_the_ridge_problem():
+    """Zero gradient of |scaled residual|^2 + weight * rows * sum (size c)^2, written out."""
+    fit, data = fitted(bent_torque, noise=0.05)
+    scale = 1 / np.sqrt(np.mean(data.torque**2, axis=0))
+    residual = ((data.torque - predicted(fit, data.motion)) * scale).ravel()
+    fuzzy = (columns(data.motion) * scale[:, None]).reshape(len(residual), -1)
+    rigid = (rigid_columns(data.motion) * scale[:, None]).reshape(len(residual), -1)
+    penalty = fit.ridge_weight * len(residual) * np.mean(fuzzy**2, axis=0) * fit.coefficients
+    np.testing.assert_allclose(rigid.T @ residual, 0.0, atol=1e-9)
+    np.testing.assert_allclose(fuzzy.T @ residual, penalty, atol=1e-9)
+
+
+def test_the_shipped_default_is_this_base():
+    assert IdentificationSettings().base == "rigid-body"

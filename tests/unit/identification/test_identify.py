@@ -1,0 +1,143 @@
+"""The whole identification, small."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
+from cpfls_cli.identification.settings import LocalSearchSettings, RidgeSettings
+from cpfls_cli.regressor import Motion
+from cpfls_cli.vehicle import newton_euler_torque
+
+SMALL = {"population": 10, "generations": 2, "local_search": LocalSearchSettings(evaluations=2)}
+SEARCHED = {**SMALL, "consequents": "seesaw", "products": "additive", "membership_functions": 3}
+
+
+def flight(samples=100, noise=0.02, seed=22, limit=np.pi):
+    rng = np.random.default_rng(seed)
+    motion = Motion(rng.uniform(-limit, limit, (samples, 3)), *rng.standard_normal((2, samples, 3)))
+    torque = newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, np.diag([0.6, 0.7, 1.2]))
+    return TorqueData(0.01 * np.arange(samples), motion, torque + noise * rng.standard_normal(torque.shape))
+
+
+def identified(settings, data=None, progress=None, seed=1):
+    data = flight() if data is None else data
+    held_out = {"held out": flight(seed=23)}
+    return identify(data, data, held_out, IdentificationSettings(**settings), np.random.default_rng(seed), progress)
+
+
+@pytest.mark.parametrize("base", ["none", "rigid-body"])
+def test_same_seed_same_result(base):
+    first, second, other = (identified({**SEARCHED, "base": base}, seed=seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first.front.chromosomes, second.front.chromosomes)
+    np.testing.assert_array_equal(first.front.objectives, second.front.objectives)
+    np.testing.assert_array_equal(first.model.coefficients, second.model.coefficients)
+    np.testing.assert_array_equal(first.history.best, second.history.best)
+    assert first.findings == second.findings
+    courses = [np.column_stack([found.history.best, found.history.evaluations]) for found in (first, other)]
+    assert not np.array_equal(*courses)
+
+
+@pytest.mark.parametrize("base", ["none", "rigid-body"])
+def test_result_hangs_together(base):
+    calls = []
+    found = identified({**SEARCHED, "base": base}, progress=lambda *call: calls.append(call))
+    assert np.isfinite(found.front.objectives).all()
+    assert np.isfinite(found.history.best).all()
+    assert np.all(np.diff(found.history.best, axis=0) <= 0)
+    assert [call[:2] for call in calls] == [(0, 2), (1, 2), (2, 2)]
+    np.testing.assert_array_equal([call[2] for call in calls], found.history.best)
+    chosen = found.front.objectives[found.front.chosen]
+    assert chosen[0] == pytest.approx(found.fit.mean_squared_error, rel=1e-9)
+    training = found.scores["training"]
+    assert chosen[1] == pytest.approx(training["model"].max_error.max(), rel=1e-9)
+    assert set(found.scores) == {"training", "held out"}
+    assert {"model", "rigid-body", "constant-inertia", "torque-zero"} <= set(training)
+    assert dict(found.samples) == {"training": 100, "held out": 100}
+    error = flight().torque - found.model.torque(flight().motion)
+    np.testing.assert_allclose(training["model"].mse, np.mean(error**2, axis=0), rtol=1e-10)
+    assert (found.ridge is None) == (base == "none")
+
+
+def test_no_member_of_the_front_dominates_another():
+    objectives = identified(SEARCHED).front.objectives
+    worse = np.all(objectives[:, None] <= objectives, axis=2) & np.any(objectives[:, None] < objectives, axis=2)
+    assert not worse.any()
+
+
+def test_a_structure_without_genes_needs_no_search():
+    found = identified({**SMALL, "base": "none", "membership_functions": 1}, flight(noise=0.0))
+    assert found.front.chromosomes.shape == (1, 0)
+    assert found.history.evaluations.tolist() == [1]
+    assert found.model.coefficients.shape == (61,)
+    assert found.scores["training"]["model"].max_error.max() < 1e-12
+
+
+def test_rigid_data_leave_the_model_no_worse_than_the_rigid_body():
+    found = identified({**SMALL, "base": "rigid-body"}, flight(noise=0.05))
+    assert found.fit.ridge_weight == np.inf
+    held_out = found.scores["held out"]
+    np.testing.assert_allclose(held_out["model"].mse, held_out["rigid-body"].mse, rtol=1e-9)
+    assert any("switched the fuzzy part off" in finding for finding in found.findings)
+
+
+def test_model_learned_from_a_selection_is_judged_on_all_of_training():
+    data, selected = flight(), np.arange(0, 100, 2)
+    settings = IdentificationSettings(**{**SMALL, "base": "rigid-body"})
+    found = identify(data, data[selected], {}, settings, np.random.default_rng(0))
+    assert dict(found.samples) == {"training": 100}
+    inertia = np.linalg.norm(found.fit.rigid_body - [0.6, 0.7, 1.2, 0, 0, 0])
+    assert inertia < 0.05
+
+
+def test_objectives_are_judged_on_all_of_training():
+    """Few samples are met exactly by 25 coefficients; what the front counts is the error beside them too."""
+    data, selected = flight(noise=0.05), np.arange(0, 100, 8)
+    settings = IdentificationSettings(**{**SEARCHED, "base": "none"})
+    found = identify(data, data[selected], {}, settings, np.random.default_rng(0))
+    error = data.torque - found.model.torque(data.motion)
+    expected = [np.mean(error**2), np.abs(error).max(), found.fit.system.conditioning]
+    np.testing.assert_allclose(found.front.objectives[found.front.chosen], expected, rtol=1e-9)
+    assert np.mean(error[selected] ** 2) < 0.5 * np.mean(error**2)
+
+
+def test_search_that_starts_with_the_uniform_partitions_is_never_worse():
+    settings = {**SEARCHED, "base": "none", "choice": "mse", "start": "with-uniform"}
+    training = identified(settings).scores["training"]
+    assert training["model"].mse.sum() <= training["uniform-partitions"].mse.sum()
+    assert "uniform-partitions" not in identified({**SMALL, "membership_functions": 1}).scores["training"]
+
+
+@pytest.mark.parametrize(("samples", "message"), [(9, "too few for 5 blocks"), (12, "embargo")])
+def test_too_few_samples(samples, message):
+    """12 samples of 0.01 s lie wholly within 0.1 s of every block of theirs."""
+    with pytest.raises(ComputationError, match=message):
+        identified(SMALL, flight(samples))
+
+
+def test_ridge_weights_must_ascend():
+    with pytest.raises(SettingError) as caught:
+        RidgeSettings(smallest=1.0, largest=0.5)
+    assert caught.value.key == "largest"
+
+
+def test_a_torque_of_zero_has_a_defined_end():
+    data = flight()
+    still = TorqueData(data.time, data.motion, np.zeros_like(data.torque))
+    found = identified({**SMALL, "base": "rigid-body"}, still)
+    np.testing.assert_array_equal(found.model.torque(data.motion), np.zeros((100, 3)))
+
+
+def test_a_vehicle_that_never_turns_cannot_be_identified():
+    zero = np.zeros((40, 3))
+    still = TorqueData(0.01 * np.arange(40), Motion(zero, zero, zero), np.ones((40, 3)))
+    for settings in ({**SMALL, "base": "rigid-body"}, {**SEARCHED, "base": "none"}):
+        with pytest.raises(ComputationError, match="no chromosome gave a finite model"):
+            identified(settings, still)
+
+
+def test_rules_without_excitation_and_rank_are_reported():
+    small_angles = flight(limit=0.2)
+    found = identified({**SEARCHED, "base": "none", "membership_functions": 5}, small_angles)
+    assert any(finding.startswith("rank ") for finding in found.findings)
+    assert any("rules not excited" in finding and "D22 rule" in finding for finding in found.findings)

@@ -1,0 +1,143 @@
+"""Simulated flights against mechanics done another way, and the noise that was asked for."""
+
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli import rotations
+from cpfls_cli.simulation import SimulationSettings, simulate
+from cpfls_cli.vehicle import VehicleSettings, body_wrench
+
+VEHICLE = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.02, -0.03, 0.01))
+TENSOR = np.array([[0.6, 0.02, -0.03], [0.02, 0.7, 0.01], [-0.03, 0.01, 1.2]])
+AMPLITUDE, FREQUENCY, PHASE = np.array([0.2, 0.15, 0.5]), np.array([1.1, 1.7, 0.6]), np.array([0.3, 1.0, 2.0])
+STEP = 1e-3
+
+
+def attitude_at(time):
+    return AMPLITUDE * np.sin(np.outer(time, FREQUENCY) + PHASE)
+
+
+def planned(samples=300):
+    time = 0.02 * np.arange(samples)
+    phase = np.outer(time, FREQUENCY) + PHASE
+    attitude = attitude_at(time)
+    swing = np.column_stack([np.sin(time), np.cos(2 * time), 0.5 * np.sin(time)])
+    return {
+        "attitude": attitude,
+        "attitude_rate": AMPLITUDE * FREQUENCY * np.cos(phase),
+        "attitude_acceleration": -(FREQUENCY**2) * attitude,
+        "position": -swing,
+        "velocity": np.gradient(-swing, time, axis=0),
+        "acceleration": swing,
+    }
+
+
+def flown(motion=None, vehicle=VEHICLE, seed=30, **settings):
+    motion = planned() if motion is None else motion
+    return simulate(motion, vehicle, SimulationSettings(**settings), np.random.default_rng(seed))
+
+
+def orientation(time):
+    return Rotation.from_euler("ZYX", attitude_at(time)[:, ::-1])
+
+
+def angular_momentum(time):
+    """In the world frame, the body rate from rotations a little before and after."""
+    turn = orientation(time - STEP).inv() * orientation(time + STEP)
+    return orientation(time).apply(turn.as_rotvec() / (2 * STEP) @ TENSOR)
+
+
+def test_body_torque_is_the_change_of_angular_momentum():
+    time = 0.02 * np.arange(300)
+    change = (angular_momentum(time + STEP) - angular_momentum(time - STEP)) / (2 * STEP)
+    expected = orientation(time).inv().apply(change)
+    torque = flown().signals["body_torque"]
+    np.testing.assert_allclose(torque, expected, atol=1e-5 * np.abs(expected).max())
+
+
+def test_work_of_the_torque_is_the_change_of_rotational_energy():
+    signals, time = flown().signals, 0.02 * np.arange(300)
+    power = np.sum(signals["torque"] * signals["attitude_rate"], axis=1)
+    energy = 0.5 * np.einsum("ni,ij,nj->n", signals["body_rate"], TENSOR, signals["body_rate"])
+    work = trapezoid(power, time)
+    assert work == pytest.approx(energy[-1] - energy[0], abs=1e-4 * np.ptp(energy))
+
+
+def test_rotors_give_back_the_torque_and_the_weight():
+    flight = flown()
+    wrench = body_wrench(VEHICLE, flight.signals["rotor_speed"])
+    np.testing.assert_allclose(wrench.body_torque, flight.signals["body_torque"], atol=1e-9)
+    force = planned()["acceleration"] + np.array([0, 0, 9.81])
+    np.testing.assert_allclose(wrench.thrust, 6.0 * np.linalg.norm(force, axis=1), rtol=1e-12)
+    assert flight.violations == ()
+    assert flight.noise_std == {}
+
+
+def test_planned_signals_pass_unchanged_without_noise():
+    flight = flown()
+    for name, values in planned().items():
+        np.testing.assert_array_equal(flight.signals[name], values)
+
+
+def test_noise_has_the_standard_deviation_that_was_asked_for():
+    clean, noisy = flown(planned(4000)), flown(planned(4000), noise={"torque": 0.3, "attitude": 0.01})
+    assert set(noisy.noise_std) == {"torque", "attitude"}
+    np.testing.assert_array_equal(noisy.noise_std["torque"], [0.3] * 3)
+    for name, std in (("torque", 0.3), ("attitude", 0.01)):
+        noise = noisy.signals[name] - clean.signals[name]
+        # The standard deviation of 4000 samples scatters by 1.1 %.
+        np.testing.assert_allclose(noise.std(axis=0), std, rtol=0.05)
+        np.testing.assert_allclose(noise.mean(axis=0), 0.0, atol=5 * std / np.sqrt(4000))
+        np.testing.assert_allclose(np.corrcoef(noise.T), np.eye(3), atol=0.08)
+    for name in ("attitude_rate", "attitude_acceleration", "position", "rotor_speed"):
+        np.testing.assert_array_equal(noisy.signals[name], clean.signals[name])
+
+
+def test_relative_noise_is_a_share_of_each_channel():
+    clean = flown(planned(4000))
+    noisy = flown(planned(4000), relative_noise={"torque": 0.05})
+    own = clean.signals["torque"].std(axis=0)
+    assert own.max() > 1.5 * own.min()
+    np.testing.assert_allclose(noisy.noise_std["torque"], 0.05 * own, rtol=1e-12)
+    noise = noisy.signals["torque"] - clean.signals["torque"]
+    np.testing.assert_allclose(noise.std(axis=0), 0.05 * own, rtol=0.05)
+
+
+def test_absolute_and_relative_noise_add_as_independent_ones():
+    own = flown().signals["torque"].std(axis=0)
+    both = flown(noise={"torque": 0.3}, relative_noise={"torque": 0.4})
+    np.testing.assert_allclose(both.noise_std["torque"], np.sqrt(0.09 + (0.4 * own) ** 2), rtol=1e-12)
+
+
+def test_body_signals_follow_from_the_noisy_ones():
+    noisy = flown(noise={"torque": 0.3, "attitude": 0.05, "attitude_rate": 0.1}).signals
+    W = rotations.euler_rate_matrix(noisy["attitude"])
+    expected = np.linalg.solve(W.swapaxes(1, 2), noisy["torque"][:, :, None])[:, :, 0]
+    np.testing.assert_allclose(noisy["body_torque"], expected, atol=1e-11)
+    np.testing.assert_allclose(noisy["body_rate"], rotations.multiply(W, noisy["attitude_rate"]), atol=1e-13)
+
+
+def test_noise_comes_from_the_given_generator():
+    first, same, other = (flown(seed=seed, noise={"torque": 0.1}).signals["torque"] for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, same)
+    assert not np.array_equal(first, other)
+
+
+def test_what_no_rotor_can_do_is_reported_and_left_out():
+    weak = VehicleSettings(rotor_speed_max_rad_s=348.5)
+    flight = flown(vehicle=weak)
+    speed = flight.signals["rotor_speed"]
+    assert {violation.kind for violation in flight.violations} == {"above the limit"}
+    for violation in flight.violations:
+        gaps = np.flatnonzero(np.isnan(speed[:, violation.rotor]))
+        assert (violation.first, violation.last, violation.count) == (gaps[0], gaps[-1], len(gaps))
+    assert np.nanmax(speed) <= 348.5
+    assert np.isfinite(flight.signals["torque"]).all()
+
+
+def test_relative_noise_on_a_rotor_that_can_never_turn_so_fast():
+    """No sample is left to take a standard deviation from; that must not raise a warning."""
+    flight = flown(vehicle=VehicleSettings(rotor_speed_max_rad_s=10.0), relative_noise={"rotor_speed": 0.1})
+    assert np.isnan(flight.signals["rotor_speed"]).all()
