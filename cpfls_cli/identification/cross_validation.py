@@ -8,6 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.errors import ComputationError
 
 RIGID = 6
 
@@ -93,11 +94,21 @@ def ridge_curve(rows: Array, right_side: Array, blocks: Blocks, weights: Array) 
     -------
     RidgeCurve
 
+    Raises
+    ------
+    ComputationError
+        If a block and its embargo leave no sample to train on.
+
     References
     ----------
     method.md section 8; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, section 7.10
     (one-standard-error rule).
     """
+    if blocks.left_out.all(axis=1).any():
+        raise ComputationError(
+            "a block of the cross-validation and its embargo cover all samples; use more samples, or lower "
+            "identification.ridge.embargo_s"
+        )
     errors = np.array([_fold_errors(rows, right_side, blocks, fold, weights) for fold in range(len(blocks.validation))])
     samples = np.sum(blocks.validation, axis=1)
     mean = np.average(errors, axis=0, weights=samples)

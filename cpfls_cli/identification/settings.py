@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt, Le
 from typing_extensions import Doc
 
+from cpfls_cli.errors import SettingError
 from cpfls_cli.evolution.settings import EvolutionSettings
 from cpfls_cli.regressor.structure import StructureSettings
 from cpfls_cli.settings import Settings
@@ -25,6 +26,11 @@ class RidgeSettings(Settings):
     smallest: Annotated[float, Gt(0), Doc("smallest weight tried, per row of the scaled regressor")] = 1e-6
     largest: Annotated[float, Gt(0), Doc("largest weight tried below 'fuzzy part off'")] = 1e2
     count: Annotated[int, Ge(2), Le(200), Doc("number of weights tried")] = 17
+
+    def __post_init__(self) -> None:
+        """Refuse weights that do not ascend."""
+        if not self.smallest < self.largest:
+            raise SettingError("largest", f"must be greater than smallest, which is {self.smallest:g}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -79,4 +79,5 @@ def _noise_std(name: str, values: Array, settings: SimulationSettings) -> Array:
     relative = {str(key): value for key, value in settings.relative_noise.items()}.get(name, 0.0)
     if relative == 0.0:
         return np.full(values.shape[1:], absolute)
-    return np.asarray(np.hypot(absolute, relative * np.nanstd(values, axis=0)))
+    own = [float(np.std(channel[np.isfinite(channel)])) if np.isfinite(channel).any() else 0.0 for channel in values.T]
+    return np.hypot(absolute, relative * np.array(own))
