@@ -7,11 +7,14 @@ from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.decimation import kept_samples
+from cpfls_cli.report.numbers import plain
 from cpfls_cli.report.svg import inline_svg
 
 WIDTH = 7.6
@@ -95,6 +98,7 @@ def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
     """
     kept = kept_samples(y)
     axes.plot(x[kept], y[kept], **style)
+    plain_ticks(axes.yaxis)
 
 
 def stacked(figure: Figure, rows: int) -> list[Axes]:
@@ -121,6 +125,17 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
     columns : int
     """
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1)
+
+
+def plain_ticks(axis: Axis) -> None:
+    """Write every tick in full: a factor in the corner of a plot is easily overlooked.
+
+    Parameters
+    ----------
+    axis : matplotlib.axis.Axis
+        With a linear scale.
+    """
+    axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, smallest=1e-4)))
 
 
 def style_of(index: int) -> dict[str, Any]:

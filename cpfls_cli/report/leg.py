@@ -41,11 +41,18 @@ def first_leg(trajectory: Artifact) -> FirstLeg:
     """
     away = trajectory.array("position") - trajectory.array("position")[0]
     distance = np.linalg.norm(away, axis=1)
-    end = int(np.argmax(distance >= distance.max() * (1 - 1e-9)))
+    end = _end(distance, np.linalg.norm(trajectory.array("jerk"), axis=1))
     direction = away[end] / (distance[end] or 1.0)
     part = slice(0, end + 1)
     curves = {name: trajectory.array(name)[part] @ direction for name in DERIVATIVES[:-1]}
     return FirstLeg(trajectory.array("time")[part], curves | {"displacement": away[part] @ direction})
+
+
+def _end(distance: Array, jerk: Array) -> int:
+    """Find the last sample of the leg; a path comes to rest so softly that distance alone would end it early."""
+    end = int(np.argmax(distance >= distance.max() * (1 - 1e-9)))
+    at_rest = (jerk <= 1e-9 * jerk.max()) | (np.diff(distance, append=-np.inf) < 0)
+    return end + int(np.argmax(at_rest[end:]))
 
 
 def peaks(trajectory: Artifact) -> dict[str, float]:

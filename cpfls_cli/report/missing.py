@@ -37,9 +37,7 @@ def missing(sources: Sources) -> dict[str, str]:
     """
     given = {source.artifact.spec.format for source in sources.all}
     return {
-        spec.format.removeprefix(
-            "cpfls/"
-        ): f"Not shown, because no {_word(spec)} was given: {shows}; made by: {command}."
+        _word(spec): f"Not shown, because no {_word(spec)} was given: {shows}; made by: {command}."
         for spec, shows, command in _LACKS
         if spec.format not in given
     }

@@ -6,6 +6,7 @@ import math
 
 UNKNOWN = "—"
 ROUNDING = 1e-12
+_LARGE = 1e6
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -36,22 +37,23 @@ def number(value: float, digits: int = 4) -> str:
     return text.replace("-", "−")
 
 
-def plain(value: float) -> str:
-    """Write a setting the way it was given: no trailing zeros.
+def plain(value: float, smallest: float = 1e-3) -> str:
+    """Write a setting or the tick of an axis: no trailing zeros, small and large ones by powers of a thousand.
 
     Parameters
     ----------
     value : float
+    smallest : float
+        What is smaller than this gets a power of ten.
 
     Returns
     -------
     str
     """
-    text = f"{value:.6g}"
-    if "e" not in text:
-        return text.replace("-", "−")
-    mantissa, exponent = text.split("e")
-    return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", "−")
+    if value == 0 or not math.isfinite(value) or smallest <= abs(value) < _LARGE:
+        return (f"{value:.6g}" if math.isfinite(value) else number(value)).replace("-", "−")
+    power = 3 * math.floor(math.log10(abs(value)) / 3)
+    return f"{value / 10.0**power:.6g} × 10{str(power).translate(_SUPERSCRIPT)}".replace("-", "−")
 
 
 def count(value: float) -> str:
@@ -119,4 +121,5 @@ def r_squared(value: float) -> str:
         return "1"
     if value > 0.99995:
         return "> 0.9999"
-    return (f"{value:.4f}" if abs(value) < 100 else number(value, 4)).replace("-", "−")
+    text = f"{value:.4f}" if abs(value) < 100 else number(value, 4)
+    return "0.0000" if text == "-0.0000" else text.replace("-", "−")

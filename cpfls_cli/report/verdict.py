@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.report.content import Text, Tone
 from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, TRAINING, Judged, Winner, judged
-from cpfls_cli.report.numbers import percent
+from cpfls_cli.report.numbers import ROUNDING, percent
 from cpfls_cli.report.source import Source, Sources
 
 
@@ -26,11 +26,16 @@ def verdict(model: Source, sources: Sources) -> Iterator[Text]:
     Text
     """
     scores = judged(model)
-    for part in scores.parts:
-        winners = scores.winners(part)
-        yield Text(_sentence(scores, part, winners), _tone(winners, part))
     if fuzzy_part_off(model):
-        yield Text("The fuzzy part is switched off: this model is the rigid body and nothing else.", "note")
+        yield Text(
+            "Cross-validation switched the fuzzy part off: this model is the rigid body and nothing else. The table "
+            "says how well that does.",
+            "note",
+        )
+    else:
+        for part in scores.parts:
+            winners = scores.winners(part)
+            yield Text(_sentence(scores, part, winners), _tone(winners, part))
     if scores.parts == [TRAINING]:
         yield Text(
             "Nothing was held out. These figures say how closely the model fits the flight that it learned from, not "
@@ -83,12 +88,12 @@ def _sentence(scores: Judged, part: str, winners: Sequence[Winner]) -> str:
         f"{_where(part)} ({samples} samples) the largest error of the model is {percent(ours)} of the largest torque "
         f"({axis}, the worst axis); the rigid body with six inertia parameters: {percent(rigid)}"
     )
-    place = f" ({rigid_axis})" if rigid_axis and rigid_axis != axis else ""
+    place = f" ({rigid_axis})" if rigid > ROUNDING and rigid_axis != axis else ""
     return f"{reached}{place}. {_comparison(winners)}"
 
 
 def _where(part: str) -> str:
-    return "In training" if part == TRAINING else f"On {part}"
+    return {TRAINING: "In training", "held-out rest": "On the held-out rest"}.get(part, f"On {part}")
 
 
 def _comparison(winners: Sequence[Winner]) -> str:

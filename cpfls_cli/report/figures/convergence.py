@@ -6,15 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from cpfls_cli.report.canvas import plot, stacked, style_of
+from cpfls_cli.report.canvas import plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.source import Source
 
-OBJECTIVES = (
-    ("smallest mean squared error", "(N m)²"),
-    ("smallest largest error", "N m"),
-    ("smallest condition number", ""),
-)
+TITLES = ("smallest mean squared error", "smallest largest error", "smallest condition number")
 
 
 def convergence_figure(name: str, model: Source) -> Plot:
@@ -31,15 +27,17 @@ def convergence_figure(name: str, model: Source) -> Plot:
     """
     best = model.artifact.array("history/best")
     generation = np.arange(len(best))
+    units = (squared_error_unit(model), "N m", "pure number")
     evaluations = int(model.artifact.array("history/evaluations")[-1])
 
     def draw(figure: Figure) -> None:
-        panels = stacked(figure, len(OBJECTIVES))
-        for index, (axes, (title, unit)) in enumerate(zip(panels, OBJECTIVES, strict=True)):
+        panels = stacked(figure, len(TITLES))
+        for index, (axes, title, unit) in enumerate(zip(panels, TITLES, units, strict=True)):
             finite = np.where(np.isfinite(best[:, index]), best[:, index], np.nan)
             axes.plot(generation, finite, marker="o", markersize=3, **style_of(0))
             axes.set_title(title)
             axes.set_ylabel(unit)
+            plain_ticks(axes.yaxis)
         panels[-1].set_xlabel("generation")
         panels[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
 
@@ -48,3 +46,18 @@ def convergence_figure(name: str, model: Source) -> Plot:
         f"{evaluations} chromosomes were evaluated."
     )
     return plot(name, caption, "Best mean squared error, largest error and condition number by generation", 4.6, draw)
+
+
+def squared_error_unit(model: Source) -> str:
+    """Name the unit of the mean squared error that the search minimised.
+
+    Parameters
+    ----------
+    model : Source
+
+    Returns
+    -------
+    str
+        Over a rigid body every axis is divided by its own scale, so the error is a pure number.
+    """
+    return "scaled torque²" if model.artifact.text("model/base") == "rigid-body" else "(N m)²"

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from cpfls_cli.report.canvas import legend_above, plot, style_of
+from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Plot
+from cpfls_cli.report.figures.convergence import squared_error_unit
 from cpfls_cli.report.source import Source
 
 
@@ -41,14 +42,16 @@ def front_figure(name: str, model: Source) -> Plot:
             label="chosen",
         )
         axes.set_xlabel("condition number")
-        axes.set_ylabel("mean squared error")
+        axes.set_ylabel(f"mean squared error, {squared_error_unit(model)}")
+        plain_ticks(axes.yaxis)
         axes.set_xscale("log")
         legend_above(axes)
 
+    members = f"{len(objectives)} member{'s' if len(objectives) > 1 else ''}"
     rule = model.config["identification"]["choice"]
     caption = (
-        f"Pareto front of {model.label}, {len(objectives)} members: mean squared error against condition number on the "
-        f"samples that trained. The third objective, the largest error, is not shown, so a member may look dominated "
+        f"Pareto front of {model.label}, {members}: mean squared error against condition number, as the "
+        f"search saw them. The third objective, the largest error, is not shown, so a member may look dominated "
         f"here. The chosen one follows the rule {rule}."
     )
     return plot(

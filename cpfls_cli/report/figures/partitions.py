@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,6 +16,7 @@ from cpfls_cli.report.source import Source
 
 _POINTS = np.linspace(0.0, 1.0, 401)
 _COLUMNS = 2
+_CLOSE = 0.05
 
 
 def partitions_figure(name: str, model: Source) -> Plot:
@@ -82,4 +85,12 @@ def _draw_partition(axes: Axes, peaks: Array, joined: bool) -> None:
     axes.set_yticks([0.0, 0.5, 1.0])
     for index, peak in enumerate(peaks):
         number = index % values.shape[1] + 1
-        axes.text(peak, 1.03, str(number), ha="center", fontsize=8, color=style_of(number - 1)["color"])
+        side = _side(peaks, index)
+        axes.text(peak, 1.03, str(number), ha=side, fontsize=8, color=style_of(number - 1)["color"])
+
+
+def _side(peaks: Array, index: int) -> Literal["left", "center", "right"]:
+    """Keep the numbers of two close peaks apart."""
+    if index + 1 < len(peaks) and peaks[index + 1] - peaks[index] < _CLOSE:
+        return "right"
+    return "left" if index > 0 and peaks[index] - peaks[index - 1] < _CLOSE else "center"

@@ -71,7 +71,7 @@ def torques_figure(name: str, prediction: Source) -> Plot:
             if measured is not None:
                 line(axes, time, measured[:, index], label="flight", **BASELINE)
             shade_outside(axes, time, artifact.array("outside"))
-            axes.set_title(f"torque on {axis}", loc="right")
+            axes.set_title(f"torque on {axis}", loc="left" if index else "right")
             axes.set_ylabel("N m")
         legend_above(panels[0])
         panels[-1].set_xlabel("time, s")

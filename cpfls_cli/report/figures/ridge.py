@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from cpfls_cli.arrays import Array
 from cpfls_cli.report.canvas import legend_above, plot, style_of
 from cpfls_cli.report.content import Plot
+from cpfls_cli.report.numbers import plain
 from cpfls_cli.report.source import Source
 
 
@@ -46,7 +47,9 @@ def ridge_figure(name: str, model: Source) -> Plot:
             markeredgewidth=2,
             label="chosen",
         )
-        shown = [*range(0, len(weight) - 1, max((len(weight) - 1) // 6, 1)), len(weight) - 1]
+        last = len(weight) - 1
+        shown = [*range(0, last - 1, max(last // 6, 1)), last]
+        axes.set_yscale("log", nonpositive="clip")
         axes.set_xticks(shown, [_word(weight[index]) for index in shown])
         axes.set_xlabel("ridge weight on the fuzzy part")
         axes.set_ylabel("error, scaled torque squared")
@@ -68,4 +71,4 @@ def _chosen(weight: Array, value: float) -> int:
 
 
 def _word(weight: float) -> str:
-    return "off" if np.isinf(weight) else f"{weight:.0e}"
+    return "fuzzy part off" if np.isinf(weight) else plain(float(f"{weight:.2g}"))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from cpfls_cli.report.content import Block, Cell, Section, Table, Text
+from cpfls_cli.report.content import Block, Cell, Heading, Section, Table, Text
 from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, TRAINING, Judged, judged
 from cpfls_cli.report.numbers import UNKNOWN, count, number, percent, r_squared
 from cpfls_cli.report.source import Source, Sources
@@ -103,8 +103,8 @@ def _scale_sentence(sources: Sources) -> str:
     theirs = _SMALLEST_MAX_ERROR / _RELATIVE_BOUND
     return (
         f"Compare the relative errors, not MSE and maxE: the largest torque here is {number(ours, 2)} N m, whereas "
-        f"an error of {_SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in the paper. "
-        "Its condition numbers belong to its own training path, which it does not define in full."
+        f"an error of {_SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in the "
+        "paper. Its condition numbers belong to its own training path, which it does not define in full."
     )
 
 
@@ -116,13 +116,17 @@ def _largest_torque(scores: Judged) -> float:
 
 def _baselines(model: Source, index: int) -> Iterator[Block]:
     scores = judged(model)
-    caption = (
-        f"{model.label} and its baselines, by axis of the Euler angles (the last column: of the body). All are fitted "
-        "to the same samples. Marked: the rigid body has the smaller mean squared error there."
+    yield Heading(f"{model.label} and its baselines")
+    yield Text(
+        "By axis of the Euler angles; the last column is about the axes of the body. All are fitted to the same "
+        "samples. Marked: the rigid body has the smaller mean squared error there."
     )
-    header = ("Judged on", "Model", "Axis", *(title for _, title, _ in _MEASURES))
-    rows = [row for part in scores.parts for name in scores.models for row in _rows(scores, part, name)]
-    yield Table(f"baselines-{index}", caption, header, rows, frozenset({0, 1, 2}))
+    header = ("Model", "Axis", *(title for _, title, _ in _MEASURES))
+    for number_of, part in enumerate(scores.parts, start=1):
+        samples = int(scores.samples[number_of - 1])
+        rows = [row for name in scores.models for row in _rows(scores, part, name)]
+        caption = f"{model.label} on {part}, {samples} samples."
+        yield Table(f"baselines-{index}-{number_of}", caption, header, rows, frozenset({0, 1}))
     lost = [part for part in scores.parts if "rigid-body" in scores.winners(part)]
     if lost:
         yield Text(
@@ -134,10 +138,7 @@ def _baselines(model: Source, index: int) -> Iterator[Block]:
 
 def _rows(scores: Judged, part: str, name: str) -> Iterator[list[str | Cell]]:
     for axis, word in enumerate(AXES):
-        samples = int(scores.samples[scores.parts.index(part)])
-        first = axis == 0 and name == scores.models[0]
-        wins = name == RIGID_BODY and scores.winner(part, axis) == "rigid-body"
         values = [Cell(shown(float(scores.of(key, name, part)[axis]))) for key, _, shown in _MEASURES]
-        if wins:
+        if name == RIGID_BODY and scores.winner(part, axis) == "rigid-body":
             values[0] = Cell(f"{values[0].text} ◂", "warning")
-        yield [f"{part}, {samples} samples" if first else "", name if axis == 0 else "", word, *values]
+        yield [name if axis == 0 else "", word, *values]

@@ -57,7 +57,8 @@ def _deficient(sources: Sources) -> Iterator[Text]:
         if rank < full:
             yield Text(
                 f"{selection.label} is rank deficient: rank {rank}, where all samples reach {full}. Its condition "
-                "number covers only the directions that it keeps. Do not train on it; use another criterion or more samples.",
+                "number covers only the directions that it keeps. Do not train on it; use another criterion or more "
+                "samples.",
                 "warning",
             )
         if full < selection.parameters:
@@ -129,8 +130,8 @@ def _comments(sources: Sources) -> Iterator[Text]:
             continue
         if condition < full:
             yield Text(
-                f"{selection.label} is better conditioned than the full set: the paper's statement that a reduced set "
-                "cannot be is refuted by it."
+                f"{selection.label} is better conditioned than the full set: the paper's floor, that a reduced set "
+                "cannot be, does not hold."
                 if sources.settings.paper
                 else f"{selection.label} is better conditioned than the full set."
             )

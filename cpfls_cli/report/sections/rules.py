@@ -41,7 +41,7 @@ def _rules(model: Source, index: int) -> Iterator[Block]:
             ("Rank of the solved system", f"{count(artifact.number('solve/rank'))} of {len(values)}"),
             (
                 "Condition number",
-                f"{number(artifact.number('solve/condition_number'), 5)} over the kept singular values",
+                f"{condition} over the kept singular values",
             ),
         ]
     )
@@ -52,7 +52,7 @@ def _rules(model: Source, index: int) -> Iterator[Block]:
     firing, determined = artifact.array("rules/firing"), artifact.array("rules/determined")
     rows = [[names[i], number(float(firing[i]), 3), percent(float(determined[i]))] for i in silent]
     caption = (
-        "Rules that are not excited: largest firing strength in training, and the share of the rule's coefficients that "
-        "the data determine. What the model says there is not learned."
+        "Rules that are not excited: largest firing strength in training, and the share of the rule's coefficients "
+        "that the data determine. What the model says there is not learned."
     )
     yield Table(f"silent-rules-{index}", caption, ("Rule", "Largest firing", "Determined"), rows)

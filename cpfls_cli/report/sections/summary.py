@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from cpfls_cli.report.content import Block, Cell, Facts, Heading, Section, Table, Text
-from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, TRAINING, Judged, judged
+from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, Judged, judged
 from cpfls_cli.report.missing import missing
-from cpfls_cli.report.numbers import count, percent, plain, r_squared
+from cpfls_cli.report.numbers import ROUNDING, count, percent, plain, r_squared
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.report.verdict import fuzzy_part_off, verdict
+
+_SHOWN = {MODEL: "model", RIGID_BODY: "rigid body", "uniform-partitions": "no search: uniform partitions"}
 
 
 def summary_section(sources: Sources) -> Section:
@@ -43,7 +45,12 @@ def _model(model: Source, sources: Sources, number: int) -> Iterator[Block]:
     yield Heading("Findings")
     yield from [Text(f"{finding[:1].upper()}{finding[1:]}.", "warning") for finding in found]
     if not found:
-        yield Text("None: rank, rules and axes are excited, and the rigid body is not better on held-out data.")
+        yield Text(
+            "None: the rank is full, every rule and every axis is excited, and the rigid body is not better on data "
+            "that were held out."
+            if len(model.artifact.texts("judged/parts")) > 1
+            else "None: the rank is full, and every rule and every axis is excited. Nothing more could be checked."
+        )
 
 
 def _facts(model: Source) -> list[tuple[str, str]]:
@@ -112,8 +119,8 @@ def _scores(model: Source, number: int) -> Table:
     scores = judged(model)
     return Table(
         f"headline-{number}",
-        f"{model.label} beside the rigid body with six inertia parameters. Relative error: largest error over largest "
-        "torque, worst axis. R²: share of the variance of the body torque explained.",
+        f"{model.label} beside the rigid body with six inertia parameters, and where there is something to search for, "
+        "beside the same structure without a search. Relative error: largest error over largest torque, worst axis. R²: share of the variance of the body torque explained.",
         ("Judged on", "Model", "Relative error", *(f"R² {axis}" for axis in AXES)),
         [row for part in scores.parts for row in _rows(scores, part)],
         frozenset({0, 1}),
@@ -121,11 +128,13 @@ def _scores(model: Source, number: int) -> Table:
 
 
 def _rows(scores: Judged, part: str) -> Iterator[list[str | Cell]]:
-    for name, shown in ((MODEL, "model"), (RIGID_BODY, "rigid body")):
+    for name, shown in _SHOWN.items():
+        if name not in scores.models:
+            continue
         relative, axis = scores.worst(name, part)
         r2 = [Cell(r_squared(value), "warning" if value < 0 else "plain") for value in scores.of("r2_body", name, part)]
-        where = part if part != TRAINING else "training"
-        yield [where if name == MODEL else "", shown, f"{percent(relative)} ({axis})", *r2]
+        worst = f"{percent(relative)} ({axis})" if relative > ROUNDING else percent(relative)
+        yield [part if name == MODEL else "", shown, worst, *r2]
 
 
 def _flight_warnings(flight: Source) -> Iterator[Block]:

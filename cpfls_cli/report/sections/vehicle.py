@@ -67,7 +67,7 @@ def _rotors(vehicle: VehicleSettings) -> list[str]:
 
 
 def _range(values: Sequence[float]) -> str:
-    low, high = plain(min(values)), plain(max(values))
+    low, high = (plain(float(f"{value:.4g}")) for value in (min(values), max(values)))
     return low if low == high else f"{low} … {high}"
 
 
