@@ -70,6 +70,21 @@ def test_gradient_of_the_reduced_cost(monkeypatch, structure, base):
     np.testing.assert_allclose(gradient, expected, atol=1e-5 * np.abs(expected).max())
 
 
+def test_jacobian_is_that_of_the_residual_beside_what_the_regressor_spans(monkeypatch):
+    """Kaufman's approximation leaves out only the part inside the span, which the coefficients follow."""
+    evaluator, rng = problem("seesaw", "none")
+    regressor = evaluator.regressor
+    weights = rng.uniform(0.3, 0.9, regressor.structure.genes)
+    residual, jacobian, _ = captured(monkeypatch, regressor, evaluator.solver, weights)
+    by_weight = [
+        (residual(weights + STEP * unit) - residual(weights - STEP * unit)) / (2 * STEP) for unit in np.eye(13)
+    ]
+    Q = regressor.matrix(decode(regressor.structure, weights)).reshape(360, -1)
+    inside = Q @ np.linalg.pinv(Q, rcond=1e-10)
+    expected = np.transpose(by_weight) - inside @ np.transpose(by_weight)
+    np.testing.assert_allclose(jacobian(weights), expected, atol=1e-5 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 def test_never_a_worse_chromosome(base):
     evaluator, rng = problem("seesaw", base)
