@@ -117,12 +117,32 @@ def without_spikes(table: Table, settings: ImportSettings) -> tuple[Table, dict[
 
 
 def count_missing(table: Table, settings: ImportSettings) -> dict[str, int]:
-    """Count the absent values of each column of the log, without those that have none."""
+    """Count the absent values of each column of the log, without those that have none.
+
+    Parameters
+    ----------
+    table : Table
+    settings : ImportSettings
+
+    Returns
+    -------
+    dict of str to int
+    """
     return _by_column(table.signals, settings, lambda column: int(np.isnan(column).sum()))
 
 
 def count_stuck(table: Table, settings: ImportSettings) -> dict[str, int]:
-    """Count the saturated values of each column of the log, without those that have none."""
+    """Count the saturated values of each column of the log, without those that have none.
+
+    Parameters
+    ----------
+    table : Table
+    settings : ImportSettings
+
+    Returns
+    -------
+    dict of str to int
+    """
     return _by_column(table.signals, settings, lambda column: count_saturated(column, settings.saturation_samples))
 
 

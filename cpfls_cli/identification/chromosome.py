@@ -42,8 +42,9 @@ def encode(weights: Array) -> IntArray:
     Returns
     -------
     array of int, shape (genes,)
+        At least 1: a function of zero width would make the output jump.
     """
-    return np.rint(np.clip(weights, 0.0, 1.0) * LARGEST_GENE).astype(np.int64)
+    return np.clip(np.rint(weights * LARGEST_GENE), 1, LARGEST_GENE).astype(np.int64)
 
 
 def weight_jacobian(structure: ModelStructure, weights: Array, by_breakpoint: list[Array]) -> Array:

@@ -39,7 +39,7 @@ class RuleExcitation:
     @property
     def excited(self) -> BoolArray:
         """Whether a rule fires at all and data determine at least half of its coefficients."""
-        return np.asarray((self.firing > SILENT_FIRING) & (self.determined > DETERMINED_SHARE))
+        return np.asarray((self.firing > SILENT_FIRING) & (self.determined >= DETERMINED_SHARE))
 
 
 def visited_cells(attitude: Array) -> BoolArray:

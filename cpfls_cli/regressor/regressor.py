@@ -81,6 +81,7 @@ class Regressor:
     def __init__(self, structure: ModelStructure, motion: Motion, ranges: tuple[InputRange, InputRange]) -> None:
         self.structure = structure
         self.motion = motion
+        self.ranges = ranges
         self.mapped: tuple[MappedInput, ...] = tuple(
             map_input(motion.attitude[:, angle], structure.settings.input_map, structure.circular, ranges[angle])
             for angle in (ROLL, PITCH)

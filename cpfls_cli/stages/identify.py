@@ -14,8 +14,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.identify import Identification, identify
+from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.judge import Score
+from cpfls_cli.identification.results import Identification
 from cpfls_cli.stages.job import Job, Outcome, begin, finish, generator
 from cpfls_cli.stages.model_file import model_data
 from cpfls_cli.stages.training import TrainingData, read_torque_data, read_training

@@ -13,8 +13,8 @@ from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.identification.identify import Identification
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.results import Identification
 from cpfls_cli.regressor.structure import ModelStructure, model_structure
 
 
