@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from cpfls_cli.arrays import Array
 from cpfls_cli.report.canvas import legend_above, plot, style_of
 from cpfls_cli.report.content import Plot
-from cpfls_cli.report.numbers import plain
+from cpfls_cli.report.numbers import number
 from cpfls_cli.report.source import Source
 
 
@@ -71,4 +71,4 @@ def _chosen(weight: Array, value: float) -> int:
 
 
 def _word(weight: float) -> str:
-    return "fuzzy part off" if np.isinf(weight) else plain(float(f"{weight:.2g}"))
+    return "fuzzy part off" if np.isinf(weight) else number(weight, 1)

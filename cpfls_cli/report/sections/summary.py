@@ -120,7 +120,8 @@ def _scores(model: Source, number: int) -> Table:
     return Table(
         f"headline-{number}",
         f"{model.label} beside the rigid body with six inertia parameters, and where there is something to search for, "
-        "beside the same structure without a search. Relative error: largest error over largest torque, worst axis. R²: share of the variance of the body torque explained.",
+        "beside the same structure without a search. Relative error: largest error over largest torque, worst axis. "
+        "R²: share of the variance of the body torque explained.",
         ("Judged on", "Model", "Relative error", *(f"R² {axis}" for axis in AXES)),
         [row for part in scores.parts for row in _rows(scores, part)],
         frozenset({0, 1}),
