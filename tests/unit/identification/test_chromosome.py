@@ -6,9 +6,9 @@ from cpfls_cli.regressor import StructureSettings, model_structure, uniform_brea
 STRUCTURE = model_structure(StructureSettings(membership_functions=(2, 3, 1, 5, 6, 7)))
 
 
-def test_encode_rounds_and_clips():
+def test_encode_rounds_and_clips_without_making_a_function_of_zero_width():
     genes = encode(np.array([-0.1, 0.0, 0.5, 1.0, 1.2, 1.6 / LARGEST_GENE]))
-    assert genes.tolist() == [0, 0, 32768, 65535, 65535, 2]
+    assert genes.tolist() == [1, 1, 32768, 65535, 65535, 2]
 
 
 def test_encoded_weights_decode_to_their_breakpoints():
