@@ -1,0 +1,276 @@
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from cpfls_cli.artifacts import read_artifact, write_artifact
+from cpfls_cli.cli.app import app
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+CONFIG = """
+seed: 3
+trajectory: {sample_time_s: 0.2}
+reduction: {size: 60}
+identification:
+  structure: cpfls
+  input_map: data-range
+  consequents: seesaw
+  products: additive
+  membership_functions: 3
+  base: none
+  population: 10
+  generations: 1
+  subpopulations: 2
+  training_share: 0.7
+  local_search: {enabled: false}
+report: {title: "<script>alert(1)</script> & a study"}
+"""
+HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
+SECTIONS = [
+    "summary", "vehicle", "path", "flights", "reduction", "identification", "search", "partitions", "prediction",
+    "rules", "provenance",
+]  # fmt: skip
+VOID = {"meta", "link", "br", "img", "input", "hr"}
+
+
+class Page(HTMLParser):
+    """Collects what a browser would see: elements, attributes, text."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.elements, self.open, self.text = [], [], ""
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.text += data
+
+    def ids(self, tag):
+        return [attributes["id"] for name, attributes in self.elements if name == tag and "id" in attributes]
+
+
+def cpfls(*arguments, code=0):
+    result = CliRunner().invoke(app, [*map(str, arguments)])
+    assert result.exit_code == code, result.output
+    return result
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    config = folder / "study.yaml"
+    config.write_text(CONFIG)
+    names = ("trajectory", "flight", "selection", "model", "ridge", "prediction", "noisy")
+    files = SimpleNamespace(folder=folder, config=config, **{name: folder / f"{name}.h5" for name in names})
+    cpfls("trajectory", config, "-o", files.trajectory)
+    cpfls("simulate", config, files.trajectory, "-o", files.flight)
+    cpfls("simulate", config, files.trajectory, "-o", files.noisy, "--set", "simulation.relative_noise.torque=0.05")
+    cpfls("reduce", config, files.flight, "-o", files.selection)
+    cpfls("identify", config, files.flight, "--selection", files.selection, "-o", files.model)
+    based = ("--set", "identification.base=rigid-body", "--set", "identification.ridge.count=3")
+    cpfls("identify", config, files.noisy, "-o", files.ridge, *based)
+    cpfls("predict", config, files.model, files.flight, "-o", files.prediction)
+    return files
+
+
+@pytest.fixture(scope="module")
+def full(study):
+    given = (study.trajectory, study.flight, study.noisy, study.selection, study.model, study.ridge, study.prediction)
+    output = study.folder / "report.html"
+    summary = json.loads(cpfls("report", study.config, *given, "-o", output, "--json").stdout)
+    html = output.read_text(encoding="utf-8")
+    return SimpleNamespace(output=output, summary=summary, html=html, page=Page(html), given=given)
+
+
+def report(study, tmp_path, *artifacts, options=()):
+    output = tmp_path / "out.html"
+    result = cpfls("report", study.config, *artifacts, "-o", output, "--json", *options)
+    return json.loads(result.stdout), output.read_text(encoding="utf-8"), result
+
+
+def test_everything_given_everything_shown(full):
+    assert full.summary["sections"] == SECTIONS == full.page.ids("section")
+    assert full.summary["figures"] == full.page.ids("figure")
+    assert full.summary["tables"] == full.page.ids("table")
+    assert full.summary["missing"] == []
+    assert full.summary["bytes"] == full.output.stat().st_size < 3_000_000
+    kinds = {re.sub(r"-\d+$", "", name) for name in full.summary["figures"]}
+    assert kinds == {
+        "figure-2-derivatives", "figure-3-attitude", "figure-4-torque", "figure-5-reduction", "convergence",
+        "pareto-front", "ridge-curve", "figure-6-partitions", "figure-7-error", "torques", "inertia-matrix",
+    }  # fmt: skip
+
+
+def test_no_id_stands_twice_and_every_element_is_closed(full):
+    ids = [attributes["id"] for _, attributes in full.page.elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    assert full.page.open == []
+
+
+def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_path):
+    summary, html, _ = report(study, tmp_path, study.noisy)
+    assert summary["sections"] == ["summary", "vehicle", "flights", "provenance"]
+    assert summary["missing"] == ["trajectory", "selection", "model", "prediction"]
+    for command in ("trajectory CONFIG", "reduce CONFIG", "identify CONFIG", "predict CONFIG"):
+        assert f"cpfls {command}" in html
+    assert "cpfls simulate" not in html
+
+
+def test_the_page_needs_nothing_from_outside(full):
+    assert "@import" not in full.html
+    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", full.html))
+    for tag, attributes in full.page.elements:
+        assert tag not in {"script", "iframe", "object", "embed", "base", "img"}
+        for key in ("src", "srcset", "href", "xlink:href", "data", "action", "poster"):
+            assert attributes.get(key, "#").startswith(("#", "data:,")), (tag, attributes)
+
+
+def test_equal_inputs_give_equal_bytes(study, full, tmp_path):
+    _, html, _ = report(study, tmp_path, *full.given)
+    assert html == full.html
+
+
+def test_every_figure_is_well_formed_and_described(full):
+    pictures = re.findall(r"<svg.*?</svg>", full.html, re.DOTALL)
+    assert len(pictures) == len(full.summary["figures"])
+    for picture in pictures:
+        root = ElementTree.fromstring(picture)
+        assert root.get("aria-label")
+        assert root.get("viewBox")
+
+
+def test_hostile_titles_and_file_names_stay_text(study, tmp_path):
+    hostile = tmp_path / HOSTILE
+    shutil.copy(study.model, hostile)
+    selection = tmp_path / "a$b$c.h5"
+    shutil.copy(study.selection, selection)
+    _, html, _ = report(study, tmp_path, hostile, selection)
+    page = Page(html)
+    assert not [tag for tag, _ in page.elements if tag in {"script", "img"}]
+    assert not [attributes for _, attributes in page.elements if any(key.startswith("on") for key in attributes)]
+    assert "<script>alert(1)</script> & a study" in page.text
+    assert HOSTILE.replace("\x07", "\N{REPLACEMENT CHARACTER}") in page.text
+    assert "a$b$c.h5" in page.text
+    assert str(tmp_path) not in html
+
+
+def test_the_headline_says_who_wins_and_on_what(study, full):
+    assert "the rigid body is better about every axis" in full.page.text
+    assert "simulated without noise" in full.page.text
+    model = read_artifact(study.model)
+    assert "On the held-out rest" in full.page.text
+    worst = 100 * float(np.max(model.array("judged/relative_error")[0, 0]))
+    assert f"{worst:.3g} %" in full.page.text
+    for finding in model.texts("findings") + read_artifact(study.ridge).texts("findings"):
+        assert finding[1:] in full.page.text
+
+
+def test_the_tables_show_the_numbers_of_the_artifacts_beside_the_paper_s(study, full):
+    selection = read_artifact(study.selection)
+    for key in ("condition_number", "condition_number_full"):
+        assert f"{selection.number(key):.5g}" in full.page.text
+    for printed in ("56254", "59771", "+22.54 %", "5506.4", "0.1531", "121.5 × 10⁻⁶"):
+        assert printed in full.page.text
+
+
+def test_the_paper_s_figures_go_when_they_are_not_asked_for(study, full, tmp_path):
+    _, html, _ = report(study, tmp_path, *full.given, options=("--set", "report.paper=false"))
+    assert "56254" not in html
+    assert "5506.4" not in html
+    assert "Paper" not in Page(html).text
+
+
+def test_a_rank_deficient_selection_is_called_so(study, tmp_path):
+    selection = read_artifact(study.selection)
+    rank = int(selection.number("rank_full")) - 2
+    broken = tmp_path / "broken.h5"
+    write_artifact(broken, replace(selection, data={**selection.data, "rank": rank, "condition_number": 7.0}))
+    _, html, _ = report(study, tmp_path, broken)
+    text = Page(html).text
+    assert f"rank deficient: rank {rank}" in text
+    assert "not comparable" in text
+    assert "better conditioned" not in text
+
+
+def test_samples_outside_the_excited_region_are_shaded_and_counted(study, tmp_path):
+    prediction = read_artifact(study.prediction)
+    outside = np.zeros(len(prediction.array("time")), dtype=np.uint8)
+    outside[10:17] = 1
+    marked = tmp_path / "marked.h5"
+    write_artifact(marked, replace(prediction, data={**prediction.data, "outside": outside}))
+    shaded = [report(study, tmp_path, path, options=("--force",))[1] for path in (study.prediction, marked)]
+    assert [html.count("#f3d9b8") > 0 for html in shaded] == [False, True]
+    assert "7 of 275 samples outside" in Page(shaded[1]).text
+
+
+def test_the_provenance_names_hashes_and_no_folder(study, full):
+    for path in full.given:
+        assert subprocess.check_output(["sha256sum", path], text=True)[:64] in full.page.text
+    assert str(study.folder) not in full.html
+    assert read_artifact(study.model).header.config in full.page.text
+
+
+def test_a_file_given_twice_counts_once_and_equal_names_are_told_apart(study, tmp_path):
+    (tmp_path / "other").mkdir()
+    copy, other = tmp_path / "copy.h5", tmp_path / "other" / "flight.h5"
+    shutil.copy(study.flight, copy)
+    shutil.copy(study.noisy, other)
+    summary, html, result = report(study, tmp_path, study.flight, copy, other)
+    assert len([name for name in summary["figures"] if name.startswith("figure-4")]) == 2
+    assert "shown once" in result.stderr
+    assert len(set(re.findall(r"flight\.h5 \([0-9a-f]{12}\)", html))) == 2
+
+
+def test_another_vehicle_is_pointed_out(study, tmp_path):
+    _, html, _ = report(study, tmp_path, study.flight, options=("--set", "vehicle.mass_kg=7.0"))
+    assert "another vehicle than this one: flight.h5" in html
+
+
+def test_what_is_not_an_artifact_ends_with_a_message(study, tmp_path):
+    foreign = tmp_path / "foreign.h5"
+    foreign.write_text("no artifact")
+    result = cpfls("report", study.config, foreign, "-o", tmp_path / "out.html", code=2)
+    assert "foreign.h5" in result.stderr
+    assert not (tmp_path / "out.html").exists()
+
+
+def test_an_existing_page_is_kept_and_a_dry_run_writes_nothing(study, full, tmp_path):
+    cpfls("report", study.config, study.flight, "-o", full.output, code=2)
+    assert full.output.read_text(encoding="utf-8") == full.html
+    cpfls("report", study.config, study.flight, "-o", tmp_path / "new.html", "--dry-run")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to show the page in")
+def test_a_browser_shows_all_figures(full, tmp_path):
+    picture = tmp_path / "page.png"
+    quiet = ("disable-gpu", "disable-quic", "no-first-run", "disable-background-networking", "disable-component-update")
+    options = ["headless", "no-sandbox", "disable-sync", *quiet, f"user-data-dir={tmp_path / 'profile'}"]
+    command = [CHROMIUM, *(f"--{option}" for option in options), f"--screenshot={picture}", "--window-size=420,2000"]
+    shown = subprocess.run(
+        [*command, "--dump-dom", full.output.as_uri()], capture_output=True, text=True, check=True, timeout=120
+    ).stdout
+    assert Page(shown).ids("figure") == full.summary["figures"]
+    assert shown.count("<svg") == len(full.summary["figures"])
+    subprocess.run([*command, full.output.as_uri()], capture_output=True, check=True, timeout=120)
+    assert Path(picture).stat().st_size > 10_000
