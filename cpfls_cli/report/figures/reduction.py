@@ -48,7 +48,7 @@ def reduction_figure(name: str, selections: Sequence[Source]) -> Plot:
 
     caption = (
         f"Figure 5. Condition number (above) and smallest and largest singular value (below) after each sample taken "
-        f"from {selections[0].input_name('flight')}. The curve begins where the selection reaches full rank; the cross "
+        f"from {selections[0].input_name('flight')}. The curve begins where the selection reaches full rank; a cross "
         "is the median of random choices of equal size."
     )
     return plot(name, caption, "Condition number over the number of selected samples, on a log scale", 5.0, draw)
@@ -56,12 +56,14 @@ def reduction_figure(name: str, selections: Sequence[Source]) -> Plot:
 
 def _draw_condition(axes: Axes, selection: Source, index: int) -> None:
     trace = selection.artifact.array("trace/condition_number")
-    label = f"{selection.artifact.text('criterion')}, {len(trace)} samples"
+    deficient = selection.artifact.number("rank") < selection.artifact.number("rank_full")
+    label = f"{selection.artifact.text('criterion')}, {len(trace)} samples{', rank deficient' if deficient else ''}"
     known = np.where(np.isfinite(trace), trace, np.nan)
     axes.plot(_numbers(trace), known, label=label, **style_of(index))
     random = float(np.median(selection.artifact.array("random/condition_number")))
     if np.isfinite(random):
-        axes.plot([len(trace)], [random], "x", color=style_of(index)["color"], markersize=7, label="random choice")
+        label = "random choice" if index == 0 else None
+        axes.plot([len(trace)], [random], "x", color=style_of(index)["color"], markersize=7, label=label)
 
 
 def _draw_singular_values(axes: Axes, selection: Source, index: int) -> None:

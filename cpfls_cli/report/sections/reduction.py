@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -56,9 +56,8 @@ def _deficient(sources: Sources) -> Iterator[Text]:
         rank, full = (int(selection.artifact.number(key)) for key in ("rank", "rank_full"))
         if rank < full:
             yield Text(
-                f"{selection.label} is rank deficient: rank {rank}, where all samples reach {full}. Its condition "
-                "number covers only the directions that it keeps. Do not train on it; use another criterion or more "
-                "samples.",
+                f"{selection.label} is rank deficient: rank {rank}, where all samples reach {full}. Do not train "
+                "on it; use another criterion or more samples.",
                 "warning",
             )
         if full < selection.parameters:
@@ -71,7 +70,9 @@ def _deficient(sources: Sources) -> Iterator[Text]:
 
 def _table(sources: Sources) -> Table:
     paper = sources.settings.paper
-    rows = [row for selection in sources.selections for row in _rows(selection)]
+    ours = (tuple(row) for selection in sources.selections for row in _rows(selection))
+    # Selections from one flight share its full set, which then stands once.
+    rows: list[Sequence[str | Cell]] = list(dict.fromkeys(ours))
     if paper:
         rows += [
             [

@@ -64,9 +64,13 @@ def _facts(model: Source) -> list[tuple[str, str]]:
         ("Learned from", f"{flight}: {learned} of {training} training samples{chosen}"),
         ("Structure", structure(model)),
         ("Parameters", parameters(model)),
-        ("Search", f"population {settings['population']}, {settings['generations']} generations"),
+        ("Search", f"population {settings['population']}, {_generations(settings['generations'])}"),
         ("Made by", f"cpfls {artifact.header.version}, seed {artifact.header.seed}"),
     ]
+
+
+def _generations(number: int) -> str:
+    return f"{number} generation{'' if number == 1 else 's'}"
 
 
 def structure(model: Source) -> str:
@@ -84,14 +88,12 @@ def structure(model: Source) -> str:
     kind = {"cpfls": "continuous periodic fuzzy system", "fls": "classic TSK fuzzy system"}[settings["structure"]]
     functions = settings["membership_functions"]
     counted = f"{functions}" if isinstance(functions, int) else ", ".join(str(n) for n in functions)
-    consequents = settings["consequents"]
-    if consequents == "harmonic":
-        consequents = f"harmonic, order {settings['harmonic_order']}"
+    order = f" of order {settings['harmonic_order']}" if settings["consequents"] == "harmonic" else ""
     base = "on a rigid body" if settings["base"] == "rigid-body" else "alone, without a rigid body underneath"
     noun = "function" if counted == "1" else "functions"
     return (
-        f"{kind} {base}; {counted} membership {noun} per input, input map {settings['input_map']}, {consequents} "
-        f"consequents ({settings['products']})"
+        f"{kind} {base}; {counted} membership {noun} per input, input map {settings['input_map']}, {settings['consequents']} "
+        f"consequents{order} ({settings['products']})"
     )
 
 

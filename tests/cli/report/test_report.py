@@ -212,6 +212,14 @@ def test_a_rank_deficient_selection_is_called_so(study, tmp_path):
     assert "better conditioned" not in text
 
 
+def test_selections_from_one_flight_share_its_full_set(study, tmp_path):
+    smaller = tmp_path / "smaller.h5"
+    cpfls("reduce", study.config, study.flight, "-o", smaller, "--set", "reduction.size=40")
+    summary, html, _ = report(study, tmp_path, study.selection, smaller)
+    assert Page(html).text.count("flight.h5, full set") == 1
+    assert [name for name in summary["figures"] if name.startswith("figure-5")] == ["figure-5-reduction-1"]
+
+
 def test_samples_outside_the_excited_region_are_shaded_and_counted(study, tmp_path):
     prediction = read_artifact(study.prediction)
     outside = np.zeros(len(prediction.array("time")), dtype=np.uint8)
