@@ -62,8 +62,8 @@ def _draw_condition(axes: Axes, selection: Source, index: int) -> None:
     axes.plot(_numbers(trace), known, label=label, **style_of(index))
     random = float(np.median(selection.artifact.array("random/condition_number")))
     if np.isfinite(random):
-        label = "random choice" if index == 0 else None
-        axes.plot([len(trace)], [random], "x", color=style_of(index)["color"], markersize=7, label=label)
+        word = "random choice" if index == 0 else None
+        axes.plot([len(trace)], [random], "x", color=style_of(index)["color"], markersize=7, label=word)
 
 
 def _draw_singular_values(axes: Axes, selection: Source, index: int) -> None:

@@ -92,8 +92,8 @@ def structure(model: Source) -> str:
     base = "on a rigid body" if settings["base"] == "rigid-body" else "alone, without a rigid body underneath"
     noun = "function" if counted == "1" else "functions"
     return (
-        f"{kind} {base}; {counted} membership {noun} per input, input map {settings['input_map']}, {settings['consequents']} "
-        f"consequents{order} ({settings['products']})"
+        f"{kind} {base}; {counted} membership {noun} per input, input map {settings['input_map']}, "
+        f"{settings['consequents']} consequents{order} ({settings['products']})"
     )
 
 
