@@ -44,7 +44,7 @@ def reduction_figure(name: str, selections: Sequence[Source]) -> Plot:
         lower.set_xlabel("selected samples")
         for axes in (upper, lower):
             axes.set_yscale("log")
-            legend_above(axes, columns=3)
+            legend_above(axes, columns=2)
 
     caption = (
         f"Figure 5. Condition number (above) and smallest and largest singular value (below) after each sample taken "
