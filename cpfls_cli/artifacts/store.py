@@ -186,8 +186,7 @@ def write_artifact(path: Path, artifact: Artifact) -> None:
         try:
             with h5py.File(temporary, "w") as file:
                 _write_header(file, artifact)
-                for name, value in artifact.data.items():
-                    _write_dataset(file, _known(artifact.spec, name), value)
+                _write_data(file, artifact)
             os.replace(temporary, path)
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error}") from None
@@ -302,11 +301,15 @@ def _identify(path: Path, file: h5py.File) -> ArtifactSpec:
     return spec
 
 
-def _known(spec: ArtifactSpec, path: str) -> DatasetSpec:
-    known = spec.dataset(path)
-    if known is None:
-        raise KeyError(f"{spec.format} has no dataset {path}")
-    return known
+def _write_data(file: h5py.File, artifact: Artifact) -> None:
+    # In the order of the format, because the order of writing shows in the bytes of a file.
+    specs = {spec.path: spec for spec in artifact.spec.datasets}
+    unknown = artifact.data.keys() - specs.keys()
+    if unknown:
+        raise KeyError(f"{artifact.spec.format} has no dataset {min(unknown)}")
+    for path, spec in specs.items():
+        if path in artifact.data:
+            _write_dataset(file, spec, artifact.data[path])
 
 
 def _write_header(file: h5py.File, artifact: Artifact) -> None:
@@ -317,7 +320,7 @@ def _write_header(file: h5py.File, artifact: Artifact) -> None:
     file.attrs["seed"] = header.seed
     file.attrs["config_sha256"] = _sha256(header.config)
     file.create_dataset(CONFIG, data=np.bytes_(header.config.encode()))
-    for role, source in header.inputs.items():
+    for role, source in sorted(header.inputs.items()):
         group = file.create_group(f"{INPUTS}/{role}")
         for key in ("name", "sha256", "format"):
             group.attrs[key] = getattr(source, key)

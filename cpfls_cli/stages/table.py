@@ -84,4 +84,4 @@ def _number(field: str, path: Path, row: int, column: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise InputError(f"{path}:{row}: column '{column}' = '{text}': not a number") from None
+        raise InputError(f"{path}:{row}: column '{column}' = {text[:40]!r}: not a number") from None

@@ -1,0 +1,99 @@
+"""The command line as a function, and a tiny study taken through every stage once."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from typer.testing import CliRunner
+
+from cpfls_cli.cli.app import app
+
+TINY = """\
+seed: 1
+trajectory: {sample_time_s: 0.1}
+reduction: {size: 60}
+identification:
+  structure: cpfls
+  input_map: data-range
+  consequents: seesaw
+  products: additive
+  membership_functions: 5
+  base: none
+  population: 10
+  generations: 1
+  local_search: {enabled: false}
+"""
+
+
+@pytest.fixture(scope="session")
+def cpfls():
+    """Run a command; anything but an exit is a bug and is raised."""
+    runner = CliRunner()
+
+    def call(*words):
+        result = runner.invoke(app, [str(word) for word in words])
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return result
+
+    return call
+
+
+@pytest.fixture
+def refuse(cpfls, tmp_path):
+    """Run a command that must fail, leave every file as it was, and say why; give its messages."""
+
+    def contents():
+        return {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+    def call(*words, code=2):
+        before = contents()
+        result = cpfls(*words)
+        assert result.exit_code == code, result.output
+        assert result.stdout == ""
+        assert contents() == before
+        lines = result.stderr.splitlines()
+        assert lines
+        assert all(line.startswith("cpfls: error: ") for line in lines), result.stderr
+        assert "Traceback" not in result.stderr
+        return [line.removeprefix("cpfls: error: ") for line in lines]
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory):
+    path = tmp_path_factory.mktemp("study") / "tiny.yaml"
+    path.write_text(TINY)
+    return path
+
+
+@pytest.fixture(scope="session")
+def pipeline(cpfls, study):
+    """Every artifact of the tiny study, and what the commands printed with --json."""
+    folder = study.parent
+    paths = {stage: folder / f"{stage}.h5" for stage in ("trajectory", "flight", "selection", "model", "prediction")}
+    commands = {
+        "trajectory": ("trajectory", study),
+        "flight": ("simulate", study, paths["trajectory"]),
+        "selection": ("reduce", study, paths["flight"]),
+        "model": ("identify", study, paths["flight"], "--selection", paths["selection"]),
+        "prediction": ("predict", study, paths["model"], paths["flight"]),
+    }
+    printed = {}
+    for stage, words in commands.items():
+        result = cpfls(*words, "-o", paths[stage], "--json")
+        assert result.exit_code == 0, result.stderr
+        printed[stage] = result.stdout
+    return SimpleNamespace(
+        **paths, paths=paths, printed=printed, summaries={k: json.loads(v) for k, v in printed.items()}
+    )
+
+
+@pytest.fixture(scope="session")
+def configs():
+    """The configs that are shipped."""
+    found = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+    assert found
+    return found

@@ -1,0 +1,235 @@
+"""Wrong artifacts: damaged, foreign, of another stage or another flight. One message, and nothing is written."""
+
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def changed(pipeline, tmp_path):
+    """Copy an artifact and change it."""
+
+    def call(stage, change):
+        path = tmp_path / f"{stage}.h5"
+        shutil.copy(pipeline.paths[stage], path)
+        with h5py.File(path, "r+") as file:
+            change(file)
+        return path
+
+    return call
+
+
+def put(path, value):
+    def change(file):
+        del file[path]
+        file[path] = value
+
+    return change
+
+
+def drop(*paths):
+    def change(file):
+        for path in paths:
+            del file[path]
+
+    return change
+
+
+@pytest.mark.parametrize("share", [0.0001, 0.01, 0.1, 0.5, 0.9, 0.99, 0.9999])
+def test_truncated(refuse, pipeline, study, tmp_path, share):
+    whole = pipeline.trajectory.read_bytes()
+    cut = tmp_path / "cut.h5"
+    cut.write_bytes(whole[: int(len(whole) * share)])
+    (line,) = refuse("simulate", study, cut, "-o", tmp_path / "out.h5")
+    assert line.startswith(f"{cut}: cannot be read as an artifact: ")
+    assert refuse("info", cut) == refuse("check", cut) == [line]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"", "is empty"), (b"t,roll\n0,1\n", "cannot be read as an artifact: not an HDF5 file, or damaged")],
+)
+def test_not_hdf5(refuse, study, tmp_path, content, message):
+    path = tmp_path / "flight.h5"
+    path.write_bytes(content)
+    assert refuse("reduce", study, path, "-o", tmp_path / "out.h5") == [f"{path}: {message}"]
+
+
+def test_foreign_hdf5(refuse, study, tmp_path):
+    path = tmp_path / "foreign.h5"
+    with h5py.File(path, "w") as file:
+        file["time"] = np.arange(3.0)
+    (line,) = refuse("reduce", study, path, "-o", tmp_path / "out.h5")
+    assert line == f"{path}: an HDF5 file, but not made by cpfls (no root attribute 'format')"
+
+
+def test_missing_file_and_folder(refuse, study, tmp_path):
+    words = ("-o", tmp_path / "out.h5")
+    assert refuse("reduce", study, tmp_path / "none.h5", *words) == [f"{tmp_path / 'none.h5'}: no such file"]
+    assert refuse("reduce", study, tmp_path, *words) == [f"{tmp_path}: is a folder, not a file"]
+    assert refuse("info", tmp_path / "none.h5") == [f"{tmp_path / 'none.h5'}: no such file"]
+    assert refuse("check", tmp_path) == [f"{tmp_path}: is a folder, not an artifact"]
+
+
+@pytest.mark.parametrize(
+    ("command", "given", "needed"),
+    [
+        ("simulate", ["flight"], "cpfls/trajectory (made by `cpfls trajectory`)"),
+        ("reduce", ["trajectory"], "cpfls/flight (made by `cpfls simulate, import`)"),
+        ("identify", ["model"], "cpfls/flight (made by `cpfls simulate, import`)"),
+        ("predict", ["flight", "flight"], "cpfls/model (made by `cpfls identify`)"),
+    ],
+)
+def test_artifact_of_another_stage(refuse, pipeline, study, tmp_path, command, given, needed):
+    paths = [pipeline.paths[stage] for stage in given]
+    (line,) = refuse(command, study, *paths, "-o", tmp_path / "out.h5")
+    assert line == f"{paths[0]}: is a cpfls/{given[0]}; this command needs a {needed}"
+
+
+def test_selection_given_as_flight_to_identify(refuse, pipeline, study, tmp_path):
+    words = ("identify", study, pipeline.flight, "--selection", pipeline.flight, "-o", tmp_path / "out.h5")
+    (line,) = refuse(*words)
+    assert line.startswith(f"{pipeline.flight}: is a cpfls/flight; this command needs a cpfls/selection")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("schema_version", 99, "schema_version = 99: written by a newer cpfls; this one reads up to 1"),
+        ("schema_version", "x", "the root attribute 'schema_version' is missing or not a number"),
+        ("format", "cpfls/other", "format = 'cpfls/other': this cpfls does not know it"),
+        ("seed", "x", "damaged: invalid literal for int() with base 10: 'x'"),
+    ],
+)
+def test_header(refuse, changed, name, value, message):
+    path = changed("flight", lambda file: file.attrs.__setitem__(name, value))
+    assert refuse("info", path) == [f"{path}: {message}"]
+
+
+def test_config_that_was_edited_in_place(refuse, changed):
+    path = changed("flight", put("config", np.bytes_(b"seed: 2\n")))
+    (line,) = refuse("info", path)
+    assert line.startswith(f"{path}: damaged: /config was changed")
+
+
+def test_required_datasets_missing(refuse, changed, study, tmp_path):
+    path = changed("trajectory", drop("jerk", "time"))
+    (line,) = refuse("simulate", study, path, "-o", tmp_path / "out.h5")
+    assert line == f"{path}: the cpfls/trajectory lacks time, jerk; make it again"
+
+
+@pytest.mark.parametrize(
+    ("command", "signal"), [("reduce", "attitude"), ("identify", "torque"), ("identify", "attitude")]
+)
+def test_flight_without_a_signal_that_the_stage_needs(refuse, changed, study, tmp_path, command, signal):
+    path = changed("flight", drop(signal))
+    (line,) = refuse(command, study, path, "-o", tmp_path / "out.h5")
+    assert line.startswith(f"{path}: lacks {signal}; this stage needs time, attitude")
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        ("attitude", np.zeros((549, 2)), "attitude: 2 along 'axis', but 3 by the format"),
+        ("attitude", np.zeros((9, 3)), "attitude: 9 along 'time', but 549 by time"),
+        ("attitude", np.zeros((0, 3)), "attitude: 0 along 'time', but 549 by time"),
+        ("attitude", 3.0, "attitude: has 0 dimensions, expected 2 ('time', 'axis')"),
+        ("attitude", np.full((549, 3), b"a"), "attitude: holds <U1, expected numbers"),
+        ("torque", np.full((549, 3), np.nan), "torque: 549 samples are not finite, the first at index 0"),
+        ("time", np.zeros(549), "time: does not ascend at index 1"),
+    ],
+)
+@pytest.mark.parametrize("dry_run", [(), ("--dry-run",)])
+def test_flight_of_wrong_content(refuse, changed, study, tmp_path, path, value, message, dry_run):
+    flight = changed("flight", put(path, value))
+    assert refuse("identify", study, flight, "-o", tmp_path / "out.h5", *dry_run) == [f"{flight}: {message}"]
+
+
+def test_flight_of_no_samples(refuse, changed, study, tmp_path):
+    def empty(file):
+        for name in ("time", *(n for n in file if n not in {"config", "inputs", "time"})):
+            shape = (0, *file[name].shape[1:])
+            del file[name]
+            file[name] = np.zeros(shape)
+
+    flight = changed("flight", empty)
+    assert refuse("reduce", study, flight, "-o", tmp_path / "out.h5") == [f"{flight}: holds no samples"]
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("model/weights", np.zeros(3)),
+        ("model/coefficients", np.zeros(5)),
+        ("model/coefficients", np.full(113, np.nan)),
+        ("model/rigid_body", np.zeros(2)),
+        ("model/input_range", np.zeros(2)),
+        ("model/visited", np.zeros((2, 3))),
+        ("model/base", 3),
+    ],
+)
+def test_model_of_wrong_content(refuse, changed, pipeline, study, tmp_path, path, value):
+    model = changed("model", put(path, value))
+    lines = refuse("predict", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
+    assert all(line.startswith(f"{model}: ") for line in lines)
+
+
+def test_model_whose_numbers_do_not_fit_its_config(refuse, changed, pipeline, study, tmp_path):
+    def shorten(file):
+        for name in ("coefficients", "parameter"):
+            values = file[f"model/{name}"][:-1]
+            del file[f"model/{name}"]
+            file[f"model/{name}"] = values
+
+    model = changed("model", shorten)
+    (line,) = refuse("predict", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
+    assert line == f"{model}: holds 24 weights and 112 coefficients; its config asks for 24 and 113"
+
+
+def test_selection_from_another_flight(refuse, cpfls, pipeline, study, tmp_path):
+    other = tmp_path / "other.h5"
+    noisy = ("--set", "simulation.relative_noise={torque: 0.05}")
+    assert cpfls("simulate", study, pipeline.trajectory, "-o", other, *noisy).exit_code == 0
+    words = ("identify", study, other, "--selection", pipeline.selection, "-o", tmp_path / "out.h5")
+    (line,) = refuse(*words)
+    assert line.startswith(
+        f"{pipeline.selection}: was made from another flight (flight.h5, sha256 differs from {other})"
+    )
+    assert refuse(*words, "--dry-run") == [line]
+
+
+def test_training_share_changed_between_reduce_and_identify(refuse, pipeline, study, tmp_path):
+    words = ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", tmp_path / "out.h5")
+    (line,) = refuse(*words, "--set", "identification.training_share=0.5")
+    assert line.startswith(f"{pipeline.selection}: selects samples beyond the first ")
+    assert "identification.training_share has changed since" in line
+
+
+@pytest.mark.parametrize("first", [-1, 1.5])
+def test_selection_with_wrong_indices(refuse, changed, pipeline, study, tmp_path, first):
+    def change(file):
+        values = file["indices"][:].astype(float)
+        values[:2] = first
+        del file["indices"]
+        file["indices"] = values
+
+    selection = changed("selection", change)
+    words = ("identify", study, pipeline.flight, "--selection", selection, "-o", tmp_path / "out.h5")
+    (line,) = refuse(*words)
+    assert line.startswith(f"{selection}: indices is empty, negative or repeats itself")
+
+
+def test_any_flipped_byte_ends_in_a_message_or_in_a_result(cpfls, pipeline, tmp_path):
+    # Metadata stands at the front of an HDF5 file; damage there must not reach the user as a traceback.
+    good = bytearray(pipeline.selection.read_bytes())
+    rng = np.random.default_rng(0)
+    path = tmp_path / "flipped.h5"
+    for place in rng.integers(0, min(len(good), 20000), 60):
+        damaged = good.copy()
+        damaged[place] ^= 0xFF
+        path.write_bytes(damaged)
+        result = cpfls("check", path)
+        assert result.exit_code in {0, 1, 2}
+        assert "Traceback" not in result.output

@@ -1,0 +1,146 @@
+"""Wrong configs: one line for each wrong key, naming file, key, value and what was meant."""
+
+import pytest
+
+
+@pytest.fixture
+def wrong(refuse, tmp_path):
+    def call(content, *words):
+        config = tmp_path / "study.yaml"
+        config.write_bytes(content if isinstance(content, bytes) else content.encode())
+        lines = refuse("trajectory", config, "-o", tmp_path / "out.h5", *words)
+        return [line.replace(f"{config}", "FILE") for line in lines]
+
+    return call
+
+
+def test_all_unknown_keys_are_listed_with_the_nearest_valid_name(wrong):
+    lines = wrong(
+        "vehicle:\n  mass: 3\n  rotors:\n  - {position_m: [1, 0, 0], spin: 1, spinn: 1}\n"
+        "trajectory: {mass_kg: 3}\nidentificaton: {}\nimport: {signals: {attitude: {columns: [a, b, c], units: rad}}}\n"
+        "reduction: {xyzzy: 1}\n"
+    )
+    assert {line.split(" (")[0] + " (" + line.split(" (")[1] for line in lines if "unknown" in line} == {
+        "FILE: vehicle.mass = 3: unknown key (did you mean 'mass_kg'?)",
+        "FILE: vehicle.rotors.0.spinn = 1: unknown key (did you mean 'spin'?)",
+        "FILE: trajectory.mass_kg = 3: unknown key (did you mean 'vehicle.mass_kg'?)",
+        "FILE: identificaton: unknown key (did you mean 'identification'?)",
+        "FILE: import.signals.attitude.units = \"rad\": unknown key (did you mean 'unit'?)",
+        "FILE: reduction.xyzzy = 1: unknown key (valid here: size, condition_number, criterion, rank_tolerance)",
+    }
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("vehicle: {mass_kg: heavy}", 'FILE: vehicle.mass_kg = "heavy": must be a number'),
+        ("vehicle: {mass_kg: '6.0'}", 'FILE: vehicle.mass_kg = "6.0": must be a number'),
+        ("vehicle: {mass_kg: null}", "FILE: vehicle.mass_kg = null: must be a number"),
+        ("vehicle: {mass_kg: 1:30}", 'FILE: vehicle.mass_kg = "1:30": must be a number'),
+        ("vehicle: {mass_kg: -6}", "FILE: vehicle.mass_kg = -6: must be greater than 0"),
+        ("vehicle: {mass_kg: .nan}", "FILE: vehicle.mass_kg = NaN: must be a finite number"),
+        ("vehicle: {gravity_m_s2: .inf}", "FILE: vehicle.gravity_m_s2 = Infinity: must be a finite number"),
+        ("vehicle: {rotors: []}", "FILE: vehicle.rotors = []: needs 1 entries at least"),
+        (
+            "vehicle: {inertia_kg_m2: [1, 2]}",
+            "FILE: vehicle.inertia_kg_m2 = [1, 2]: needs 3 entries or needs 6 entries",
+        ),
+        ("vehicle: 3", "FILE: vehicle = 3: must be a section of keys"),
+        ("report: {title: 3}", "FILE: report.title = 3: must be text"),
+        ("identification: {population: true}", "FILE: identification.population = true: must be a whole number"),
+        ("identification: {population: 75.0}", "FILE: identification.population = 75.0: must be a whole number"),
+        ("identification: {structure: fuzzy}", "FILE: identification.structure = \"fuzzy\": must be 'cpfls' or 'fls'"),
+        (
+            "identification: {membership_functions: x}",
+            'FILE: identification.membership_functions = "x": must be a whole number or must be a list',
+        ),
+        ("import: {crop_s: [3, 1]}", "FILE: import.crop_s = [3, 1]: needs 0 <= begin < end"),
+        ("import: {signals: {torque: {columns: [a, b, c]}}}", "FILE: import.signals.torque.unit: is missing"),
+        ("seed: 010", "FILE: seed = 10.0: must be a whole number"),
+        ("seed: null", "FILE: seed = null: must be a whole number"),
+        ("seed: 99999999999999999999", "FILE: seed = 99999999999999999999: must be less than 9223372036854775808"),
+    ],
+)
+def test_one_wrong_value(wrong, content, message):
+    assert wrong(content) == [message]
+
+
+def test_negative_inertia_names_its_key(wrong):
+    (line,) = wrong("vehicle: {inertia_kg_m2: [-0.6, 0.6, 1.2]}")
+    assert line.startswith("FILE: vehicle.inertia_kg_m2 = [-0.6, 0.6, 1.2]: ")
+    assert "greater than 0" in line
+
+
+def test_errors_of_all_sections_come_together(wrong):
+    lines = wrong("seed: x\nvehicle: {mass_kg: x}\nreduction: {size: x}\nreport: {paper: 1}\n")
+    assert [line.split(" = ")[0] for line in lines] == [
+        "FILE: seed",
+        "FILE: vehicle.mass_kg",
+        "FILE: reduction.size",
+        "FILE: report.paper",
+    ]
+
+
+def test_long_values_are_cut(wrong):
+    (line,) = wrong(f"report: {{title: [{', '.join(['1'] * 500)}]}}")
+    assert len(line) < 150
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("vehicle: {mass_kg: 1, mass_kg: 2}", "FILE:1:23: not valid YAML: key 'mass_kg' stands twice"),
+        ("seed: 1\nseed: 2\n", "FILE:2:1: not valid YAML: key 'seed' stands twice"),
+        ("vehicle:\n\tmass_kg: 1\n", "FILE:2:1: not valid YAML: found character '\\t' that cannot start any token"),
+        ("seed: [1\nb: }", "FILE:2:2: not valid YAML: expected ',' or ']', but got ':'"),
+        ("seed: 1\n---\nseed: 2\n", "FILE:2:1: not valid YAML: but found another document"),
+        ("", "FILE: the config is empty; `cpfls config` prints a commented default"),
+        ("# nothing\n", "FILE: the config is empty; `cpfls config` prints a commented default"),
+        ("- seed\n", "FILE: a config is a mapping of sections; this is a list"),
+        (b"\x89HDF\r\n\x1a\n\xff\xfe", "FILE: not a text file; a config is YAML in UTF-8"),
+        (b"seed: \x00\n", "FILE: not valid YAML: unacceptable character #x0000: special characters are not allowed"),
+        ("1: 2\n", "FILE:1:1: not valid YAML: key 1 is not text"),
+        ("vehicle: &a [*a]\n", "FILE:1:10: not valid YAML: found unconstructable recursive node"),
+    ],
+)
+def test_not_a_config(wrong, content, message):
+    assert wrong(content) == [message]
+
+
+@pytest.mark.parametrize("tag", ["!!binary aGk=", "!!set {a}", "!!timestamp 2001-01-01", "!!python/name:os.system ''"])
+def test_tags_beyond_plain_data_are_refused(wrong, tag):
+    (line,) = wrong(f"report: {{title: {tag}}}")
+    assert line.startswith("FILE:1:17: not valid YAML: could not determine a constructor for the tag")
+
+
+def test_a_number_of_many_digits_and_a_deep_list(wrong):
+    assert wrong("seed: 1" + "0" * 5000)[0].startswith("FILE: not valid YAML: ")
+    assert wrong("[" * 3000)[0].startswith("FILE: not valid YAML: ")
+
+
+def test_missing_config_and_folder_as_config(refuse, tmp_path):
+    words = ("-o", tmp_path / "out.h5")
+    assert refuse("trajectory", tmp_path / "none.yaml", *words) == [
+        f"{tmp_path / 'none.yaml'}: cannot read the config: No such file or directory"
+    ]
+    assert refuse("trajectory", tmp_path, *words) == [f"{tmp_path}: cannot read the config: Is a directory"]
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("vehicle", "--set vehicle: write section.key=value"),
+        ("=3", "--set =3: write section.key=value"),
+        ("vehicle..mass_kg=3", "--set vehicle..mass_kg=3: write section.key=value"),
+        ("vehicle.mass=3", "FILE: vehicle.mass = 3: unknown key (did you mean 'mass_kg'?)"),
+        ("vehicle.mass_kg=x", 'FILE: vehicle.mass_kg = "x": must be a number'),
+        ("vehicle.mass_kg=[", "--set vehicle.mass_kg:1:2: not valid YAML: "),
+        ("vehicle.mass_kg.x=1", "--set vehicle.mass_kg.x=1: 'vehicle.mass_kg' is a single value and has no keys"),
+        ("vehicle.rotors.9.spin=1", "--set vehicle.rotors.9.spin=1: '9' is not an index of a list of 4"),
+        ("vehicle.rotors.-1.spin=1", "--set vehicle.rotors.-1.spin=1: '-1' is not an index of a list of 4"),
+        ("vehicle.rotors.0.spinn=1", "FILE: vehicle.rotors.0.spinn = 1: unknown key (did you mean 'spin'?)"),
+    ],
+)
+def test_wrong_override(wrong, override, message):
+    (line,) = wrong("vehicle: {mass_kg: 6}\n", "--set", override)
+    assert line.startswith(message)

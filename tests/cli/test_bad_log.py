@@ -1,0 +1,144 @@
+"""Logs in CSV: good ones of every dialect, and wrong ones with a message that names file, row and column."""
+
+import gzip
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+CONFIG = """\
+import:
+  time_column: t
+  signals:
+    attitude: {columns: [roll, pitch, yaw], unit: rad}
+    body_torque: {columns: [mx, my, mz], unit: N m}
+"""
+NAMES = ["t", "roll", "pitch", "yaw", "mx", "my", "mz"]
+
+
+def rows():
+    time = np.arange(0.0, 4.0, 0.02)
+    angles = [0.2 * np.sin((2 + axis) * time) for axis in range(3)]
+    torques = [0.1 * np.cos((3 + axis) * time) for axis in range(3)]
+    return np.column_stack([time, *angles, *torques])
+
+
+def table(delimiter=",", names=NAMES):
+    lines = [delimiter.join(names), *(delimiter.join(f"{value:.9g}" for value in row) for row in rows())]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(CONFIG)
+    return path
+
+
+@pytest.fixture
+def write(tmp_path):
+    def call(content, name="log.csv"):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return call
+
+
+@pytest.fixture
+def wrong(refuse, config, write, tmp_path):
+    def call(content, name="log.csv", *words):
+        log = write(content, name)
+        lines = refuse("import", config, log, "-o", tmp_path / "flight.h5", *words)
+        return [line.replace(str(log), "LOG") for line in lines]
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("content", "name"),
+    [
+        (table(), "log.csv"),
+        (table(";"), "log.csv"),
+        (table("\t"), "log.csv"),
+        (table().replace("\n", "\r\n"), "log.csv"),
+        ("\ufeff" + table(), "log.csv"),
+        (gzip.compress(table().encode()), "log.csv.gz"),
+    ],
+    ids=["comma", "semicolon", "tab", "crlf", "bom", "gzip"],
+)
+def test_every_dialect_gives_the_same_flight(cpfls, config, write, tmp_path, content, name):
+    flight = tmp_path / "flight.h5"
+    result = cpfls("import", config, write(content, name), "-o", flight, "--json")
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert (summary["samples"], summary["dropped"]) == (200, {})
+    assert summary["rate_hz"] == pytest.approx(50.0)
+    with h5py.File(flight) as file:
+        np.testing.assert_allclose(file["attitude"], rows()[:, 1:4], atol=1e-8)
+        np.testing.assert_allclose(file["body_torque"], rows()[:, 4:], atol=1e-8)
+        assert file["inputs/log"].attrs["name"] == name
+        assert file["inputs/log"].attrs["format"] == name.rsplit(".", 1)[-1]
+
+
+@pytest.mark.parametrize("dry_run", [(), ("--dry-run",)])
+def test_missing_columns_are_all_named_with_the_nearest_ones(wrong, dry_run):
+    lines = wrong(table(names=["time", "Roll", "pitch", "yaw", "mx", "my", "torque_z"]), "log.csv", *dry_run)
+    assert [line.split(" (")[0] for line in lines] == [
+        "LOG: import.time_column: the log has no column 't'",
+        "LOG: import.signals.attitude.columns: the log has no column 'roll'",
+        "LOG: import.signals.body_torque.columns: the log has no column 'mz'",
+    ]
+    assert "nearest: Roll" in lines[1]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "LOG: is empty; a log starts with a line of column names"),
+        ("\n\n", "LOG: is empty; a log starts with a line of column names"),
+        (",".join(NAMES) + "\n", "LOG: holds column names but no samples"),
+        ("t,t,pitch\n0,1,2\n", "LOG: column 't' stands twice"),
+        (",".join(NAMES) + "\n0,0,0,0,0,0,0\n1,0,0\n", "LOG:3: 3 fields, but 7 column names"),
+        (",".join(NAMES) + "\n0,0,0,0,0,0,0,0\n", "LOG:2: 8 fields, but 7 column names"),
+        (",".join(NAMES) + "\n0,0,up,0,0,0,0\n", "LOG:2: column 'pitch' = 'up': not a number"),
+        (",".join(NAMES) + "\n0,0,\x00,0,0,0,0\n", "LOG:2: column 'pitch' = '\\x00': not a number"),
+        (";".join(NAMES) + "\n0;0,5;0;0;0;0;0\n", "LOG:2: column 'roll' = '0,5': not a number"),
+    ],
+)
+def test_wrong_table(wrong, content, message):
+    assert wrong(content) == [message]
+
+
+@pytest.mark.parametrize(
+    "content", [b"\x89HDF\r\n\x1a\n" + bytes(range(256)), table().encode("utf-16"), b"t," + b"x" * 200_000]
+)
+def test_binary_junk(wrong, content):
+    (line,) = wrong(content)
+    assert line.startswith("LOG: not a CSV file: ")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"t,roll\n0,1\n", gzip.compress(table().encode())[:-40], gzip.compress(table().encode())[:200] + b"junk" * 50],
+    ids=["plain text", "truncated", "corrupt"],
+)
+def test_corrupt_gzip(wrong, content):
+    (line,) = wrong(content, "log.csv.gz")
+    assert line.startswith("LOG: ")
+
+
+def test_config_without_signals(refuse, study, write, tmp_path):
+    log = write(table())
+    (line,) = refuse("import", study, log, "-o", tmp_path / "flight.h5")
+    assert line.startswith(f"{log}: import.signals: no signal is mapped")
+
+
+def test_flight_without_torque_is_refused_by_identify(cpfls, refuse, config, write, tmp_path):
+    flight = tmp_path / "flight.h5"
+    without = "import:\n  signals:\n    attitude: {columns: [roll, pitch, yaw], unit: rad}\n  torque_source: null\n"
+    config.write_text(without)
+    assert cpfls("import", config, write(table()), "-o", flight).exit_code == 0
+    (line,) = refuse("identify", config, flight, "-o", tmp_path / "model.h5")
+    assert line.startswith(f"{flight}: lacks torque; this stage needs time, attitude")

@@ -1,0 +1,96 @@
+"""`cpfls info` and `cpfls check` on every kind of artifact."""
+
+import hashlib
+import json
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+import cpfls_cli
+from cpfls_cli.artifacts.formats import format_of
+
+STAGES = ("trajectory", "flight", "selection", "model", "prediction")
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_check_finds_nothing_in_what_the_program_writes(cpfls, pipeline, stage):
+    result = cpfls("check", pipeline.paths[stage], "--json")
+    assert result.exit_code == 0
+    summary = json.loads(result.stdout)
+    assert (summary["format"], summary["good"], summary["findings"]) == (f"cpfls/{stage}", True, [])
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_info_tells_origin_and_content(cpfls, pipeline, stage):
+    path = pipeline.paths[stage]
+    summary = json.loads(cpfls("info", path, "--json").stdout)
+    assert (summary["format"], summary["seed"]) == (f"cpfls/{stage}", 1)
+    assert summary["cpfls_version"] == cpfls_cli.__version__
+    with h5py.File(path) as file:
+        for name, entry in summary["datasets"].items():
+            assert entry["shape"] == list(file[name].shape)
+            assert entry["units"] == file[name].attrs["units"]
+    lines = cpfls("info", path).stdout
+    assert all(name in lines for name in summary["datasets"])
+
+
+@pytest.mark.parametrize(
+    ("stage", "roles"),
+    [
+        ("trajectory", {}),
+        ("flight", {"trajectory": "trajectory"}),
+        ("selection", {"flight": "flight"}),
+        ("model", {"flight": "flight", "selection": "selection"}),
+        ("prediction", {"model": "model", "flight": "flight"}),
+    ],
+)
+def test_inputs_are_named_by_role_and_hash(cpfls, pipeline, stage, roles):
+    inputs = json.loads(cpfls("info", pipeline.paths[stage], "--json").stdout)["inputs"]
+    assert inputs == {
+        role: {
+            "name": f"{source}.h5",
+            "sha256": hashlib.sha256(pipeline.paths[source].read_bytes()).hexdigest(),
+            "format": f"cpfls/{source}",
+        }
+        for role, source in roles.items()
+    }
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_files_describe_themselves_and_hold_nothing_that_the_format_does_not_name(pipeline, stage):
+    spec = format_of(f"cpfls/{stage}")
+    with h5py.File(pipeline.paths[stage]) as file:
+        config = bytes(file["config"][()])
+        assert file.attrs["config_sha256"] == hashlib.sha256(config).hexdigest()
+        assert set(file.attrs) == {"format", "schema_version", "cpfls_version", "seed", "config_sha256"}
+        found = {}
+        file.visititems(lambda name, item: found.update({name: item}) if isinstance(item, h5py.Dataset) else None)
+        del found["config"]
+        assert set(found) <= {dataset.path for dataset in spec.datasets}
+        for name, dataset in found.items():
+            assert {"units", "frame", "description"} == {key for key in dataset.attrs if key != "DIMENSION_LABELS"}
+            assert [dimension.label for dimension in dataset.dims] == list(spec.dataset(name).dimensions)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "finding"),
+    [
+        ("attitude", np.zeros((549, 2)), "attitude: 2 along 'axis', but 3 by the format"),
+        ("attitude", np.full((549, 3), np.inf), "attitude: 549 samples are not finite, the first at index 0"),
+        ("time", np.r_[0.0, np.arange(548.0)], "time: does not ascend at index 1"),
+    ],
+)
+def test_check_says_what_is_wrong_and_ends_with_1(cpfls, pipeline, tmp_path, name, value, finding):
+    path = tmp_path / "flight.h5"
+    shutil.copy(pipeline.flight, path)
+    with h5py.File(path, "r+") as file:
+        del file[name]
+        file[name] = value
+    result = cpfls("check", path)
+    assert (result.exit_code, result.stdout) == (1, f"{path}: {finding}\n")
+    summary = json.loads(cpfls("check", path, "--json").stdout)
+    assert (summary["good"], summary["findings"]) == (False, [finding])
+    quiet = cpfls("check", path, "-q")
+    assert (quiet.exit_code, quiet.output) == (1, "")

@@ -1,0 +1,78 @@
+"""Interrupts and closed pipes, with real processes."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+MESSAGE = "cpfls: error: interrupted: no half-written file is left\n"
+PROGRAM = [sys.executable, "-m", "cpfls_cli"]
+# Sends the signal to itself the moment a module is looked for, in place of a guess at the time of loading.
+INTERRUPTED_IMPORT = """
+import os, signal, sys
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            sys.meta_path.remove(self)
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+            except KeyboardInterrupt:
+                if {swallow}:
+                    raise ImportError("a compiled module that lost the interrupt") from None
+                raise
+
+sys.meta_path.insert(0, Finder())
+sys.argv = {words!r}
+from cpfls_cli.cli.main import run
+run()
+"""
+
+
+def environment():
+    return {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_signal_during_the_search_leaves_nothing(pipeline, study, tmp_path, number, code):
+    output = tmp_path / "model.h5"
+    words = ["identify", str(study), str(pipeline.flight), "-o", str(output), "-v"]
+    endless = ["--set", "identification.population=50", "--set", "identification.generations=100000"]
+    with subprocess.Popen(
+        [*PROGRAM, *words, *endless], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment()
+    ) as process:
+        assert process.stderr.readline().startswith("identify: ")
+        process.send_signal(number)
+        printed, messages = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert printed == ""
+    assert messages.endswith(MESSAGE)
+    assert "Traceback" not in messages
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("swallow", [False, True])
+@pytest.mark.parametrize("module", ["typer", "pydantic", "numpy", "h5py", "scipy.linalg"])
+def test_interrupt_while_loading(pipeline, study, tmp_path, module, swallow):
+    words = ["cpfls", "identify", str(study), str(pipeline.flight), "-o", str(tmp_path / "model.h5")]
+    code = INTERRUPTED_IMPORT.format(module=module, swallow=swallow, words=words)
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment())
+    assert (result.returncode, result.stdout, result.stderr) == (130, "", MESSAGE)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [["config"], ["--version"]])
+def test_reader_that_has_seen_enough(words):
+    with subprocess.Popen([*PROGRAM, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.close()
+        messages = process.stderr.read()
+    assert (process.returncode, messages) == (1, "")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no device that is always full")
+def test_output_to_a_full_disk():
+    with open("/dev/full", "w") as full:
+        result = subprocess.run([*PROGRAM, "config"], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert (result.returncode, result.stderr) == (2, "cpfls: error: output: No space left on device\n")

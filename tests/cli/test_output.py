@@ -1,0 +1,99 @@
+"""Where results go: nothing is replaced, half written or written in a dry run unless it was asked for."""
+
+import pytest
+
+
+def test_existing_output_needs_force(cpfls, refuse, study, tmp_path):
+    output = tmp_path / "trajectory.h5"
+    output.write_text("precious")
+    assert refuse("trajectory", study, "-o", output) == [f"{output}: exists already; --force replaces it"]
+    assert refuse("trajectory", study, "-o", output, "--dry-run") == [f"{output}: exists already; --force replaces it"]
+    assert cpfls("trajectory", study, "-o", output, "--force").exit_code == 0
+    assert output.read_bytes().startswith(b"\x89HDF")
+    assert [path.name for path in tmp_path.iterdir()] == ["trajectory.h5"]
+
+
+def test_an_input_is_never_the_output(refuse, pipeline, study, tmp_path):
+    message = "is an input of this command; -o must name another file"
+    link = tmp_path / "link.h5"
+    link.symlink_to(pipeline.flight)
+    for output in (pipeline.flight, link):
+        words = ("reduce", study, pipeline.flight, "-o", output, "--force")
+        assert refuse(*words) == [f"{output}: {message}"]
+    words = ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", pipeline.selection, "--force")
+    assert refuse(*words) == [f"{pipeline.selection}: {message}"]
+
+
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_output_that_cannot_be_a_file(refuse, study, tmp_path, force):
+    (tmp_path / "plain.txt").write_text("")
+    (tmp_path / "folder").mkdir()
+    cases = {
+        tmp_path / "none" / "out.h5": f"cannot write into the folder {tmp_path / 'none'}: No such file or directory",
+        tmp_path / "plain.txt" / "out.h5": f"cannot write into the folder {tmp_path / 'plain.txt'}: Not a directory",
+        tmp_path / ("x" * 300): f"cannot write into the folder {tmp_path}: File name too long",
+        tmp_path / "folder": "is a folder; -o names a file",
+    }
+    for output, message in cases.items():
+        assert refuse("trajectory", study, "-o", output, *force) == [f"{output}: {message}"]
+
+
+def test_folder_without_permission(refuse, study, tmp_path, monkeypatch):
+    # Root may write anywhere, so the refusal of the system is put in its place.
+    def refuse_to_make(**_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("tempfile.mkstemp", refuse_to_make)
+    (line,) = refuse("trajectory", study, "-o", tmp_path / "out.h5")
+    assert line == f"{tmp_path / 'out.h5'}: cannot write into the folder {tmp_path}: Permission denied"
+
+
+def test_devices_are_not_replaced(refuse, study):
+    assert refuse("trajectory", study, "-o", "/dev/null", "--force") == [
+        "/dev/null: is a device or a pipe; -o names a file"
+    ]
+
+
+def test_failure_while_computing_leaves_the_old_output(refuse, pipeline, study, tmp_path):
+    output = tmp_path / "flight.h5"
+    output.write_text("precious")
+    # A rotor this slow cannot carry the vehicle, which only the computation finds out.
+    weak = ("--set", "vehicle.rotor_speed_max_rad_s=10")
+    lines = refuse("simulate", study, pipeline.trajectory, "-o", output, "--force", *weak, code=1)
+    assert lines[-1].startswith(f"{pipeline.trajectory}: no flight was written; ")
+
+
+def test_full_disk_leaves_the_old_output(refuse, study, tmp_path, monkeypatch):
+    output = tmp_path / "trajectory.h5"
+    output.write_text("precious")
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("cpfls_cli.artifacts.store._write_dataset", fail)
+    (line,) = refuse("trajectory", study, "-o", output, "--force")
+    assert line.startswith(f"{output}: cannot be written: ")
+    assert "No space left on device" in line
+
+
+@pytest.mark.parametrize("command", ["trajectory", "simulate", "reduce", "identify", "predict"])
+def test_dry_run_writes_nothing(cpfls, pipeline, study, tmp_path, command):
+    words = {
+        "trajectory": (),
+        "simulate": (pipeline.trajectory,),
+        "reduce": (pipeline.flight,),
+        "identify": (pipeline.flight, "--selection", pipeline.selection),
+        "predict": (pipeline.model, pipeline.flight),
+    }[command]
+    result = cpfls(command, study, *words, "-o", tmp_path / "out.h5", "--dry-run")
+    assert result.exit_code == 0
+    assert result.stdout == f"{tmp_path / 'out.h5'}: would be written; the config and all inputs are good\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_dry_run_finds_bad_input(refuse, pipeline, study, tmp_path):
+    words = ("-o", tmp_path / "out.h5", "--dry-run")
+    assert "unknown key" in refuse("trajectory", study, *words, "--set", "vehicle.mass=1")[0]
+    for command in ("simulate", "reduce", "identify"):
+        assert "this command needs a" in refuse(command, study, pipeline.model, *words)[0]
+    assert "this command needs a" in refuse("predict", study, pipeline.flight, pipeline.flight, *words)[0]

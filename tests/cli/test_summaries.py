@@ -1,0 +1,91 @@
+"""What commands print: one JSON object, warnings apart, nothing when quiet."""
+
+import json
+
+import pytest
+
+KEYS = {
+    "trajectory": {"samples", "duration_s", "dt_s", "max"},
+    "flight": {"samples", "max_torque"},
+    "selection": {"samples", "selected", "criterion", "rank", "condition_number", "condition_number_full"},
+    "model": {
+        "mse",
+        "max_error",
+        "relative_error",
+        "condition_number",
+        "rank",
+        "parameters",
+        "generations",
+        "evaluations",
+        "baselines",
+        "held_out",
+        "seconds",
+    },
+    "prediction": {"samples", "mse", "relative_error", "outside"},
+}
+
+
+@pytest.mark.parametrize("stage", KEYS)
+def test_json_is_one_object_on_one_line_with_the_promised_keys(pipeline, stage):
+    assert pipeline.printed[stage].count("\n") == 1
+    assert KEYS[stage] <= set(pipeline.summaries[stage])
+
+
+def test_figures_of_the_tiny_study(pipeline):
+    trajectory, flight, selection, model, prediction = (pipeline.summaries[stage] for stage in KEYS)
+    # Rows of 54.86 s at 0.1 s, counted from 0; and the selection that the config asks for.
+    assert trajectory["samples"] == flight["samples"] == prediction["samples"] == 549
+    assert trajectory["dt_s"] == 0.1
+    assert len(flight["max_torque"]) == 3
+    assert (selection["samples"], selection["selected"], selection["rank"]) == (549, 60, 113)
+    assert (model["parameters"], model["rank"], model["generations"]) == (113, 113, 1)
+    assert model["evaluations"] >= 10
+    assert {"rigid-body", "constant-inertia", "torque-zero"} <= set(model["baselines"])
+    assert model["baselines"]["rigid-body"]["mse"] < 1e-20 < model["mse"]
+    assert model["held_out"] == {}
+
+
+def test_held_out_part_and_other_flights_are_judged_by_name(cpfls, pipeline, study, tmp_path):
+    words = ("identify", study, pipeline.flight, "--validate", pipeline.flight, "-o", tmp_path / "m.h5", "--json")
+    result = cpfls(*words, "--set", "identification.training_share=0.6")
+    held_out = json.loads(result.stdout)["held_out"]
+    assert set(held_out) == {"held-out rest", "flight.h5"}
+    assert held_out["flight.h5"]["samples"] == 549
+    assert {"mse", "relative_error", "baselines"} <= set(held_out["held-out rest"])
+
+
+@pytest.mark.parametrize("stage", ["trajectory", "prediction"])
+def test_quiet_prints_nothing(cpfls, pipeline, study, tmp_path, stage):
+    words = {
+        "trajectory": ("trajectory", study),
+        "prediction": ("predict", study, pipeline.model, pipeline.flight),
+    }[stage]
+    result = cpfls(*words, "-o", tmp_path / "out.h5", "-q")
+    assert (result.exit_code, result.output) == (0, "")
+    assert (tmp_path / "out.h5").exists()
+
+
+def test_warnings_never_reach_standard_output(cpfls, pipeline, study, tmp_path):
+    # The printed rule stalls below full rank, which is worth a warning.
+    words = ("reduce", study, pipeline.flight, "--set", "reduction.criterion=paper-literal", "--json")
+    result = cpfls(*words, "-o", tmp_path / "s.h5")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["stalled"] is True
+    assert result.stderr.startswith("cpfls: note: ")
+
+
+def test_people_get_lines_and_no_json(cpfls, study, tmp_path):
+    result = cpfls("trajectory", study, "-o", tmp_path / "t.h5")
+    assert "549 samples over 54.86 s" in result.stdout
+    assert "{" not in result.stdout
+
+
+def test_verbose_reports_progress_on_standard_error_only(cpfls, pipeline, study, tmp_path):
+    result = cpfls("identify", study, pipeline.flight, "-o", tmp_path / "m.h5", "-v", "--json")
+    assert json.loads(result.stdout)
+    assert "identify: 1 of 1" in result.stderr
+
+
+def test_set_changes_the_result(cpfls, study, tmp_path):
+    faster = cpfls("trajectory", study, "-o", tmp_path / "t.h5", "--set", "trajectory.sample_time_s=0.2", "--json")
+    assert json.loads(faster.stdout)["samples"] == 275

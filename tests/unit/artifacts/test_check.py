@@ -1,0 +1,58 @@
+"""The rules of `check_artifact`, each broken alone."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.check import check_artifact
+from cpfls_cli.artifacts.formats import FLIGHT, MODEL
+from cpfls_cli.artifacts.store import Artifact, Header
+
+
+def findings(spec=FLIGHT, **data):
+    return check_artifact(Artifact(spec, Header("1", 1, ""), {k.replace("__", "/"): v for k, v in data.items()}))
+
+
+def flight(**changes):
+    return {"time": np.arange(4.0), "attitude": np.zeros((4, 3)), "rotor_speed": np.zeros((4, 6))} | changes
+
+
+def test_good():
+    assert findings(**flight()) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "finding"),
+    [
+        ({"attitude": np.zeros((4, 2))}, "attitude: 2 along 'axis', but 3 by the format"),
+        ({"attitude": np.zeros((5, 3))}, "attitude: 5 along 'time', but 4 by time"),
+        ({"attitude": np.zeros(4)}, "attitude: has 1 dimensions, expected 2 ('time', 'axis')"),
+        ({"attitude": np.float64(1)}, "attitude: has 0 dimensions, expected 2 ('time', 'axis')"),
+        ({"rotor_command": np.zeros((4, 5))}, "rotor_command: 5 along 'rotor', but 6 by rotor_speed"),
+        ({"attitude": np.full((4, 3), "x")}, "attitude: holds <U1, expected numbers"),
+        ({"attitude": np.zeros((4, 3), complex)}, "attitude: holds complex128, expected numbers"),
+        ({"quality__warning": np.zeros(1)}, "quality/warning: holds float64, expected text"),
+        ({"delay__value": np.nan}, "delay/value: 1 samples are not finite, the first at index 0"),
+        ({"time": np.array([0.0, 1, 1, 2])}, "time: does not ascend at index 2"),
+        ({"time": np.array([0.0, 3, 2, 1])}, "time: does not ascend at index 2"),
+    ],
+)
+def test_one_rule_broken(changes, finding):
+    assert findings(**flight(**changes)) == [finding]
+
+
+def test_not_finite_counts_samples_and_names_the_first():
+    attitude = np.zeros((4, 3))
+    attitude[2, 1], attitude[3] = np.nan, np.inf
+    assert findings(**flight(attitude=attitude)) == ["attitude: 2 samples are not finite, the first at index 2"]
+
+
+def test_gaps_are_allowed_where_the_format_says_so():
+    assert findings(**flight(rotor_speed=np.full((4, 6), np.nan))) == []
+
+
+def test_lengths_in_digits_are_fixed():
+    assert findings(MODEL, model__rigid_body=np.zeros(5)) == ["model/rigid_body: 5 along '6', but 6 by the format"]
+
+
+def test_empty_datasets_are_not_an_error_of_the_rules():
+    assert findings(time=np.zeros(0), attitude=np.zeros((0, 3))) == []

@@ -1,0 +1,137 @@
+"""Artifacts are written whole or not at all, and refused where they are not known."""
+
+import os
+import stat
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.formats import PREDICTION, SELECTION, TRAJECTORY
+from cpfls_cli.artifacts.store import (
+    Artifact,
+    Header,
+    InputFile,
+    atomic_path,
+    check_output,
+    format_name,
+    read_artifact,
+    write_artifact,
+    write_text,
+)
+from cpfls_cli.errors import InputError
+
+HEADER = Header("1.2.3", 4, "seed: 4\n", {"flight": InputFile("f.h5", "ab" * 32, "cpfls/flight")})
+
+
+def selection(**changes):
+    data = {
+        "indices": np.array([4, 2]),
+        "trace/condition_number": np.array([np.inf, 3.0]),
+        "trace/singular_value_min": np.ones(2),
+        "trace/singular_value_max": np.ones(2),
+        "rank": 2,
+        "rank_full": 2,
+        "condition_number": 3.0,
+        "condition_number_full": 4.0,
+        "candidates": 9,
+        "criterion": np.array("sigma_min"),
+        "stop_reason": np.array("size reached: 2 of 9, \u03bc"),
+        "random/condition_number": np.array([5.0, np.nan]),
+    }
+    return Artifact(SELECTION, HEADER, data | changes)
+
+
+def test_reading_gives_what_was_written(tmp_path):
+    path = tmp_path / "s.h5"
+    write_artifact(path, selection())
+    artifact = read_artifact(path, SELECTION)
+    assert artifact.spec is SELECTION
+    assert artifact.header == HEADER
+    assert artifact.text("stop_reason") == "size reached: 2 of 9, \u03bc"
+    assert artifact.number("rank") == 2.0
+    np.testing.assert_array_equal(artifact.array("trace/condition_number"), [np.inf, 3.0])
+    np.testing.assert_array_equal(artifact.array("random/condition_number"), [5.0, np.nan])
+    assert artifact.data["indices"].dtype == np.int64
+    assert format_name(path) == "cpfls/selection"
+
+
+def test_equal_content_is_an_equal_file(tmp_path):
+    changes = {"a.h5": {}, "a much longer name.h5": {}, "other.h5": {"rank": 1}}
+    for name, change in changes.items():
+        write_artifact(tmp_path / name, selection(**change))
+    first, second, other = ((tmp_path / name).read_bytes() for name in changes)
+    assert first == second
+    assert first != other
+
+
+@pytest.mark.parametrize("old", [None, b"precious"])
+@pytest.mark.parametrize("failing", [{"unknown": 1}, {"indices": np.array([object()])}], ids=["unknown", "object"])
+def test_failure_in_the_middle_leaves_the_old_file_and_nothing_else(tmp_path, old, failing):
+    path = tmp_path / "s.h5"
+    if old is not None:
+        path.write_bytes(old)
+    with pytest.raises((KeyError, TypeError)):
+        write_artifact(path, selection(**failing))
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == ([] if old is None else [("s.h5", old)])
+
+
+def test_interrupt_while_writing_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    path = tmp_path / "s.h5"
+    write_artifact(path, selection())
+    before = path.read_bytes()
+    monkeypatch.setattr("cpfls_cli.artifacts.store.os.replace", interrupt)
+    for write in (lambda: write_artifact(path, selection(rank=1)), lambda: write_text(path, "page")):
+        with pytest.raises(KeyboardInterrupt):
+            write()
+        assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [("s.h5", before)]
+
+
+def test_files_get_the_permissions_of_any_new_file(tmp_path):
+    previous = os.umask(0o027)
+    try:
+        write_artifact(tmp_path / "s.h5", selection())
+        write_text(tmp_path / "page.html", "page")
+    finally:
+        os.umask(previous)
+    assert {stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()} == {0o640}
+
+
+def test_temporary_name_is_hidden_and_in_the_same_folder(tmp_path):
+    with atomic_path(tmp_path / "s.h5") as temporary:
+        assert temporary.parent == tmp_path
+        assert temporary.name.startswith(".s.h5.")
+        assert list(tmp_path.iterdir()) == [temporary]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_check_output_leaves_nothing(tmp_path):
+    (tmp_path / "old").write_text("old")
+    check_output(tmp_path / "new", force=False)
+    check_output(tmp_path / "old", force=True)
+    with pytest.raises(InputError, match="--force"):
+        check_output(tmp_path / "old", force=False)
+    assert [path.name for path in tmp_path.iterdir()] == ["old"]
+
+
+def test_wrong_format_names_both(tmp_path):
+    write_artifact(tmp_path / "s.h5", selection())
+    with pytest.raises(InputError, match=r"is a cpfls/selection; .* needs a cpfls/trajectory .* or cpfls/prediction"):
+        read_artifact(tmp_path / "s.h5", TRAJECTORY, PREDICTION)
+
+
+def test_pipe_is_not_waited_for(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match="is a device or a pipe"):
+        read_artifact(pipe)
+    with pytest.raises(InputError, match="is a device or a pipe"):
+        check_output(pipe, force=True)
+
+
+def test_format_name_of_what_is_no_artifact(tmp_path):
+    (tmp_path / "log.csv").write_text("t\n0\n")
+    assert format_name(tmp_path / "log.csv") is None
+    assert format_name(tmp_path / "none") is None
