@@ -65,6 +65,11 @@ data/%/flight.h5: data/%/trajectory.h5 data/%/.part/simulate.yaml
 data/%/selection.h5: data/%/flight.h5 data/%/.part/reduce.yaml
 	$(CPFLS) reduce configs/$*.yaml $< -o $@ --force
 
+# Table 4 has two more sizes.
+TABLE_4_SIZES := 1170 2743
+data/paper/selection-%.h5: data/paper/flight.h5 data/paper/.part/reduce.yaml
+	$(CPFLS) reduce configs/paper.yaml $< -o $@ --force --set reduction.size=$*
+
 data/%/model.h5: data/%/flight.h5 data/%/selection.h5 data/%/.part/identify.yaml
 	$(CPFLS) identify configs/$*.yaml $< --selection data/$*/selection.h5 -o $@ --force
 
@@ -75,6 +80,8 @@ ARTIFACTS := trajectory flight selection model prediction
 
 data/%/report.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
 	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) -o $@ --force
+
+data/paper/report.html: $(TABLE_4_SIZES:%=data/paper/selection-%.h5)
 
 test: $(INSTALLED_DEV)
 	$(BIN)/python -m pytest -n 2
