@@ -56,6 +56,7 @@ def test_all_unknown_keys_are_listed_with_the_nearest_valid_name(wrong):
         ),
         ("import: {crop_s: [3, 1]}", "FILE: import.crop_s = [3, 1]: needs 0 <= begin < end"),
         ("import: {signals: {torque: {columns: [a, b, c]}}}", "FILE: import.signals.torque.unit: is missing"),
+        ("identification: {size: 9}", "FILE: identification.size = 9: unknown key (did you mean 'reduction.size'?)"),
         ("seed: 010", "FILE: seed = 10.0: must be a whole number"),
         ("seed: null", "FILE: seed = null: must be a whole number"),
         ("seed: 99999999999999999999", "FILE: seed = 99999999999999999999: must be less than 9223372036854775808"),
