@@ -40,16 +40,27 @@ def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]
     -------
     Outcome
     """
-    inputs = [flight, *([selection] if selection else []), *validate]
-    early = begin(job, *inputs)
+    started = begin(job, _roles(flight, selection, validate))
     data = read_training(flight, selection, job.study)
     held_out = _held_out(data, validate)
-    if early is not None:
-        return early
-    started = time.perf_counter()
-    try:
-        with threadpool_limits(limits=1):
-            result = identify(
+    if started.dry_run is not None:
+        return started.dry_run
+    clock = time.perf_counter()
+    result = _identify(job, flight, data, held_out)
+    finish(job, MODEL, model_data(result, job.study.identification.base, data.learned), started.inputs)
+    return _outcome(result, len(data.learned), time.perf_counter() - clock)
+
+
+def _roles(flight: Path, selection: Path | None, validate: Sequence[Path]) -> dict[str, Path]:
+    roles = {"flight": flight} | ({"selection": selection} if selection else {})
+    return roles | {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
+
+
+def _identify(job: Job, flight: Path, data: TrainingData, held_out: dict[str, TorqueData]) -> Identification:
+    # One thread: the same bytes whatever the number of cores.
+    with threadpool_limits(limits=1):
+        try:
+            return identify(
                 data.flight[data.split.training],
                 data.flight[data.learned],
                 held_out,
@@ -57,12 +68,8 @@ def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]
                 generator(job.study, "identify"),
                 lambda done, total, best: job.progress(done, total, _note(best)),
             )
-    except ComputationError as error:
-        raise ComputationError(f"{flight}: {error}") from None
-    roles = {"flight": flight, **({"selection": selection} if selection else {})}
-    roles |= {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
-    finish(job, MODEL, model_data(result, job.study.identification.base, data.learned), roles)
-    return _outcome(result, len(data.learned), time.perf_counter() - started)
+        except ComputationError as error:
+            raise ComputationError(f"{flight}: {error}") from None
 
 
 def _held_out(data: TrainingData, validate: Sequence[Path]) -> dict[str, TorqueData]:

@@ -40,15 +40,15 @@ def run(job: Job, log: Path) -> Outcome:
     InputError
         If the log cannot be read or lacks columns that the config names.
     """
-    early = begin(job, log)
+    started = begin(job, {"log": log})
     settings = job.study.import_
     columns = read_csv(log, _wanted(settings))
     with _naming(log):
-        if early is not None:
+        if started.dry_run is not None:
             read_signals(columns, settings)
-            return early
+            return started.dry_run
         flight = _import(columns, job.study)
-    finish(job, FLIGHT, {**_signals(flight), **_quality(flight), **_delay(flight)}, {"log": log})
+    finish(job, FLIGHT, {**_signals(flight), **_quality(flight), **_delay(flight)}, started.inputs)
     return _outcome(flight)
 
 

@@ -76,39 +76,58 @@ class Outcome:
     warnings: tuple[str, ...] = field(default=())
 
 
-def begin(job: Job, *inputs: Path) -> Outcome | None:
+@dataclass(frozen=True)
+class Started:
+    """A job whose inputs and output are good.
+
+    Attributes
+    ----------
+    inputs : mapping of str to InputFile
+        By role, as they were before anything was computed.
+    dry_run : Outcome or None
+        What a dry run says; None where the stage has to go on.
+    """
+
+    inputs: Mapping[str, InputFile]
+    dry_run: Outcome | None
+
+
+def begin(job: Job, inputs: Mapping[str, Path]) -> Started:
     """Check inputs and output of a job before anything is computed.
 
     Parameters
     ----------
     job : Job
-    *inputs : Path
+    inputs : mapping of str to Path
+        By role.
 
     Returns
     -------
-    Outcome or None
-        What a dry run says; None where the stage has to go on.
+    Started
 
     Raises
     ------
     InputError
         If an input is missing, the output exists or cannot be written, or is one of the inputs.
     """
-    for path in inputs:
-        if not path.exists():
-            raise InputError(f"{path}: no such file")
-        if not path.is_file():
-            raise InputError(f"{path}: is a {'folder' if path.is_dir() else 'device or a pipe'}, not a file")
-        if job.output.exists() and path.samefile(job.output):
-            raise InputError(f"{job.output}: is an input of this command; -o must name another file")
+    for path in inputs.values():
+        _check_input(path, job.output)
     check_output(job.output, job.force)
-    if not job.dry_run:
-        return None
     line = f"{job.output}: would be written; the config and all inputs are good"
-    return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
+    dry_run = Outcome({"dry_run": True, "output": str(job.output)}, (line,)) if job.dry_run else None
+    return Started({role: input_file(path) for role, path in inputs.items()}, dry_run)
 
 
-def finish(job: Job, spec: ArtifactSpec, data: Mapping[str, Any], inputs: Mapping[str, Path]) -> None:
+def _check_input(path: Path, output: Path) -> None:
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if not path.is_file():
+        raise InputError(f"{path}: is a {'folder' if path.is_dir() else 'device or a pipe'}, not a file")
+    if output.exists() and path.samefile(output):
+        raise InputError(f"{output}: is an input of this command; -o must name another file")
+
+
+def finish(job: Job, spec: ArtifactSpec, data: Mapping[str, Any], inputs: Mapping[str, InputFile]) -> None:
     """Write the artifact of a stage.
 
     Parameters
@@ -116,15 +135,10 @@ def finish(job: Job, spec: ArtifactSpec, data: Mapping[str, Any], inputs: Mappin
     job : Job
     spec : ArtifactSpec
     data : mapping of str to array
-    inputs : mapping of str to Path
+    inputs : mapping of str to InputFile
         By role.
     """
-    header = Header(
-        version=cpfls_cli.__version__,
-        seed=job.study.seed,
-        config=resolved_yaml(job.study),
-        inputs={role: input_file(path) for role, path in inputs.items()},
-    )
+    header = Header(cpfls_cli.__version__, job.study.seed, resolved_yaml(job.study), inputs)
     write_artifact(job.output, Artifact(spec, header, data))
 
 

@@ -31,13 +31,13 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     -------
     Outcome
     """
-    early = begin(job, model, flight)
+    started = begin(job, {"model": model, "flight": flight})
     identified = read_model(read_good(model, MODEL), model)
     source = read_with(flight, FLIGHT, "time", *MOTION)
-    if early is not None:
-        return early
+    if started.dry_run is not None:
+        return started.dry_run
     data = _predict(identified, source)
-    finish(job, PREDICTION, data, {"model": model, "flight": flight})
+    finish(job, PREDICTION, data, started.inputs)
     return _outcome(source, data)
 
 

@@ -36,10 +36,10 @@ def run(job: Job, flight: Path) -> Outcome:
     -------
     Outcome
     """
-    early = begin(job, flight)
+    started = begin(job, {"flight": flight})
     source = read_with(flight, FLIGHT, "time", *MOTION)
-    if early is not None:
-        return early
+    if started.dry_run is not None:
+        return started.dry_run
     end = split_flight(source.array("time"), job.study.identification.training_share, 0.0).training.stop
     motion = flight_motion(source)[slice(0, end)]
     structure = model_structure(job.study.identification)
@@ -51,7 +51,7 @@ def run(job: Job, flight: Path) -> Outcome:
             random = _random(Q, len(selection.indices), job.study)
     except CpflsError as error:
         raise ComputationError(f"{flight}: {error}") from None
-    finish(job, SELECTION, _data(selection, len(Q), random), {"flight": flight})
+    finish(job, SELECTION, _data(selection, len(Q), random), started.inputs)
     return _outcome(selection, len(Q), random)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import cpfls_cli
-from cpfls_cli.artifacts.store import file_sha256, read_artifact, write_text
+from cpfls_cli.artifacts.store import read_artifact, write_text
 from cpfls_cli.config.load import validate
 from cpfls_cli.config.resolved import resolved
 from cpfls_cli.config.yaml_text import parse_yaml
@@ -29,13 +29,13 @@ def run(job: Job, artifacts: Sequence[Path]) -> Outcome:
     -------
     Outcome
     """
-    early = begin(job, *artifacts)
-    files = {path: file_sha256(path) for path in artifacts}
+    started = begin(job, {str(path): path for path in artifacts})
+    files = {path: started.inputs[str(path)].sha256 for path in artifacts}
     distinct = {sha256: path for path, sha256 in reversed(files.items())}
     kept = [path for path, sha256 in files.items() if distinct[sha256] == path]
     sources = _sources(kept, [files[path] for path in kept])
-    if early is not None:
-        return early
+    if started.dry_run is not None:
+        return started.dry_run
     page = report_page(Sources(sources, job.study.vehicle, job.study.report), cpfls_cli.__version__)
     write_text(job.output, page.html)
     repeated = tuple(
@@ -74,4 +74,4 @@ def _outcome(output: Path, page: Page, repeated: Sequence[str]) -> Outcome:
     lines = [f"{len(page.sections)} sections, {len(page.figures)} figures, {len(page.tables)} tables, {size} bytes"]
     if page.missing:
         lines.append(f"not given: {', '.join(page.missing)}")
-    return Outcome(summary, tuple(lines), tuple(f"{note}; shown once" for note in repeated))
+    return Outcome(summary, tuple(lines), tuple(repeated))

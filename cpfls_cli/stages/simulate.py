@@ -34,10 +34,10 @@ def run(job: Job, trajectory: Path) -> Outcome:
     ComputationError
         If a rotor would have to do what it cannot, unless `simulation.infeasible` is ``report``.
     """
-    early = begin(job, trajectory)
+    started = begin(job, {"trajectory": trajectory})
     source = read_with(trajectory, TRAJECTORY, "time", *_PLANNED)
-    if early is not None:
-        return early
+    if started.dry_run is not None:
+        return started.dry_run
     planned = {name: source.array(name) for name in _PLANNED}
     flight = simulate(planned, job.study.vehicle, job.study.simulation, generator(job.study, "simulate"))
     time = source.array("time")
@@ -45,7 +45,7 @@ def run(job: Job, trajectory: Path) -> Outcome:
     if problems and job.study.simulation.infeasible == "stop":
         remedy = "fly gentler, change the vehicle, or set simulation.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
-    finish(job, FLIGHT, {"time": time, **flight.signals, **_noise(flight)}, {"trajectory": trajectory})
+    finish(job, FLIGHT, {"time": time, **flight.signals, **_noise(flight)}, started.inputs)
     return _outcome(flight, time, problems)
 
 

@@ -20,11 +20,12 @@ def run(job: Job) -> Outcome:
     -------
     Outcome
     """
-    if (early := begin(job)) is not None:
-        return early
+    started = begin(job, {})
+    if started.dry_run is not None:
+        return started.dry_run
     planned = plan(job.study.trajectory, job.study.vehicle.gravity_m_s2)
     values = asdict(planned)
-    finish(job, TRAJECTORY, {spec.path: values[spec.path] for spec in TRAJECTORY.datasets}, {})
+    finish(job, TRAJECTORY, {spec.path: values[spec.path] for spec in TRAJECTORY.datasets}, started.inputs)
     settings = job.study.trajectory
     summary = {
         "samples": len(planned.time),
