@@ -82,25 +82,25 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
         yield _log_progress(title) if common.verbose and not common.quiet else _silent
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     columns = (
         TextColumn(title),
         BarColumn(),
-        MofNCompleteColumn(),
+        TaskProgressColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.fields[note]}"),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=None, note="")
 
-        def show(done: int, total: int, note: str = "") -> None:
+        def show(done: float, total: int, note: str = "") -> None:
             bar.update(task, completed=done, total=total, note=note)
 
         yield show
 
 
-def _silent(done: int, total: int, note: str = "") -> None:
+def _silent(done: float, total: int, note: str = "") -> None:
     """Show nothing."""
 
 
@@ -108,10 +108,10 @@ def _log_progress(title: str) -> Callable[..., None]:
     """Write a line at most once a second, for logs."""
     last = [time.monotonic()]
 
-    def show(done: int, total: int, note: str = "") -> None:
+    def show(done: float, total: int, note: str = "") -> None:
         if time.monotonic() - last[0] >= 1.0 or done == total:
             last[0] = time.monotonic()
-            print(f"{title}: {done} of {total}  {note}", file=sys.stderr)
+            print(f"{title}: {done / total:4.0%}  {note}", file=sys.stderr)
 
     return show
 

@@ -51,7 +51,7 @@ def identify(
     settings : IdentificationSettings
     rng : numpy.random.Generator
     progress : callable, optional
-        Called after each generation with its index, their number and the best objectives so far.
+        Called after each evaluated chromosome.
 
     Returns
     -------

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.evolution.archive import Evaluate, Evaluation
 from cpfls_cli.evolution.engine import evolve
 from cpfls_cli.evolution.state import Generation
 from cpfls_cli.identification.choice import choose
@@ -16,7 +18,30 @@ from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.results import Front, History
 from cpfls_cli.identification.settings import IdentificationSettings
 
-Progress = Callable[[int, int, Array], None]
+
+@dataclass(frozen=True)
+class SearchStep:
+    """How far a search has come.
+
+    Attributes
+    ----------
+    generation : int
+        The generation under evaluation; 0 is the initial population.
+    generations : int
+        The last one.
+    share : float
+        Share of its new chromosomes that are evaluated.
+    best : array, shape (3,), or None
+        Best of each objective up to the generation before; None during the first.
+    """
+
+    generation: int
+    generations: int
+    share: float
+    best: Array | None
+
+
+Progress = Callable[[SearchStep], None]
 
 
 def search(
@@ -48,11 +73,11 @@ def search(
         history = History(np.array([1]), objectives, np.array([1]))
         return Front(only.genes, objectives, 0), history
     generations: list[Generation] = []
+    evaluate = _watched(evaluator, generations, settings.generations, progress) if progress else evaluator
     initial = uniform_chromosome(structure)[None] if settings.start == "with-uniform" else None
-    for generation in evolve(evaluator, structure.genes, settings, rng, initial):
-        generations.append(generation)
-        if progress is not None:
-            progress(generation.index, settings.generations, _best(generation))
+    for generation in evolve(evaluate, structure.genes, settings, rng, initial):
+        # One at a time: the progress of the next one reads them while it is bred.
+        generations.append(generation)  # noqa: PERF402
     last = generations[-1]
     usable = np.isfinite(last.front_objectives).all(axis=1)
     if not usable.any():
@@ -65,6 +90,21 @@ def search(
         np.array([len(g.front_genes) for g in generations]),
     )
     return front, history
+
+
+def _watched(evaluator: Evaluator, past: Sequence[Generation], last: int, progress: Progress) -> Evaluate:
+    """Evaluate one chromosome after the other, so that a long generation shows how far it has come."""
+
+    def evaluate(genes: IntArray) -> Evaluation:
+        best = _best(past[-1]) if past else None
+        parts = []
+        for done in range(1, len(genes) + 1):
+            parts.append(evaluator(genes[done - 1 : done]))
+            progress(SearchStep(len(past), last, done / len(genes), best))
+        refined, objectives = ([getattr(part, name) for part in parts] for name in ("genes", "objectives"))
+        return Evaluation(np.concatenate(refined), np.concatenate(objectives))
+
+    return evaluate
 
 
 def _best(generation: Generation) -> Array:

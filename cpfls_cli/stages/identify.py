@@ -17,6 +17,7 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.results import Identification
+from cpfls_cli.identification.search import SearchStep
 from cpfls_cli.stages.job import Job, Outcome, begin, finish, generator
 from cpfls_cli.stages.model_file import model_data
 from cpfls_cli.stages.training import TrainingData, read_torque_data, read_training
@@ -66,7 +67,7 @@ def _identify(job: Job, flight: Path, data: TrainingData, held_out: dict[str, To
                 held_out,
                 job.study.identification,
                 generator(job.study, "identify"),
-                lambda done, total, best: job.progress(done, total, _note(best)),
+                lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step)),
             )
         except ComputationError as error:
             raise ComputationError(f"{flight}: {error}") from None
@@ -83,8 +84,11 @@ def _held_out(data: TrainingData, validate: Sequence[Path]) -> dict[str, TorqueD
     return parts
 
 
-def _note(best: Array) -> str:
-    return "MSE {:.3g}  largest error {:.3g} N m  condition {:.4g}".format(*best)
+def _note(step: SearchStep) -> str:
+    generation = f"generation {step.generation} of {step.generations}"
+    if step.best is None:
+        return generation
+    return f"{generation}  best " + "MSE {:.3g}  largest error {:.3g} N m  condition {:.4g}".format(*step.best)
 
 
 def _outcome(result: Identification, learned: int, seconds: float) -> Outcome:

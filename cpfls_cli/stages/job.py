@@ -31,7 +31,7 @@ from cpfls_cli.errors import InputError
 class Progress(Protocol):
     """Shows how far long work has come."""
 
-    def __call__(self, done: int, total: int, note: str = "") -> None:
+    def __call__(self, done: float, total: int, note: str = "") -> None:
         """Take note that `done` of `total` steps are done."""
         ...
 

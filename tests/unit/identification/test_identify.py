@@ -41,12 +41,17 @@ def test_same_seed_same_result(base):
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 def test_result_hangs_together(base):
     calls = []
-    found = identified({**SEARCHED, "base": base}, progress=lambda *call: calls.append(call))
+    found = identified({**SEARCHED, "base": base}, progress=calls.append)
     assert np.isfinite(found.front.objectives).all()
     assert np.isfinite(found.history.best).all()
     assert np.all(np.diff(found.history.best, axis=0) <= 0)
-    assert [call[:2] for call in calls] == [(0, 2), (1, 2), (2, 2)]
-    np.testing.assert_array_equal([call[2] for call in calls], found.history.best)
+    assert len(calls) == found.history.evaluations[-1]
+    done = [step.generation + step.share for step in calls]
+    assert np.all(np.diff(done) > 0)
+    assert {step.generations for step in calls} == {2}
+    for step in calls:
+        if step.generation > 0:
+            np.testing.assert_array_equal(step.best, found.history.best[step.generation - 1])
     chosen = found.front.objectives[found.front.chosen]
     assert chosen[0] == pytest.approx(found.fit.mean_squared_error, rel=1e-9)
     training = found.scores["training"]
