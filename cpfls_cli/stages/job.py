@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -25,7 +26,7 @@ from cpfls_cli.artifacts.store import (
 )
 from cpfls_cli.config.resolved import resolved_yaml
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import ConfigError, InputError, SettingError
 
 
 class Progress(Protocol):
@@ -206,6 +207,29 @@ def read_good(path: Path, spec: ArtifactSpec) -> Artifact:
     if findings:
         raise InputError("\n".join(f"{path}: {finding}" for finding in findings))
     return artifact
+
+
+@contextmanager
+def settings_of(section: str) -> Iterator[None]:
+    """Name the config key where the numerics refuse a setting that does not suit the data.
+
+    Parameters
+    ----------
+    section : str
+        Section of the config whose settings are in use.
+
+    Yields
+    ------
+    None
+
+    Raises
+    ------
+    ConfigError
+    """
+    try:
+        yield
+    except SettingError as error:
+        raise ConfigError(f"{section}.{error.key}: {error}") from None
 
 
 def generator(study: Study, stage: str) -> np.random.Generator:
