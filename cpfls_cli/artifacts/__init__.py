@@ -2,18 +2,12 @@
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.formats import FLIGHT, FORMATS, MODEL, PREDICTION, SELECTION, TRAJECTORY, format_of
+from cpfls_cli.artifacts.hashing import file_sha256
+from cpfls_cli.artifacts.output import check_output, write_text
+from cpfls_cli.artifacts.reading import format_name, read_artifact
+from cpfls_cli.artifacts.records import Artifact, Header, InputFile
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION, ArtifactSpec, DatasetSpec
-from cpfls_cli.artifacts.store import (
-    Artifact,
-    Header,
-    InputFile,
-    check_output,
-    file_sha256,
-    format_name,
-    read_artifact,
-    write_artifact,
-    write_text,
-)
+from cpfls_cli.artifacts.writing import write_artifact
 
 __all__ = [
     "FLIGHT",

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.spec import DatasetSpec
-from cpfls_cli.artifacts.store import Artifact
 
 _FIXED = {"axis": 3}
 

@@ -7,6 +7,12 @@ from dataclasses import dataclass, field
 SCHEMA_VERSION = 1
 """Raised when a dataset is renamed, removed or changes its meaning; new optional datasets do not raise it."""
 
+CONFIG = "config"
+"""Path of the resolved study, in every artifact."""
+
+INPUTS = "inputs"
+"""Path of the group with one group for each input file, by role."""
+
 EULER = "Euler angles (intrinsic ZYX)"
 BODY = "body (FLU)"
 WORLD = "world (z up)"

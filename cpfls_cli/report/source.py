@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION, SELECTION, TRAJECTORY
+from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.spec import ArtifactSpec
-from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.report.settings import ReportSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 

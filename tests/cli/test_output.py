@@ -70,7 +70,7 @@ def test_full_disk_leaves_the_old_output(refuse, study, tmp_path, monkeypatch):
     def fail(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("cpfls_cli.artifacts.store._write_dataset", fail)
+    monkeypatch.setattr("cpfls_cli.artifacts.writing._write_dataset", fail)
     (line,) = refuse("trajectory", study, "-o", output, "--force")
     assert line.startswith(f"{output}: cannot be written: ")
     assert "No space left on device" in line

@@ -7,17 +7,10 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.formats import PREDICTION, SELECTION, TRAJECTORY
-from cpfls_cli.artifacts.store import (
-    Artifact,
-    Header,
-    InputFile,
-    atomic_path,
-    check_output,
-    format_name,
-    read_artifact,
-    write_artifact,
-    write_text,
-)
+from cpfls_cli.artifacts.output import atomic_path, check_output, write_text
+from cpfls_cli.artifacts.reading import format_name, read_artifact
+from cpfls_cli.artifacts.records import Artifact, Header, InputFile
+from cpfls_cli.artifacts.writing import write_artifact
 from cpfls_cli.errors import InputError
 
 HEADER = Header("1.2.3", 4, "seed: 4\n", {"flight": InputFile("f.h5", "ab" * 32, "cpfls/flight")})
@@ -82,7 +75,7 @@ def test_interrupt_while_writing_leaves_the_old_file_and_nothing_else(tmp_path, 
     path = tmp_path / "s.h5"
     write_artifact(path, selection())
     before = path.read_bytes()
-    monkeypatch.setattr("cpfls_cli.artifacts.store.os.replace", interrupt)
+    monkeypatch.setattr("os.replace", interrupt)
     for write in (lambda: write_artifact(path, selection(rank=1)), lambda: write_text(path, "page")):
         with pytest.raises(KeyboardInterrupt):
             write()

@@ -1,0 +1,89 @@
+"""Outputs: refused before anything is computed, and written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from cpfls_cli.errors import InputError
+
+
+def check_output(path: Path, force: bool) -> None:
+    """Refuse an output that cannot or must not be written, before anything is computed.
+
+    Parameters
+    ----------
+    path : Path
+    force : bool
+        Allow an existing file to be replaced.
+
+    Raises
+    ------
+    InputError
+        If the file exists, its folder does not, or the folder cannot be written.
+    """
+    with atomic_path(path):
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; -o names a file")
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: is a device or a pipe; -o names a file")
+        if path.exists() and not force:
+            raise InputError(f"{path}: exists already; --force replaces it")
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside a file, and remove what is left of it afterwards.
+
+    Parameters
+    ----------
+    path : Path
+        The file to be written in the end; the caller moves the temporary file there with `os.replace`.
+
+    Yields
+    ------
+    Path
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist or cannot be written.
+    """
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    except OSError as error:
+        raise InputError(f"{path}: cannot write into the folder {path.parent}: {error.strerror}") from None
+    temporary = Path(name)
+    try:
+        os.close(handle)
+        # mkstemp makes private files; an artifact gets the permissions any new file would.
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        yield temporary
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file under a temporary name, then move it in place.
+
+    Parameters
+    ----------
+    path : Path
+    text : str
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    with atomic_path(path) as temporary:
+        try:
+            temporary.write_text(text, encoding="utf-8")
+            os.replace(temporary, path)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error}") from None
