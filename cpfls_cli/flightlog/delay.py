@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flightlog.results import DelayEstimate
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
+from cpfls_cli.inertia import body_torque_columns
 
 _SMALLEST_WINDOW = 50
 
@@ -118,7 +119,7 @@ def _prepare(
     if not scale.any():
         raise ComputationError("the delay cannot be estimated: the torque is constant")
     scale[scale == 0] = np.inf
-    columns = _inertia_columns(smooth_rate, derivative(time, smooth_rate))[window] / scale[:, None]
+    columns = body_torque_columns(smooth_rate, derivative(time, smooth_rate))[window] / scale[:, None]
     regressor = (columns - columns.mean(axis=0)).reshape(-1, 6)
     return _Fit(time[window], CubicSpline(time, smooth_torque), scale, regressor, _orthonormal(regressor))
 
@@ -133,17 +134,6 @@ def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
             f" {delay_max_s:g}: at least {_SMALLEST_WINDOW} samples must remain"
         )
     return slice(int(first), int(last))
-
-
-def _inertia_columns(rate: Array, acceleration: Array) -> Array:
-    """Write ``I omegad + omega x I omega`` as columns times (Ixx, Iyy, Izz, Ixy, Ixz, Iyz)."""
-    entries = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
-    columns = []
-    for row, column in entries:
-        unit = np.zeros((3, 3))
-        unit[row, column] = unit[column, row] = 1.0
-        columns.append(acceleration @ unit + np.cross(rate, rate @ unit))
-    return np.stack(columns, axis=2)
 
 
 def _orthonormal(regressor: Array) -> Array:

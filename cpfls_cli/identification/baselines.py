@@ -11,6 +11,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.least_squares import solve
 from cpfls_cli.identification.rigid_base import rigid_columns
+from cpfls_cli.inertia import symmetric_columns
 from cpfls_cli.regressor.motion import Motion
 
 Columns = Callable[[Motion], Array]
@@ -48,11 +49,7 @@ def constant_inertia_columns(motion: Motion) -> Array:
     -------
     array, shape (samples, 3, 6)
     """
-    columns = np.zeros((len(motion), 3, 6))
-    for parameter, (row, column) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
-        columns[:, row, parameter] = motion.acceleration[:, column]
-        columns[:, column, parameter] = motion.acceleration[:, row]
-    return columns
+    return symmetric_columns(motion.acceleration)
 
 
 def no_torque_columns(motion: Motion) -> Array:

@@ -10,6 +10,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.excitation import outside_visited
 from cpfls_cli.identification.rigid_base import rigid_columns
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor
 from cpfls_cli.regressor.structure import ModelStructure
@@ -105,22 +106,6 @@ class Model:
     def _torque(self, motion: Motion) -> Array:
         fuzzy = Regressor(self.structure, motion, self.ranges).torque(self.partitions, self.coefficients)
         return np.asarray(fuzzy + rigid_columns(motion) @ self.rigid_body)
-
-
-def symmetric(parameters: Array) -> Array:
-    """Arrange six parameters as a symmetric matrix.
-
-    Parameters
-    ----------
-    parameters : array, shape (6,)
-        xx, yy, zz, xy, xz, yz.
-
-    Returns
-    -------
-    array, shape (3, 3)
-    """
-    xx, yy, zz, xy, xz, yz = parameters
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def coriolis_matrix(inertia: InertiaValues, rate: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.vehicle import inertia as elements
+from cpfls_cli.inertia import body_torque_columns, symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -21,7 +21,7 @@ def inertia_tensor(vehicle: VehicleSettings) -> Array:
     -------
     array, shape (3, 3), kg m^2, body frame
     """
-    return elements.tensor(vehicle.inertia_kg_m2)
+    return symmetric(vehicle.inertia_kg_m2)
 
 
 def inertia_matrix(attitude: Array, inertia: Array) -> Array:
@@ -136,7 +136,6 @@ def rigid_body_regressor(attitude: Array, attitude_rate: Array, attitude_acceler
     """
     omega = rotations.body_rate(attitude, attitude_rate)
     alpha = rotations.body_acceleration(attitude, attitude_rate, attitude_acceleration)
-    gyroscopic = np.cross(omega[:, :, None], elements.columns(omega), axis=1)
-    body_columns = elements.columns(alpha) + gyroscopic
-    regressor: Array = rotations.euler_rate_matrix(attitude).swapaxes(1, 2) @ body_columns
+    W = rotations.euler_rate_matrix(attitude)
+    regressor: Array = W.swapaxes(1, 2) @ body_torque_columns(omega, alpha)
     return regressor

@@ -10,8 +10,8 @@ from annotated_types import Gt, MinLen
 from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.settings import Settings
-from cpfls_cli.vehicle.inertia import tensor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class VehicleSettings(Settings):
             raise SettingError("inertia_kg_m2", "give 3 moments of inertia, or 3 moments and 3 off-diagonal entries")
         if not min(self.inertia_kg_m2[:3]) > 0:
             raise SettingError("inertia_kg_m2", "the moments of inertia Ixx, Iyy, Izz must be greater than 0")
-        smallest = np.linalg.eigvalsh(tensor(self.inertia_kg_m2)).min()
+        smallest = np.linalg.eigvalsh(symmetric(self.inertia_kg_m2)).min()
         if not smallest > 0:
             message = f"is not positive definite (smallest principal moment {smallest:.6g}); lower Ixy, Ixz or Iyz"
             raise SettingError("inertia_kg_m2", message)

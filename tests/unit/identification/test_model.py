@@ -6,7 +6,7 @@ import pytest
 from cpfls_cli.identification import Model
 from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.excitation import visited_cells
-from cpfls_cli.identification.model import coriolis_matrix, symmetric
+from cpfls_cli.identification.model import coriolis_matrix
 from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure
 
 STRUCTURES = {
@@ -87,8 +87,3 @@ def test_attitudes_outside_training_are_flagged(case):
     model, motion = case
     assert not model.outside(motion.attitude).any()
     assert model.outside(np.random.default_rng(20).uniform(-np.pi, np.pi, (500, 3))).any()
-
-
-def test_symmetric():
-    expected = [[1, 4, 5], [4, 2, 6], [5, 6, 3]]
-    np.testing.assert_array_equal(symmetric(np.array([1.0, 2, 3, 4, 5, 6])), expected)

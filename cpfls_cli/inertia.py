@@ -1,0 +1,77 @@
+"""The six numbers of a symmetric matrix of inertia: their names, their places, and what they multiply in a torque."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+
+INERTIA_PARAMETERS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+"""Names in the order of every array of six; the last three are entries of the tensor, not products of inertia."""
+
+INERTIA_PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Row and column of each of the six."""
+
+
+def symmetric(parameters: Sequence[float] | Array) -> Array:
+    """Arrange six parameters as a symmetric matrix.
+
+    Parameters
+    ----------
+    parameters : array or sequence, shape (6,) or (3,)
+        In the order of `INERTIA_PARAMETERS`; off-diagonal entries that are left out are zero.
+
+    Returns
+    -------
+    array, shape (3, 3)
+    """
+    matrix = np.zeros((3, 3))
+    rows, columns = np.array(INERTIA_PLACES[: len(parameters)]).T
+    matrix[rows, columns] = matrix[columns, rows] = parameters
+    return matrix
+
+
+def symmetric_columns(vectors: Array) -> Array:
+    """Write ``S v`` with a symmetric S as a matrix times the six elements of S.
+
+    Parameters
+    ----------
+    vectors : array, shape (time, 3)
+        v.
+
+    Returns
+    -------
+    array, shape (time, 3, 6)
+        Multiplies the elements in the order of `INERTIA_PARAMETERS`.
+    """
+    columns = np.zeros((len(vectors), 3, len(INERTIA_PLACES)))
+    for parameter, (row, column) in enumerate(INERTIA_PLACES):
+        columns[:, row, parameter] = vectors[:, column]
+        columns[:, column, parameter] = vectors[:, row]
+    return columns
+
+
+def body_torque_columns(body_rate: Array, body_acceleration: Array) -> Array:
+    """Write ``I omegad + omega x I omega`` as a matrix times the six elements of the inertia tensor I.
+
+    Parameters
+    ----------
+    body_rate : array, shape (time, 3), rad/s, body frame
+        omega.
+    body_acceleration : array, shape (time, 3), rad/s^2, body frame
+        omegad.
+
+    Returns
+    -------
+    array, shape (time, 3, 6), 1/s^2, body frame
+        Multiplies (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) in kg m^2 and gives the body torque in N m.
+
+    References
+    ----------
+    method.md section 2.
+    """
+    gyroscopic = np.cross(body_rate[:, :, None], symmetric_columns(body_rate), axis=1)
+    columns: Array = symmetric_columns(body_acceleration) + gyroscopic
+    return columns

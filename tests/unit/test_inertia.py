@@ -1,0 +1,55 @@
+"""Six inertia parameters: their order, and the torque they give."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.inertia import INERTIA_PARAMETERS, INERTIA_PLACES, body_torque_columns, symmetric, symmetric_columns
+
+PARAMETERS = np.array([1.0, 2.0, 3.0, 0.4, 0.5, 0.6])
+MATRIX = np.array([[1.0, 0.4, 0.5], [0.4, 2.0, 0.6], [0.5, 0.6, 3.0]])
+
+
+def vectors(seed, count=50):
+    return np.random.default_rng(seed).normal(size=(count, 3))
+
+
+def test_six_parameters_fill_the_matrix():
+    np.testing.assert_array_equal(symmetric(PARAMETERS), MATRIX)
+
+
+def test_three_parameters_fill_the_diagonal():
+    np.testing.assert_array_equal(symmetric((1.0, 2.0, 3.0)), np.diag([1.0, 2.0, 3.0]))
+
+
+def test_names_say_the_places():
+    axes = "xyz"
+    assert tuple(f"I{axes[row]}{axes[column]}" for row, column in INERTIA_PLACES) == INERTIA_PARAMETERS
+
+
+def test_columns_times_parameters_are_the_matrix_times_the_vectors():
+    v = vectors(1)
+    np.testing.assert_allclose(symmetric_columns(v) @ PARAMETERS, v @ MATRIX, atol=1e-14)
+
+
+def test_body_torque_by_euler_s_equations():
+    (p, q, r), (dp, dq, dr) = vectors(2).T, vectors(3).T
+    xx, yy, zz = PARAMETERS[:3]
+    expected = np.column_stack([xx * dp + (zz - yy) * q * r, yy * dq + (xx - zz) * p * r, zz * dr + (yy - xx) * p * q])
+    torque = body_torque_columns(vectors(2), vectors(3))[:, :, :3] @ PARAMETERS[:3]
+    np.testing.assert_allclose(torque, expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_torque_of_a_full_tensor_is_the_change_of_its_angular_momentum(axis):
+    """Along a turn about one body axis, where world and body axes agree at time 0: d(R I omega)/dt."""
+    rate, acceleration, step = 1.3, -0.7, 1e-5
+    direction = np.eye(3)[axis]
+
+    def momentum(time):
+        angle, speed = rate * time + acceleration * time**2 / 2, rate + acceleration * time
+        return Rotation.from_rotvec(angle * direction).apply(MATRIX @ (speed * direction))
+
+    expected = (momentum(step) - momentum(-step)) / (2 * step)
+    found = body_torque_columns(rate * direction[None], acceleration * direction[None])[0] @ PARAMETERS
+    np.testing.assert_allclose(found, expected, atol=1e-8)
