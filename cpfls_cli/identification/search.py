@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Evaluate, Evaluation
 from cpfls_cli.evolution.engine import evolve
-from cpfls_cli.evolution.state import Generation
+from cpfls_cli.evolution.state import Generation, best
 from cpfls_cli.identification.choice import choose
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.evaluator import Evaluator
@@ -86,7 +86,7 @@ def search(
     front = Front(last.front_genes[usable], objectives, choose(objectives, settings.choice))
     history = History(
         np.array([g.evaluations for g in generations]),
-        np.array([_best(g) for g in generations]),
+        np.array([best(g) for g in generations]),
         np.array([len(g.front_genes) for g in generations]),
     )
     return front, history
@@ -96,16 +96,12 @@ def _watched(evaluator: Evaluator, past: Sequence[Generation], last: int, progre
     """Evaluate one chromosome after the other, so that a long generation shows how far it has come."""
 
     def evaluate(genes: IntArray) -> Evaluation:
-        best = _best(past[-1]) if past else None
+        best_so_far = best(past[-1]) if past else None
         parts = []
         for done in range(1, len(genes) + 1):
             parts.append(evaluator(genes[done - 1 : done]))
-            progress(SearchStep(len(past), last, done / len(genes), best))
+            progress(SearchStep(len(past), last, done / len(genes), best_so_far))
         refined, objectives = ([getattr(part, name) for part in parts] for name in ("genes", "objectives"))
         return Evaluation(np.concatenate(refined), np.concatenate(objectives))
 
     return evaluate
-
-
-def _best(generation: Generation) -> Array:
-    return np.asarray(np.min(generation.front_objectives, axis=0))
