@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import MODEL
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.identify import identify
+from cpfls_cli.identification.identify import TRAINING, identify
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.search import SearchStep
-from cpfls_cli.stages.job import Job, Outcome, begin, finish, generator
+from cpfls_cli.stages.job import Job, Outcome, Started, begin, finish, generator, settings_of
 from cpfls_cli.stages.model_file import model_data
 from cpfls_cli.stages.training import TrainingData, read_torque_data, read_training
 
@@ -43,7 +43,7 @@ def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]
     """
     started = begin(job, _roles(flight, selection, validate))
     data = read_training(flight, selection, job.study)
-    held_out = _held_out(data, validate)
+    held_out = _held_out(job, data, started, validate)
     if started.dry_run is not None:
         return started.dry_run
     clock = time.perf_counter()
@@ -58,9 +58,8 @@ def _roles(flight: Path, selection: Path | None, validate: Sequence[Path]) -> di
 
 
 def _identify(job: Job, flight: Path, data: TrainingData, held_out: dict[str, TorqueData]) -> Identification:
-    # One thread: the same bytes whatever the number of cores.
-    with threadpool_limits(limits=1):
-        try:
+    try:
+        with settings_of("identification"):
             return identify(
                 data.flight[data.split.training],
                 data.flight[data.learned],
@@ -69,19 +68,29 @@ def _identify(job: Job, flight: Path, data: TrainingData, held_out: dict[str, To
                 generator(job.study, "identify"),
                 lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step)),
             )
-        except ComputationError as error:
-            raise ComputationError(f"{flight}: {error}") from None
+    except ComputationError as error:
+        raise ComputationError(f"{flight}: {error}") from None
 
 
-def _held_out(data: TrainingData, validate: Sequence[Path]) -> dict[str, TorqueData]:
+def _held_out(job: Job, data: TrainingData, started: Started, validate: Sequence[Path]) -> dict[str, TorqueData]:
+    """Gather what is judged but not learned from, under names of their own."""
     rest = data.flight[data.split.held_out]
+    if job.study.identification.training_share < 1 and not len(rest):
+        raise ConfigError(
+            f"identification.embargo_s = {job.study.identification.embargo_s:g}: leaves nothing of the flight to be "
+            "held out; lower it, or lower identification.training_share"
+        )
     parts = {REST: rest} if len(rest) else {}
-    for path in validate:
-        name, number = path.name, 2
-        while name in parts:
-            name, number = f"{path.name} ({number})", number + 1
-        parts[name] = read_torque_data(path)
+    for number, path in enumerate(validate, start=1):
+        if started.inputs[f"validate-{number}"].sha256 == started.inputs["flight"].sha256:
+            raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
+        parts[_free_name(path.name, {TRAINING, *parts})] = read_torque_data(path)
     return parts
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    numbered = (f"{name} ({number})" for number in count(2))
+    return next(candidate for candidate in chain([name], numbered) if candidate not in taken)
 
 
 def _note(step: SearchStep) -> str:
@@ -94,24 +103,25 @@ def _note(step: SearchStep) -> str:
 def _outcome(result: Identification, learned: int, seconds: float) -> Outcome:
     training = result.scores["training"]
     held_out = {part: scores for part, scores in result.scores.items() if part != "training"}
-    system = result.fit.system
     baselines = [name for name in training if name != "model"]
     summary = {
         **_score_summary(training["model"]),
-        "condition_number": system.condition_number,
-        "rank": system.rank,
-        "parameters": _parameters(result),
+        "condition_number": result.system.condition_number,
+        "rank": result.system.rank,
+        "parameters": result.system.row_space.shape[1],
         "generations": len(result.history.evaluations) - 1,
         "evaluations": int(result.history.evaluations[-1]),
         "front": len(result.front.objectives),
         "samples": result.samples["training"],
         "learned": learned,
         "ridge_weight": result.fit.ridge_weight,
+        "fuzzy_part": "off" if np.isinf(result.fit.ridge_weight) else "on",
         "baselines": {name: _score_summary(training[name]) for name in baselines},
         "held_out": {
             part: {
                 **_score_summary(scores["model"]),
                 "samples": result.samples[part],
+                "outside": result.outside[part],
                 "baselines": {name: _score_summary(scores[name]) for name in baselines},
             }
             for part, scores in held_out.items()
@@ -120,10 +130,6 @@ def _outcome(result: Identification, learned: int, seconds: float) -> Outcome:
         "seconds": round(seconds, 3),
     }
     return Outcome(summary, tuple(_lines(result, learned)), result.findings)
-
-
-def _parameters(result: Identification) -> int:
-    return len(result.model.coefficients) + (6 if np.any(result.model.rigid_body) else 0)
 
 
 def _score_summary(score: Score) -> dict[str, Any]:
@@ -142,9 +148,9 @@ def _worst(values: Array) -> float:
 
 
 def _lines(result: Identification, learned: int) -> list[str]:
-    system = result.fit.system
+    system = result.system
     lines = [
-        f"{_parameters(result)} parameters from {learned} samples; rank {system.rank}, "
+        f"{system.row_space.shape[1]} parameters from {learned} samples; rank {system.rank}, "
         f"condition number {system.condition_number:.5g}; {result.history.evaluations[-1]} evaluations"
     ]
     width = max(len(part) for part in result.scores)

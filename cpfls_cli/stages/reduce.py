@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT, SELECTION
@@ -46,9 +45,8 @@ def run(job: Job, flight: Path) -> Outcome:
     regressor = Regressor(structure, motion, data_ranges(structure, motion.attitude))
     Q = regressor.matrix(uniform_breakpoints(structure))
     try:
-        with threadpool_limits(limits=1):
-            selection = reduce(Q, job.study.reduction, job.progress)
-            random = _random(Q, len(selection.indices), job.study)
+        selection = reduce(Q, job.study.reduction, job.progress)
+        random = _random(Q, len(selection.indices), job.study)
     except CpflsError as error:
         raise ComputationError(f"{flight}: {error}") from None
     finish(job, SELECTION, _data(selection, len(Q), random), started.inputs)
