@@ -126,7 +126,8 @@ def map_input(angle: Array, input_map: InputMap, circular: bool, data_range: Inp
     Paper sections 3, 4 and 9; method.md section 5.
     """
     if input_map == "full-circle":
-        turns = np.mod(angle, 2.0 * np.pi) / (2.0 * np.pi)
+        # A circular system has no seam; a classic one jumps, so its seam lies opposite to hover.
+        turns = np.mod(angle, 2.0 * np.pi) / (2.0 * np.pi) if circular else wrap(angle) / (2.0 * np.pi) + 0.5
         per_turn = np.full(len(angle), 0.5 / np.pi)
         consequent, slope = seesaw(angle) if circular else (turns, per_turn)
         return MappedInput(turns, per_turn, consequent, slope)

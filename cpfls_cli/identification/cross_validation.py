@@ -8,25 +8,45 @@ import numpy as np
 from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import SettingError
 
 RIGID = 6
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """Contiguous blocks of samples for cross-validation.
+    """Contiguous blocks of a flight for cross-validation.
 
     Attributes
     ----------
-    validation : array of bool, shape (folds, samples)
+    validation : array of bool, shape (folds, judged samples)
         Samples judged in each fold.
-    left_out : array of bool, shape (folds, samples)
-        Samples that do not train in each fold: those judged, and those within the embargo around them.
+    left_out : array of bool, shape (folds, learned samples)
+        Samples that do not train in each fold: those within the block's time, and within the embargo around it.
     """
 
     validation: BoolArray
     left_out: BoolArray
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of a linear regression by sample and axis, all scaled.
+
+    Attributes
+    ----------
+    matrix : array, shape (samples, 3, 6 + parameters)
+        Rigid-body columns, then fuzzy columns.
+    right_side : array, shape (samples, 3)
+        Torque.
+    """
+
+    matrix: Array
+    right_side: Array
+
+    def of(self, samples: BoolArray) -> tuple[Array, Array]:
+        """Stack the rows of some samples."""
+        return self.matrix[samples].reshape(-1, self.matrix.shape[2]), self.right_side[samples].reshape(-1)
 
 
 @dataclass(frozen=True)
@@ -51,13 +71,15 @@ class RidgeCurve:
     chosen: int
 
 
-def contiguous_blocks(time: Array, folds: int, embargo: float) -> Blocks:
-    """Cut samples into contiguous blocks of equal numbers.
+def contiguous_blocks(judged: Array, learned: Array, folds: int, embargo: float) -> Blocks:
+    """Cut a flight into contiguous blocks of equal numbers of judged samples.
 
     Parameters
     ----------
-    time : array, shape (samples,), s
-        Ascending.
+    judged : array, shape (judged samples,), s
+        Times of the samples that judge, ascending.
+    learned : array, shape (learned samples,), s
+        Times of the samples that train: the same, or a selection of them.
     folds : int
     embargo : float
         Seconds before and after a block that do not train with it held out.
@@ -65,16 +87,26 @@ def contiguous_blocks(time: Array, folds: int, embargo: float) -> Blocks:
     Returns
     -------
     Blocks
+
+    Raises
+    ------
+    SettingError
+        If a block and its embargo leave no sample to train on.
     """
-    folds = max(min(folds, len(time)), 1)
-    label: IntArray = np.arange(len(time)) * folds // max(len(time), 1)
+    folds = max(min(folds, len(judged)), 1)
+    label: IntArray = np.arange(len(judged)) * folds // max(len(judged), 1)
     validation = np.arange(folds)[:, None] == label
-    spans = [(time[block][0] - embargo, time[block][-1] + embargo) for block in validation]
-    left_out = np.array([(time >= start) & (time <= end) for start, end in spans])
+    spans = [(judged[block][0] - embargo, judged[block][-1] + embargo) for block in validation]
+    left_out = np.array([(learned >= start) & (learned <= end) for start, end in spans])
+    if left_out.all(axis=1).any():
+        raise SettingError(
+            "ridge.embargo_s",
+            f"a block and {embargo:g} s on both sides cover all samples; lower it, or use more samples",
+        )
     return Blocks(validation, left_out)
 
 
-def ridge_curve(rows: Array, right_side: Array, blocks: Blocks, weights: Array) -> RidgeCurve:
+def ridge_curve(learned: Rows, judged: Rows, blocks: Blocks, weights: Array) -> RidgeCurve:
     """Cross-validate the ridge weight on the columns after the first six.
 
     The six rigid-body columns are free of penalty. For each fold they are eliminated (Schur complement), and one
@@ -82,10 +114,11 @@ def ridge_curve(rows: Array, right_side: Array, blocks: Blocks, weights: Array) 
 
     Parameters
     ----------
-    rows : array, shape (samples, 3, 6 + parameters)
-        Rigid-body columns, then fuzzy columns scaled to equal size; rows scaled by axis.
-    right_side : array, shape (samples, 3)
-        Scaled torque.
+    learned : Rows
+        Of the samples that train.
+    judged : Rows
+        Of the samples that judge: all of the flight's training part, so that what a selection leaves between its
+        samples is seen.
     blocks : Blocks
     weights : array, shape (tried,)
         Finite ridge weights, ascending, as shares of the number of rows.
@@ -94,22 +127,12 @@ def ridge_curve(rows: Array, right_side: Array, blocks: Blocks, weights: Array) 
     -------
     RidgeCurve
 
-    Raises
-    ------
-    ComputationError
-        If a block and its embargo leave no sample to train on.
-
     References
     ----------
     method.md section 8; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, section 7.10
     (one-standard-error rule).
     """
-    if blocks.left_out.all(axis=1).any():
-        raise ComputationError(
-            "a block of the cross-validation and its embargo cover all samples; use more samples, or lower "
-            "identification.ridge.embargo_s"
-        )
-    errors = np.array([_fold_errors(rows, right_side, blocks, fold, weights) for fold in range(len(blocks.validation))])
+    errors = np.array([_fold_errors(learned, judged, blocks, fold, weights) for fold in range(len(blocks.validation))])
     samples = np.sum(blocks.validation, axis=1)
     mean = np.average(errors, axis=0, weights=samples)
     spread = np.std(errors, axis=0, ddof=1) / np.sqrt(len(errors)) if len(errors) > 1 else np.zeros_like(mean)
@@ -119,13 +142,11 @@ def ridge_curve(rows: Array, right_side: Array, blocks: Blocks, weights: Array) 
     return RidgeCurve(np.append(weights, np.inf), mean, spread, chosen)
 
 
-def _fold_errors(rows: Array, right_side: Array, blocks: Blocks, fold: int, weights: Array) -> Array:
+def _fold_errors(learned: Rows, judged: Rows, blocks: Blocks, fold: int, weights: Array) -> Array:
     """Mean squared error on one block for every weight, the fuzzy part off last."""
-    train = ~blocks.left_out[fold]
-    A, y = rows[train].reshape(-1, rows.shape[2]), right_side[train].reshape(-1)
-    V, z = (a[blocks.validation[fold]] for a in (rows, right_side))
-    coefficients = _ridge_path(A.T @ A, A.T @ y, weights * len(y))
-    residual = z.reshape(-1)[:, None] - V.reshape(-1, V.shape[2]) @ coefficients
+    A, y = learned.of(~blocks.left_out[fold])
+    V, z = judged.of(blocks.validation[fold])
+    residual = z[:, None] - V @ _ridge_path(A.T @ A, A.T @ y, weights * len(y))
     return np.asarray(np.mean(residual**2, axis=0))
 
 

@@ -15,6 +15,7 @@ from cpfls_cli.identification.local_search import refine
 from cpfls_cli.identification.rigid_base import rigid_columns
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor.regressor import Regressor
+from cpfls_cli.regressor.structure import ModelStructure
 
 OBJECTIVES = 3
 NOT_DEFINED = np.full(OBJECTIVES, np.inf)
@@ -65,8 +66,6 @@ class Evaluator:
 
     Attributes
     ----------
-    regressor : Regressor
-        Of the samples that parameters are learned from.
     solver : CoefficientSolver
     judge : Judge
     local_search : LocalSearchSettings
@@ -74,11 +73,15 @@ class Evaluator:
         Take the solver's cross-validated error for the first objective, not the training part's.
     """
 
-    regressor: Regressor
     solver: CoefficientSolver
     judge: Judge
     local_search: LocalSearchSettings
     cross_validated: bool
+
+    @property
+    def structure(self) -> ModelStructure:
+        """Structure of the models."""
+        return self.solver.regressor.structure
 
     def __call__(self, genes: IntArray) -> Evaluation:
         """Evaluate chromosomes, refining each by local search if enabled.
@@ -111,12 +114,8 @@ class Evaluator:
         partitions = self._decode(chromosome)
         if not all(np.isfinite(part).all() for part in partitions):
             return None
-        Q = self.regressor.matrix(partitions)
-        # A very narrow function has slopes beyond what the decomposition can carry.
-        if not np.isfinite(Q).all() or np.max(np.abs(Q)) > 1e100:
-            return None
-        fit = self.solver.fit(Q)
-        return fit if np.isfinite(fit.mean_squared_error) and fit.system.rank > 0 else None
+        fit = self.solver.fit(partitions)
+        return fit if fit is not None and np.isfinite(fit.mean_squared_error) and fit.system.rank > 0 else None
 
     def objectives(self, chromosome: IntArray, fit: Fit) -> Array:
         """Judge a fit by all objectives.
@@ -150,11 +149,11 @@ class Evaluator:
         return chromosome, objectives
 
     def _refined(self, chromosome: IntArray, fit: Fit) -> IntArray | None:
-        movable = any(partition.functions > 2 for partition in self.regressor.structure.partitions)
+        movable = any(partition.functions > 2 for partition in self.structure.partitions)
         if not self.local_search.enabled or not movable or np.isinf(fit.ridge_weight):
             return None
         weights = np.asarray(chromosome / LARGEST_GENE, dtype=float)
-        return encode(refine(self.regressor, self.solver, weights, fit, self.local_search.evaluations))
+        return encode(refine(self.solver, weights, fit, self.local_search.evaluations))
 
     def _decode(self, chromosome: IntArray) -> tuple[Array, ...]:
-        return decode(self.regressor.structure, chromosome.astype(float))
+        return decode(self.structure, chromosome.astype(float))

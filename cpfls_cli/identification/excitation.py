@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.fuzzy.inputs import wrap
-from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.regressor.regressor import Breakpoints, Regressor
 
 CELLS = 72
@@ -75,22 +75,35 @@ def outside_visited(visited: BoolArray, attitude: Array) -> BoolArray:
     return np.asarray(~visited[_cells(attitude[:, 0]), _cells(attitude[:, 1])])
 
 
-def rule_excitation(regressor: Regressor, partitions: Breakpoints, system: LeastSquares) -> RuleExcitation:
-    """Measure how far the samples of a regressor excite each rule.
+def rule_excitation(
+    regressor: Regressor, partitions: Breakpoints, Q: Array, noise: float, inertia: float, rank_tolerance: float
+) -> RuleExcitation:
+    """Measure how far samples excite each rule.
+
+    A direction of the coefficients counts as determined where noise in the torque moves it by less than the
+    inertia itself: its singular value is above noise over inertia, and above the rank tolerance.
 
     Parameters
     ----------
     regressor : Regressor
     partitions : sequence of array
-    system : LeastSquares
-        A solved system whose first columns are those of the regressor.
+    Q : array, shape (samples, 3, parameters)
+        The regressor's matrix for these partitions.
+    noise : float, N m
+        Root mean square of what no model explains.
+    inertia : float, kg m^2
+        Typical moment of inertia.
+    rank_tolerance : float
 
     Returns
     -------
     RuleExcitation
     """
+    rows = Q.reshape(-1, Q.shape[2])
+    _, singular_values, Vt = linalg.svd(rows, full_matrices=False, check_finite=False)
+    floor = max(rank_tolerance * singular_values[0], noise / inertia if inertia > 0 else 0.0)
+    share = np.sum(Vt[singular_values > floor] ** 2, axis=0)
     names, firing, determined = [], [], []
-    share = np.sum(system.row_space**2, axis=0)
     for index, block in enumerate(regressor.structure.blocks):
         names += [f"{block.function.name} rule {rule + 1}" for rule in range(block.rules)]
         firing.append(np.max(regressor.firing(index, partitions), axis=0))

@@ -9,37 +9,63 @@ import numpy as np
 from cpfls_cli.identification.excitation import RuleExcitation
 from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.judge import Score
+from cpfls_cli.identification.least_squares import LeastSquares
 
 HARDLY_EXCITED_R2 = 0.5
+NAMED = 8
+RIVALS = {
+    "rigid-body": "the rigid body with six inertia parameters",
+    "constant-inertia": "a constant inertia matrix",
+    "uniform-partitions": "the same structure with uniform partitions and no search",
+}
 
 
-def findings(fit: Fit, excitation: RuleExcitation, scores: Mapping[str, Mapping[str, Score]]) -> list[str]:
+def findings(
+    fit: Fit,
+    system: LeastSquares,
+    excitation: RuleExcitation,
+    scores: Mapping[str, Mapping[str, Score]],
+    outside: Mapping[str, int],
+) -> list[str]:
     """Say in words what failed or was not excited.
 
     Parameters
     ----------
     fit : Fit
+    system : LeastSquares
+        The regressor of the model's parameters, without penalty.
     excitation : RuleExcitation
     scores : mapping
         By part, then by model.
+    outside : mapping
+        Samples outside the visited attitudes, by part.
 
     Returns
     -------
     list of str
     """
-    return [*_rank(fit), *_silent_rules(excitation), *_fuzzy_part_off(fit), *_axes(scores), *_beaten(scores)]
+    return [
+        *_rank(system),
+        *_silent_rules(excitation),
+        *_fuzzy_part_off(fit),
+        *_axes(scores),
+        *_beaten(scores),
+        *_outside(outside),
+    ]
 
 
-def _rank(fit: Fit) -> Iterator[str]:
-    parameters = fit.system.row_space.shape[1]
-    if fit.system.rank < parameters:
-        yield f"rank {fit.system.rank} of {parameters}: the minimum-norm solution was taken"
+def _rank(system: LeastSquares) -> Iterator[str]:
+    parameters = system.row_space.shape[1]
+    if system.rank < parameters:
+        yield f"rank {system.rank} of {parameters}: the minimum-norm solution was taken"
 
 
 def _silent_rules(excitation: RuleExcitation) -> Iterator[str]:
     silent = [name for name, excited in zip(excitation.name, excitation.excited, strict=True) if not excited]
     if silent:
-        yield f"{len(silent)} of {len(excitation.name)} rules not excited: {', '.join(silent)}"
+        rest = f" and {len(silent) - NAMED} more" if len(silent) > NAMED else ""
+        named = ", ".join(silent[:NAMED])
+        yield f"{len(silent)} of {len(excitation.name)} rules not excited beyond the noise: {named}{rest}"
 
 
 def _fuzzy_part_off(fit: Fit) -> Iterator[str]:
@@ -58,17 +84,24 @@ def _axes(scores: Mapping[str, Mapping[str, Score]]) -> Iterator[str]:
 
 
 def _beaten(scores: Mapping[str, Mapping[str, Score]]) -> Iterator[str]:
-    """Name the parts of the data on which a simpler model is better."""
-    rivals = {
-        "rigid-body": "the rigid body with six inertia parameters",
-        "uniform-partitions": "the same structure with uniform partitions and no search",
-    }
+    """Name the parts of the data on which a simpler model explains more, all axes counted alike."""
     for part, by_model in scores.items():
-        for rival, words in rivals.items():
-            ours = by_model["model"].mse.sum()
-            if rival in by_model and by_model[rival].mse.sum() < ours * (1 - 1e-9):
-                yield f"{part}: {words} is better (mean squared error {_ratio(by_model[rival], ours)} of the model's)"
+        ours = by_model["model"]
+        for rival, words in RIVALS.items():
+            if rival in by_model and _unexplained(by_model[rival]) < _unexplained(ours) * (1 - 1e-9):
+                r2 = " ".join(f"{theirs:.4g} against {own:.4g}," for theirs, own in _pairs(by_model[rival], ours))
+                yield f"{part}: {words} explains more (R2 of roll, pitch, yaw {r2.rstrip(',')})"
 
 
-def _ratio(rival: Score, ours: float) -> str:
-    return f"{rival.mse.sum() / ours:.3g}"
+def _pairs(theirs: Score, ours: Score) -> Iterator[tuple[float, float]]:
+    return zip(theirs.r2, ours.r2, strict=True)
+
+
+def _unexplained(score: Score) -> float:
+    return float(np.nansum(1.0 - score.r2))
+
+
+def _outside(outside: Mapping[str, int]) -> Iterator[str]:
+    for part, samples in outside.items():
+        if samples:
+            yield f"{part}: {samples} samples lie outside the attitudes that training visited"

@@ -9,8 +9,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.least_squares import LeastSquares, solve
+from cpfls_cli.regressor.regressor import Breakpoints, Regressor
 
 NO_RIGID_BODY = np.zeros(6)
+LARGEST_ENTRY = 1e100
 
 
 @dataclass(frozen=True)
@@ -46,14 +48,34 @@ class Fit:
 
 
 class CoefficientSolver(Protocol):
-    """Finds the linear parameters for a regressor."""
+    """Finds the linear parameters of a model for given partitions."""
 
-    def fit(self, Q: Array) -> Fit:
-        """Solve for the linear parameters and judge them.
+    @property
+    def regressor(self) -> Regressor:
+        """Regressor of the samples that parameters are learned from."""
+        ...
+
+    def fit(self, partitions: Breakpoints) -> Fit | None:
+        """Solve for the linear parameters.
 
         Parameters
         ----------
-        Q : array, shape (samples, 3, parameters)
+        partitions : sequence of array, shape (functions,)
+
+        Returns
+        -------
+        Fit or None
+            None where the regressor is not finite.
+        """
+        ...
+
+    def refit(self, partitions: Breakpoints, start: Fit) -> Fit:
+        """Solve again with the hyperparameters of an earlier fit, for a local search.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+        start : Fit
 
         Returns
         -------
@@ -61,17 +83,17 @@ class CoefficientSolver(Protocol):
         """
         ...
 
-    def refit(self, Q: Array, start: Fit) -> Fit:
-        """Solve again with the hyperparameters of an earlier fit, for a local search.
+    def unpenalised(self, partitions: Breakpoints, fit: Fit) -> LeastSquares:
+        """Decompose the regressor of the parameters that a fit uses, without any penalty: what the data determine.
 
         Parameters
         ----------
-        Q : array, shape (samples, 3, parameters)
-        start : Fit
+        partitions : sequence of array, shape (functions,)
+        fit : Fit
 
         Returns
         -------
-        Fit
+        LeastSquares
         """
         ...
 
@@ -82,20 +104,45 @@ class PlainSolver:
 
     Attributes
     ----------
+    regressor : Regressor
     torque : array, shape (samples, 3), N m
     rank_tolerance : float
     """
 
+    regressor: Regressor
     torque: Array
     rank_tolerance: float
 
-    def fit(self, Q: Array) -> Fit:
+    def fit(self, partitions: Breakpoints) -> Fit | None:
         """Solve for the coefficients; see `CoefficientSolver.fit`."""
+        Q = self.regressor.matrix(partitions)
+        return self._solve(Q) if usable(Q) else None
+
+    def refit(self, partitions: Breakpoints, start: Fit) -> Fit:  # noqa: ARG002 - there are no hyperparameters to keep
+        """Solve for the coefficients; see `CoefficientSolver.refit`."""
+        return self._solve(self.regressor.matrix(partitions))
+
+    def unpenalised(self, partitions: Breakpoints, fit: Fit) -> LeastSquares:  # noqa: ARG002 - the fit has no penalty
+        """Give the solved system; see `CoefficientSolver.unpenalised`."""
+        return fit.system
+
+    def _solve(self, Q: Array) -> Fit:
         system = solve(Q.reshape(-1, Q.shape[2]), self.torque.reshape(-1), self.rank_tolerance)
         mean_squared = float(np.mean(system.residual**2))
         unscaled = np.ones(3), np.ones(Q.shape[2])
         return Fit(system.coefficients, NO_RIGID_BODY, 0.0, mean_squared, system, *unscaled)
 
-    def refit(self, Q: Array, start: Fit) -> Fit:  # noqa: ARG002 - there are no hyperparameters to keep
-        """Solve for the coefficients; see `CoefficientSolver.refit`."""
-        return self.fit(Q)
+
+def usable(Q: Array) -> bool:
+    """Tell whether a regressor can be decomposed.
+
+    Parameters
+    ----------
+    Q : array, shape (samples, 3, parameters)
+
+    Returns
+    -------
+    bool
+        False where it is not finite, or a very narrow function has slopes beyond what a decomposition can carry.
+    """
+    return bool(np.isfinite(Q).all() and np.max(np.abs(Q)) <= LARGEST_ENTRY)

@@ -7,17 +7,15 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.errors import ComputationError
-from cpfls_cli.identification.baselines import fit_baselines
+from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.identification.baselines import Baseline, fit_baselines
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
-from cpfls_cli.identification.cross_validation import RidgeCurve
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import Evaluator, Judge
 from cpfls_cli.identification.excitation import RuleExcitation, rule_excitation, visited_cells
 from cpfls_cli.identification.findings import findings
 from cpfls_cli.identification.fit import CoefficientSolver, Fit, PlainSolver
 from cpfls_cli.identification.judge import Score, score
-from cpfls_cli.identification.least_squares import solve
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.rigid_base import RigidBaseSolver
@@ -27,6 +25,7 @@ from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import Regressor, data_ranges
 from cpfls_cli.regressor.structure import model_structure
 
+TRAINING = "training"
 UNIFORM = "uniform-partitions"
 
 
@@ -47,7 +46,7 @@ def identify(
     learned : TorqueData
         The samples of it that parameters are learned from: all, or a selection, in the order of time.
     held_out : mapping of str to TorqueData
-        Data that nothing is learned from, by name; judged once, at the end.
+        Data that nothing is learned from, by name (not ``training``); judged once, at the end.
     settings : IdentificationSettings
     rng : numpy.random.Generator
     progress : callable, optional
@@ -60,7 +59,9 @@ def identify(
     Raises
     ------
     ComputationError
-        If there are too few samples or no chromosome gives a finite model.
+        If no chromosome gives a finite model.
+    SettingError
+        If the settings ask for more than the samples give.
 
     References
     ----------
@@ -77,20 +78,24 @@ def identify(
     uniform = _solve(evaluator, uniform_chromosome(model.structure), training)
     if uniform is not None and model.structure.genes > 0:
         predictors[UNIFORM] = uniform[0].torque
-    parts = {"training": training, **held_out}
+    parts = {TRAINING: training, **held_out}
     scores = {part: _scores(predictors, data) for part, data in parts.items()}
-    excitation = _excitation(evaluator, model, settings)
+    outside = {part: int(np.sum(model.outside(data.motion.attitude))) for part, data in parts.items()}
+    excitation = _excitation(evaluator, model, baselines[0], scores[TRAINING], settings)
+    system = evaluator.solver.unpenalised(model.partitions, fit)
     return Identification(
         model=model,
         fit=fit,
+        system=system,
         front=front,
         history=history,
         excitation=excitation,
-        ridge=_ridge(evaluator, model),
+        ridge=evaluator.solver.curve(model.partitions) if isinstance(evaluator.solver, RigidBaseSolver) else None,
         baselines=baselines,
         scores=scores,
-        samples={name: len(data) for name, data in parts.items()},
-        findings=tuple(findings(fit, excitation, scores)),
+        samples={part: len(data) for part, data in parts.items()},
+        outside=outside,
+        findings=tuple(findings(fit, system, excitation, scores, outside)),
     )
 
 
@@ -111,37 +116,22 @@ def model_evaluator(training: TorqueData, learned: TorqueData, settings: Identif
     """
     structure = model_structure(settings)
     ranges = data_ranges(structure, training.motion.attitude)
-    regressor = Regressor(structure, learned.motion, ranges)
-    judge = Judge.of(training, Regressor(structure, training.motion, ranges))
-    solver = coefficient_solver(learned, settings)
-    return Evaluator(regressor, solver, judge, settings.local_search, settings.base == "rigid-body")
+    whole = Regressor(structure, training.motion, ranges)
+    selected = whole if len(learned) == len(training) else Regressor(structure, learned.motion, ranges)
+    solver = _solver((learned, selected), (training, whole), settings)
+    return Evaluator(solver, Judge.of(training, whole), settings.local_search, settings.base == "rigid-body")
 
 
-def coefficient_solver(learned: TorqueData, settings: IdentificationSettings) -> CoefficientSolver:
-    """Prepare the solver that the base asks for.
-
-    Parameters
-    ----------
-    learned : TorqueData
-    settings : IdentificationSettings
-
-    Returns
-    -------
-    CoefficientSolver
-
-    Raises
-    ------
-    ComputationError
-        If there are too few samples for the base.
-    """
+def _solver(
+    learned: tuple[TorqueData, Regressor], training: tuple[TorqueData, Regressor], settings: IdentificationSettings
+) -> CoefficientSolver:
+    """Prepare the solver that the base asks for."""
+    data, regressor = learned
     if settings.base == "none":
-        return PlainSolver(learned.torque, settings.rank_tolerance)
-    if len(learned) < 2 * settings.ridge.folds:
-        raise ComputationError(
-            f"{len(learned)} samples are too few for {settings.ridge.folds} blocks of cross-validation; "
-            "select more samples or lower identification.ridge.folds"
-        )
-    return RigidBaseSolver.of(learned, settings.ridge, settings.rank_tolerance)
+        return PlainSolver(regressor, data.torque, settings.rank_tolerance)
+    if len(data) < 2 * settings.ridge.folds:
+        raise SettingError("ridge.folds", f"{len(data)} samples are too few for that many blocks; use more samples")
+    return RigidBaseSolver.of(learned, training, settings.ridge, settings.rank_tolerance)
 
 
 def _solve(evaluator: Evaluator, chromosome: IntArray, training: TorqueData) -> tuple[Model, Fit] | None:
@@ -149,7 +139,7 @@ def _solve(evaluator: Evaluator, chromosome: IntArray, training: TorqueData) -> 
     fit = evaluator.fit(chromosome)
     if fit is None:
         return None
-    regressor = evaluator.regressor
+    regressor = evaluator.solver.regressor
     partitions = decode(regressor.structure, chromosome.astype(float))
     visited = visited_cells(training.motion.attitude)
     model = Model(regressor.structure, regressor.ranges, partitions, fit.coefficients, fit.rigid_body, visited)
@@ -160,14 +150,16 @@ def _scores(predictors: Mapping[str, Callable[[Motion], Array]], data: TorqueDat
     return {name: score(data, torque(data.motion)) for name, torque in predictors.items()}
 
 
-def _excitation(evaluator: Evaluator, model: Model, settings: IdentificationSettings) -> RuleExcitation:
-    """Decompose the fuzzy part alone: what of it the samples determine, whatever lies underneath."""
-    Q = evaluator.regressor.matrix(model.partitions)
-    system = solve(Q.reshape(-1, Q.shape[2]), np.zeros(Q.shape[0] * 3), settings.rank_tolerance)
-    return rule_excitation(evaluator.regressor, model.partitions, system)
-
-
-def _ridge(evaluator: Evaluator, model: Model) -> RidgeCurve | None:
-    if not isinstance(evaluator.solver, RigidBaseSolver):
-        return None
-    return evaluator.solver.curve(evaluator.regressor.matrix(model.partitions))
+def _excitation(
+    evaluator: Evaluator,
+    model: Model,
+    rigid_body: Baseline,
+    scores: Mapping[str, Score],
+    settings: IdentificationSettings,
+) -> RuleExcitation:
+    """Measure what of the fuzzy part alone the samples determine beyond their noise, whatever lies underneath."""
+    regressor = evaluator.solver.regressor
+    Q = regressor.matrix(model.partitions)
+    noise = float(np.sqrt(min(np.mean(scores[name].mse) for name in ("model", rigid_body.name))))
+    inertia = float(np.mean(np.abs(rigid_body.parameters[:3])))
+    return rule_excitation(regressor, model.partitions, Q, noise, inertia, settings.rank_tolerance)

@@ -10,7 +10,6 @@ from scipy.optimize import least_squares
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.chromosome import decode, weight_jacobian
 from cpfls_cli.identification.fit import CoefficientSolver, Fit
-from cpfls_cli.regressor.regressor import Regressor
 from cpfls_cli.regressor.sensitivity import torque_sensitivity
 
 
@@ -18,7 +17,6 @@ from cpfls_cli.regressor.sensitivity import torque_sensitivity
 class _ReducedProblem:
     """Residual and Jacobian of the weights with the coefficients solved for, each point computed once."""
 
-    regressor: Regressor
     solver: CoefficientSolver
     start: Fit
     _point: Array = field(default_factory=lambda: np.empty(0))
@@ -30,27 +28,25 @@ class _ReducedProblem:
     def jacobian(self, weights: Array) -> Array:
         """Kaufman's approximation: the derivative of the fit, projected off what the regressor spans."""
         fit = self._at(weights)
-        partitions = decode(self.regressor.structure, weights)
-        moved = torque_sensitivity(self.regressor, partitions, fit.coefficients)
-        by_weight = weight_jacobian(self.regressor.structure, weights, moved) * fit.row_scale[:, None]
+        regressor = self.solver.regressor
+        moved = torque_sensitivity(regressor, decode(regressor.structure, weights), fit.coefficients)
+        by_weight = weight_jacobian(regressor.structure, weights, moved) * fit.row_scale[:, None]
         rows = np.zeros((len(fit.system.residual), by_weight.shape[2]))
         rows[: by_weight.shape[0] * 3] = by_weight.reshape(-1, by_weight.shape[2])
         return -fit.system.reject(rows)
 
     def _at(self, weights: Array) -> Fit:
         if self._fit is None or not np.array_equal(weights, self._point):
-            partitions = decode(self.regressor.structure, weights)
-            self._fit = self.solver.refit(self.regressor.matrix(partitions), self.start)
+            self._fit = self.solver.refit(decode(self.solver.regressor.structure, weights), self.start)
             self._point = weights.copy()
         return self._fit
 
 
-def refine(regressor: Regressor, solver: CoefficientSolver, weights: Array, start: Fit, evaluations: int) -> Array:
+def refine(solver: CoefficientSolver, weights: Array, start: Fit, evaluations: int) -> Array:
     """Refine partition weights by nonlinear least squares with the coefficients eliminated.
 
     Parameters
     ----------
-    regressor : Regressor
     solver : CoefficientSolver
     weights : array, shape (genes,)
         On [0, 1], no partition all zero.
@@ -68,7 +64,7 @@ def refine(regressor: Regressor, solver: CoefficientSolver, weights: Array, star
     ----------
     method.md section 7; Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973); Kaufman, BIT 15 (1975).
     """
-    problem = _ReducedProblem(regressor, solver, start)
+    problem = _ReducedProblem(solver, start)
     found = least_squares(
         problem.residual, weights, jac=problem.jacobian, bounds=(0.0, 1.0), max_nfev=evaluations, x_scale="jac"
     )

@@ -11,6 +11,7 @@ from cpfls_cli.identification.cross_validation import RidgeCurve
 from cpfls_cli.identification.excitation import RuleExcitation
 from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.judge import Score
+from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.model import Model
 
 
@@ -59,6 +60,8 @@ class Identification:
     model : Model
     fit : Fit
         The final model's linear parameters, solved in full precision.
+    system : LeastSquares
+        The regressor of the parameters that the model uses, without penalty: its rank and condition number.
     front : Front
     history : History
     excitation : RuleExcitation
@@ -71,12 +74,15 @@ class Identification:
         structure without any search.
     samples : mapping of str to int
         Samples judged by part.
+    outside : mapping of str to int
+        How many of them lie outside the attitudes that training visited.
     findings : tuple of str
         What failed or was not excited, in words.
     """
 
     model: Model
     fit: Fit
+    system: LeastSquares
     front: Front
     history: History
     excitation: RuleExcitation
@@ -84,4 +90,5 @@ class Identification:
     baselines: tuple[Baseline, ...]
     scores: Mapping[str, Mapping[str, Score]]
     samples: Mapping[str, int]
+    outside: Mapping[str, int]
     findings: tuple[str, ...]

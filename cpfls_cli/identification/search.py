@@ -66,7 +66,7 @@ def search(
     ComputationError
         If no chromosome gives a finite model.
     """
-    structure = evaluator.regressor.structure
+    structure = evaluator.structure
     if structure.genes == 0:
         only = evaluator(uniform_chromosome(structure)[None])
         objectives = only.objectives

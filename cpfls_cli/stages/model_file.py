@@ -107,10 +107,10 @@ def _parameter_names(structure: ModelStructure) -> Iterator[str]:
 
 def _solution(result: Identification) -> dict[str, Any]:
     data: dict[str, Any] = {
-        "solve/singular_values": result.fit.system.singular_values,
-        "solve/rank": result.fit.system.rank,
-        "solve/condition_number": result.fit.system.condition_number,
-        "solve/parameters": len(result.model.coefficients),
+        "solve/singular_values": result.system.singular_values,
+        "solve/rank": result.system.rank,
+        "solve/condition_number": result.system.condition_number,
+        "solve/parameters": result.system.row_space.shape[1],
         "rules/name": np.array(result.excitation.name),
         "rules/firing": result.excitation.firing,
         "rules/determined": result.excitation.determined,
@@ -148,6 +148,7 @@ def _judged(result: Identification) -> dict[str, Any]:
         "judged/models": np.array(models),
         "judged/parts": np.array(parts),
         "judged/samples": np.array([result.samples[part] for part in parts]),
+        "judged/outside": np.array([result.outside[part] for part in parts]),
         **{f"judged/{measure}": table(measure) for measure in ("mse", "max_error", "relative_error", "r2", "r2_body")},
         "baselines/rigid_body": by_name["rigid-body"],
         "baselines/constant_inertia": by_name["constant-inertia"],

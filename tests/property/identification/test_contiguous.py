@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cpfls_cli.errors import SettingError
 from cpfls_cli.identification import split_flight
 from cpfls_cli.identification.cross_validation import contiguous_blocks
 
@@ -13,7 +14,14 @@ embargoes = st.floats(0, 2)
 
 @given(times, st.integers(1, 20), embargoes)
 def test_blocks(time, folds, embargo):
-    blocks = contiguous_blocks(time, folds, embargo)
+    try:
+        blocks = contiguous_blocks(time, time, folds, embargo)
+    except SettingError:
+        # Refused only where some block with its embargo covers all samples.
+        label = np.arange(len(time)) * min(folds, len(time)) // len(time)
+        parts = [time[label == fold] for fold in range(label[-1] + 1)]
+        assert any(p[0] - embargo <= time[0] + 1e-9 and time[-1] - 1e-9 <= p[-1] + embargo for p in parts)
+        return
     sizes = blocks.validation.sum(axis=1)
     assert len(sizes) == min(folds, len(time))
     assert sizes.max() - sizes.min() <= 1

@@ -12,6 +12,8 @@ from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_range
 from cpfls_cli.vehicle import newton_euler_torque
 
 PARAMETERS = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
+STRUCTURE = model_structure(StructureSettings(harmonic_order=2, products="tensor", membership_functions=1))
+PARTITIONS = uniform_breakpoints(STRUCTURE)
 TENSOR = np.array([[0.6, 0.03, -0.02], [0.03, 0.7, 0.04], [-0.02, 0.04, 1.2]])
 
 
@@ -45,12 +47,16 @@ def fitted(torque_of, noise):
     torque = torque_of(m)
     torque = torque + noise * torque.std(axis=0) * np.random.default_rng(28).standard_normal(torque.shape)
     data = TorqueData(0.01 * np.arange(len(m)), m, torque)
-    return RigidBaseSolver.of(data, RidgeSettings(), 1e-10).fit(columns(m)), data
+    whole = (data, regressor(m))
+    return RigidBaseSolver.of(whole, whole, RidgeSettings(), 1e-10).fit(PARTITIONS), data
+
+
+def regressor(m):
+    return Regressor(STRUCTURE, m, data_ranges(STRUCTURE, m.attitude))
 
 
 def columns(m):
-    structure = model_structure(StructureSettings(harmonic_order=2, products="tensor", membership_functions=1))
-    return Regressor(structure, m, data_ranges(structure, m.attitude)).matrix(uniform_breakpoints(structure))
+    return regressor(m).matrix(PARTITIONS)
 
 
 def predicted(fit, m):
@@ -94,6 +100,19 @@ def test_coefficients_solve_the_ridge_problem():
     penalty = fit.ridge_weight * len(residual) * np.mean(fuzzy**2, axis=0) * fit.coefficients
     np.testing.assert_allclose(rigid.T @ residual, 0.0, atol=1e-9)
     np.testing.assert_allclose(fuzzy.T @ residual, penalty, atol=1e-9)
+
+
+def test_what_a_selection_misses_is_judged_all_the_same():
+    """A selection that holds still about roll fits anything there; the samples between it know better."""
+    m = motion(27)
+    data = TorqueData(0.01 * np.arange(len(m)), m, rigid_torque(m) + 0.05 * rigid_torque(motion(31)))
+    few = np.flatnonzero(np.abs(m.attitude[:, 0]) < 0.5)
+    learned = data[few]
+    solver = RigidBaseSolver.of((learned, regressor(learned.motion)), (data, regressor(m)), RidgeSettings(), 1e-10)
+    curve = solver.curve(PARTITIONS)
+    assert curve.weight[curve.chosen] == np.inf
+    blind = RigidBaseSolver.of(*[(learned, regressor(learned.motion))] * 2, RidgeSettings(), 1e-10).curve(PARTITIONS)
+    assert curve.error[0] > 10 * blind.error[0]
 
 
 def test_the_shipped_default_is_this_base():

@@ -45,9 +45,14 @@ def test_continuous_where_the_input_folds_or_closes(place, consequent):
     assert jump(place, True, consequent) < 1e-5
 
 
-@pytest.mark.parametrize("place", [0.0, 2 * np.pi])
+@pytest.mark.parametrize("place", [-np.pi, np.pi, 3 * np.pi])
 def test_classic_system_jumps_at_the_seam(place):
     assert jump(place, False, ("seesaw", 1, "additive")) > 0.1
+
+
+@pytest.mark.parametrize("place", [0.0, 0.5 * np.pi, 2 * np.pi])
+def test_classic_system_is_continuous_at_hover(place):
+    assert jump(place, False, ("seesaw", 1, "additive")) < 1e-5
 
 
 def test_seesaw_of_equation_11():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.cross_validation import contiguous_blocks, ridge_curve
+from cpfls_cli.identification.cross_validation import Rows, contiguous_blocks, ridge_curve
 
 RIGID = 6
 WEIGHTS = np.geomspace(1e-6, 1e2, 5)
@@ -35,8 +35,8 @@ def brute_force(rows, right_side, blocks, weight):
 @pytest.mark.parametrize(("samples", "folds", "embargo"), [(60, 5, 0.0), (61, 4, 0.05), (40, 2, 0.03)])
 def test_curve_is_that_of_a_refit_per_block_and_weight(fuzzy, samples, folds, embargo):
     rows, right_side, time = problem(fuzzy, samples)
-    blocks = contiguous_blocks(time, folds, embargo)
-    curve = ridge_curve(rows, right_side, blocks, WEIGHTS)
+    blocks = contiguous_blocks(time, time, folds, embargo)
+    curve = ridge_curve(*[Rows(rows, right_side)] * 2, blocks, WEIGHTS)
     np.testing.assert_array_equal(curve.weight, [*WEIGHTS, np.inf])
     errors = np.array([brute_force(rows, right_side, blocks, weight) for weight in curve.weight])
     size = blocks.validation.sum(axis=1)
@@ -45,10 +45,26 @@ def test_curve_is_that_of_a_refit_per_block_and_weight(fuzzy, samples, folds, em
     np.testing.assert_allclose(curve.standard_error, errors.std(axis=1, ddof=1) / np.sqrt(folds), rtol=1e-5)
 
 
+def test_a_selection_is_judged_by_all_samples():
+    rows, right_side, time = problem()
+    learned = np.arange(0, 60, 3)
+    blocks = contiguous_blocks(time, time[learned], 4, 0.02)
+    curve = ridge_curve(Rows(rows[learned], right_side[learned]), Rows(rows, right_side), blocks, WEIGHTS)
+    errors = []
+    for validation, left_out in zip(blocks.validation, blocks.left_out, strict=True):
+        kept = learned[~left_out]
+        assert not set(kept) & set(np.flatnonzero(validation))
+        A, y = rows[kept].reshape(-1, rows.shape[2]), right_side[kept].ravel()
+        penalty = np.sqrt(WEIGHTS[2] * len(y)) * np.eye(A.shape[1])[RIGID:]
+        c = np.linalg.lstsq(np.vstack([A, penalty]), np.concatenate([y, np.zeros(len(penalty))]), rcond=None)[0]
+        errors.append(np.mean((right_side[validation] - rows[validation] @ c) ** 2))
+    assert curve.error[2] == pytest.approx(np.mean(errors), rel=1e-6)
+
+
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.05, 0.3])
 def test_chosen_weight_is_the_largest_within_one_standard_error(share):
     rows, right_side, time = problem(share=share)
-    curve = ridge_curve(rows, right_side, contiguous_blocks(time, 5, 0.0), WEIGHTS)
+    curve = ridge_curve(*[Rows(rows, right_side)] * 2, contiguous_blocks(time, time, 5, 0.0), WEIGHTS)
     best = np.argmin(curve.error)
     good = [
         w for w, e in zip(curve.weight, curve.error, strict=True) if e <= curve.error[best] + curve.standard_error[best]
@@ -60,7 +76,7 @@ def test_a_useless_fuzzy_part_is_switched_off_and_a_useful_one_is_not():
     chosen = []
     for share in (0.0, 1.0):
         rows, right_side, time = problem(share=share)
-        curve = ridge_curve(rows, right_side, contiguous_blocks(time, 5, 0.0), WEIGHTS)
+        curve = ridge_curve(*[Rows(rows, right_side)] * 2, contiguous_blocks(time, time, 5, 0.0), WEIGHTS)
         chosen.append(curve.weight[curve.chosen])
     assert chosen[0] == np.inf
     assert chosen[1] < 1
@@ -69,7 +85,7 @@ def test_a_useless_fuzzy_part_is_switched_off_and_a_useful_one_is_not():
 def test_dependent_rigid_columns_are_allowed():
     rows, right_side, time = problem()
     rows[:, :, 5] = rows[:, :, 0]
-    blocks = contiguous_blocks(time, 5, 0.0)
-    curve = ridge_curve(rows, right_side, blocks, WEIGHTS)
+    blocks = contiguous_blocks(time, time, 5, 0.0)
+    curve = ridge_curve(*[Rows(rows, right_side)] * 2, blocks, WEIGHTS)
     errors = np.array([brute_force(rows, right_side, blocks, weight).mean() for weight in curve.weight])
     np.testing.assert_allclose(curve.error, errors, rtol=1e-6)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from cpfls_cli.identification.excitation import outside_visited, rule_excitation, visited_cells
-from cpfls_cli.identification.least_squares import solve
 from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 
 DEGREE = np.pi / 180
@@ -31,14 +30,13 @@ def test_cells_wrap_at_half_a_turn():
     assert not outside_visited(visited_cells(edges), edges).any()
 
 
-def excitation(attitude, **settings):
+def excitation(attitude, noise=0.0, **settings):
     rng = np.random.default_rng(15)
     motion = Motion(attitude, rng.standard_normal(attitude.shape), rng.standard_normal(attitude.shape))
     structure = model_structure(StructureSettings(consequents="seesaw", products="additive", **settings))
     regressor = Regressor(structure, motion, data_ranges(structure, attitude))
     partitions = uniform_breakpoints(structure)
-    Q = regressor.matrix(partitions).reshape(-1, structure.parameters)
-    return rule_excitation(regressor, partitions, solve(Q, np.zeros(len(Q)), 1e-10))
+    return rule_excitation(regressor, partitions, regressor.matrix(partitions), noise, 0.5, 1e-10)
 
 
 def test_rules_that_never_fire_are_named():
@@ -67,3 +65,13 @@ def test_one_sample_determines_three_directions():
     structure = model_structure(StructureSettings(consequents="seesaw", products="additive", membership_functions=3))
     features = np.concatenate([np.full(block.rules, block.features) for block in structure.blocks])
     np.testing.assert_allclose(found.determined @ features, 3.0)
+
+
+def test_noise_leaves_fewer_directions_determined():
+    """A direction counts where noise moves its coefficient by less than the inertia."""
+    attitude = np.random.default_rng(16).uniform(-3.1, 3.1, (400, 3))
+    quiet, loud, deafening = (excitation(attitude, noise, membership_functions=5) for noise in (0.01, 2.0, 1e6))
+    assert quiet.excited.all()
+    assert loud.determined.sum() < quiet.determined.sum()
+    assert not deafening.excited.any()
+    assert np.all(deafening.determined == 0)

@@ -113,10 +113,10 @@ def test_search_that_starts_with_the_uniform_partitions_is_never_worse():
     assert "uniform-partitions" not in identified({**SMALL, "membership_functions": 1}).scores["training"]
 
 
-@pytest.mark.parametrize(("samples", "message"), [(9, "too few for 5 blocks"), (12, "embargo")])
+@pytest.mark.parametrize(("samples", "message"), [(9, "too few for that many blocks"), (12, "cover all samples")])
 def test_too_few_samples(samples, message):
     """12 samples of 0.01 s lie wholly within 0.1 s of every block of theirs."""
-    with pytest.raises(ComputationError, match=message):
+    with pytest.raises(SettingError, match=message):
         identified(SMALL, flight(samples))
 
 

@@ -8,10 +8,9 @@ import pytest
 
 from cpfls_cli.identification import IdentificationSettings, TorqueData, local_search
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, uniform_chromosome
-from cpfls_cli.identification.evaluator import Evaluator, Judge
-from cpfls_cli.identification.identify import coefficient_solver
+from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import LocalSearchSettings
-from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure
+from cpfls_cli.regressor import Motion
 from cpfls_cli.vehicle import newton_euler_torque
 
 STRUCTURES = {
@@ -29,20 +28,12 @@ def problem(structure, base, samples=120):
     torque[:, 1] += np.exp(np.cos(motion.attitude[:, 0])) * motion.acceleration[:, 1]
     torque += 0.05 * rng.standard_normal(torque.shape)
     data = TorqueData(0.01 * np.arange(samples), motion, torque)
-    settings = IdentificationSettings(**STRUCTURES[structure], base=base)
-    counted = model_structure(settings)
-    regressor = Regressor(counted, motion, data_ranges(counted, motion.attitude))
-    evaluator = Evaluator(
-        regressor,
-        coefficient_solver(data, settings),
-        Judge.of(data, regressor),
-        LocalSearchSettings(enabled=False),
-        base == "rigid-body",
-    )
-    return evaluator, rng
+    off = LocalSearchSettings(enabled=False)
+    settings = IdentificationSettings(**STRUCTURES[structure], base=base, local_search=off)
+    return model_evaluator(data, data, settings), rng
 
 
-def captured(monkeypatch, regressor, solver, weights):
+def captured(monkeypatch, solver, weights):
     """The residual and the Jacobian that the refinement hands to the optimiser."""
     handed = {}
 
@@ -51,8 +42,8 @@ def captured(monkeypatch, regressor, solver, weights):
         return SimpleNamespace(x=start)
 
     monkeypatch.setattr(local_search, "least_squares", optimiser)
-    start = solver.fit(regressor.matrix(decode(regressor.structure, weights)))
-    local_search.refine(regressor, solver, weights, start, 1)
+    start = solver.fit(decode(solver.regressor.structure, weights))
+    local_search.refine(solver, weights, start, 1)
     return handed["residual"], handed["jacobian"], start
 
 
@@ -60,9 +51,8 @@ def captured(monkeypatch, regressor, solver, weights):
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 def test_gradient_of_the_reduced_cost(monkeypatch, structure, base):
     evaluator, rng = problem(structure, base)
-    regressor, solver = evaluator.regressor, evaluator.solver
-    weights = rng.uniform(0.3, 0.9, regressor.structure.genes)
-    residual, jacobian, start = captured(monkeypatch, regressor, solver, weights)
+    weights = rng.uniform(0.3, 0.9, evaluator.structure.genes)
+    residual, jacobian, start = captured(monkeypatch, evaluator.solver, weights)
     assert np.isfinite(start.ridge_weight)
     gradient = jacobian(weights).T @ residual(weights)
     cost = [[0.5 * np.sum(residual(weights + s * STEP * unit) ** 2) for s in (1, -1)] for unit in np.eye(len(weights))]
@@ -73,9 +63,9 @@ def test_gradient_of_the_reduced_cost(monkeypatch, structure, base):
 def test_jacobian_is_that_of_the_residual_beside_what_the_regressor_spans(monkeypatch):
     """Kaufman's approximation leaves out only the part inside the span, which the coefficients follow."""
     evaluator, rng = problem("seesaw", "none")
-    regressor = evaluator.regressor
+    regressor = evaluator.solver.regressor
     weights = rng.uniform(0.3, 0.9, regressor.structure.genes)
-    residual, jacobian, _ = captured(monkeypatch, regressor, evaluator.solver, weights)
+    residual, jacobian, _ = captured(monkeypatch, evaluator.solver, weights)
     by_weight = [
         (residual(weights + STEP * unit) - residual(weights - STEP * unit)) / (2 * STEP) for unit in np.eye(13)
     ]
@@ -88,7 +78,7 @@ def test_jacobian_is_that_of_the_residual_beside_what_the_regressor_spans(monkey
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 def test_never_a_worse_chromosome(base):
     evaluator, rng = problem("seesaw", base)
-    chromosomes = rng.integers(0, LARGEST_GENE + 1, (12, evaluator.regressor.structure.genes))
+    chromosomes = rng.integers(0, LARGEST_GENE + 1, (12, evaluator.structure.genes))
     chromosomes[0] = 0
     chromosomes[1, 2:5] = 0
     chromosomes[2, ::2] = 0
@@ -105,7 +95,7 @@ def test_never_a_worse_chromosome(base):
 
 def test_undefined_chromosomes_get_the_worst_objectives():
     evaluator, _ = problem("seesaw", "none")
-    structure = evaluator.regressor.structure
+    structure = evaluator.structure
     chromosomes = np.array([np.zeros(structure.genes, dtype=np.int64), uniform_chromosome(structure)])
     evaluated = replace(evaluator, local_search=LocalSearchSettings())(chromosomes)
     np.testing.assert_array_equal(evaluated.objectives[0], [np.inf] * 3)
@@ -115,7 +105,8 @@ def test_undefined_chromosomes_get_the_worst_objectives():
 
 def test_objectives_are_those_of_a_plain_least_squares_fit():
     evaluator, rng = problem("seesaw", "none")
-    regressor, solver = evaluator.regressor, evaluator.solver
+    solver = evaluator.solver
+    regressor = solver.regressor
     chromosome = rng.integers(20000, LARGEST_GENE, regressor.structure.genes)
     evaluated = evaluator(chromosome[None])
     Q = regressor.matrix(decode(regressor.structure, chromosome.astype(float))).reshape(360, -1)

@@ -48,8 +48,10 @@ def zadeh(x, b):
 def scaled(angle, training, settings):
     """Antecedent and consequent input."""
     if settings.input_map == "full-circle":
-        turn = (angle % (2 * np.pi)) / (2 * np.pi)
-        return turn, triangle(angle) if settings.structure == "cpfls" else turn
+        if settings.structure == "cpfls":
+            return (angle % (2 * np.pi)) / (2 * np.pi), triangle(angle)
+        # The classic system's seam lies opposite to hover.
+        return (((angle + np.pi) % (2 * np.pi)) / (2 * np.pi),) * 2
     low, high = triangle(training).min(), triangle(training).max()
     return ((triangle(angle) - low) / (high - low),) * 2
 
