@@ -11,12 +11,13 @@ export OPENBLAS_NUM_THREADS := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce quick hexarotor test lint bench clean FORCE
+.PHONY: help reproduce quick hexarotor crazyflie test lint bench clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -4
 	@echo "  make quick       the same study with a small search, in a minute"
 	@echo "  make hexarotor   a six-rotor study with a rigid body under the fuzzy part"
+	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
 	@echo "  make lint        formatting, lint, types, import contracts"
 	@echo "  make bench       benchmarks, as Markdown tables"
 	@echo "  make clean       remove what studies produced"
@@ -29,6 +30,9 @@ quick: data/quick/report.html
 
 hexarotor: data/hexarotor/report.html
 	@echo "open data/hexarotor/report.html"
+
+crazyflie: data/crazyflie/report.html
+	@echo "open data/crazyflie/report.html"
 
 $(INSTALLED): pyproject.toml
 	$(PYTHON) -m venv .venv
@@ -44,6 +48,7 @@ $(INSTALLED_DEV): pyproject.toml | $(INSTALLED)
 STRUCTURE := structure input_map consequents harmonic_order products membership_functions training_share
 PART_trajectory := trajectory vehicle.gravity_m_s2
 PART_simulate := vehicle simulation
+PART_import := import vehicle identification.training_share
 PART_reduce := reduction $(addprefix identification.,$(STRUCTURE))
 PART_identify := identification
 PART_report := vehicle report
@@ -54,7 +59,7 @@ data/%/.part/$(1).yaml: configs/%.yaml FORCE | $(INSTALLED)
 	@$(CPFLS) config $$< $(foreach key,$(PART_$(1)),--section $(key)) > $$@.new
 	@if cmp --silent $$@.new $$@; then rm $$@.new; else mv $$@.new $$@; fi
 endef
-$(foreach stage,trajectory simulate reduce identify report,$(eval $(call part,$(stage))))
+$(foreach stage,trajectory simulate import reduce identify report,$(eval $(call part,$(stage))))
 
 data/%/trajectory.h5: data/%/.part/trajectory.yaml
 	$(CPFLS) trajectory configs/$*.yaml -o $@ --force
@@ -70,8 +75,17 @@ TABLE_4_SIZES := 1170 2743
 data/paper/selection-%.h5: data/paper/flight.h5 data/paper/.part/reduce.yaml
 	$(CPFLS) reduce configs/paper.yaml $< -o $@ --force --set reduction.size=$*
 
-data/%/model.h5: data/%/flight.h5 data/%/selection.h5 data/%/.part/identify.yaml
-	$(CPFLS) identify configs/$*.yaml $< --selection data/$*/selection.h5 -o $@ --force
+# A flight that the model never learns from: another direction, the other way round.
+UNSEEN := --set trajectory.path=straight --set "trajectory.direction=[1.0, -0.6, 0.2]" \
+	--set trajectory.displacement_m=50.0 --set trajectory.yaw_turn_rad=-6.283185307179586
+data/%/unseen-trajectory.h5: data/%/.part/trajectory.yaml
+	$(CPFLS) trajectory configs/$*.yaml -o $@ --force $(UNSEEN)
+
+data/%/unseen.h5: data/%/unseen-trajectory.h5 data/%/.part/simulate.yaml
+	$(CPFLS) simulate configs/$*.yaml $< -o $@ --force
+
+data/%/model.h5: data/%/flight.h5 data/%/selection.h5 data/%/unseen.h5 data/%/.part/identify.yaml
+	$(CPFLS) identify configs/$*.yaml $< --selection data/$*/selection.h5 --validate data/$*/unseen.h5 -o $@ --force
 
 data/%/prediction.h5: data/%/model.h5 data/%/flight.h5
 	$(CPFLS) predict configs/$*.yaml $^ -o $@ --force
@@ -80,6 +94,25 @@ ARTIFACTS := trajectory flight selection model prediction
 
 data/%/report.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
 	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) -o $@ --force
+
+# The real flight: its logs are in the folder LOGS.
+LOGS ?= ../shared/data/real/crazyswarm2_lee
+REAL := data/crazyflie
+$(REAL)/log%.h5: $(LOGS)/log%.csv $(REAL)/.part/import.yaml
+	$(CPFLS) import configs/crazyflie.yaml $< -o $@ --force
+
+$(REAL)/selection.h5: $(REAL)/log119.h5 $(REAL)/.part/reduce.yaml
+	$(CPFLS) reduce configs/crazyflie.yaml $< -o $@ --force
+
+$(REAL)/model.h5: $(REAL)/log119.h5 $(REAL)/selection.h5 $(REAL)/log149.h5 $(REAL)/.part/identify.yaml
+	$(CPFLS) identify configs/crazyflie.yaml $< --selection $(REAL)/selection.h5 --validate $(REAL)/log149.h5 -o $@ --force
+
+$(REAL)/prediction%.h5: $(REAL)/model.h5 $(REAL)/log%.h5
+	$(CPFLS) predict configs/crazyflie.yaml $^ -o $@ --force
+
+REAL_ARTIFACTS := log119 log149 selection model prediction119 prediction149
+$(REAL)/report.html: $(REAL_ARTIFACTS:%=$(REAL)/%.h5) $(REAL)/.part/report.yaml
+	$(CPFLS) report configs/crazyflie.yaml $(filter %.h5,$^) -o $@ --force
 
 data/paper/report.html: $(TABLE_4_SIZES:%=data/paper/selection-%.h5)
 
@@ -96,8 +129,10 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[bench]"
 	$(BIN)/python benchmarks/evolution_hypervolume.py
 	$(BIN)/python benchmarks/reduction.py
+	$(MAKE) data/paper/selection.h5
+	$(BIN)/python benchmarks/judging.py configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
 
 clean:
-	rm -rf data/paper data/quick data/hexarotor
+	rm -rf data/paper data/quick data/hexarotor data/crazyflie
 
 FORCE:

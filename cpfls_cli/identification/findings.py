@@ -89,12 +89,14 @@ def _beaten(scores: Mapping[str, Mapping[str, Score]]) -> Iterator[str]:
         ours = by_model["model"]
         for rival, words in RIVALS.items():
             if rival in by_model and _unexplained(by_model[rival]) < _unexplained(ours) * (1 - 1e-9):
-                r2 = " ".join(f"{theirs:.4g} against {own:.4g}," for theirs, own in _pairs(by_model[rival], ours))
-                yield f"{part}: {words} explains more (R2 of roll, pitch, yaw {r2.rstrip(',')})"
+                yield (
+                    f"{part}: {words} leaves less unexplained of the torque ({_by_axis(by_model[rival])} of roll, pitch, "
+                    f"yaw; the model {_by_axis(ours)})"
+                )
 
 
-def _pairs(theirs: Score, ours: Score) -> Iterator[tuple[float, float]]:
-    return zip(theirs.r2, ours.r2, strict=True)
+def _by_axis(score: Score) -> str:
+    return " ".join(f"{share:.2g}" for share in 1.0 - score.r2)
 
 
 def _unexplained(score: Score) -> float:

@@ -15,4 +15,5 @@ class ReportSettings(Settings):
     """What the report shows."""
 
     title: Annotated[str, Doc("heading of the page")] = "Identification of rotational dynamics"
+    notes: Annotated[tuple[str, ...], Doc("what a reader should know about this study, one sentence each")] = ()
     paper: Annotated[bool, Doc("show the figures that the paper prints beside ours")] = True

@@ -37,7 +37,7 @@ def _flight(flight: Source, index: int, sources: Sources) -> Iterator[Block]:
     artifact = flight.artifact
     yield Heading(flight.label)
     yield Facts(_facts(flight))
-    if "quality/reason" in artifact.data:
+    if "quality/count" in artifact.data:
         yield _quality(flight, index)
     if "quality/warning" in artifact.data:
         yield from [Text(f"{warning}.", "warning") for warning in artifact.texts("quality/warning")]
@@ -94,7 +94,9 @@ def _noise(flight: Source) -> str:
 def _quality(flight: Source, index: int) -> Table:
     artifact = flight.artifact
     rows = [
-        [reason.replace("_", " "), count(number_of)]
-        for reason, number_of in zip(artifact.texts("quality/reason"), artifact.array("quality/dropped"), strict=True)
+        [reason, count(number_of)]
+        for reason, number_of in zip(artifact.texts("quality/reason"), artifact.array("quality/count"), strict=True)
     ]
-    return Table(f"quality-{index}", f"Rows and values dropped or repaired in {flight.label}.", ("Why", "Count"), rows)
+    return Table(
+        f"quality-{index}", f"What was found in the log of {flight.label}.", ("What: what was done", "Count"), rows
+    )

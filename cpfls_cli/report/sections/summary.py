@@ -25,7 +25,7 @@ def summary_section(sources: Sources) -> Section:
     -------
     Section
     """
-    blocks: list[Block] = []
+    blocks: list[Block] = [Text(note, "note") for note in sources.settings.notes]
     for number, model in enumerate(sources.models, start=1):
         blocks += _model(model, sources, number)
     if not sources.models:
@@ -109,7 +109,7 @@ def parameters(model: Source) -> str:
     str
     """
     artifact = model.artifact
-    fuzzy = count(artifact.number("solve/parameters"))
+    fuzzy = count(len(artifact.array("model/coefficients")))
     if artifact.text("model/base") != "rigid-body":
         return f"{fuzzy} linear parameters, rank {count(artifact.number('solve/rank'))}"
     off = ", all zero because the fuzzy part is off" if fuzzy_part_off(model) else ""
