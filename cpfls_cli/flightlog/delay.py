@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.results import DelayEstimate
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 from cpfls_cli.inertia import body_torque_columns
@@ -88,8 +88,10 @@ def estimate_delay(
 
     Raises
     ------
+    SettingError
+        If the longest delay leaves too few samples.
     ComputationError
-        If too few samples are left, or the torque is constant.
+        If the torque is constant, or the share holds no samples.
 
     References
     ----------
@@ -129,9 +131,10 @@ def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
     edge = 0.0 if lowpass_hz is None else 0.5 / lowpass_hz
     first, last = np.searchsorted(time, [time[0] + delay_max_s + edge, time[-1] - edge])
     if last - first < _SMALLEST_WINDOW:
-        raise ComputationError(
-            f"the delay cannot be estimated on {time[-1] - time[0]:.3g} s of flight with import.delay_max_s ="
-            f" {delay_max_s:g}: at least {_SMALLEST_WINDOW} samples must remain"
+        raise SettingError(
+            "delay_max_s",
+            f"{delay_max_s:g} s is too long to estimate a delay on {time[-1] - time[0]:.3g} s of flight:"
+            f" {max(last - first, 0)} samples remain, and at least {_SMALLEST_WINDOW} must",
         )
     return slice(int(first), int(last))
 

@@ -11,13 +11,16 @@ from scipy.interpolate import CubicSpline
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.flightlog.agreement import warn_of_disagreement
 from cpfls_cli.flightlog.motion import body_rate_of
-from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
+from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
+_LARGEST_REFINEMENT = 10
+_FEWEST_SAMPLES = 10
 
 
 def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:
@@ -39,6 +42,9 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
 
     Raises
     ------
+    SettingError
+        If the cut-off is not below half of the log's rate, or `rate_hz` leaves next to no samples or is more than ten
+        times the log's.
     ComputationError
         If the pitch comes within a degree of +-90 degrees, where Euler rates are not defined.
 
@@ -48,10 +54,9 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     """
     smooth = _filtered(signals, settings)
     arrays = _arrays(smooth) | _derived(smooth)
-    time = smooth.time
-    report = replace(signals.report, lowpass_hz=settings.lowpass_hz)
+    time, report = smooth.time, _filter_report(smooth, settings)
     if settings.rate_hz is not None:
-        time = np.arange(int(time[-1] * settings.rate_hz + 1e-6) + 1) / settings.rate_hz
+        time = _clock(time, settings.rate_hz, report.log_rate_hz)
         arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
         report = replace(
             report,
@@ -60,6 +65,24 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
             warnings=report.warnings + _warn_of_aliasing(settings, report.log_rate_hz),
         )
     return ImportedFlight(time=time, report=report, **arrays)
+
+
+def _filter_report(smooth: LogSignals, settings: ImportSettings) -> ImportReport:
+    warnings = smooth.report.warnings
+    if smooth.attitude is not None and smooth.body_rate is not None:
+        warnings += warn_of_disagreement(smooth.time, smooth.attitude, smooth.body_rate)
+    return replace(smooth.report, lowpass_hz=settings.lowpass_hz, warnings=warnings)
+
+
+def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
+    samples = int(time[-1] * rate_hz + 1e-6) + 1
+    if rate_hz > _LARGEST_REFINEMENT * log_rate_hz or samples < _FEWEST_SAMPLES:
+        raise SettingError(
+            "rate_hz",
+            f"{rate_hz:g} Hz does not suit {time[-1]:.4g} s of flight at {log_rate_hz:.4g} Hz: at most"
+            f" {_LARGEST_REFINEMENT} times the log's rate, and {_FEWEST_SAMPLES} samples at least",
+        )
+    return np.arange(samples) / rate_hz
 
 
 def _arrays(signals: LogSignals) -> dict[str, Array]:
@@ -80,7 +103,7 @@ def _derived(signals: LogSignals) -> dict[str, Array]:
     derived: dict[str, Array] = {}
     body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
     if body_rate is not None:
-        derived |= {"body_rate": body_rate, "body_acceleration": derivative(signals.time, body_rate)}
+        derived["body_rate"] = body_rate
     if signals.attitude is None or body_rate is None:
         return derived
     _require_regular(signals.time, signals.attitude)

@@ -43,8 +43,10 @@ def import_log(
     ------
     InputError
         If columns are missing, a gap is too long, or the rotors are to give the torque and no way is given.
+    SettingError
+        If a key of the section does not suit the log: crop, rate, cut-off or delay.
     ComputationError
-        If the pitch comes within a degree of +-90 degrees, or the flight is too short.
+        If the pitch comes within a degree of +-90 degrees, or the delay cannot be estimated.
     """
     signals = read_signals(columns, settings)
     if settings.torque_source in ("rotor-speed", "rotor-command"):

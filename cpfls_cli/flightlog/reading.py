@@ -11,16 +11,16 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.clock import longest_stretch
 from cpfls_cli.flightlog.columns import select_columns
 from cpfls_cli.flightlog.conversion import to_program_frames
+from cpfls_cli.flightlog.quality import count_values, warn_of_values
 from cpfls_cli.flightlog.repair import fill
 from cpfls_cli.flightlog.results import ImportReport, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.table import (
     Table,
-    count_missing,
-    count_stuck,
+    find_table_spikes,
     in_order_and_cropped,
     made_continuous,
-    without_spikes,
+    without,
 )
 
 
@@ -42,32 +42,37 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
 
     Raises
     ------
+    SettingError
+        If the crop leaves fewer than two rows.
     InputError
         If columns are missing, or a gap is too long.
     """
     read = Table(*select_columns(columns, settings))
     table, dropped = in_order_and_cropped(read, settings)
     table = made_continuous(table)
-    missing, saturated = count_missing(table, settings), count_stuck(table, settings)
-    table, spikes = without_spikes(table, settings)
-    stretch = longest_stretch(table.time, np.isfinite(table.columns()), settings)
-    table = table.rows(stretch.rows)
+    spikes = find_table_spikes(table, settings)
+    repaired = table if settings.spike_deviations is None else without(table, spikes)
+    stretch = longest_stretch(table.time, np.isfinite(repaired.columns()), settings)
+    dropped |= {"incomplete_ends": stretch.incomplete_ends, "gap": stretch.beyond_gap}
+    table, repaired = table.rows(stretch.rows), repaired.rows(stretch.rows)
+    counts = count_values(table, {name: marked[stretch.rows] for name, marked in spikes.items()}, settings)
     clock, rate_hz = _uniform_clock(table.time)
-    on_clock = {name: fill(table.time, values, clock) for name, values in table.signals.items()}
-    steps = np.diff(table.time)
+    on_clock = {name: fill(table.time, values, clock) for name, values in repaired.signals.items()}
+    gaps, longest_gap_s = _gaps(table.time)
     report = ImportReport(
         samples_read=len(read.time),
         samples=len(clock),
-        dropped=dropped | {"incomplete_ends": stretch.incomplete_ends, "gap": stretch.beyond_gap},
-        missing=missing,
-        spikes=spikes,
-        saturated=saturated,
-        gaps=int((steps > 1.5 * np.median(steps)).sum()),
-        longest_gap_s=float(steps.max()),
+        dropped=dropped,
+        missing=counts.missing,
+        spikes=counts.spikes,
+        suspected_spikes=counts.suspected_spikes,
+        saturated=counts.saturated,
+        gaps=gaps,
+        longest_gap_s=longest_gap_s,
         span_s=(float(clock[0]), float(clock[-1])),
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,
-        warnings=(*_warn_of_saturation(saturated), *_warn_of_gap(stretch.beyond_gap), *_warn_of_pitch(on_clock)),
+        warnings=(*warn_of_values(counts), *_warn_of_gap(stretch.beyond_gap), *_warn_of_pitch(on_clock)),
     )
     return LogSignals(time=clock - clock[0], report=report, **to_program_frames(on_clock, settings))
 
@@ -79,10 +84,9 @@ def _uniform_clock(time: Array) -> tuple[Array, float]:
     return time[0] + period * np.arange(samples), 1 / period
 
 
-def _warn_of_saturation(saturated: Mapping[str, int]) -> list[str]:
-    return [
-        f"{column} stands at its extreme for {count} samples in all: saturated?" for column, count in saturated.items()
-    ]
+def _gaps(time: Array) -> tuple[int, float]:
+    steps = np.diff(time)
+    return int((steps > 1.5 * np.median(steps)).sum()), float(steps.max())
 
 
 def _warn_of_gap(rows: int) -> list[str]:

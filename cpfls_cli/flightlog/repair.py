@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter
+from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray
 
@@ -13,9 +13,10 @@ _DEVIATION_OF_MEDIAN = 1.4826
 def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
     """Find spikes by Hampel's identifier, ``|x - median| > deviations * scale``.
 
-    The scale is the largest of 1.4826 times the median departure in the running window, the same over the whole
-    channel, and the channel's mean step. The last two keep a quiet stretch, and the crest of a signal without noise,
-    from being taken for spikes.
+    The scale is the largest of 1.4826 times the median departure from the median within the running window, 1.4826
+    times the median departure of the whole channel from its running median, and the channel's mean step. The first is
+    large where the signal turns fast, so that a resolved crest is none; the last two keep a quiet stretch, and a
+    signal of few distinct values, from being taken for spikes.
 
     Parameters
     ----------
@@ -39,8 +40,10 @@ def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
     known = np.flatnonzero(np.isfinite(values))
     if len(known) < 2:
         return spikes
-    departure = np.abs(values[known] - median_filter(values[known], size=window, mode="nearest"))
-    local = median_filter(departure, size=window, mode="nearest")
+    around = _windows(values[known], window)
+    median = np.median(around, axis=1)
+    departure = np.abs(values[known] - median)
+    local = np.median(np.abs(around - median[:, None]), axis=1)
     scale = _DEVIATION_OF_MEDIAN * np.maximum(local, np.median(departure))
     spikes[known] = departure > deviations * np.maximum(scale, np.abs(np.diff(values[known])).mean())
     return spikes
@@ -100,6 +103,13 @@ def without_jumps(angles: Array) -> Array:
     continuous = angles.copy()
     continuous[known] = np.unwrap(angles[known])
     return continuous
+
+
+def _windows(values: Array, window: int) -> Array:
+    """Surround each value by its neighbours; mirrored at the ends, where repeating would hide a spike."""
+    before = window // 2
+    padded = np.pad(values, (before, window - 1 - before), mode="reflect")
+    return np.asarray(sliding_window_view(padded, window), dtype=float)
 
 
 def _values_in_runs(marked: BoolArray, samples: int) -> int:

@@ -53,9 +53,11 @@ class ImportReport:
         Rows dropped, by reason: `time_not_finite`, `repeated_time`, `backward_time`, `crop`, `incomplete_ends`
         (before the first or after the last value of some column), `gap` (outside the part that is kept).
     missing, spikes : mapping from str to int
-        Values of each column that were absent or found to be spikes, and interpolated; columns without are left out.
-    saturated : mapping from str to int
-        Values of each column in long runs at its extremes; reported only, not changed.
+        Values of each column, in the part that is kept, that were absent or found to be spikes, and interpolated;
+        columns without are left out.
+    suspected_spikes, saturated : mapping from str to int
+        Values of each column that look like spikes, where none are to be interpolated, and values in long runs at the
+        column's extremes; reported only, not changed.
     gaps : int
         Gaps in the time stamps (more than 1.5 times the median step) that were interpolated.
     longest_gap_s : float
@@ -79,6 +81,7 @@ class ImportReport:
     dropped: Mapping[str, int]
     missing: Mapping[str, int]
     spikes: Mapping[str, int]
+    suspected_spikes: Mapping[str, int]
     saturated: Mapping[str, int]
     gaps: int
     longest_gap_s: float
@@ -105,7 +108,7 @@ class LogSignals:
     body_torque : array, shape (time, 3), N m, body frame, or None
     position, velocity, acceleration : array, shape (time, 3), m, m/s, m/s^2, world frame, or None
     rotor_speed : array, shape (time, rotor), rad/s, or None
-    rotor_command : array, shape (time, rotor), or None
+    rotor_command : array, shape (time, rotor), SI unit of the signal's `unit`, or None
     report : ImportReport
     """
 
@@ -131,13 +134,10 @@ class ImportedFlight(LogSignals):
         Euler rates, ``W^-1 omega``; None without attitude.
     attitude_acceleration : array, shape (time, 3), rad/s^2, or None
         Derivative of the Euler rates.
-    body_acceleration : array, shape (time, 3), rad/s^2, body frame, or None
-        Derivative of the body rates.
     torque : array, shape (time, 3), N m, or None
         Generalised torque on the Euler coordinates, ``W^T tau_body``; None without attitude.
     """
 
     attitude_rate: Array | None = None
     attitude_acceleration: Array | None = None
-    body_acceleration: Array | None = None
     torque: Array | None = None

@@ -99,9 +99,12 @@ class ImportSettings(Settings):
     ] = "stop"
     spike_deviations: Annotated[
         Annotated[float, Gt(0)] | None,
-        Doc("departure from the running median that is a spike, in robust standard deviations; null: no test"),
+        Doc(
+            "departure from the running median, in robust standard deviations, from which a value is a spike and is"
+            " interpolated; null: spikes beyond 10 are counted and warned of, and nothing is changed"
+        ),
     ] = None
-    spike_window_samples: Annotated[int, Ge(3), Doc("window of the running median of the spike test")] = 7
+    spike_window_samples: Annotated[int, Ge(3), Le(101), Doc("window of the running median of the spike test")] = 7
     saturation_samples: Annotated[int, Ge(2), Doc("equal extreme values in a row that count as saturated")] = 20
     delay_s: Annotated[
         Annotated[float, Ge(0)] | Literal["estimate"], Doc("time from command to motion, s, or estimate")

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import SettingError
 
 _PADDED_PERIODS = 3
 
@@ -33,14 +33,14 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int)
 
     Raises
     ------
-    ComputationError
+    SettingError
         If the cut-off is not below half of the sampling rate.
     """
     if cutoff_hz is None:
         return values
     if cutoff_hz >= rate_hz / 2:
-        raise ComputationError(
-            f"import.lowpass_hz = {cutoff_hz:g} must lie below half of the log's rate, {rate_hz / 2:.4g} Hz"
+        raise SettingError(
+            "lowpass_hz", f"{cutoff_hz:g} Hz does not lie below half of the log's rate, {rate_hz / 2:.4g} Hz"
         )
     sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
     # scipy pads by the filter's length, which is too short for its slow transient when the cut-off is low.

@@ -14,10 +14,10 @@ from cpfls_cli.artifacts.formats import FLIGHT
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.importing import import_log
-from cpfls_cli.flightlog.reading import read_signals
 from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
-from cpfls_cli.stages.job import Job, Outcome, begin, finish
+from cpfls_cli.stages.job import Job, Outcome, begin, finish, settings_of
+from cpfls_cli.stages.log_quality import found_and_done
 from cpfls_cli.stages.table import read_csv
 from cpfls_cli.vehicle.rotors import body_wrench
 
@@ -39,15 +39,16 @@ def run(job: Job, log: Path) -> Outcome:
     ------
     InputError
         If the log cannot be read or lacks columns that the config names.
+    ConfigError
+        If a key of the section `import` does not suit the log; the message names both.
     """
     started = begin(job, {"log": log})
-    settings = job.study.import_
-    columns = read_csv(log, _wanted(settings))
-    with _naming(log):
-        if started.dry_run is not None:
-            read_signals(columns, settings)
-            return started.dry_run
+    columns = read_csv(log, _wanted(job.study.import_))
+    with _naming(log), settings_of("import"):
         flight = _import(columns, job.study)
+    # An import is quick, and only the whole of it shows that every key suits the log.
+    if started.dry_run is not None:
+        return started.dry_run
     finish(job, FLIGHT, {**_signals(flight), **_quality(flight), **_delay(flight)}, started.inputs)
     return _outcome(flight)
 
@@ -111,26 +112,14 @@ def _signals(flight: ImportedFlight) -> dict[str, Array]:
 
 
 def _quality(flight: ImportedFlight) -> dict[str, Any]:
-    counts = _counts(flight)
+    counts = found_and_done(flight.report)
     quality: dict[str, Any] = {}
     if counts:
         quality["quality/reason"] = np.array(list(counts))
-        quality["quality/dropped"] = np.array(list(counts.values()), dtype=np.int64)
+        quality["quality/count"] = np.array(list(counts.values()), dtype=np.int64)
     if flight.report.warnings:
         quality["quality/warning"] = np.array(flight.report.warnings)
     return quality
-
-
-def _counts(flight: ImportedFlight) -> dict[str, int]:
-    """Rows dropped by reason, then values repaired or found saturated."""
-    report = flight.report
-    repaired = {
-        "missing": report.missing,
-        "spikes": report.spikes,
-        "saturated": report.saturated,
-    }
-    counts = {reason: count for reason, count in report.dropped.items() if count}
-    return counts | {kind: sum(by_column.values()) for kind, by_column in repaired.items() if by_column}
 
 
 def _delay(flight: ImportedFlight) -> dict[str, Any]:
@@ -147,16 +136,22 @@ def _outcome(flight: ImportedFlight) -> Outcome:
         "samples": report.samples,
         "samples_read": report.samples_read,
         "rate_hz": report.rate_hz,
+        "log_rate_hz": report.log_rate_hz,
+        "lowpass_hz": report.lowpass_hz,
+        "span_s": list(report.span_s),
+        "gaps": report.gaps,
+        "longest_gap_s": report.longest_gap_s,
         "dropped": {reason: count for reason, count in report.dropped.items() if count},
         "missing": dict(report.missing),
         "spikes": dict(report.spikes),
+        "suspected_spikes": dict(report.suspected_spikes),
         "saturated": dict(report.saturated),
         "delay_s": report.delay_s,
         "delay_r2": None if estimate is None else [float(value) for value in estimate.r2],
         "signals": [name for name in _signals(flight) if name != "time"],
     }
     lines = [f"{report.samples} samples at {report.rate_hz:.4g} Hz from {report.samples_read} rows"]
-    lines += [f"{reason.replace('_', ' ')}: {count}" for reason, count in _counts(flight).items()]
+    lines += [f"{count} x {what}" for what, count in found_and_done(report).items()]
     if estimate is not None:
         r2 = " ".join(f"{value:.3f}" for value in estimate.r2)
         lines.append(f"delay of motion behind command: {1e3 * report.delay_s:.1f} ms (R2 about body axes {r2})")

@@ -1,0 +1,65 @@
+"""Do attitude and gyroscope tell of one motion? Swapped columns and wrong signs show where they do not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.flightlog.smoothing import derivative, low_pass
+
+_AXES = ("x (roll)", "y (pitch)", "z (yaw)")
+_COMPARED_BELOW_HZ = 5.0
+_FILTER_ORDER = 4
+_MOVING_RAD_S = 0.1
+_MOVING_SHARE = 0.1
+_POOR_CORRELATION = 0.6
+
+
+def warn_of_disagreement(time: Array, attitude: Array, body_rate: Array) -> tuple[str, ...]:
+    """Compare measured body rates with the derivative of the attitude, ``W(q) dq/dt``, about each body axis.
+
+    Both go through one low-pass filter, for the derivative of an attitude that is logged in steps is mostly noise. An
+    axis is judged where either moves by more than 0.1 rad/s and a tenth of the most moving axis (standard deviations):
+    about an axis that hardly turns, errors of the others decide.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+        Uniform.
+    attitude : array, shape (time, 3), rad
+    body_rate : array, shape (time, 3), rad/s, body frame
+        As measured.
+
+    Returns
+    -------
+    tuple of str
+        A sentence for each axis whose correlation is below 0.6.
+    """
+    derived = _slow_part(time, rotations.body_rate(attitude, derivative(time, attitude)))
+    measured = _slow_part(time, body_rate)
+    correlation = _correlation(derived, measured)
+    return tuple(
+        f"about body {axis} the attitude's derivative and the body rate hardly agree (correlation {value:.2f}):"
+        " check columns, signs and frames of import.signals.attitude (or quaternion) and import.signals.body_rate"
+        for axis, value, moves in zip(_AXES, correlation, _moving(derived, measured), strict=True)
+        if moves and value < _POOR_CORRELATION
+    )
+
+
+def _slow_part(time: Array, values: Array) -> Array:
+    rate_hz = 1 / float(time[1] - time[0])
+    return low_pass(values, rate_hz, min(_COMPARED_BELOW_HZ, rate_hz / 5), _FILTER_ORDER)
+
+
+def _moving(derived: Array, measured: Array) -> BoolArray:
+    motion = np.maximum(derived.std(axis=0), measured.std(axis=0))
+    moving: BoolArray = motion > max(_MOVING_RAD_S, _MOVING_SHARE * motion.max())
+    return moving
+
+
+def _correlation(derived: Array, measured: Array) -> Array:
+    """Correlate column by column; 0 where one stands still."""
+    spread = derived.std(axis=0) * measured.std(axis=0)
+    together = ((derived - derived.mean(axis=0)) * (measured - measured.mean(axis=0))).mean(axis=0)
+    return np.asarray(np.divide(together, spread, out=np.zeros(3), where=spread > 0), dtype=float)

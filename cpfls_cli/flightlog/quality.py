@@ -1,0 +1,96 @@
+"""How good the columns of a log are: values that are absent, look like spikes, or stand at an extreme."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.flightlog.repair import count_saturated
+from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.flightlog.table import Table
+
+
+@dataclass(frozen=True)
+class ValueCounts:
+    """Bad values by column of the log; columns without are left out.
+
+    Attributes
+    ----------
+    missing : dict from str to int
+        Absent.
+    spikes, suspected_spikes : dict from str to int
+        Spikes that are interpolated, and spikes that are left alone; one of the two is empty.
+    saturated : dict from str to int
+        In long runs at an extreme.
+    """
+
+    missing: dict[str, int]
+    spikes: dict[str, int]
+    suspected_spikes: dict[str, int]
+    saturated: dict[str, int]
+
+
+def count_values(table: Table, spikes: Mapping[str, BoolArray], settings: ImportSettings) -> ValueCounts:
+    """Count the bad values of each column of the log.
+
+    Parameters
+    ----------
+    table : Table
+        The part that is kept, as logged.
+    spikes : mapping from signal name to array of bool, shape (sample, column)
+        Where its spikes are.
+    settings : ImportSettings
+        The names of the columns, `spike_deviations` and `saturation_samples`.
+
+    Returns
+    -------
+    ValueCounts
+    """
+    found = _by_column(spikes, settings, lambda column: int(column.sum()))
+    repaired = settings.spike_deviations is not None
+    return ValueCounts(
+        missing=_by_column(table.signals, settings, lambda column: int(np.isnan(column).sum())),
+        spikes=found if repaired else {},
+        suspected_spikes={} if repaired else found,
+        saturated=_by_column(
+            table.signals, settings, lambda column: count_saturated(column, settings.saturation_samples)
+        ),
+    )
+
+
+def warn_of_values(counts: ValueCounts) -> tuple[str, ...]:
+    """Say which columns hold values that look wrong and are used as they are.
+
+    Parameters
+    ----------
+    counts : ValueCounts
+
+    Returns
+    -------
+    tuple of str
+    """
+    saturated = (
+        f"{column} stands at its extreme for {count} samples in all: saturated?"
+        for column, count in counts.saturated.items()
+    )
+    suspected = (
+        f"{count} suspected {'spike' if count == 1 else 'spikes'} in column {column}, used as logged: set"
+        " import.spike_deviations to interpolate"
+        for column, count in counts.suspected_spikes.items()
+    )
+    return (*saturated, *suspected)
+
+
+def _by_column(
+    signals: Mapping[str, Array | BoolArray], settings: ImportSettings, count: Callable[[Any], int]
+) -> dict[str, int]:
+    counts = {
+        column: count(values)
+        for name, signal in settings.signals.items()
+        for column, values in zip(signal.columns, signals[name].T, strict=True)
+    }
+    return {column: number for column, number in counts.items() if number}
