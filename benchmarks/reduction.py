@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.reduction import ReductionSettings, Selection, random_selection, reduce
+from cpfls_cli.reduction import ReductionSettings, Selection, random_selections, reduce
 from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.trajectory import TrajectorySettings, plan
 
@@ -48,7 +48,7 @@ def timed(Q: Array, criterion: str, size: int) -> tuple[Selection, float]:
 
 
 def random_range(Q: Array, size: int, rng: np.random.Generator) -> tuple[float, float]:
-    draws = [random_selection(Q, size, rng).condition_number for _ in range(RANDOM_DRAWS)]
+    draws = [draw.condition_number for draw in random_selections(Q, size, RANDOM_DRAWS, rng)]
     return min(draws), float(np.median(draws))
 
 

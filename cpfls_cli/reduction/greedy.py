@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import SettingError
 from cpfls_cli.reduction.criteria import make_criterion
 from cpfls_cli.reduction.rank_start import rank_growing_start
 from cpfls_cli.reduction.row_space import RowSpace, row_space
@@ -39,17 +39,15 @@ def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = No
     Raises
     ------
     ComputationError
-        If Q has the wrong shape or a value that is not finite, or if the size is larger than the number of
-        samples or too small for the rank.
+        If Q has the wrong shape or a value that is not finite, or is zero everywhere.
+    SettingError
+        If the size is larger than the number of samples or too small for the rank.
 
     References
     ----------
     Paper, section 8, eq. (19); method.md, section 6.
     """
-    space = row_space(Q, settings.rank_tolerance)
-    limit = _sample_limit(space, settings)
-    start = _start(space, settings.criterion, limit)
-    run = Run(space, make_criterion(space, settings.criterion), start)
+    run, limit = _prepare(Q, settings)
     while not (reason := _stop_reason(run, settings, limit)):
         run.step()
         if progress is not None:
@@ -57,17 +55,38 @@ def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = No
     return run.selection(settings.criterion, reason)
 
 
+def check_reducible(Q: Array, settings: ReductionSettings) -> None:
+    """Refuse what `reduce` would refuse, without the work of choosing.
+
+    Parameters
+    ----------
+    Q : array, shape (samples, 3, parameters)
+    settings : ReductionSettings
+
+    Raises
+    ------
+    ComputationError, SettingError
+        See `reduce`.
+    """
+    _prepare(Q, settings)
+
+
+def _prepare(Q: Array, settings: ReductionSettings) -> tuple[Run, int]:
+    """Set up a run and the most samples it may choose."""
+    space = row_space(Q, settings.rank_tolerance)
+    limit = _sample_limit(space, settings)
+    start = _start(space, settings.criterion, limit)
+    return Run(space, make_criterion(space, settings.criterion), start), limit
+
+
 def _sample_limit(space: RowSpace, settings: ReductionSettings) -> int:
     size = settings.size
     if size is None:
         return space.samples
     if size > space.samples:
-        raise ComputationError(f"size = {size}: larger than the training set, which has {space.samples} samples")
+        raise SettingError("size", f"the training set has only {space.samples} samples; keep fewer")
     if size < space.smallest_samples:
-        raise ComputationError(
-            f"size = {size}: too few samples; the training set has rank {space.rank}, "
-            f"which takes at least {space.smallest_samples} samples of three rows"
-        )
+        raise _too_few(space, space.smallest_samples)
     return size
 
 
@@ -76,11 +95,12 @@ def _start(space: RowSpace, criterion: CriterionName, limit: int) -> IntArray:
         return np.zeros(0, dtype=np.int64)
     start = rank_growing_start(space)
     if len(start) > limit:
-        raise ComputationError(
-            f"size = {limit}: too few samples; the selection needs {len(start)} to reach "
-            f"rank {space.rank}, the rank of the training set"
-        )
+        raise _too_few(space, len(start))
     return start
+
+
+def _too_few(space: RowSpace, needed: int) -> SettingError:
+    return SettingError("size", f"the training set has rank {space.rank}, which takes {needed} samples or more")
 
 
 def _stop_reason(run: Run, settings: ReductionSettings, limit: int) -> StopReason | None:

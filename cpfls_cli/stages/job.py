@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from cpfls_cli.artifacts.reading import format_name, read_artifact
 from cpfls_cli.artifacts.records import Artifact, Header, InputFile
 from cpfls_cli.artifacts.spec import ArtifactSpec
 from cpfls_cli.artifacts.writing import write_artifact
-from cpfls_cli.config.resolved import resolved_yaml
+from cpfls_cli.config.resolved import resolved, resolved_yaml
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ConfigError, InputError, SettingError
 
@@ -205,13 +206,15 @@ def read_good(path: Path, spec: ArtifactSpec) -> Artifact:
 
 
 @contextmanager
-def settings_of(section: str) -> Iterator[None]:
+def settings_of(section: str, study: Study | None = None) -> Iterator[None]:
     """Name the config key where the numerics refuse a setting that does not suit the data.
 
     Parameters
     ----------
     section : str
         Section of the config whose settings are in use.
+    study : Study, optional
+        Names the value of the key too.
 
     Yields
     ------
@@ -224,7 +227,17 @@ def settings_of(section: str) -> Iterator[None]:
     try:
         yield
     except SettingError as error:
-        raise ConfigError(f"{section}.{error.key}: {error}") from None
+        key = f"{section}.{error.key}"
+        raise ConfigError(f"{key}{_shown_value(study, key)}: {error}") from None
+
+
+def _shown_value(study: Study | None, key: str) -> str:
+    if study is None:
+        return ""
+    value: Any = resolved(study, [key])
+    for part in key.split("."):
+        value = value[part]
+    return f" = {json.dumps(value)}"
 
 
 def generator(study: Study, stage: str) -> np.random.Generator:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +11,16 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT, SELECTION
+from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import ComputationError, CpflsError
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.data import split_flight
-from cpfls_cli.reduction.baseline import random_selection
-from cpfls_cli.reduction.greedy import reduce
+from cpfls_cli.reduction.baseline import random_selections
+from cpfls_cli.reduction.greedy import check_reducible, reduce
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
-from cpfls_cli.stages.job import Job, Outcome, begin, finish, generator, read_with
+from cpfls_cli.stages.job import Job, Outcome, begin, finish, generator, read_with, settings_of
 from cpfls_cli.stages.training import MOTION, flight_motion
 
 RANDOM_DRAWS = 20
@@ -37,27 +40,38 @@ def run(job: Job, flight: Path) -> Outcome:
     """
     started = begin(job, {"flight": flight})
     source = read_with(flight, FLIGHT, "time", *MOTION)
-    if started.dry_run is not None:
-        return started.dry_run
-    end = split_flight(source.array("time"), job.study.identification.training_share, 0.0).training.stop
-    motion = flight_motion(source)[slice(0, end)]
-    structure = model_structure(job.study.identification)
-    regressor = Regressor(structure, motion, data_ranges(structure, motion.attitude))
-    Q = regressor.matrix(uniform_breakpoints(structure))
-    try:
+    with _naming(flight), settings_of("reduction", job.study):
+        Q = _regressor(source, job.study)
+        if started.dry_run is not None:
+            check_reducible(Q, job.study.reduction)
+            return started.dry_run
         selection = reduce(Q, job.study.reduction, job.progress)
         random = _random(Q, len(selection.indices), job.study)
-    except CpflsError as error:
-        raise ComputationError(f"{flight}: {error}") from None
     finish(job, SELECTION, _data(selection, len(Q), random), started.inputs)
     return _outcome(selection, len(Q), random)
+
+
+@contextmanager
+def _naming(flight: Path) -> Iterator[None]:
+    try:
+        yield
+    except ComputationError as error:
+        raise ComputationError(f"{flight}: {error}") from None
+
+
+def _regressor(flight: Artifact, study: Study) -> Array:
+    """Regressor of the part of a flight that trains, at uniform partitions."""
+    training = split_flight(flight.array("time"), study.identification.training_share, 0.0).training
+    motion = flight_motion(flight)[training]
+    structure = model_structure(study.identification)
+    return Regressor(structure, motion, data_ranges(structure, motion.attitude)).matrix(uniform_breakpoints(structure))
 
 
 def _random(Q: Array, size: int, study: Study) -> Array:
     """Condition numbers of random choices of equal size: what any rule must beat."""
     rng = generator(study, "reduce")
-    tolerance = study.reduction.rank_tolerance
-    return np.array([random_selection(Q, size, rng, tolerance).condition_number for _ in range(RANDOM_DRAWS)])
+    draws = random_selections(Q, size, RANDOM_DRAWS, rng, study.reduction.rank_tolerance)
+    return np.array([draw.condition_number for draw in draws])
 
 
 def _data(selection: Selection, candidates: int, random: Array) -> dict[str, Any]:

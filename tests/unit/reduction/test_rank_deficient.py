@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.errors import ComputationError
-from cpfls_cli.reduction import ReductionSettings, random_selection, reduce
+from cpfls_cli.errors import SettingError
+from cpfls_cli.reduction import ReductionSettings, random_selections, reduce
 
 
 def deficient(rank=7, columns=16, samples=60, seed=0):
@@ -42,7 +42,7 @@ def test_samples_of_dependent_rows_reach_the_rank_one_by_one():
     Q = rng.standard_normal((30, 1, 6)) * np.array([1.0, 0.5, -2.0])[:, None]
     selection = reduce(Q, ReductionSettings(size=12))
     assert selection.rank_trace[:6].tolist() == [1, 2, 3, 4, 5, 6]
-    with pytest.raises(ComputationError, match="needs 6 to reach rank 6"):
+    with pytest.raises(SettingError, match="has rank 6, which takes 6 samples"):
         reduce(Q, ReductionSettings(size=4))
 
 
@@ -77,8 +77,10 @@ def test_printed_rule_stalls_and_says_so():
 
 def test_random_selection_has_the_condition_number_of_its_rows():
     Q = deficient(rank=16)
-    subset = random_selection(Q, 25, np.random.default_rng(0))
-    assert len(set(subset.indices.tolist())) == 25
-    assert subset.condition_number == pytest.approx(kept_condition_number(Q, subset.indices, 16), rel=1e-9)
-    few = random_selection(Q, 3, np.random.default_rng(0))
+    subsets = random_selections(Q, 25, 4, np.random.default_rng(0))
+    assert len({tuple(subset.indices) for subset in subsets}) == 4
+    for subset in subsets:
+        assert len(set(subset.indices.tolist())) == 25
+        assert subset.condition_number == pytest.approx(kept_condition_number(Q, subset.indices, 16), rel=1e-9)
+    (few,) = random_selections(Q, 3, 1, np.random.default_rng(0))
     assert (few.rank, few.full_rank, few.condition_number) == (9, False, np.inf)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.reduction import ReductionSettings, random_selection, reduce
+from cpfls_cli.reduction import ReductionSettings, check_reducible, random_selections, reduce
 
 REGRESSOR = np.random.default_rng(0).standard_normal((20, 3, 10))
 
@@ -15,10 +15,18 @@ def test_something_must_stop_the_reduction():
     assert caught.value.key == "size"
 
 
-@pytest.mark.parametrize(("size", "message"), [(21, "has 20 samples"), (3, "at least 4 samples")])
-def test_size_must_fit_the_samples_and_the_rank(size, message):
-    with pytest.raises(ComputationError, match=message):
-        reduce(REGRESSOR, ReductionSettings(size=size))
+@pytest.mark.parametrize("refuse", [reduce, check_reducible])
+@pytest.mark.parametrize(("size", "message"), [(21, "has only 20 samples"), (3, "rank 10, which takes 4 samples")])
+def test_size_must_fit_the_samples_and_the_rank(refuse, size, message):
+    with pytest.raises(SettingError, match=message) as caught:
+        refuse(REGRESSOR, ReductionSettings(size=size))
+    assert caught.value.key == "size"
+
+
+@pytest.mark.parametrize("size", [4, 20])
+def test_the_smallest_and_the_largest_size_are_taken(size):
+    check_reducible(REGRESSOR, ReductionSettings(size=size))
+    assert reduce(REGRESSOR, ReductionSettings(size=size)).rank == 10
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -43,4 +51,4 @@ def test_no_excitation():
 @pytest.mark.parametrize("size", [0, 21])
 def test_random_selection_of_an_impossible_size(size):
     with pytest.raises(ComputationError, match="expected 1 to 20"):
-        random_selection(REGRESSOR, size, np.random.default_rng(0))
+        random_selections(REGRESSOR, size, 1, np.random.default_rng(0))
