@@ -1,7 +1,7 @@
 """Study configs: one YAML file, validated as a whole."""
 
 from cpfls_cli.config.load import load_study, read_config, validate
-from cpfls_cli.config.resolved import commented_default, resolved, resolved_yaml, sha256_of
+from cpfls_cli.config.resolved import commented_default, resolved, resolved_yaml
 from cpfls_cli.config.study import SECTIONS, Study
 
 __all__ = [
@@ -12,6 +12,5 @@ __all__ = [
     "read_config",
     "resolved",
     "resolved_yaml",
-    "sha256_of",
     "validate",
 ]

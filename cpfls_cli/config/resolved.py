@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -62,21 +61,6 @@ def resolved_yaml(study: Study, sections: Sequence[str] = ()) -> str:
     str
     """
     return to_yaml(resolved(study, sections))
-
-
-def sha256_of(text: str) -> str:
-    """Hash a text.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    str
-        Hexadecimal SHA-256.
-    """
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def commented_default() -> str:

@@ -23,14 +23,11 @@ class FlatAttitude:
         Roll, pitch, yaw.
     attitude_rate : array, shape (time, 3), rad/s
     attitude_acceleration : array, shape (time, 3), rad/s^2
-    specific_thrust : array, shape (time,), m/s^2
-        Thrust over mass, ``|a + g e3|``.
     """
 
     attitude: Array
     attitude_rate: Array
     attitude_acceleration: Array
-    specific_thrust: Array
 
 
 def flat_attitude(time: Array, translation: Array, heading: Array, gravity: float) -> FlatAttitude:
@@ -67,12 +64,7 @@ def flat_attitude(time: Array, translation: Array, heading: Array, gravity: floa
     tilted = _length(forward, up)
     _refuse_sideways(time, tilted[0], gravity)
     attitude, rate, acceleration = np.stack([_angle(right, tilted), _angle(forward, up), heading], axis=2)
-    return FlatAttitude(
-        attitude=attitude,
-        attitude_rate=rate,
-        attitude_acceleration=acceleration,
-        specific_thrust=np.linalg.norm(force[0], axis=1),
-    )
+    return FlatAttitude(attitude=attitude, attitude_rate=rate, attitude_acceleration=acceleration)
 
 
 def _in_heading_frame(force: Array, heading: Array) -> tuple[Array, Array, Array]:

@@ -27,8 +27,6 @@ class Trajectory:
     attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad and s
         Roll, pitch, yaw.
     body_rate : array, shape (time, 3), rad/s, body frame
-    specific_thrust : array, shape (time,), m/s^2
-        Thrust over mass.
     maxima : dict
         Largest absolute value of each derivative of a move, by name, in the displacement measure of the
         settings, in m and s; from the closed form, not from the samples.
@@ -49,7 +47,6 @@ class Trajectory:
     attitude_rate: Array
     attitude_acceleration: Array
     body_rate: Array
-    specific_thrust: Array
     maxima: dict[str, float]
 
 
@@ -95,7 +92,6 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
         attitude_rate=flat.attitude_rate,
         attitude_acceleration=flat.attitude_acceleration,
         body_rate=rotations.body_rate(flat.attitude, flat.attitude_rate),
-        specific_thrust=flat.specific_thrust,
         maxima=asdict(settings.move.peaks),
     )
 
