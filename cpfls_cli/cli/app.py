@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cpfls_cli import __version__
+from cpfls_cli.cli.narration import Narration
 from cpfls_cli.cli.options import Common, ConfigArgument, OutputOption, with_common
 from cpfls_cli.cli.terminal import messages_for_errors, progress_bar, tell
 
@@ -199,7 +200,11 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
     with messages_for_errors():
         from cpfls_cli.stages.job import Job
 
+        narration = Narration(title, common.verbose and not common.quiet)
         study = common.study(config)
+        narration.reads(config)
         with progress_bar(title, common) as progress:
-            outcome = call(Job(study, output, common.force, common.dry_run, progress))
+            outcome = call(Job(study, output, common.force, common.dry_run, progress, narration.reads))
+        if not common.dry_run:
+            narration.wrote(output)
         tell(outcome, common)

@@ -30,7 +30,10 @@ class Common:
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Override the seed of the config.")] = None
     force: Annotated[bool, typer.Option("--force", help="Replace an existing output.")] = False
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Say more on standard error.")] = False
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", "-v", help="Say what is read and written, how large it is and how long it took."),
+    ] = False
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check config, inputs and output; compute and write nothing.")
     ] = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -46,6 +46,8 @@ class Job:
     dry_run : bool
         Check everything, compute and write nothing.
     progress : Progress
+    reads : callable
+        Takes note of every input file.
     """
 
     study: Study
@@ -53,6 +55,7 @@ class Job:
     force: bool
     dry_run: bool
     progress: Progress
+    reads: Callable[[Path], None]
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,7 @@ def begin(job: Job, inputs: Mapping[str, Path]) -> Started:
     """
     for path in inputs.values():
         _check_input(path, job.output)
+        job.reads(path)
     check_output(job.output, job.force)
     line = f"{job.output}: would be written; the config and all inputs are good"
     dry_run = Outcome({"dry_run": True, "output": str(job.output)}, (line,)) if job.dry_run else None
