@@ -28,6 +28,7 @@ def warn_of_disagreement(time: Array, attitude: Array, body_rate: Array) -> tupl
     time : array, shape (time,), s
         Uniform.
     attitude : array, shape (time, 3), rad
+        Not filtered yet: the relation between the two is not linear.
     body_rate : array, shape (time, 3), rad/s, body frame
         As measured.
 
@@ -49,7 +50,10 @@ def warn_of_disagreement(time: Array, attitude: Array, body_rate: Array) -> tupl
 
 def _slow_part(time: Array, values: Array) -> Array:
     rate_hz = 1 / float(time[1] - time[0])
-    return low_pass(values, rate_hz, min(_COMPARED_BELOW_HZ, rate_hz / 5), _FILTER_ORDER)
+    slow = low_pass(values, rate_hz, min(_COMPARED_BELOW_HZ, rate_hz / 5), _FILTER_ORDER)
+    # A noisy first or last value is mirrored about itself by the filter and spoils what is near it.
+    edge = min(round(rate_hz / _COMPARED_BELOW_HZ), len(slow) // 4)
+    return slow[edge : len(slow) - edge]
 
 
 def _moving(derived: Array, measured: Array) -> BoolArray:

@@ -14,7 +14,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.agreement import warn_of_disagreement
 from cpfls_cli.flightlog.motion import body_rate_of
-from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
+from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 
@@ -54,7 +54,8 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     """
     smooth = _filtered(signals, settings)
     arrays = _arrays(smooth) | _derived(smooth)
-    time, report = smooth.time, _filter_report(smooth, settings)
+    time = smooth.time
+    report = replace(signals.report, lowpass_hz=settings.lowpass_hz, warnings=_warnings(signals))
     if settings.rate_hz is not None:
         time = _clock(time, settings.rate_hz, report.log_rate_hz)
         arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
@@ -67,11 +68,10 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     return ImportedFlight(time=time, report=report, **arrays)
 
 
-def _filter_report(smooth: LogSignals, settings: ImportSettings) -> ImportReport:
-    warnings = smooth.report.warnings
-    if smooth.attitude is not None and smooth.body_rate is not None:
-        warnings += warn_of_disagreement(smooth.time, smooth.attitude, smooth.body_rate)
-    return replace(smooth.report, lowpass_hz=settings.lowpass_hz, warnings=warnings)
+def _warnings(signals: LogSignals) -> tuple[str, ...]:
+    if signals.attitude is None or signals.body_rate is None:
+        return signals.report.warnings
+    return signals.report.warnings + warn_of_disagreement(signals.time, signals.attitude, signals.body_rate)
 
 
 def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:

@@ -54,7 +54,7 @@ class ImportReport:
         (before the first or after the last value of some column), `gap` (outside the part that is kept).
     missing, spikes : mapping from str to int
         Values of each column, in the part that is kept, that were absent or found to be spikes, and interpolated;
-        columns without are left out.
+        columns without are left out. A spike in the first or the last row drops that row instead.
     suspected_spikes, saturated : mapping from str to int
         Values of each column that look like spikes, where none are to be interpolated, and values in long runs at the
         column's extremes; reported only, not changed.

@@ -151,7 +151,7 @@ def _outcome(flight: ImportedFlight) -> Outcome:
         "signals": [name for name in _signals(flight) if name != "time"],
     }
     lines = [f"{report.samples} samples at {report.rate_hz:.4g} Hz from {report.samples_read} rows"]
-    lines += [f"{count} x {what}" for what, count in found_and_done(report).items()]
+    lines += [f"{what} ({count})" for what, count in found_and_done(report).items()]
     if estimate is not None:
         r2 = " ".join(f"{value:.3f}" for value in estimate.r2)
         lines.append(f"delay of motion behind command: {1e3 * report.delay_s:.1f} ms (R2 about body axes {r2})")

@@ -8,30 +8,39 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
+from cpfls_cli.flightlog.smoothing import derivative
 
 FOLDER = Path(os.environ.get("CPFLS_FLIGHTS", "../shared/data")) / "real" / "crazyswarm2_lee"
 
 
-def imported(name, **changes):
+def columns_of(name):
     path = FOLDER / f"{name}.csv"
     if not path.exists():
         pytest.skip(f"{path} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
     with path.open() as stream:
         header, *rows = csv.reader(stream)
-    columns = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+    return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+
+
+def imported(name, **changes):
+    return taken(columns_of(name), **changes)
+
+
+def taken(columns, lowpass_hz=8.0, **changes):
     units = {"attitude": ("rpy", "rad"), "body_rate": ("omega", "rad/s"), "body_torque": ("torque", "N m")}
     signals = {
         signal: SignalMap(columns=tuple(f"ctrlLee_{column}{axis}" for axis in "xyz"), unit=unit)
         for signal, (column, unit) in units.items()
     }
-    return import_log(columns, ImportSettings(signals=signals, lowpass_hz=8.0, **changes))
+    return import_log(columns, ImportSettings(signals=signals, lowpass_hz=lowpass_hz, **changes))
 
 
 def explained(flight, axis):
     """R2 of a rigid body turning about one axis: angular acceleration, gyroscopic product, constant."""
     rate, torque = flight.body_rate, flight.body_torque[:, axis]
     product = rate[:, (axis + 1) % 3] * rate[:, (axis + 2) % 3]
-    regressor = np.column_stack([flight.body_acceleration[:, axis], product, np.ones(len(torque))])
+    acceleration = derivative(flight.time, rate[:, axis])
+    regressor = np.column_stack([acceleration, product, np.ones(len(torque))])
     residual = torque - regressor @ np.linalg.lstsq(regressor, torque, rcond=None)[0]
     return 1 - residual.var() / torque.var()
 
@@ -63,3 +72,55 @@ def test_attitude_and_gyroscope_of_the_log_agree_about_the_motion(name):
     derived = np.gradient(flight.attitude, flight.time, axis=0)
     for axis in (0, 1):
         assert np.corrcoef(derived[:, axis], flight.attitude_rate[:, axis])[0, 1] > 0.9
+
+
+@pytest.mark.parametrize("name", ["log119", "log149", "log45"])
+@pytest.mark.parametrize("lowpass_hz", [None, 3.0, 8.0, 30.0])
+def test_gyroscope_and_attitude_of_a_real_flight_are_not_warned_of(name, lowpass_hz):
+    flight = imported(name, lowpass_hz=lowpass_hz)
+    assert flight.report.warnings == ()
+    # One pause of the logger in each flight, 24 to 68 ms long.
+    assert flight.report.gaps == 1
+    assert 0.02 < flight.report.longest_gap_s < 0.07
+
+
+@pytest.mark.parametrize("name", ["log119", "log149", "log45"])
+@pytest.mark.parametrize("signal", ["omega", "rpy"])
+def test_swapped_columns_of_a_real_flight_are_warned_of(name, signal):
+    columns = columns_of(name)
+    x, y = f"ctrlLee_{signal}x", f"ctrlLee_{signal}y"
+    columns[x], columns[y] = columns[y], columns[x]
+    assert "import.signals.body_rate" in " ".join(taken(columns).report.warnings)
+
+
+@pytest.mark.parametrize(("axis", "word"), [("x", "roll"), ("y", "pitch")])
+def test_a_wrong_sign_in_a_real_flight_is_warned_of_by_axis(axis, word):
+    columns = columns_of("log119")
+    columns[f"ctrlLee_omega{axis}"] *= -1
+    (warning,) = taken(columns).report.warnings
+    assert f"about body {axis} ({word})" in warning
+    assert float(warning.split("correlation ")[1].split(")")[0]) < -0.95
+
+
+@pytest.mark.parametrize("row", [0, 1, 700, 1437, 1438])
+def test_a_spike_in_the_gyroscope_of_a_real_flight_is_counted_and_can_be_repaired(row):
+    columns, clean = columns_of("log119"), imported("log119")
+    columns["ctrlLee_omegax"][row] += 50
+    seen = taken(columns).report
+    assert (seen.suspected_spikes, seen.spikes) == ({"ctrlLee_omegax": 1}, {})
+    assert any("1 suspected spike in column ctrlLee_omegax" in text for text in seen.warnings)
+    repaired = taken(columns, spike_deviations=10.0)
+    # Nothing is there to interpolate from beyond an end, so the row goes.
+    at_end = row in (0, 1438)
+    assert (repaired.report.spikes, repaired.report.dropped["incomplete_ends"]) == (
+        ({}, 1) if at_end else ({"ctrlLee_omegax": 1}, 0)
+    )
+    assert (repaired.report.suspected_spikes, repaired.report.warnings) == ({}, ())
+    at = clean.report.span_s[0] + clean.time
+    rate = np.interp(at, repaired.report.span_s[0] + repaired.time, repaired.body_rate[:, 0])
+    assert np.abs(rate - clean.body_rate[:, 0])[20:-20].max() < 0.05
+
+
+def test_rows_lost_from_a_real_flight_are_counted_as_a_gap():
+    columns = {name: np.delete(values, slice(400, 412)) for name, values in columns_of("log119").items()}
+    assert taken(columns).report.gaps == imported("log119").report.gaps + 1

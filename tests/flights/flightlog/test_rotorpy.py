@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
+from cpfls_cli.flightlog.smoothing import derivative
 
 PATH = Path(os.environ.get("CPFLS_FLIGHTS", "../shared/data")) / "rotorpy" / "none.csv"
 INERTIA = np.array([0.00365, 0.00368, 0.00703])
@@ -38,10 +39,16 @@ def imported(source, **changes):
     )
 
 
+@pytest.mark.parametrize("source", ["rotor-speed", "rotor-command"])
+def test_a_smooth_flight_without_noise_gives_nothing_to_warn_of(source):
+    report = imported(source).report
+    assert (report.warnings, report.gaps, report.suspected_spikes) == ((), 0, {})
+
+
 def test_the_torque_of_the_rotors_is_that_of_the_motion():
     flight = imported("rotor-speed")
     momentum = INERTIA * flight.body_rate
-    needed = INERTIA * flight.body_acceleration + np.cross(flight.body_rate, momentum)
+    needed = INERTIA * derivative(flight.time, flight.body_rate) + np.cross(flight.body_rate, momentum)
     error = (needed - flight.body_torque)[50:-50]
     assert (error.std(axis=0) < 1e-3 * flight.body_torque.std(axis=0)).all()
 

@@ -53,3 +53,18 @@ def test_spikes_do_not_depend_on_scale_and_offset(scale, offset, seed):
     spikes = find_spikes(values, 8.0, 7)
     assert spikes[30]
     np.testing.assert_array_equal(find_spikes(scale * values + offset, 8.0, 7), spikes)
+
+
+@given(st.floats(0.01, 0.2), st.floats(0, 6.2), st.floats(-3, 3), st.integers(3, 9))
+def test_crests_of_a_resolved_oscillation_are_no_spikes(frequency, phase, slope, window):
+    """Up to five samples to a period, on any slope, in any window: the turning points are motion."""
+    sample = np.arange(200.0)
+    wave = np.sin(2 * np.pi * frequency * sample + phase) + slope * sample
+    assert not find_spikes(wave, 8.0, window).any()
+
+
+@given(st.integers(0, 199), st.floats(20, 1e6), st.sampled_from([-1, 1]), st.integers(0, 100))
+def test_one_large_spike_is_found_wherever_it_stands(row, size, sign, seed):
+    values = np.random.default_rng(seed).uniform(-1, 1, 200)
+    values[row] = sign * size
+    np.testing.assert_array_equal(np.flatnonzero(find_spikes(values, 8.0, 7)), [row])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog import estimate_delay
 
 INERTIA = np.array([[0.012, 0.001, -0.0005], [0.001, 0.015, 0.0008], [-0.0005, 0.0008, 0.024]])
@@ -60,5 +60,6 @@ def test_a_constant_torque_and_a_short_flight_are_refused():
     time, rate, torque = flight(0.05)
     with pytest.raises(ComputationError, match="torque is constant"):
         estimate_delay(time, rate, np.ones_like(torque))
-    with pytest.raises(ComputationError, match="at least 50 samples"):
+    with pytest.raises(SettingError, match="at least 50 must") as caught:
         estimate_delay(time[:60], rate[:60], torque[:60])
+    assert caught.value.key == "delay_max_s"

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
+from cpfls_cli.flightlog.smoothing import derivative
 from cpfls_cli.rotations import body_acceleration, body_rate, generalised_torque
 
 INERTIA = np.array([0.6, 0.7, 1.2])
@@ -67,7 +68,7 @@ def test_filtering_keeps_the_torque_equation():
     for name in [name for name in columns if name != "t"]:
         columns[name] = columns[name] + 0.02 * columns[name].std() * rng.standard_normal(5000)
     flight = import_log(columns, ImportSettings(signals=mapped(), lowpass_hz=3.0))
-    rate, acceleration = flight.body_rate, flight.body_acceleration
+    rate, acceleration = flight.body_rate, derivative(flight.time, flight.body_rate)
     unit = np.eye(3)
     regressor = np.stack([acceleration * e + np.cross(rate, rate * e) for e in unit], axis=2)
     inner = slice(200, -200)
@@ -119,4 +120,50 @@ def test_a_log_without_attitude_keeps_its_body_axes():
     flight = import_log(log(), ImportSettings(signals=signals))
     assert flight.attitude is None
     assert flight.torque is None
-    assert flight.body_acceleration.shape == flight.body_torque.shape
+    np.testing.assert_allclose(flight.body_torque, torque_at(flight.time), atol=1e-10)
+
+
+@pytest.mark.parametrize(("source", "shifted"), [("column", False), ("rotor-speed", True)])
+def test_measured_rotor_speeds_are_shifted_only_where_the_torque_comes_from_them(source, shifted):
+    """The command is always shifted; with a delay of 10 samples the cut log starts at the tenth."""
+    ramp = np.arange(5000.0)
+    columns = log() | {"om": ramp, "u": ramp}
+    signals = mapped() | {"rotor_speed": SignalMap(columns=("om",), unit="rad/s")}
+    signals["rotor_command"] = SignalMap(columns=("u",), unit="1")
+    settings = ImportSettings(signals=signals, torque_source=source, delay_s=10 * PERIOD)
+    flight = import_log(columns, settings, rotor_torque=lambda log: log.rotor_speed[:, [0, 0, 0]])
+    np.testing.assert_allclose(flight.body_rate, body_rate(*motion(flight.time + 10 * PERIOD)[:2]), atol=1e-9)
+    np.testing.assert_allclose(flight.rotor_command[:, 0], ramp[:-10], atol=1e-6)
+    np.testing.assert_allclose(flight.rotor_speed[:, 0], ramp[:-10] if shifted else ramp[10:], atol=1e-6)
+    torque = torque_at(flight.time) if source == "column" else ramp[:-10, None] * np.ones(3)
+    np.testing.assert_allclose(flight.body_torque, torque, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("key", "changes"),
+    [
+        ("lowpass_hz", {"lowpass_hz": 125.0}),
+        ("lowpass_hz", {"lowpass_hz": 125.0, "delay_s": "estimate"}),
+        ("delay_max_s", {"delay_s": "estimate", "delay_max_s": 19.9}),
+        ("delay_max_s", {"delay_s": "estimate", "delay_max_s": 1e9}),
+        ("delay_s", {"delay_s": 20.0}),
+        ("delay_s", {"delay_s": 1e12}),
+        ("rate_hz", {"rate_hz": 1e12}),
+        ("rate_hz", {"rate_hz": 2501.0}),
+        ("rate_hz", {"rate_hz": 0.4}),
+        ("crop_s", {"crop_s": (20.5, 30.0)}),
+        ("crop_s", {"crop_s": (1.0, 1.001)}),
+    ],
+)
+def test_a_setting_that_does_not_suit_the_log_is_refused_at_its_key(key, changes):
+    """The log lasts 20 s at 250 Hz."""
+    with pytest.raises(SettingError) as caught:
+        import_log(log(), ImportSettings(signals=mapped(), **changes))
+    assert caught.value.key == key
+
+
+def test_a_delay_cannot_be_estimated_without_torque():
+    signals = {name: signal for name, signal in mapped().items() if name != "body_torque"}
+    with pytest.raises(SettingError, match="needs a torque") as caught:
+        import_log(log(), ImportSettings(signals=signals, torque_source=None, delay_s="estimate"))
+    assert caught.value.key == "delay_s"

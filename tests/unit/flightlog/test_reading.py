@@ -148,12 +148,22 @@ def test_jumps_of_a_rotor_command_are_no_spikes():
     assert signals.rotor_command[90, 0] == pytest.approx(1)
 
 
-def test_without_the_test_spikes_stay():
+def test_without_a_threshold_spikes_are_counted_and_warned_of_and_stay():
     columns = log()
-    columns["p"][60] += 5.0
+    columns["p"][[60, 61, 150]] += 5.0
     signals = read_signals(columns, settings())
-    assert signals.report.spikes == {}
-    assert signals.body_rate[60, 0] > 4
+    assert (signals.report.spikes, signals.report.suspected_spikes) == ({}, {"p": 3})
+    (warning,) = signals.report.warnings
+    assert warning.startswith("3 suspected spikes in column p, used as logged: set import.spike_deviations")
+    np.testing.assert_allclose(signals.body_rate[:, 0], columns["p"], atol=1e-12)
+
+
+def test_values_outside_the_part_that_is_kept_are_not_counted():
+    columns = without(log(), slice(120, 150))
+    columns["q"][[60, 140]] = np.nan
+    columns["p"][[30, 155]] += 5.0
+    signals = read_signals(columns, settings(gap_rule="longest-part"))
+    assert (signals.report.missing, signals.report.suspected_spikes) == ({"q": 1}, {"p": 1})
 
 
 def test_saturated_values_are_counted_and_left_alone():

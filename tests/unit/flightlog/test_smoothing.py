@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 
 TIME = np.arange(4000) / 200
@@ -31,8 +31,9 @@ def test_no_cut_off_leaves_the_values():
 
 
 def test_a_cut_off_above_half_the_rate_is_refused():
-    with pytest.raises(ComputationError, match=r"import\.lowpass_hz = 60 must lie below"):
+    with pytest.raises(SettingError, match=r"60 Hz does not lie below half of the log's rate, 50 Hz") as caught:
         low_pass(np.zeros((50, 3)), 100, 60.0, 4)
+    assert caught.value.key == "lowpass_hz"
 
 
 def test_the_derivative_is_of_fourth_order():
