@@ -89,10 +89,8 @@ def _beaten(scores: Mapping[str, Mapping[str, Score]]) -> Iterator[str]:
         ours = by_model["model"]
         for rival, words in RIVALS.items():
             if rival in by_model and _unexplained(by_model[rival]) < _unexplained(ours) * (1 - 1e-9):
-                yield (
-                    f"{part}: {words} leaves less unexplained of the torque ({_by_axis(by_model[rival])} of roll, pitch, "
-                    f"yaw; the model {_by_axis(ours)})"
-                )
+                shares = f"{_by_axis(by_model[rival])} of roll, pitch, yaw; the model {_by_axis(ours)}"
+                yield f"{part}: {words} leaves less of the torque unexplained ({shares})"
 
 
 def _by_axis(score: Score) -> str:
