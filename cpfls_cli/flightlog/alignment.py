@@ -60,7 +60,7 @@ def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: f
 def _estimate(signals: LogSignals, settings: ImportSettings, share: float) -> DelayEstimate:
     body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
     if body_rate is None or signals.body_torque is None:
-        raise SettingError("delay_s", "estimate needs a torque, and body rates or an attitude")
+        raise SettingError("delay_s", "needs a torque, and body rates or an attitude")
     return estimate_delay(
         signals.time,
         body_rate,
@@ -89,7 +89,7 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
     period = signals.time[1] - signals.time[0]
     first = int(np.ceil(delay / period - 1e-9))
     if first > len(signals.time) - 2:
-        raise SettingError("delay_s", f"{delay:g} s is longer than the flight, {signals.time[-1]:.4g} s")
+        raise SettingError("delay_s", f"longer than the flight, {signals.time[-1]:.4g} s")
     time = signals.time[first:]
     commands = (*_COMMANDS, "rotor_speed") if speeds_command else _COMMANDS
     cut: dict[str, Array] = {}

@@ -133,8 +133,8 @@ def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
     if last - first < _SMALLEST_WINDOW:
         raise SettingError(
             "delay_max_s",
-            f"{delay_max_s:g} s is too long to estimate a delay on {time[-1] - time[0]:.3g} s of flight:"
-            f" {max(last - first, 0)} samples remain, and at least {_SMALLEST_WINDOW} must",
+            f"too long to estimate a delay on {time[-1] - time[0]:.3g} s of flight: {max(last - first, 0)} samples"
+            f" remain, and at least {_SMALLEST_WINDOW} must",
         )
     return slice(int(first), int(last))
 

@@ -79,8 +79,8 @@ def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
     if rate_hz > _LARGEST_REFINEMENT * log_rate_hz or samples < _FEWEST_SAMPLES:
         raise SettingError(
             "rate_hz",
-            f"{rate_hz:g} Hz does not suit {time[-1]:.4g} s of flight at {log_rate_hz:.4g} Hz: at most"
-            f" {_LARGEST_REFINEMENT} times the log's rate, and {_FEWEST_SAMPLES} samples at least",
+            f"does not suit {time[-1]:.4g} s of flight at {log_rate_hz:.4g} Hz; at most {_LARGEST_REFINEMENT} times the"
+            f" log's rate, and {_FEWEST_SAMPLES} samples at least",
         )
     return np.arange(samples) / rate_hz
 

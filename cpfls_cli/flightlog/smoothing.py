@@ -39,9 +39,7 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int)
     if cutoff_hz is None:
         return values
     if cutoff_hz >= rate_hz / 2:
-        raise SettingError(
-            "lowpass_hz", f"{cutoff_hz:g} Hz does not lie below half of the log's rate, {rate_hz / 2:.4g} Hz"
-        )
+        raise SettingError("lowpass_hz", f"does not lie below half of the log's rate, {rate_hz / 2:.4g} Hz")
     sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
     # scipy pads by the filter's length, which is too short for its slow transient when the cut-off is low.
     padding = min(len(values) - 1, ceil(_PADDED_PERIODS * rate_hz / cutoff_hz))

@@ -72,7 +72,7 @@ def in_order_and_cropped(table: Table, settings: ImportSettings) -> tuple[Table,
     if inside.sum() < 2:
         raise SettingError(
             "crop_s",
-            f"[{begin:g}, {end:g}] leaves {inside.sum()} rows of a log of {table.time[-1]:.6g} s; see import.time_unit",
+            f"leaves {inside.sum()} rows of a log of {table.time[-1]:.6g} s; see import.time_unit",
         )
     return table.rows(inside), dropped | {"crop": int((~inside).sum())}
 

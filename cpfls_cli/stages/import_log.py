@@ -44,7 +44,7 @@ def run(job: Job, log: Path) -> Outcome:
     """
     started = begin(job, {"log": log})
     columns = read_csv(log, _wanted(job.study.import_))
-    with _naming(log), settings_of("import"):
+    with _naming(log), settings_of("import", job.study):
         flight = _import(columns, job.study)
     # An import is quick, and only the whole of it shows that every key suits the log.
     if started.dry_run is not None:

@@ -142,3 +142,22 @@ def test_flight_without_torque_is_refused_by_identify(cpfls, refuse, config, wri
     assert cpfls("import", config, write(table()), "-o", flight).exit_code == 0
     (line,) = refuse("identify", config, flight, "-o", tmp_path / "model.h5")
     assert line.startswith(f"{flight}: lacks torque; this stage needs time, attitude")
+
+
+@pytest.mark.parametrize("dry_run", [(), ("--dry-run",)])
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("lowpass_hz", "25.0", "does not lie below half of the log's rate, 25 Hz"),
+        ("delay_s", "100.0", "longer than the flight, 3.98 s"),
+        ("rate_hz", "1000000000000.0", "does not suit 3.98 s of flight at 50 Hz"),
+        ("rate_hz", "0.001", "does not suit 3.98 s of flight at 50 Hz"),
+        ("crop_s", "[5.0, 9.0]", "leaves 0 rows of a log of 3.98 s"),
+        ("delay_max_s", "3.5", "too long to estimate a delay on"),
+    ],
+)
+def test_a_key_that_does_not_suit_the_log_is_named(wrong, key, value, message, dry_run):
+    estimate = ("--set", "import.delay_s=estimate") if key == "delay_max_s" else ()
+    (line,) = wrong(table(), "log.csv", "--set", f"import.{key}={value}", *estimate, *dry_run)
+    assert line.startswith(f"LOG: import.{key} = ")
+    assert f": {message}" in line

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 KEYS = {
@@ -46,11 +47,14 @@ def test_figures_of_the_tiny_study(pipeline):
 
 
 def test_held_out_part_and_other_flights_are_judged_by_name(cpfls, pipeline, study, tmp_path):
-    words = ("identify", study, pipeline.flight, "--validate", pipeline.flight, "-o", tmp_path / "m.h5", "--json")
+    path, other = tmp_path / "path.h5", tmp_path / "other.h5"
+    cpfls("trajectory", study, "-o", path, "--set", "trajectory.sample_time_s=0.2")
+    cpfls("simulate", study, path, "-o", other)
+    words = ("identify", study, pipeline.flight, "--validate", other, "-o", tmp_path / "m.h5", "--json")
     result = cpfls(*words, "--set", "identification.training_share=0.6")
     held_out = json.loads(result.stdout)["held_out"]
-    assert set(held_out) == {"held-out rest", "flight.h5"}
-    assert held_out["flight.h5"]["samples"] == 549
+    assert set(held_out) == {"held-out rest", "other.h5"}
+    assert held_out["other.h5"]["samples"] == 275
     assert {"mse", "relative_error", "baselines"} <= set(held_out["held-out rest"])
 
 
@@ -89,3 +93,31 @@ def test_verbose_reports_progress_on_standard_error_only(cpfls, pipeline, study,
 def test_set_changes_the_result(cpfls, study, tmp_path):
     faster = cpfls("trajectory", study, "-o", tmp_path / "t.h5", "--set", "trajectory.sample_time_s=0.2", "--json")
     assert json.loads(faster.stdout)["samples"] == 275
+
+
+def test_an_import_tells_in_json_and_in_lines_what_it_read_and_what_it_did_about_it(cpfls, tmp_path):
+    time = np.delete(np.arange(0.0, 4.0, 0.02), [50, 51, 52])
+    angles = [0.2 * np.sin((2 + axis) * time) for axis in range(3)]
+    angles[1][120] += 1
+    log, config = tmp_path / "log.csv", tmp_path / "study.yaml"
+    np.savetxt(log, np.column_stack([time, *angles]), delimiter=",", header="t,roll,pitch,yaw", comments="")
+    signals = "signals: {attitude: {columns: [roll, pitch, yaw], unit: rad}}"
+    config.write_text(f"import: {{{signals}, torque_source: null, crop_s: [0, 3.5]}}")
+    result = cpfls("import", config, log, "-o", tmp_path / "flight.h5", "--json")
+    assert (result.exit_code, result.stdout.count("\n")) == (0, 1)
+    summary = json.loads(result.stdout)
+    assert summary["samples"] == 176
+    assert summary["rate_hz"] == summary["log_rate_hz"] == pytest.approx(50)
+    assert summary["dropped"] == {"crop": 24}
+    assert (summary["gaps"], summary["longest_gap_s"]) == (1, pytest.approx(0.08))
+    assert summary["span_s"] == pytest.approx([0, 3.5])
+    assert (summary["lowpass_hz"], summary["spikes"], summary["suspected_spikes"]) == (None, {}, {"pitch": 1})
+    assert {"samples_read", "missing", "saturated", "delay_s", "delay_r2", "signals"} <= set(summary)
+    assert "1 suspected spike in column pitch" in result.stderr
+    repaired = cpfls("import", config, log, "-o", tmp_path / "f.h5", "--set", "import.spike_deviations=10")
+    assert repaired.stdout.splitlines()[1:] == [
+        "outside import.crop_s: rows dropped (24)",
+        "gaps in the time stamps, up to 0.08 s: interpolated (1)",
+        "spikes: values interpolated (1)",
+    ]
+    assert "spike" not in repaired.stderr

@@ -1,0 +1,81 @@
+"""The shipped study of a real flight, through the commands: what is learned from one log holds on its rest."""
+
+import json
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from cpfls_cli.cli.app import app
+
+FOLDER = Path(os.environ.get("CPFLS_FLIGHTS", "../shared/data")) / "real" / "crazyswarm2_lee"
+CONFIG = Path(__file__).parents[2] / "configs" / "crazyflie.yaml"
+
+
+def run(*words):
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Every file of the study, and what the commands printed; the search is small, the rest as shipped."""
+    logs = {name: FOLDER / f"{name}.csv" for name in ("log119", "log149")}
+    for path in logs.values():
+        if not path.exists():
+            pytest.skip(f"{path} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
+    folder = tmp_path_factory.mktemp("crazyflie")
+    f119, f149, selection, model = (folder / name for name in ("f119.h5", "f149.h5", "selection.h5", "model.h5"))
+    imported = {
+        "log119": run("import", CONFIG, logs["log119"], "-o", f119, "--json"),
+        "log149": run("import", CONFIG, logs["log149"], "-o", f149, "--json"),
+    }
+    run("reduce", CONFIG, f119, "-o", selection, "--json")
+    words = ("identify", CONFIG, f119, "--selection", selection, "--validate", f149, "-o", model, "--json")
+    small = ("--set", "identification.population=10", "--set", "identification.generations=1")
+    return SimpleNamespace(imported=imported, identified=run(*words, *small), flight=f119)
+
+
+def test_the_delay_is_the_one_that_was_found_by_hand(study):
+    """The origin of the data states 60 to 80 ms."""
+    assert 0.06 < study.imported["log119"]["delay_s"] < 0.08
+
+
+@pytest.mark.parametrize("name", ["log119", "log149"])
+def test_the_pause_of_the_logger_is_told_and_no_spike_is_invented(study, name):
+    imported = study.imported[name]
+    assert (imported["gaps"], imported["spikes"], imported["suspected_spikes"]) == (1, {}, {})
+    assert 0.05 < imported["longest_gap_s"] < 0.07
+
+
+def test_the_file_tells_what_was_done_about_the_gap(study):
+    with h5py.File(study.flight) as file:
+        assert list(file["quality/reason"].asstr()) == ["gaps in the time stamps, up to 0.0595 s: interpolated"]
+        np.testing.assert_array_equal(file["quality/count"], [1])
+        assert "quality/warning" not in file
+
+
+def test_roll_and_pitch_of_the_held_out_rest_are_explained(study):
+    roll, pitch, _ = study.identified["held_out"]["held-out rest"]["r2_body"]
+    assert roll > 0.9
+    assert pitch > 0.9
+
+
+def test_the_model_is_not_worse_than_a_rigid_body_on_the_held_out_rest(study):
+    rest = study.identified["held_out"]["held-out rest"]
+    assert rest["mse"] <= rest["baselines"]["rigid-body"]["mse"] * (1 + 1e-6)
+    assert rest["mse"] < 0.1 * rest["baselines"]["torque-zero"]["mse"]
+
+
+def test_the_other_flight_is_judged_and_its_roll_and_pitch_are_explained(study):
+    roll, pitch, _ = study.identified["held_out"]["f149.h5"]["r2_body"]
+    assert min(roll, pitch) > 0.8
+
+
+def test_yaw_is_called_hardly_excited(study):
+    assert any("yaw is hardly excited" in finding for finding in study.identified["findings"])
