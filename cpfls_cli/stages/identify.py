@@ -59,7 +59,7 @@ def _roles(flight: Path, selection: Path | None, validate: Sequence[Path]) -> di
 
 def _identify(job: Job, flight: Path, data: TrainingData, held_out: dict[str, TorqueData]) -> Identification:
     try:
-        with settings_of("identification"):
+        with settings_of("identification", job.study):
             return identify(
                 data.flight[data.split.training],
                 data.flight[data.learned],

@@ -210,15 +210,14 @@ def read_good(path: Path, spec: ArtifactSpec) -> Artifact:
 
 
 @contextmanager
-def settings_of(section: str, study: Study | None = None) -> Iterator[None]:
-    """Name the config key where the numerics refuse a setting that does not suit the data.
+def settings_of(section: str, study: Study) -> Iterator[None]:
+    """Name the config key and its value where the numerics refuse a setting that does not suit the data.
 
     Parameters
     ----------
     section : str
         Section of the config whose settings are in use.
-    study : Study, optional
-        Names the value of the key too.
+    study : Study
 
     Yields
     ------
@@ -232,16 +231,14 @@ def settings_of(section: str, study: Study | None = None) -> Iterator[None]:
         yield
     except SettingError as error:
         key = f"{section}.{error.key}"
-        raise ConfigError(f"{key}{_shown_value(study, key)}: {error}") from None
+        raise ConfigError(f"{key} = {json.dumps(_value(study, key))}: {error}") from None
 
 
-def _shown_value(study: Study | None, key: str) -> str:
-    if study is None:
-        return ""
+def _value(study: Study, key: str) -> Any:
     value: Any = resolved(study, [key])
     for part in key.split("."):
         value = value[part]
-    return f" = {json.dumps(value)}"
+    return value
 
 
 def generator(study: Study, stage: str) -> np.random.Generator:
