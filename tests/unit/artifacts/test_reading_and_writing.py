@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.formats import PREDICTION, SELECTION, TRAJECTORY
-from cpfls_cli.artifacts.output import atomic_path, check_output, write_text
+from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.reading import format_name, read_artifact
 from cpfls_cli.artifacts.records import Artifact, Header, InputFile
 from cpfls_cli.artifacts.writing import write_artifact
@@ -92,23 +92,6 @@ def test_files_get_the_permissions_of_any_new_file(tmp_path):
     assert {stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()} == {0o640}
 
 
-def test_temporary_name_is_hidden_and_in_the_same_folder(tmp_path):
-    with atomic_path(tmp_path / "s.h5") as temporary:
-        assert temporary.parent == tmp_path
-        assert temporary.name.startswith(".s.h5.")
-        assert list(tmp_path.iterdir()) == [temporary]
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_check_output_leaves_nothing(tmp_path):
-    (tmp_path / "old").write_text("old")
-    check_output(tmp_path / "new", force=False)
-    check_output(tmp_path / "old", force=True)
-    with pytest.raises(InputError, match="--force"):
-        check_output(tmp_path / "old", force=False)
-    assert [path.name for path in tmp_path.iterdir()] == ["old"]
-
-
 def test_wrong_format_names_both(tmp_path):
     write_artifact(tmp_path / "s.h5", selection())
     with pytest.raises(InputError, match=r"is a cpfls/selection; .* needs a cpfls/trajectory .* or cpfls/prediction"):
@@ -120,8 +103,6 @@ def test_pipe_is_not_waited_for(tmp_path):
     os.mkfifo(pipe)
     with pytest.raises(InputError, match="is a device or a pipe"):
         read_artifact(pipe)
-    with pytest.raises(InputError, match="is a device or a pipe"):
-        check_output(pipe, force=True)
 
 
 def test_format_name_of_what_is_no_artifact(tmp_path):
