@@ -60,6 +60,13 @@ def test_the_file_tells_what_was_done_about_the_gap(study):
         assert "quality/warning" not in file
 
 
+def test_the_page_tells_it_too(study):
+    page = study.flight.with_name("page.html")
+    result = CliRunner().invoke(app, ["report", str(CONFIG), str(study.flight), "-o", str(page)])
+    assert result.exit_code == 0, result.stderr
+    assert "gaps in the time stamps, up to 0.0595 s: interpolated" in page.read_text()
+
+
 def test_roll_and_pitch_of_the_held_out_rest_are_explained(study):
     roll, pitch, _ = study.identified["held_out"]["held-out rest"]["r2_body"]
     assert roll > 0.9
