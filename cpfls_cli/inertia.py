@@ -33,6 +33,23 @@ def symmetric(parameters: Sequence[float] | Array) -> Array:
     return matrix
 
 
+def six_parameters(inertia: Sequence[float] | Array) -> Array:
+    """Fill three moments of inertia up to six parameters.
+
+    Parameters
+    ----------
+    inertia : sequence of float, length 3 or 6, kg m^2
+
+    Returns
+    -------
+    array, shape (6,), kg m^2
+        Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
+    """
+    parameters = np.zeros(len(INERTIA_PARAMETERS))
+    parameters[: len(inertia)] = inertia
+    return parameters
+
+
 def symmetric_columns(vectors: Array) -> Array:
     """Write ``S v`` with a symmetric S as a matrix times the six elements of S.
 

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
+from cpfls_cli.identification.axes import AxisEvidence
 from cpfls_cli.identification.excitation import RuleExcitation
 from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.least_squares import LeastSquares
+from cpfls_cli.identification.physics import why_unphysical
 
-HARDLY_EXCITED_R2 = 0.5
+AXES = ("roll", "pitch", "yaw")
+BADLY_EXPLAINED_R2 = 0.5
+HARDLY_EXCITED_SHARE = 1 / 3
+LARGE_CONSTANT_SHARE = 0.25
+LARGEST_SCALE = 3.0
 NAMED = 8
 RIVALS = {
     "rigid-body": "the rigid body with six inertia parameters",
@@ -20,77 +28,151 @@ RIVALS = {
 }
 
 
-def findings(
-    fit: Fit,
-    system: LeastSquares,
-    excitation: RuleExcitation,
-    scores: Mapping[str, Mapping[str, Score]],
-    outside: Mapping[str, int],
-) -> list[str]:
-    """Say in words what failed or was not excited.
+@dataclass(frozen=True)
+class Evidence:
+    """All that a verdict on an identification rests on.
 
-    Parameters
+    Attributes
     ----------
     fit : Fit
     system : LeastSquares
         The regressor of the model's parameters, without penalty.
     excitation : RuleExcitation
-    scores : mapping
+    axes : AxisEvidence
+        Of the training part.
+    rigid_body : array, shape (6,), kg m^2
+        The rigid body that fits the learned samples best.
+    stated : array, shape (6,), kg m^2, or None
+        Inertia stated for the vehicle.
+    indefinite : int
+        Training samples at which D(q) is not positive definite.
+    samples, outside : mapping of str to int
+        Samples judged, and of them outside the visited attitudes, by part; the training part comes first.
+    scores : mapping of str to mapping of str to Score
         By part, then by model.
-    outside : mapping
-        Samples outside the visited attitudes, by part.
+    """
+
+    fit: Fit
+    system: LeastSquares
+    excitation: RuleExcitation
+    axes: AxisEvidence
+    rigid_body: Array
+    stated: Array | None
+    indefinite: int
+    samples: Mapping[str, int]
+    outside: Mapping[str, int]
+    scores: Mapping[str, Mapping[str, Score]]
+
+
+def findings(evidence: Evidence) -> list[str]:
+    """Say in words what failed or was not excited, what matters most first.
+
+    Parameters
+    ----------
+    evidence : Evidence
 
     Returns
     -------
     list of str
     """
-    return [
-        *_rank(system),
-        *_silent_rules(excitation),
-        *_fuzzy_part_off(fit),
-        *_axes(scores),
-        *_beaten(scores),
-        *_outside(outside),
-    ]
+    rules = (_physics, _scale, _axes, _rank, _silent_rules, _fuzzy_part_off, _beaten, _badly_explained, _outside)
+    return [finding for rule in rules for finding in rule(evidence)]
 
 
-def _rank(system: LeastSquares) -> Iterator[str]:
-    parameters = system.row_space.shape[1]
-    if system.rank < parameters:
-        yield f"rank {system.rank} of {parameters}: the minimum-norm solution was taken"
+def _physics(evidence: Evidence) -> Iterator[str]:
+    remedy = "check signs, axes, frames and units of the log"
+    why = why_unphysical(evidence.rigid_body)
+    if why is not None:
+        yield f"the rigid body that fits best {why}: {remedy}"
+    if evidence.indefinite:
+        training = next(iter(evidence.samples.values()))
+        share = f"{evidence.indefinite} of {training} training samples"
+        yield f"D(q) is not positive definite at {share}: not a model of a body, do not use it; {remedy}"
 
 
-def _silent_rules(excitation: RuleExcitation) -> Iterator[str]:
-    silent = [name for name, excited in zip(excitation.name, excitation.excited, strict=True) if not excited]
-    if silent:
-        rest = f" and {len(silent) - NAMED} more" if len(silent) > NAMED else ""
-        named = ", ".join(silent[:NAMED])
-        yield f"{len(silent)} of {len(excitation.name)} rules not excited beyond the noise: {named}{rest}"
+def _scale(evidence: Evidence) -> Iterator[str]:
+    if evidence.stated is None:
+        return
+    ratio = evidence.rigid_body[:3] / evidence.stated[:3]
+    if np.any(ratio > LARGEST_SCALE) or np.any(ratio < 1 / LARGEST_SCALE):
+        found = " ".join(f"{value:.3g}" for value in ratio)
+        yield (
+            f"the moments of inertia found are {found} times those stated (vehicle.inertia_kg_m2): check the units of "
+            "torque and rates, the rotors' factors, and the vehicle"
+        )
 
 
-def _fuzzy_part_off(fit: Fit) -> Iterator[str]:
-    if np.isinf(fit.ridge_weight):
-        yield "cross-validation switched the fuzzy part off: the data hold no evidence beyond the rigid body"
-
-
-def _axes(scores: Mapping[str, Mapping[str, Score]]) -> Iterator[str]:
-    explained = scores["training"]["rigid-body"].r2_body
-    for axis, r2 in zip(("roll", "pitch", "yaw"), explained, strict=True):
-        if not r2 > HARDLY_EXCITED_R2:
+def _axes(evidence: Evidence) -> Iterator[str]:
+    """Tell a constant torque, a lack of excitation, and torque that is not inertial from each other."""
+    alone = evidence.scores[_training(evidence)]["rigid-body"].r2_body
+    seen = evidence.axes
+    for axis, name in enumerate(AXES):
+        large = abs(seen.constant[axis]) > LARGE_CONSTANT_SHARE * seen.torque[axis]
+        if large and 1 - seen.r2[axis] < 0.75 * (1 - alone[axis]):
             yield (
-                f"{axis} is hardly excited: the motion explains less than half of its torque in training (R2 of the "
-                f"rigid body {r2:.2f}); do not trust this axis"
+                f"{name}: a constant torque of {seen.constant[axis]:.3g} N m acts that no motion explains (centre of "
+                "mass, trim or sensor bias); the model has no term for it"
+            )
+        if not seen.r2[axis] > BADLY_EXPLAINED_R2:
+            moves = seen.acceleration[axis] > HARDLY_EXCITED_SHARE * np.max(seen.acceleration)
+            reason = ": something other than inertia acts, or columns are wrong" if moves else " is hardly excited"
+            yield (
+                f"{name}{reason}: motion and a constant explain less than half of its torque in training (R2 "
+                f"{seen.r2[axis]:.2f}); do not trust this axis"
             )
 
 
-def _beaten(scores: Mapping[str, Mapping[str, Score]]) -> Iterator[str]:
+def _training(evidence: Evidence) -> str:
+    return next(iter(evidence.scores))
+
+
+def _rank(evidence: Evidence) -> Iterator[str]:
+    parameters = evidence.system.row_space.shape[1]
+    if evidence.system.rank < parameters:
+        yield f"rank {evidence.system.rank} of {parameters}: the minimum-norm solution was taken"
+
+
+def _silent_rules(evidence: Evidence) -> Iterator[str]:
+    rules = evidence.excitation
+    silent = [name for name, excited in zip(rules.name, rules.excited, strict=True) if not excited]
+    if silent:
+        rest = f" and {len(silent) - NAMED} more" if len(silent) > NAMED else ""
+        named = ", ".join(silent[:NAMED])
+        yield f"{len(silent)} of {len(rules.name)} rules not excited beyond the noise: {named}{rest}"
+
+
+def _fuzzy_part_off(evidence: Evidence) -> Iterator[str]:
+    if np.isinf(evidence.fit.ridge_weight):
+        left = " ".join(f"{100 * (1 - r2):.3g}" for r2 in evidence.scores[_training(evidence)]["model"].r2_body)
+        yield (
+            "cross-validation switched the fuzzy part off: no evidence for an inertia that depends on attitude; what "
+            f"the rigid body leaves unexplained of roll, pitch, yaw ({left} %) is noise or an effect that has no term"
+        )
+
+
+def _beaten(evidence: Evidence) -> Iterator[str]:
     """Name the parts of the data on which a simpler model explains more, all axes counted alike."""
-    for part, by_model in scores.items():
+    for part, by_model in evidence.scores.items():
         ours = by_model["model"]
         for rival, words in RIVALS.items():
             if rival in by_model and _unexplained(by_model[rival]) < _unexplained(ours) * (1 - 1e-9):
                 shares = f"{_by_axis(by_model[rival])} of roll, pitch, yaw; the model {_by_axis(ours)}"
                 yield f"{part}: {words} leaves less of the torque unexplained ({shares})"
+
+
+def _badly_explained(evidence: Evidence) -> Iterator[str]:
+    """Name held-out parts and axes that the model does not explain, where it did in training."""
+    training, *held_out = evidence.scores
+    learned = evidence.scores[training]["model"].r2_body
+    for part in held_out:
+        r2 = evidence.scores[part]["model"].r2_body
+        bad = [
+            name
+            for name, ours, before in zip(AXES, r2, learned, strict=True)
+            if not ours > BADLY_EXPLAINED_R2 and before > BADLY_EXPLAINED_R2
+        ]
+        if bad:
+            yield f"{part}: the model explains less than half of the torque about {', '.join(bad)}"
 
 
 def _by_axis(score: Score) -> str:
@@ -101,7 +183,8 @@ def _unexplained(score: Score) -> float:
     return float(np.nansum(1.0 - score.r2))
 
 
-def _outside(outside: Mapping[str, int]) -> Iterator[str]:
-    for part, samples in outside.items():
-        if samples:
-            yield f"{part}: {samples} samples lie outside the attitudes that training visited"
+def _outside(evidence: Evidence) -> Iterator[str]:
+    for part, outside in evidence.outside.items():
+        if outside:
+            samples = evidence.samples[part]
+            yield f"{part}: {outside} of {samples} samples lie outside the attitudes that training visited"

@@ -8,15 +8,17 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.identification.axes import axis_evidence
 from cpfls_cli.identification.baselines import Baseline, fit_baselines
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import Evaluator, Judge
 from cpfls_cli.identification.excitation import RuleExcitation, rule_excitation, visited_cells
-from cpfls_cli.identification.findings import findings
+from cpfls_cli.identification.findings import Evidence, findings
 from cpfls_cli.identification.fit import CoefficientSolver, Fit, PlainSolver
 from cpfls_cli.identification.judge import Score, score
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.physics import not_positive_definite
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.rigid_base import RigidBaseSolver
 from cpfls_cli.identification.search import Progress, search
@@ -36,6 +38,7 @@ def identify(
     settings: IdentificationSettings,
     rng: np.random.Generator,
     progress: Progress | None = None,
+    stated_inertia: Array | None = None,
 ) -> Identification:
     """Identify a model and judge it beside its baselines.
 
@@ -51,6 +54,8 @@ def identify(
     rng : numpy.random.Generator
     progress : callable, optional
         Called after each evaluated chromosome.
+    stated_inertia : array, shape (6,), kg m^2, optional
+        Inertia stated for the vehicle, to compare with what the flight says.
 
     Returns
     -------
@@ -80,22 +85,22 @@ def identify(
         predictors[UNIFORM] = uniform[0].torque
     parts = {TRAINING: training, **held_out}
     scores = {part: _scores(predictors, data) for part, data in parts.items()}
-    outside = {part: int(np.sum(model.outside(data.motion.attitude))) for part, data in parts.items()}
-    excitation = _excitation(evaluator, model, baselines[0], scores[TRAINING], settings)
-    system = evaluator.solver.unpenalised(model.partitions, fit)
-    return Identification(
-        model=model,
+    evidence = Evidence(
         fit=fit,
-        system=system,
-        front=front,
-        history=history,
-        excitation=excitation,
-        ridge=evaluator.solver.curve(model.partitions) if isinstance(evaluator.solver, RigidBaseSolver) else None,
-        baselines=baselines,
-        scores=scores,
+        system=evaluator.solver.unpenalised(model.partitions, fit),
+        excitation=_excitation(evaluator, model, baselines[0], scores[TRAINING], settings),
+        axes=axis_evidence(training, settings.rank_tolerance),
+        rigid_body=baselines[0].parameters,
+        stated=stated_inertia,
+        indefinite=int(np.sum(not_positive_definite(model.inertia(training.motion.attitude).value))),
         samples={part: len(data) for part, data in parts.items()},
-        outside=outside,
-        findings=tuple(findings(fit, system, excitation, scores, outside)),
+        outside={part: int(np.sum(model.outside(data.motion.attitude))) for part, data in parts.items()},
+        scores=scores,
+    )
+    ridge = evaluator.solver.curve(model.partitions) if isinstance(evaluator.solver, RigidBaseSolver) else None
+    told = tuple(findings(evidence))
+    return Identification(
+        **vars(evidence), model=model, front=front, history=history, ridge=ridge, baselines=baselines, findings=told
     )
 
 

@@ -35,6 +35,11 @@ class Score:
     r2: Array
     r2_body: Array
 
+    @property
+    def worst_relative_error(self) -> float:
+        """Largest relative error of the axes that have torque; 0 if none has."""
+        return float(np.max(self.relative_error[np.isfinite(self.relative_error)], initial=0.0))
+
 
 def score(data: TorqueData, predicted: Array) -> Score:
     """Compare a prediction with the torque of a flight.

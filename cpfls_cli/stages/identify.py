@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.identification.data import TorqueData
@@ -18,6 +17,7 @@ from cpfls_cli.identification.identify import TRAINING, identify
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.search import SearchStep
+from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.stages.job import Job, Outcome, Started, begin, finish, generator, settings_of
 from cpfls_cli.stages.model_file import model_data
 from cpfls_cli.stages.training import TrainingData, read_torque_data, read_training
@@ -49,7 +49,7 @@ def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]
     clock = time.perf_counter()
     result = _identify(job, flight, data, held_out)
     finish(job, MODEL, model_data(result, job.study.identification.base, data.learned), started.inputs)
-    return _outcome(result, len(data.learned), time.perf_counter() - clock)
+    return _outcome(job, result, len(data.learned), time.perf_counter() - clock)
 
 
 def _roles(flight: Path, selection: Path | None, validate: Sequence[Path]) -> dict[str, Path]:
@@ -67,6 +67,7 @@ def _identify(job: Job, flight: Path, data: TrainingData, held_out: dict[str, To
                 job.study.identification,
                 generator(job.study, "identify"),
                 lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step)),
+                six_parameters(job.study.vehicle.inertia_kg_m2),
             )
     except ComputationError as error:
         raise ComputationError(f"{flight}: {error}") from None
@@ -97,10 +98,10 @@ def _note(step: SearchStep) -> str:
     generation = f"generation {step.generation} of {step.generations}"
     if step.best is None:
         return generation
-    return f"{generation}  best " + "MSE {:.3g}  largest error {:.3g} N m  condition {:.4g}".format(*step.best)
+    return f"{generation}  best error {step.best[0]:.3g}, max {step.best[1]:.3g} N m, cond {step.best[2]:.4g}"
 
 
-def _outcome(result: Identification, learned: int, seconds: float) -> Outcome:
+def _outcome(job: Job, result: Identification, learned: int, seconds: float) -> Outcome:
     training = result.scores["training"]
     held_out = {part: scores for part, scores in result.scores.items() if part != "training"}
     baselines = [name for name in training if name != "model"]
@@ -116,6 +117,13 @@ def _outcome(result: Identification, learned: int, seconds: float) -> Outcome:
         "learned": learned,
         "ridge_weight": result.fit.ridge_weight,
         "fuzzy_part": "off" if np.isinf(result.fit.ridge_weight) else "on",
+        "inertia_kg_m2": {
+            "found": dict(zip(INERTIA_PARAMETERS, result.rigid_body.tolist(), strict=True)),
+            "stated": dict(
+                zip(INERTIA_PARAMETERS, six_parameters(job.study.vehicle.inertia_kg_m2).tolist(), strict=True)
+            ),
+        },
+        "not_positive_definite": result.indefinite,
         "baselines": {name: _score_summary(training[name]) for name in baselines},
         "held_out": {
             part: {
@@ -136,15 +144,11 @@ def _score_summary(score: Score) -> dict[str, Any]:
     return {
         "mse": float(np.mean(score.mse)),
         "max_error": float(np.max(score.max_error)),
-        "relative_error": _worst(score.relative_error),
+        "relative_error": score.worst_relative_error,
         "mse_by_axis": [float(value) for value in score.mse],
         "r2": [float(value) for value in score.r2],
         "r2_body": [float(value) for value in score.r2_body],
     }
-
-
-def _worst(values: Array) -> float:
-    return float(np.max(values[np.isfinite(values)], initial=0.0))
 
 
 def _lines(result: Identification, learned: int) -> list[str]:
@@ -153,11 +157,13 @@ def _lines(result: Identification, learned: int) -> list[str]:
         f"{system.row_space.shape[1]} parameters from {learned} samples; rank {system.rank}, "
         f"condition number {system.condition_number:.5g}; {result.history.evaluations[-1]} evaluations"
     ]
+    moments = " ".join(f"{name} {value:.4g}" for name, value in zip(INERTIA_PARAMETERS, result.rigid_body, strict=True))
+    lines.append(f"rigid body that fits best, kg m^2: {moments}")
     width = max(len(part) for part in result.scores)
     for part, scores in result.scores.items():
         for name, score in scores.items():
             r2 = " ".join(f"{value:8.4f}" for value in score.r2_body)
             errors = f"MSE {np.mean(score.mse):9.3g}  largest error {np.max(score.max_error):9.3g} N m"
-            relative = f"relative {_worst(score.relative_error):8.3%}"
+            relative = f"relative {score.worst_relative_error:8.3%}"
             lines.append(f"{part:{width}}  {name:16}  {errors}  {relative}  R2 roll pitch yaw {r2}")
     return lines

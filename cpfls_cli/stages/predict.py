@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import score
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.physics import not_positive_definite
 from cpfls_cli.stages.job import Job, Outcome, begin, finish, read_good, read_with
 from cpfls_cli.stages.model_file import read_model
 from cpfls_cli.stages.training import MOTION, flight_motion
@@ -60,14 +61,20 @@ def _predict(model: Model, flight: Artifact) -> dict[str, Any]:
 
 def _outcome(flight: Artifact, data: dict[str, Any]) -> Outcome:
     samples, outside = len(data["time"]), int(np.sum(data["outside"]))
+    indefinite = int(np.sum(not_positive_definite(data["inertia"])))
     summary: dict[str, Any] = {"samples": samples, "mse": None, "relative_error": None, "outside": outside}
+    summary["not_positive_definite"] = indefinite
     lines = [f"{samples} samples, {outside} outside the region that the training data visited"]
+    warnings = []
+    if outside:
+        warnings.append(f"{outside} of {samples} samples are extrapolated: do not trust the model there")
+    if indefinite:
+        warnings.append(f"D(q) is not positive definite at {indefinite} of {samples} samples: no body moves like that")
     if "error" in data:
         measured = TorqueData(data["time"], flight_motion(flight), data["measured_torque"])
         judged = score(measured, data["torque"])
-        worst = float(np.max(judged.relative_error[np.isfinite(judged.relative_error)], initial=0.0))
-        summary |= {"mse": float(np.mean(judged.mse)), "relative_error": worst}
+        summary |= {"mse": float(np.mean(judged.mse)), "relative_error": judged.worst_relative_error}
         summary |= {"r2": judged.r2.tolist(), "r2_body": judged.r2_body.tolist()}
-        lines.append(f"MSE {summary['mse']:.4g} (N m)^2, relative error {worst:.3%} (worst axis)")
-    warnings = (f"{outside} of {samples} samples are extrapolated: do not trust the model there",) if outside else ()
-    return Outcome(summary, tuple(lines), warnings)
+        lines.append(f"MSE {summary['mse']:.4g} (N m)^2, relative error {judged.worst_relative_error:.3%} (worst axis)")
+        lines.append("R2 of body torque, roll pitch yaw: " + " ".join(f"{value:.4f}" for value in judged.r2_body))
+    return Outcome(summary, tuple(lines), tuple(warnings))

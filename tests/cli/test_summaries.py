@@ -87,7 +87,7 @@ def test_people_get_lines_and_no_json(cpfls, study, tmp_path):
 def test_verbose_reports_progress_on_standard_error_only(cpfls, pipeline, study, tmp_path):
     result = cpfls("identify", study, pipeline.flight, "-o", tmp_path / "m.h5", "-v", "--json")
     assert json.loads(result.stdout)
-    assert "identify: 100%  generation 1 of 1  best MSE" in result.stderr
+    assert "identify: 100%  generation 1 of 1  best error" in result.stderr
 
 
 def test_set_changes_the_result(cpfls, study, tmp_path):
