@@ -93,12 +93,15 @@ def _physics(evidence: Evidence) -> Iterator[str]:
 def _scale(evidence: Evidence) -> Iterator[str]:
     if evidence.stated is None:
         return
-    ratio = evidence.rigid_body[:3] / evidence.stated[:3]
+    # An axis that the flight does not explain says nothing about scales.
+    explained = evidence.axes.r2 > BADLY_EXPLAINED_R2
+    ratio = (evidence.rigid_body[:3] / evidence.stated[:3])[explained]
     if np.any(ratio > LARGEST_SCALE) or np.any(ratio < 1 / LARGEST_SCALE):
         found = " ".join(f"{value:.3g}" for value in ratio)
+        axes = ", ".join(np.array(AXES)[explained])
         yield (
-            f"the moments of inertia found are {found} times those stated (vehicle.inertia_kg_m2): check the units of "
-            "torque and rates, the rotors' factors, and the vehicle"
+            f"the moments of inertia found ({axes}) are {found} times those stated (vehicle.inertia_kg_m2): check the "
+            "units of torque and rates, the rotors' factors, and the vehicle"
         )
 
 
