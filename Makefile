@@ -43,8 +43,8 @@ $(INSTALLED_DEV): pyproject.toml | $(INSTALLED)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
 	@touch $@
 
-# Each artifact depends on its inputs and on its own part of the config, written out with all defaults; a part that
-# comes out the same leaves its file, and so everything made from it, untouched.
+# Each artifact depends on its inputs and on its own part of the config, written out with all defaults and the version
+# of the program; a part that comes out the same leaves its file, and so everything made from it, untouched.
 STRUCTURE := structure input_map consequents harmonic_order products membership_functions training_share
 PART_trajectory := trajectory vehicle.gravity_m_s2
 PART_simulate := vehicle simulation
@@ -56,7 +56,7 @@ PART_report := vehicle report
 define part
 data/%/.part/$(1).yaml: configs/%.yaml FORCE | $(INSTALLED)
 	@mkdir -p $$(@D)
-	@$(CPFLS) config $$< $(foreach key,$(PART_$(1)),--section $(key)) > $$@.new
+	@{ echo "# $$$$($(CPFLS) --version)"; $(CPFLS) config $$< $(foreach key,$(PART_$(1)),--section $(key)); } > $$@.new
 	@if cmp --silent $$@.new $$@; then rm $$@.new; else mv $$@.new $$@; fi
 endef
 $(foreach stage,trajectory simulate import reduce identify report,$(eval $(call part,$(stage))))
