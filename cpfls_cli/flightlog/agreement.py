@@ -1,6 +1,9 @@
-"""Do attitude and gyroscope tell of one motion? Swapped columns and wrong signs show where they do not."""
+"""Do attitude and gyroscope tell of one motion? Swapped columns, wrong signs and wrong units show where not."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from math import log, pi
 
 import numpy as np
 
@@ -14,6 +17,10 @@ _FILTER_ORDER = 4
 _MOVING_RAD_S = 0.1
 _MOVING_SHARE = 0.1
 _POOR_CORRELATION = 0.6
+# At a correlation of 0.6 and a true gain of 1, noise in one of the two changes the ratio of their spreads by 1.7.
+_LARGEST_GAIN = 2.0
+_DEGREES = 180 / pi
+_NEAR = 1.3
 
 
 def warn_of_disagreement(time: Array, attitude: Array, body_rate: Array) -> tuple[str, ...]:
@@ -21,7 +28,8 @@ def warn_of_disagreement(time: Array, attitude: Array, body_rate: Array) -> tupl
 
     Both go through one low-pass filter, for the derivative of an attitude that is logged in steps is mostly noise. An
     axis is judged where either moves by more than 0.1 rad/s and a tenth of the most moving axis (standard deviations):
-    about an axis that hardly turns, errors of the others decide.
+    about an axis that hardly turns, errors of the others decide. The gain of an axis that agrees is the ratio of the
+    two standard deviations (reduced major axis regression), for either may hold the noise.
 
     Parameters
     ----------
@@ -35,17 +43,40 @@ def warn_of_disagreement(time: Array, attitude: Array, body_rate: Array) -> tupl
     Returns
     -------
     tuple of str
-        A sentence for each axis whose correlation is below 0.6.
+        A sentence for each axis whose correlation is below 0.6, or else whose gain is not within 0.5 .. 2.
     """
     derived = _slow_part(time, rotations.body_rate(attitude, derivative(time, attitude)))
     measured = _slow_part(time, body_rate)
-    correlation = _correlation(derived, measured)
-    return tuple(
-        f"about body {axis} the attitude's derivative and the body rate hardly agree (correlation {value:.2f}):"
-        " check columns, signs and frames of import.signals.attitude (or quaternion) and import.signals.body_rate"
-        for axis, value, moves in zip(_AXES, correlation, _moving(derived, measured), strict=True)
-        if moves and value < _POOR_CORRELATION
+    correlation, moving = _correlation(derived, measured), np.flatnonzero(_moving(derived, measured))
+    poor = correlation < _POOR_CORRELATION
+    gain = {int(axis): float(measured[:, axis].std() / derived[:, axis].std()) for axis in moving if not poor[axis]}
+    return (*(_contradiction(int(axis), correlation[axis]) for axis in moving if poor[axis]), *_wrong_gains(gain))
+
+
+def _contradiction(axis: int, correlation: float) -> str:
+    return (
+        f"about body {_AXES[axis]} the attitude's derivative and the body rate hardly agree (correlation"
+        f" {correlation:.2f}): check columns, signs and frames of import.signals.attitude (or quaternion) and"
+        " import.signals.body_rate"
     )
+
+
+def _wrong_gains(gain: dict[int, float]) -> Iterator[str]:
+    for axis, value in gain.items():
+        if not 1 / _LARGEST_GAIN <= value <= _LARGEST_GAIN:
+            yield (
+                f"about body {_AXES[axis]} the body rate is {value:.3g} times the attitude's derivative:"
+                f" {_explanation(value)}"
+            )
+
+
+def _explanation(gain: float) -> str:
+    units = "units of import.signals.body_rate (or attitude_rate) and import.signals.attitude, and import.time_unit"
+    if abs(log(gain / _DEGREES)) < log(_NEAR):
+        return "that is 180/pi; is import.signals.body_rate.unit (or attitude_rate.unit) deg/s?"
+    if abs(log(gain * _DEGREES)) < log(_NEAR):
+        return "that is pi/180; is import.signals.body_rate.unit (or attitude_rate.unit) rad/s, or attitude.unit deg?"
+    return f"check the {units}"
 
 
 def _slow_part(time: Array, values: Array) -> Array:

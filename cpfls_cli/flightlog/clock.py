@@ -82,15 +82,36 @@ def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -
     if gaps.any() and settings.gap_rule == "stop":
         begin, end = (time[first_full + row] for row in _runs(gaps)[0])
         raise InputError(
-            f"the log has a gap of {end - begin:.3g} s at {begin:.3f} s, longer than import.gap_s ="
+            _slow_log(time, present, settings)
+            or f"the log has a gap of {end - begin:.3g} s at {begin:.3f} s, longer than import.gap_s ="
             f" {settings.gap_s:g}: raise it, cut with import.crop_s, or set import.gap_rule to longest-part"
         )
     stretches = [(first_full + begin, first_full + end) for begin, end in _runs(~gaps)]
     if not stretches:
-        raise InputError("no stretch of the log has values in all mapped columns; see import.signals, import.gap_s")
+        raise InputError(
+            _slow_log(time, present, settings)
+            or "no stretch of the log has values in all mapped columns; see import.signals, import.gap_s"
+        )
     first, last = max(stretches, key=lambda run: float(time[run[1]] - time[run[0]]))
     incomplete = first_full + len(time) - 1 - last_full
     return Stretch(slice(first, last + 1), incomplete, len(time) - incomplete - (last + 1 - first))
+
+
+def _slow_log(time: Array, present: BoolArray, settings: ImportSettings) -> str | None:
+    """Say so where the usual step, not a gap in it, is longer than the longest gap allowed."""
+    step = float(np.median(np.diff(time)))
+    if step > settings.gap_s:
+        return (
+            f"the median step is {step:.3g} s, longer than import.gap_s = {settings.gap_s:g}: is import.time_unit ="
+            f" {settings.time_unit} right, or raise import.gap_s"
+        )
+    slowest = max(float(np.median(np.diff(time[column]))) for column in present.T)
+    if slowest > settings.gap_s:
+        return (
+            f"a mapped column has a value only every {slowest:.3g} s (median), longer than import.gap_s ="
+            f" {settings.gap_s:g}: raise import.gap_s, or leave its signal out of import.signals"
+        )
+    return None
 
 
 def _common_span(present: BoolArray) -> tuple[int, int]:

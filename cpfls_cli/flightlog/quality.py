@@ -25,7 +25,7 @@ class ValueCounts:
     spikes, suspected_spikes : dict from str to int
         Spikes that are interpolated, and spikes that are left alone; one of the two is empty.
     saturated : dict from str to int
-        In long runs at an extreme.
+        In long runs at an extreme; not of a quaternion, and not of rotors at rest.
     """
 
     missing: dict[str, int]
@@ -56,9 +56,17 @@ def count_values(table: Table, spikes: Mapping[str, BoolArray], settings: Import
         missing=_by_column(table.signals, settings, lambda column: int(np.isnan(column).sum())),
         spikes=found if repaired else {},
         suspected_spikes={} if repaired else found,
-        saturated=_by_column(
-            table.signals, settings, lambda column: count_saturated(column, settings.saturation_samples)
-        ),
+        saturated=_saturated(table, settings),
+    )
+
+
+def _saturated(table: Table, settings: ImportSettings) -> dict[str, int]:
+    """Count saturated values; a hovering vehicle's quaternion stands at 1, and a parked one's rotors at 0."""
+    length = settings.saturation_samples
+    rotors = {name: signal for name, signal in table.signals.items() if name.startswith("rotor")}
+    others = {name: signal for name, signal in table.signals.items() if name != "quaternion" and name not in rotors}
+    return _by_column(rotors, settings, lambda column: count_saturated(column, length, rest=0.0)) | _by_column(
+        others, settings, lambda column: count_saturated(column, length)
     )
 
 
@@ -91,6 +99,7 @@ def _by_column(
     counts = {
         column: count(values)
         for name, signal in settings.signals.items()
+        if name in signals
         for column, values in zip(signal.columns, signals[name].T, strict=True)
     }
     return {column: number for column, number in counts.items() if number}

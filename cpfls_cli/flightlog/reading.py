@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import pi
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.flightlog.angles import refuse_steep_pitch, warn_of_angles
 from cpfls_cli.flightlog.clock import longest_stretch
 from cpfls_cli.flightlog.columns import select_columns
 from cpfls_cli.flightlog.conversion import to_program_frames
@@ -45,7 +45,8 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     SettingError
         If the crop leaves fewer than two rows.
     InputError
-        If columns are missing, or a gap is too long.
+        If columns are missing, a gap is too long, the clock goes backward and stays behind, or the pitch is larger
+        than any pitch.
     """
     read = Table(*select_columns(columns, settings))
     table, dropped = in_order_and_cropped(read, settings)
@@ -58,6 +59,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     counts = count_values(table, {name: marked[stretch.rows] for name, marked in spikes.items()}, settings)
     clock, rate_hz = _uniform_clock(table.time)
     on_clock = {name: fill(table.time, values, clock) for name, values in repaired.signals.items()}
+    refuse_steep_pitch(on_clock)
     gaps, longest_gap_s = _gaps(table.time)
     report = ImportReport(
         samples_read=len(read.time),
@@ -72,7 +74,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         span_s=(float(clock[0]), float(clock[-1])),
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,
-        warnings=(*warn_of_values(counts), *_warn_of_gap(stretch.beyond_gap), *_warn_of_pitch(on_clock)),
+        warnings=(*warn_of_values(counts), *_warn_of_gap(stretch.beyond_gap), *warn_of_angles(read.signals)),
     )
     return LogSignals(time=clock - clock[0], report=report, **to_program_frames(on_clock, settings))
 
@@ -91,9 +93,3 @@ def _gaps(time: Array) -> tuple[int, float]:
 
 def _warn_of_gap(rows: int) -> list[str]:
     return [f"{rows} rows beyond a gap are not used"] if rows else []
-
-
-def _warn_of_pitch(signals: Mapping[str, Array]) -> list[str]:
-    if "attitude" not in signals or np.abs(signals["attitude"][:, 1]).max() <= pi / 2:
-        return []
-    return ["the pitch exceeds 90 degrees, which roll, pitch, yaw never do: check the unit and the order of attitude"]

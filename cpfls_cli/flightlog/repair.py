@@ -49,7 +49,7 @@ def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
     return spikes
 
 
-def count_saturated(values: Array, samples: int) -> int:
+def count_saturated(values: Array, samples: int, rest: float | None = None) -> int:
     """Count the values in runs at the channel's smallest or largest value.
 
     Parameters
@@ -58,6 +58,8 @@ def count_saturated(values: Array, samples: int) -> int:
         One channel.
     samples : int
         Length from which a run counts.
+    rest : float, optional
+        Extreme at which the channel may stand without being saturated.
 
     Returns
     -------
@@ -67,7 +69,8 @@ def count_saturated(values: Array, samples: int) -> int:
     known = values[np.isfinite(values)]
     if len(known) == 0 or known.min() == known.max():
         return 0
-    return sum(_values_in_runs(known == extreme, samples) for extreme in (known.min(), known.max()))
+    extremes = [extreme for extreme in (known.min(), known.max()) if extreme != rest]
+    return sum(_values_in_runs(known == extreme, samples) for extreme in extremes)
 
 
 def fill(time: Array, values: Array, target: Array) -> Array:

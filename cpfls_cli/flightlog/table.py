@@ -11,6 +11,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.repair import find_spikes, without_jumps
+from cpfls_cli.flightlog.restart import refuse_restart
 from cpfls_cli.flightlog.settings import ImportSettings
 
 # Measured, not derived: over 15 flights no gyroscope, torque or attitude has a value beyond 7, and 99 % of the single
@@ -41,7 +42,9 @@ class Table:
 
 
 def in_order_and_cropped(table: Table, settings: ImportSettings) -> tuple[Table, dict[str, int]]:
-    """Keep the rows whose time stamps increase and lie inside the crop.
+    """Keep the rows that lie inside the crop, and of these the ones whose time stamps increase.
+
+    The crop comes first, so that it can cut off a part whose clock went wrong.
 
     Parameters
     ----------
@@ -61,20 +64,22 @@ def in_order_and_cropped(table: Table, settings: ImportSettings) -> tuple[Table,
     SettingError
         If the crop leaves fewer than two rows.
     InputError
-        If the time stamps do.
+        If the time stamps do, or go backward and stay behind.
     """
-    kept, dropped = increasing_rows(table.time)
-    table = table.rows(kept)
-    if len(table.time) < 2:
-        raise InputError("the log has fewer than two rows of increasing time stamps; see import.time_column")
     begin, end = settings.crop_s or (-np.inf, np.inf)
-    inside = (table.time >= begin) & (table.time <= end)
-    if inside.sum() < 2:
+    outside = (table.time < begin) | (table.time > end)
+    inside = np.isfinite(table.time) & ~outside
+    if settings.crop_s is not None and inside.sum() < 2:
         raise SettingError(
             "crop_s",
-            f"leaves {inside.sum()} rows of a log of {table.time[-1]:.6g} s; see import.time_unit",
+            f"leaves {inside.sum()} rows of a log of {np.nanmax(table.time):.6g} s; see import.time_unit",
         )
-    return table.rows(inside), dropped | {"crop": int((~inside).sum())}
+    table = table.rows(~outside)
+    refuse_restart(table.time, np.flatnonzero(~outside) + 1)
+    kept, dropped = increasing_rows(table.time)
+    if len(kept) < 2:
+        raise InputError("the log has fewer than two rows of increasing time stamps; see import.time_column")
+    return table.rows(kept), dropped | {"crop": int(outside.sum())}
 
 
 def made_continuous(table: Table) -> Table:

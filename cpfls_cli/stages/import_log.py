@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,14 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import CpflsError, InputError
+from cpfls_cli.errors import CpflsError
 from cpfls_cli.flightlog.importing import import_log
-from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
+from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.stages.job import Job, Outcome, begin, finish, settings_of
-from cpfls_cli.stages.log_quality import found_and_done
+from cpfls_cli.stages.log_quality import found_and_done, missing_signals
+from cpfls_cli.stages.rotor_torque import rotor_torque, rotor_torque_words
 from cpfls_cli.stages.table import read_csv
-from cpfls_cli.vehicle.rotors import body_wrench
 
 
 def run(job: Job, log: Path) -> Outcome:
@@ -45,12 +46,12 @@ def run(job: Job, log: Path) -> Outcome:
     started = begin(job, {"log": log})
     columns = read_csv(log, _wanted(job.study.import_))
     with _naming(log), settings_of("import", job.study):
-        flight = _import(columns, job.study)
+        flight = _with_hints(_import(columns, job.study))
     # An import is quick, and only the whole of it shows that every key suits the log.
     if started.dry_run is not None:
         return started.dry_run
     finish(job, FLIGHT, {**_signals(flight), **_quality(flight), **_delay(flight)}, started.inputs)
-    return _outcome(flight)
+    return _outcome(flight, job.study)
 
 
 @contextmanager
@@ -65,45 +66,20 @@ def _import(columns: dict[str, Array], study: Study) -> ImportedFlight:
     return import_log(
         columns,
         study.import_,
-        rotor_torque=_rotor_torque(study),
+        rotor_torque=rotor_torque(study),
         # The delay is a parameter too: the part of the flight that is held out must not choose it.
         delay_share=study.identification.training_share,
     )
 
 
+def _with_hints(flight: ImportedFlight) -> ImportedFlight:
+    """Add to the warnings what later stages will miss."""
+    warnings = (*flight.report.warnings, *missing_signals(flight))
+    return replace(flight, report=replace(flight.report, warnings=warnings))
+
+
 def _wanted(settings: ImportSettings) -> set[str]:
     return {settings.time_column} | {column for signal in settings.signals.values() for column in signal.columns}
-
-
-def _rotor_torque(study: Study) -> Callable[[LogSignals], Array]:
-    """Make the body torque of the rotors from their speeds, or from commands taken for speeds."""
-
-    def torque(signals: LogSignals) -> Array:
-        if study.import_.torque_source == "rotor-speed":
-            speed = signals.rotor_speed
-        else:
-            unit = study.import_.signals["rotor_command"].unit
-            speed = _commanded_speed(signals.rotor_command, unit, study.vehicle.rotor_speed_max_rad_s)
-        rotors = len(study.vehicle.rotors)
-        if speed is None or speed.shape[1] != rotors:
-            raise InputError(
-                f"import.signals names {0 if speed is None else speed.shape[1]} rotors, vehicle.rotors has {rotors}"
-            )
-        return body_wrench(study.vehicle, speed).body_torque
-
-    return torque
-
-
-def _commanded_speed(command: Array | None, unit: str, speed_max: float) -> Array | None:
-    """Take a command in 0..1 as a share of the largest rotor speed; speeds are taken as they are."""
-    if command is None or unit in {"rad/s", "rpm"}:
-        return command
-    if unit != "1":
-        raise InputError(
-            f"import.signals.rotor_command.unit = {unit}: torque_source rotor-command needs commands in 0..1 (unit 1, "
-            "with scale and offset) or rotor speeds (rad/s, rpm)"
-        )
-    return command * speed_max
 
 
 def _signals(flight: ImportedFlight) -> dict[str, Array]:
@@ -129,7 +105,7 @@ def _delay(flight: ImportedFlight) -> dict[str, Any]:
     return delay
 
 
-def _outcome(flight: ImportedFlight) -> Outcome:
+def _outcome(flight: ImportedFlight, study: Study) -> Outcome:
     report = flight.report
     estimate = report.delay
     summary = {
@@ -152,6 +128,7 @@ def _outcome(flight: ImportedFlight) -> Outcome:
     }
     lines = [f"{report.samples} samples at {report.rate_hz:.4g} Hz from {report.samples_read} rows"]
     lines += [f"{what} ({count})" for what, count in found_and_done(report).items()]
+    lines += rotor_torque_words(study)
     if estimate is not None:
         r2 = " ".join(f"{value:.3f}" for value in estimate.r2)
         lines.append(f"delay of motion behind command: {1e3 * report.delay_s:.1f} ms (R2 about body axes {r2})")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Final
 
-from cpfls_cli.flightlog.results import ImportReport
+from cpfls_cli.flightlog.results import ImportedFlight, ImportReport
 
 _DROPPED: Final = MappingProxyType(
     {
@@ -41,3 +41,28 @@ def found_and_done(report: ImportReport) -> dict[str, int]:
     }
     counts = rows | gaps | {what: sum(by_column.values()) for what, by_column in values.items()}
     return {what: count for what, count in counts.items() if count}
+
+
+def missing_signals(flight: ImportedFlight) -> tuple[str, ...]:
+    """Say which later stages will refuse a flight for what its log lacks, and which key would provide it.
+
+    Parameters
+    ----------
+    flight : ImportedFlight
+
+    Returns
+    -------
+    tuple of str
+    """
+    sentences = []
+    if flight.attitude is None:
+        sentences.append(
+            "the flight has no attitude, so reduce, identify and predict will refuse it: map one with"
+            " import.signals.attitude or import.signals.quaternion"
+        )
+    if flight.body_torque is None:
+        sentences.append(
+            "the flight has no torque, so identify will refuse it: map one with import.signals.body_torque, or"
+            " rotors with import.signals.rotor_speed or rotor_command, and name it in import.torque_source"
+        )
+    return tuple(sentences)

@@ -48,7 +48,7 @@ def run(job: Job, flight: Path) -> Outcome:
         selection = reduce(Q, job.study.reduction, job.progress)
         random = _random(Q, len(selection.indices), job.study)
     finish(job, SELECTION, _data(selection, len(Q), random), started.inputs)
-    return _outcome(selection, len(Q), random)
+    return _outcome(selection, len(Q), random, job.study.reduction.condition_number)
 
 
 @contextmanager
@@ -91,7 +91,7 @@ def _data(selection: Selection, candidates: int, random: Array) -> dict[str, Any
     }
 
 
-def _outcome(selection: Selection, candidates: int, random: Array) -> Outcome:
+def _outcome(selection: Selection, candidates: int, random: Array, target: float | None) -> Outcome:
     summary = {
         "samples": candidates,
         "selected": len(selection.indices),
@@ -110,9 +110,16 @@ def _outcome(selection: Selection, candidates: int, random: Array) -> Outcome:
         f"condition number {selection.condition_number:.5g} (all samples {selection.condition_number_full:.5g}, random "
         f"choice of equal size {np.median(random):.5g})",
     )
-    warnings = (
-        ("the rule stalled below full rank: do not train on this selection; use sigma_min, A or D",)
-        if selection.stalled
-        else ()
-    )
-    return Outcome(summary, lines, warnings)
+    return Outcome(summary, lines, tuple(_warnings(selection, candidates, target)))
+
+
+def _warnings(selection: Selection, candidates: int, target: float | None) -> Iterator[str]:
+    if selection.stalled:
+        yield "the rule stalled below full rank: do not train on this selection; use sigma_min, A or D"
+    if target is not None and selection.condition_number > target:
+        all_in = len(selection.indices) == candidates
+        limit = "all samples are in" if all_in else "reduction.size stopped the selection; raise it or set it to null"
+        yield (
+            f"the target reduction.condition_number = {target:g} is not reached, the selection has"
+            f" {selection.condition_number:.5g}: {limit}"
+        )

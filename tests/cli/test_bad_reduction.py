@@ -1,5 +1,7 @@
 """A reduction that the flight does not allow: the key and its value, also where nothing would be computed."""
 
+import json
+
 import pytest
 
 
@@ -19,3 +21,20 @@ def test_size_that_does_not_suit_the_flight(refuse, pipeline, study, tmp_path, s
 def test_all_samples_can_be_asked_for(cpfls, pipeline, study, tmp_path):
     words = ("-o", tmp_path / "out.h5", "--set", "reduction.size=549", "--dry-run")
     assert cpfls("reduce", study, pipeline.flight, *words).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("size", "target", "words"),
+    [
+        ("60", 2.0, "reduction.size stopped the selection; raise it or set it to null"),
+        ("null", 2.0, "all samples are in"),
+        ("60", 1e9, None),
+    ],
+)
+def test_a_condition_number_that_is_not_reached_is_said(cpfls, pipeline, study, tmp_path, size, target, words):
+    options = ("--set", f"reduction.size={size}", "--set", f"reduction.condition_number={target}", "--json")
+    faster = ("--set", "reduction.criterion=D", "--set", "identification.training_share=0.2")
+    result = cpfls("reduce", study, pipeline.flight, "-o", tmp_path / "out.h5", *options, *faster)
+    reached = json.loads(result.stdout)["condition_number"]
+    note = f"the target reduction.condition_number = 2 is not reached, the selection has {reached:.5g}: {words}"
+    assert result.stderr == (f"cpfls: note: {note}\n" if words else "")

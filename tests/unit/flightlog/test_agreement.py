@@ -66,3 +66,40 @@ def test_an_axis_that_hardly_turns_is_not_judged():
     columns["w2"] = -columns["w2"]
     assert warnings(log(sizes=(0.001, 0.001, 0.001), noise=0.05)) == []
     assert not any("yaw" in text for text in warnings(log(sizes=(0.01, 0.9, 0.001)) | {"w2": 0 * TIME}))
+
+
+def gains(columns, signals=SIGNALS):
+    settings = ImportSettings(signals=signals, torque_source=None)
+    return [text for text in import_log(columns, settings).report.warnings if "times the attitude's derivative" in text]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+@pytest.mark.parametrize(
+    ("factor", "unit"), [(180 / np.pi, "deg/s"), (np.pi / 180, "rad/s")], ids=["taken for rad/s", "taken for deg/s"]
+)
+def test_rates_in_the_other_unit_are_named_by_their_gain(factor, unit, noise):
+    columns = log(noise=noise)
+    columns |= {name: factor * columns[name] for name in ("w0", "w1", "w2")}
+    found = gains(columns)
+    assert [text.split(" the ")[0] for text in found] == [
+        "about body x (roll)",
+        "about body y (pitch)",
+        "about body z (yaw)",
+    ]
+    values = [float(text.split("rate is ")[1].split(" ")[0]) for text in found]
+    np.testing.assert_allclose(values, factor, rtol=0.1 if noise else 0.005)
+    assert all(f"import.signals.body_rate.unit (or attitude_rate.unit) {unit}" in text for text in found)
+
+
+@pytest.mark.parametrize(("gain", "warned"), [(0.45, True), (0.55, False), (1.9, False), (2.1, True)])
+def test_a_gain_between_a_half_and_two_is_let_pass(gain, warned):
+    columns = log()
+    columns["w1"] = gain * columns["w1"]
+    found = gains(columns)
+    assert len(found) == warned
+    assert all("about body y (pitch)" in text and "check the units" in text for text in found)
+
+
+def test_noise_alone_is_no_gain():
+    assert gains(log(noise=0.3, held=5)) == []
+    assert gains(log(noise=5.0)) == []

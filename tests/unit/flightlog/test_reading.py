@@ -204,8 +204,70 @@ def test_yaw_logged_between_minus_and_plus_180_degrees_turns_on():
     np.testing.assert_allclose(signals.attitude[:, 2], np.deg2rad(400 * signals.time), atol=1e-9)
 
 
-def test_degrees_taken_for_radians_are_noticed():
-    mapped = {"attitude": SignalMap(columns=("p", "angle", "r"), unit="rad")}
+def attitude(columns, **angles):
+    names = ("roll", "pitch", "yaw")
+    zero = {name: np.zeros(len(columns["t"])) for name in names}
+    return columns | zero | angles, {"attitude": SignalMap(columns=names, unit="rad")}
+
+
+def test_degrees_taken_for_radians_stop_at_the_pitch():
+    columns, mapped = attitude(log(), pitch=20 * log()["p"])
+    with pytest.raises(InputError, match=r"attitude reaches 20 rad of pitch.* is import.signals.attitude.unit deg\?"):
+        read_signals(columns, settings(signals=mapped))
+
+
+def test_a_nose_straight_up_is_no_degrees():
+    columns, mapped = attitude(log(), pitch=np.full(201, np.pi / 2 + 0.01))
+    assert read_signals(columns, settings(signals=mapped)).report.warnings == ()
+
+
+def test_a_spike_of_the_pitch_that_is_interpolated_is_no_degrees():
+    pitch = 0.1 * log()["p"]
+    pitch[80] = 40.0
+    columns, mapped = attitude(log(), pitch=pitch)
+    read_signals(columns, settings(signals=mapped, spike_deviations=8.0))
+    with pytest.raises(InputError, match="spike_deviations"):
+        read_signals(columns, settings(signals=mapped))
+
+
+@pytest.mark.parametrize("angle", ["roll", "yaw"])
+def test_roll_and_yaw_beyond_a_full_turn_are_doubted_where_no_gyroscope_can_tell(angle):
+    columns, mapped = attitude(log(), **{angle: 30 * log()["p"]})
+    (warning,) = read_signals(columns, settings(signals=mapped)).report.warnings
+    assert warning.startswith(f"attitude reaches 30 rad of {angle}: is import.signals.attitude.unit deg?")
+    assert read_signals(columns, settings(signals=mapped | RATE)).report.warnings == ()
+
+
+@pytest.mark.parametrize(("name", "signal"), [("quaternion", "1"), ("rotor_speed", "rad/s"), ("rotor_command", "1")])
+def test_a_quaternion_near_one_and_rotors_at_rest_are_not_saturated(name, signal):
+    value = np.where(np.arange(201) < 100, 0.0, 400 * log()["p"])
+    columns = log() | {f"u{i}": value for i in range(4)}
+    if name == "quaternion":
+        columns |= {"u0": np.minimum(1.0, 1.2 - 0.2 * log()["t"]), "u1": 0 * value, "u2": 0 * value, "u3": 0.1 * value}
+    mapped = RATE | {name: SignalMap(columns=("u0", "u1", "u2", "u3"), unit=signal)}
+    assert read_signals(columns, settings(signals=mapped)).report.saturated == {}
+
+
+def test_rotors_at_their_largest_speed_are_saturated():
+    columns = log() | {"u": np.minimum(np.where(np.arange(201) < 50, 0.0, 900 * log()["t"]), 1000.0)}
+    mapped = RATE | {"rotor_speed": SignalMap(columns=("u",), unit="rad/s")}
+    saturated = read_signals(columns, settings(signals=mapped)).report.saturated
+    assert saturated == {"u": int((columns["u"] == 1000).sum())}
+    assert saturated["u"] > 80
+
+
+@pytest.mark.parametrize("rule", ["stop", "longest-part"])
+def test_a_step_longer_than_the_gap_asks_for_the_unit_of_time(rule):
+    """A log at 100 Hz whose stamps are milliseconds, taken for seconds."""
+    with pytest.raises(InputError) as caught:
+        read_signals(log() | {"t": 1e3 * log()["t"]}, settings(gap_rule=rule))
+    assert str(caught.value) == (
+        "the median step is 10 s, longer than import.gap_s = 0.1: is import.time_unit = s right, or raise import.gap_s"
+    )
+
+
+def test_a_slow_column_in_a_fast_log_is_told_from_a_wrong_clock():
     columns = log()
-    columns["angle"] = 20 * columns["p"]
-    assert any("check the unit" in text for text in read_signals(columns, settings(signals=mapped)).report.warnings)
+    columns["r"][np.arange(201) % 20 != 0] = np.nan
+    with pytest.raises(InputError, match=r"a mapped column has a value only every 0\.2 s"):
+        read_signals(columns, settings())

@@ -1,0 +1,79 @@
+"""What an import says of a log beyond its values: what later stages will miss, and what the torque was made of."""
+
+import h5py
+import numpy as np
+import pytest
+
+TIME = np.arange(0.0, 4.0, 0.02)
+SIGNALS = {
+    "attitude": "attitude: {columns: [roll, pitch, yaw], unit: rad}",
+    "body_rate": "body_rate: {columns: [p, q, r], unit: rad/s}",
+    "body_torque": "body_torque: {columns: [mx, my, mz], unit: N m}",
+    "rotor_command": "rotor_command: {columns: [u1, u2, u3, u4], unit: '1'}",
+    "rotor_speed": "rotor_speed: {columns: [u1, u2, u3, u4], unit: rad/s}",
+}
+NO_ATTITUDE = "the flight has no attitude, so reduce, identify and predict will refuse it: map one with import.signals."
+NO_TORQUE = "the flight has no torque, so identify will refuse it: map one with import.signals.body_torque"
+
+
+@pytest.fixture
+def imported(cpfls, tmp_path):
+    """Import a made-up log with some of its signals; give lines, notes and the flight."""
+
+    def call(*signals, source="null"):
+        names = ["t", "roll", "pitch", "yaw", "p", "q", "r", "mx", "my", "mz", "u1", "u2", "u3", "u4"]
+        waves = [0.1 * np.sin((2 + number % 3) * TIME) for number in range(len(names) - 5)]
+        rows = np.column_stack([TIME, *waves, *(0.5 + waves[wave] for wave in range(4))])
+        log, config, flight = (tmp_path / name for name in ("log.csv", "study.yaml", "flight.h5"))
+        np.savetxt(log, rows, delimiter=",", header=",".join(names), comments="")
+        mapped = ", ".join(SIGNALS[signal] for signal in signals)
+        config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: {source}}}")
+        result = cpfls("import", config, log, "-o", flight, "--force")
+        assert result.exit_code == 0, result.stderr
+        notes = [line.removeprefix("cpfls: note: ") for line in result.stderr.splitlines()]
+        return result.stdout.splitlines(), notes, flight
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("signals", "source", "wanted"),
+    [
+        (("body_rate",), "null", [NO_ATTITUDE, NO_TORQUE]),
+        (("body_rate", "body_torque"), "column", [NO_ATTITUDE]),
+        (("attitude",), "null", [NO_TORQUE]),
+        (("attitude", "body_torque"), "column", []),
+        (("attitude", "rotor_command"), "rotor-command", []),
+    ],
+)
+def test_what_later_stages_will_miss_is_said_and_kept(imported, signals, source, wanted):
+    _, notes, flight = imported(*signals, source=source)
+    assert [note[: len(start)] for note, start in zip(notes, wanted, strict=True)] == wanted
+    with h5py.File(flight) as file:
+        kept = list(file["quality/warning"].asstr()) if notes else []
+        assert ("quality/warning" in file, kept) == (bool(notes), notes)
+
+
+def test_the_stages_refuse_as_it_was_said(imported, refuse, study, tmp_path):
+    _, _, flight = imported("attitude")
+    assert "lacks torque" in refuse("identify", study, flight, "-o", tmp_path / "out.h5")[0]
+    _, _, flight = imported("body_rate", "body_torque", source="column")
+    for words in (("reduce", study, flight), ("identify", study, flight)):
+        assert "lacks attitude" in refuse(*words, "-o", tmp_path / "out.h5")[0]
+
+
+def test_commands_are_shares_of_the_largest_speed_and_it_says_so(imported):
+    lines, _, flight = imported("attitude", "rotor_command", source="rotor-command")
+    assert "body torque: of vehicle.rotors, speed = command * vehicle.rotor_speed_max_rad_s (1000 rad/s)" in lines
+    with h5py.File(flight) as file:
+        speed, torque = 1000 * file["rotor_command"][:], file["body_torque"][:]
+    # The default vehicle: rotor 2 stands on the right of the body and rotor 4 on its left, at 0.3 m.
+    expected = 0.3 * 121.5e-6 * (speed[:, 3] ** 2 - speed[:, 1] ** 2)
+    np.testing.assert_allclose(torque[:, 0], expected, rtol=1e-9, atol=1e-12)
+
+
+def test_measured_speeds_are_named_and_a_column_needs_no_words(imported):
+    lines, _, _ = imported("attitude", "rotor_speed", source="rotor-speed")
+    assert "body torque: of vehicle.rotors at their measured speeds" in lines
+    lines, _, _ = imported("attitude", "body_torque", source="column")
+    assert not any("body torque" in line for line in lines)

@@ -1,0 +1,74 @@
+import re
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog import ImportSettings, SignalMap, read_signals
+
+RATE = {"body_rate": SignalMap(columns=("p", "q", "r"), unit="rad/s")}
+STAMPS = 0.01 * np.arange(3000)
+
+
+def read(time, crop_s=None):
+    columns = {"t": time} | {name: np.arange(len(time), dtype=float) for name in "pqr"}
+    return read_signals(columns, ImportSettings(signals=RATE, torque_source=None, crop_s=crop_s, gap_s=10.0))
+
+
+def refusal(time):
+    with pytest.raises(InputError) as caught:
+        read(time)
+    return str(caught.value)
+
+
+def test_a_clock_that_restarts_stops_with_the_row_and_the_rows_behind():
+    message = refusal(np.concatenate([STAMPS, STAMPS]))
+    assert message.startswith(
+        "time goes backward at row 3001 (from 29.99 s to 0 s after the first stamp) and stays behind for 2999 rows:"
+        " the clock was reset or logs were joined; split the log"
+    )
+    assert "cannot tell the parts apart" in message
+
+
+@pytest.mark.parametrize(
+    ("time", "rows"),
+    [
+        (np.concatenate([STAMPS + 500, STAMPS]), 3000),
+        (np.concatenate([STAMPS, STAMPS + 20]), 2000),
+        (np.concatenate([STAMPS[:1000], STAMPS[1000:1001] + 4e6, STAMPS[1001:]]), 2999),
+    ],
+    ids=["reset from a later clock", "joined with some overlap", "one stamp far in the future"],
+)
+def test_a_crop_that_is_offered_keeps_what_it_says(time, rows):
+    message = refusal(time)
+    offer = re.search(r"keep one part of (\d+) rows with import.crop_s = \[(.*), (.*)\]", message)
+    assert int(offer[1]) == pytest.approx(rows, abs=2)
+    kept = read(time, crop_s=(float(offer[2]), float(offer[3]))).report
+    assert kept.samples_read - sum(kept.dropped.values()) == pytest.approx(int(offer[1]), abs=1)
+    assert kept.dropped["backward_time"] == 0
+
+
+def test_late_packets_are_dropped_and_counted_however_many():
+    time = STAMPS.copy()
+    time[10::10] -= 0.015
+    assert read(time).report.dropped["backward_time"] == 299
+
+
+def test_bursts_of_late_packets_up_to_five_per_cent_are_dropped():
+    time = STAMPS.copy()
+    time[1000:1150] -= 5
+    assert read(time).report.dropped["backward_time"] == 150
+    time[1000:1160] = STAMPS[1000:1160] - 5
+    assert "at row 1001 (from 9.99 s to 5 s" in refusal(time)
+
+
+def test_rows_without_a_stamp_do_not_hide_a_restart():
+    time = np.concatenate([STAMPS, STAMPS])
+    time[3001::2] = np.nan
+    assert "time goes backward at row 3001" in refusal(time)
+
+
+def test_rows_are_those_of_the_log_under_a_crop_too():
+    time = np.concatenate([STAMPS, STAMPS])
+    with pytest.raises(InputError, match="at row 3501 "):
+        read(time, crop_s=(5.0, 25.0))
