@@ -19,6 +19,10 @@ from cpfls_cli.errors import CpflsError, InputError
 if TYPE_CHECKING:
     from cpfls_cli.stages.job import Outcome
 
+_BAR_WIDTH = 20
+# 128 plus the number of SIGPIPE: what a shell reports of the tools that this signal ends.
+_CLOSED_PIPE = 141
+
 
 @contextmanager
 def messages_for_errors() -> Iterator[None]:
@@ -39,12 +43,12 @@ def messages_for_errors() -> Iterator[None]:
     except BrokenPipeError:
         # Whoever reads the output has seen enough, as in `cpfls config | head -1`.
         _mute_output()
-        raise typer.Exit(1) from None
+        raise typer.Exit(_CLOSED_PIPE) from None
     except OSError as error:
         if error.filename is None:
             _mute_output()
         _complain(f"{error.filename or 'output'}: {error.strerror or error}")
-        raise typer.Exit(InputError.exit_code) from None
+        raise typer.Exit(InputError.exit_code if error.filename else CpflsError.exit_code) from None
 
 
 def tell(outcome: Outcome, common: Common) -> None:
@@ -83,15 +87,17 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.table import Column
 
     columns = (
         TextColumn(title),
-        BarColumn(),
+        BarColumn(bar_width=_BAR_WIDTH, table_column=Column(width=_BAR_WIDTH)),
         TaskProgressColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
+        TimeRemainingColumn(table_column=Column(no_wrap=True)),
+        # What is left of the line; a longer note is cut, so that bar and time stay whole.
+        TextColumn("{task.fields[note]}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as bar:
         task = bar.add_task(title, total=None, note="")
 
         def show(done: float, total: int, note: str = "") -> None:

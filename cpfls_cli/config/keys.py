@@ -6,13 +6,16 @@ import types
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from typing_extensions import Doc
 
 from cpfls_cli.config.study import Study
 
+Choice = str | int | None
+
 _ENTRIES = {tuple, list, dict, Mapping}
+_UNIONS = {Union, types.UnionType}
 
 
 @dataclass(frozen=True)
@@ -28,12 +31,18 @@ class Key:
         The settings class below this key.
     many : bool
         Whether the key holds a list or a mapping of such sections.
+    choices : tuple of str, int or None
+        The only values allowed; empty where there are other ones.
+    entries : tuple of str
+        Names that the entries of a mapping may have; empty where it is no mapping of named entries.
     """
 
     name: str
     doc: str
     section: type | None
     many: bool
+    choices: tuple[Choice, ...]
+    entries: tuple[Choice, ...]
 
 
 @cache
@@ -54,7 +63,11 @@ def keys_of(settings: type) -> tuple[Key, ...]:
         names = {name: field.alias or name for name, field in Study.model_fields.items()}
     else:
         names = {field.name: field.name for field in fields(settings)}
-    return tuple(Key(shown, _doc(hints[name]), *_section(hints[name])) for name, shown in names.items())
+    return tuple(_key(shown, hints[name]) for name, shown in names.items())
+
+
+def _key(name: str, hint: Any) -> Key:
+    return Key(name, _doc(hint), *_section(hint), _choices(hint) or (), _entries(hint))
 
 
 def known_keys(location: Sequence[str], deep: bool = False) -> list[str]:
@@ -102,7 +115,29 @@ def _section(hint: Any, many: bool = False) -> tuple[type | None, bool]:
     if is_dataclass(hint) and isinstance(hint, type):
         return hint, many
     origin = get_origin(hint)
-    if origin in {Annotated, Union, types.UnionType} or origin in _ENTRIES:
+    if origin is Annotated or origin in _UNIONS or origin in _ENTRIES:
         found = (_section(part, many or origin in _ENTRIES) for part in get_args(hint))
         return next((pair for pair in found if pair[0] is not None), (None, False))
     return None, False
+
+
+def _choices(hint: Any) -> tuple[Choice, ...] | None:
+    """Find the values of a hint such as ``Literal["s", "ms"] | None``; None where it allows others too."""
+    origin = get_origin(hint)
+    if origin is Literal:
+        return get_args(hint)
+    if hint is types.NoneType:
+        return (None,)
+    if origin is Annotated:
+        return _choices(get_args(hint)[0])
+    if origin not in _UNIONS:
+        return None
+    parts = [_choices(part) for part in get_args(hint)]
+    return None if None in parts else tuple(value for part in parts if part for value in part)
+
+
+def _entries(hint: Any) -> tuple[Choice, ...]:
+    """Find the names that the entries of a mapping may have."""
+    if get_origin(hint) is Annotated:
+        return _entries(get_args(hint)[0])
+    return _choices(get_args(hint)[0]) or () if get_origin(hint) in {dict, Mapping} else ()

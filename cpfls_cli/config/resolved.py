@@ -1,11 +1,10 @@
-"""A study written out again: resolved, in parts, hashed, and as a commented default."""
+"""A study written out again: resolved, whole or in parts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from cpfls_cli.config.keys import keys_of
 from cpfls_cli.config.study import SECTIONS, Study
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.errors import ConfigError
@@ -61,28 +60,3 @@ def resolved_yaml(study: Study, sections: Sequence[str] = ()) -> str:
     str
     """
     return to_yaml(resolved(study, sections))
-
-
-def commented_default() -> str:
-    """Write the default study as YAML with a line of comment on every key.
-
-    Returns
-    -------
-    str
-    """
-    return "\n".join(_commented(Study, resolved(Study()), 0)) + "\n"
-
-
-def _commented(settings: type, data: dict[str, Any], depth: int) -> Iterator[str]:
-    indent = "  " * depth
-    for key in keys_of(settings):
-        value = data[key.name]
-        if key.section is not None and isinstance(value, dict) and set(value) == {k.name for k in keys_of(key.section)}:
-            yield f"{indent}{key.name}:  # {key.doc}" if key.doc else f"{indent}{key.name}:"
-            yield from _commented(key.section, value, depth + 1)
-            continue
-        if key.doc:
-            yield f"{indent}# {key.doc}"
-        if key.section is not None:
-            yield from (f"{indent}#   {below.name}: {below.doc}" for below in keys_of(key.section))
-        yield from (indent + line for line in to_yaml({key.name: value}).rstrip("\n").split("\n"))

@@ -83,9 +83,8 @@ class ImportSettings(Settings):
     torque_source: Annotated[
         Literal["column", "rotor-speed", "rotor-command"] | None,
         Doc(
-            "where the body torque comes from: column (torque or body_torque), the rotors of the vehicle by their "
-            "rotor-speed, or by rotor-command (commands in 0..1 are multiplied by vehicle.rotor_speed_max_rad_s; speeds"
-            " are taken as they are); null: no torque"
+            "column: torque or body_torque of the log; rotor-speed, rotor-command: of the vehicle's rotors, commands in"
+            " 0..1 times vehicle.rotor_speed_max_rad_s, speeds as they are; null: no torque"
         ),
     ] = "column"
     crop_s: Annotated[tuple[float, float] | None, Doc("begin and end that are kept, s from the first stamp")] = None

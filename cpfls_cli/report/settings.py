@@ -16,4 +16,4 @@ class ReportSettings(Settings):
 
     title: Annotated[str, Doc("heading of the page")] = "Identification of rotational dynamics"
     notes: Annotated[tuple[str, ...], Doc("what a reader should know about this study, one sentence each")] = ()
-    paper: Annotated[bool, Doc("show the figures that the paper prints beside ours")] = True
+    paper: Annotated[bool, Doc("show the figures that the paper prints beside ours")] = False

@@ -68,11 +68,11 @@ def test_reader_that_has_seen_enough(words):
     with subprocess.Popen([*PROGRAM, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         process.stdout.close()
         messages = process.stderr.read()
-    assert (process.returncode, messages) == (1, "")
+    assert (process.returncode, messages) == (141, "")
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no device that is always full")
 def test_output_to_a_full_disk():
     with open("/dev/full", "w") as full:
         result = subprocess.run([*PROGRAM, "config"], stdout=full, stderr=subprocess.PIPE, text=True)
-    assert (result.returncode, result.stderr) == (2, "cpfls: error: output: No space left on device\n")
+    assert (result.returncode, result.stderr) == (1, "cpfls: error: output: No space left on device\n")

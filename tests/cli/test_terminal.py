@@ -9,10 +9,10 @@ import sys
 import pytest
 
 
-def on_terminal(*words):
-    """Run a command with standard error on a terminal of 200 columns; give exit code, output and what was shown."""
+def on_terminal(*words, columns=200):
+    """Run a command with standard error on a terminal; give exit code, output and what was shown."""
     ours, theirs = pty.openpty()
-    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "200"}
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": str(columns)}
     command = [sys.executable, "-m", "cpfls_cli", *map(str, words)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, env=environment) as process:
         os.close(theirs)
@@ -55,3 +55,16 @@ def test_verbose_speaks_on_a_terminal_too(identify, tmp_path):
 
 def test_quiet_shows_nothing(identify):
     assert on_terminal(*identify[:5], "-q") == (0, "", "")
+
+
+def test_bar_and_time_stay_whole_on_a_terminal_of_80_columns(identify):
+    code, _, shown = on_terminal(*identify, columns=80)
+    assert code == 0, shown
+    lines = [line.rstrip() for line in re.split(r"[\r\n]+", shown) if line.startswith("identify ")]
+    assert lines
+    assert max(map(len, lines)) <= 80
+    timed = re.compile(r"identify [━╸╺ ]{20} +\d+% \d:\d\d:\d\d generation \d of 3 .*")
+    last = [line for line in lines if timed.fullmatch(line)]
+    assert last, lines
+    # The note is longer than what is left of the line.
+    assert any(line.endswith("…") for line in last)

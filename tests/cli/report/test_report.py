@@ -32,7 +32,7 @@ identification:
   subpopulations: 2
   training_share: 0.7
   local_search: {enabled: false}
-report: {title: "<script>alert(1)</script> & a study"}
+report: {title: "<script>alert(1)</script> & a study", paper: true}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [

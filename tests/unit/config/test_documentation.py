@@ -1,8 +1,13 @@
 """Every key of a config is documented, and the commented default shows it."""
 
+from typing import get_args
+
+from cpfls_cli.config.commented import commented_default
 from cpfls_cli.config.keys import keys_of, known_keys
-from cpfls_cli.config.resolved import commented_default
+from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import SECTIONS, Study
+from cpfls_cli.flightlog import SignalName
+from cpfls_cli.units import KNOWN_UNITS
 
 
 def all_keys(settings, prefix=""):
@@ -35,3 +40,46 @@ def test_known_keys_look_inside_lists_and_mappings():
     assert known_keys(["vehicle", "mass_kg"]) == []
     assert known_keys(["nowhere"]) == []
     assert "vehicle.rotors.spin" in known_keys([], deep=True)
+
+
+def enumerated(schema):
+    """Find every list of allowed values in a JSON schema."""
+    if isinstance(schema, dict):
+        yield from [frozenset(schema["enum"])] if isinstance(schema.get("enum"), list) else []
+        for part in schema.values():
+            yield from enumerated(part)
+    elif isinstance(schema, list):
+        for part in schema:
+            yield from enumerated(part)
+
+
+def test_the_values_of_every_key_are_those_that_the_validating_library_allows():
+    listed = [set(values) - {None} for _, key in all_keys(Study) for values in (key.choices, key.entries) if values]
+    assert len(listed) > 20
+    # A value allowed besides others, such as an estimate in place of a number, is a constant and no list.
+    assert set(map(frozenset, listed)) == set(enumerated(Study.model_json_schema()))
+
+
+def above(key):
+    """Comments above a key of the commented default."""
+    lines = [line.strip() for line in commented_default().splitlines()]
+    end = lines.index(key)
+    start = max(number for number in range(end) if not lines[number].startswith("#"))
+    return [line.removeprefix("# ") for line in lines[start + 1 : end]]
+
+
+def test_the_commented_default_lists_the_values_below_the_line_on_the_key():
+    assert above("torque_source: column")[1:] == ["one of column, rotor-speed, rotor-command, null"]
+    assert above("time_unit: s") == ["unit of the time stamps", "one of s, ms, us, ns"]
+    assert len(above("gap_s: 0.1")) == len(above("delay_s: 0.0")) == 1
+
+
+def test_signals_come_with_their_names_units_and_an_example_that_is_a_study():
+    comments = above("signals: {}")
+    assert all(name in " ".join(comments[1:3]) for name in get_args(SignalName))
+    assert f"    one of '1', {', '.join(list(KNOWN_UNITS)[1:])}" in comments
+    begin = next(number for number, line in enumerate(comments) if line.startswith("example"))
+    example = "import:\n  signals:\n" + "\n".join(f"  {line}" for line in comments[begin + 1 :])
+    signals = validate(parse_config(example, "example"), "example").import_.signals
+    assert set(signals) == {"attitude", "body_torque"}
+    assert signals["body_torque"].sign == (1, -1, -1)
