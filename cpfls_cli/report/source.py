@@ -42,6 +42,11 @@ class Source:
     parameters: int
 
     @property
+    def searched(self) -> bool:
+        """Whether a model has partitions to search for; without, one chromosome was evaluated."""
+        return bool(self.artifact.array("model/weights").size)
+
+    @property
     def short_hash(self) -> str:
         """First digits of the hash."""
         return self.sha256[:HASH_SHOWN]

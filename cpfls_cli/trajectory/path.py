@@ -8,6 +8,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.trajectory.attitude import flat_attitude
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, covering
 from cpfls_cli.trajectory.settings import TrajectorySettings
@@ -65,12 +66,23 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
     Raises
     ------
     ComputationError
-        If the path asks for free fall, where the attitude is not defined.
+        If the path asks for free fall, where the attitude is not defined, or is too large for numbers to hold.
 
     References
     ----------
     Sections 7 and 9 of the paper; method.md section 3.
     """
+    # What overflows is told from what does not at the end, with a remedy.
+    with np.errstate(over="ignore", invalid="ignore"):
+        planned = _planned(settings, gravity)
+    if not all(np.isfinite(values).all() for values in vars(planned).values() if isinstance(values, np.ndarray)):
+        raise ComputationError(
+            "the attitude's derivatives are too large for numbers to hold; lower trajectory.yaw_turn_rad"
+        )
+    return planned
+
+
+def _planned(settings: TrajectorySettings, gravity: float) -> Trajectory:
     time = _sample_times(settings)
     motion = _back_and_forth(settings, time)[..., None] * _direction(settings)
     heading = _heading(settings, time)

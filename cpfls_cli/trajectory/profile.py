@@ -132,9 +132,10 @@ def covering(displacement: float, period: float, holds: Holds) -> BaseProfile:
     Returns
     -------
     BaseProfile
+        Of infinite amplitude where the period is too short for any number.
     """
-    unit = BaseProfile(amplitude=1.0, period=period, holds=holds)
-    return BaseProfile(amplitude=displacement / unit.peaks.displacement, period=period, holds=holds)
+    reached = BaseProfile(amplitude=1.0, period=period, holds=holds).peaks.displacement
+    return BaseProfile(amplitude=displacement / reached if reached else np.inf, period=period, holds=holds)
 
 
 def _segments(period: float, holds: Holds) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt
@@ -12,6 +12,9 @@ from typing_extensions import Doc
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, covering
+
+_LARGEST_PEAK = 1e100
+_LARGEST_SIZE = 1e9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,12 +84,22 @@ class TrajectorySettings(Settings):
         for key, value in given.items():
             if value is not None and value <= 0:
                 raise SettingError(key, "must be greater than 0")
+        self._check_peaks("displacement_m" if self.amplitude_m_s5 is None else "amplitude_m_s5")
+
+    def _check_peaks(self, key: str) -> None:
+        name, value = max(asdict(self.move.peaks).items(), key=lambda peak: peak[1])
+        # The attitude multiplies up to three of them, and the largest number is 1.8e308.
+        if not value < _LARGEST_PEAK:
+            message = f"a move with period_s = {self.period_s:g} has {name} up to {value:.3g} in m and s: too large to"
+            raise SettingError(key, f"{message} compute with; lower it, or raise period_s")
 
     def _check_time(self) -> None:
         needed = self.legs * self.move.duration
         if needed > self.duration_s * (1 + 1e-12):
             message = f"{self.legs} moves of {self.move.duration:g} s need {needed:g} s; raise it or lower legs"
             raise SettingError("duration_s", message)
+        if self.duration_s > _LARGEST_SIZE * self.sample_time_s:
+            raise SettingError("sample_time_s", f"makes more than {_LARGEST_SIZE:g} samples of duration_s; raise it")
         if self.sample_time_s > self.duration_s:
             raise SettingError("sample_time_s", "is longer than duration_s")
 

@@ -10,8 +10,6 @@ from cpfls_cli.report.canvas import plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.source import Source
 
-TITLES = ("smallest mean squared error", "smallest largest error", "smallest condition number")
-
 
 def convergence_figure(name: str, model: Source) -> Plot:
     """Draw the best of each objective found so far, by generation.
@@ -27,12 +25,14 @@ def convergence_figure(name: str, model: Source) -> Plot:
     """
     best = model.artifact.array("history/best")
     generation = np.arange(len(best))
-    units = (squared_error_unit(model), "N m", "pure number")
+    error, unit = first_objective(model)
+    titles = (f"smallest {error}", "smallest largest error", "smallest condition number")
+    units = (unit, "N m", "pure number")
     evaluations = int(model.artifact.array("history/evaluations")[-1])
 
     def draw(figure: Figure) -> None:
-        panels = stacked(figure, len(TITLES))
-        for index, (axes, title, unit) in enumerate(zip(panels, TITLES, units, strict=True)):
+        panels = stacked(figure, len(titles))
+        for index, (axes, title, unit) in enumerate(zip(panels, titles, units, strict=True)):
             finite = np.where(np.isfinite(best[:, index]), best[:, index], np.nan)
             axes.plot(generation, finite, marker="o", markersize=3, **style_of(0))
             axes.set_title(title)
@@ -45,11 +45,11 @@ def convergence_figure(name: str, model: Source) -> Plot:
         f"Search of {model.label}: the best value of each objective found so far, each possibly by another chromosome; "
         f"{evaluations} chromosomes were evaluated."
     )
-    return plot(name, caption, "Best mean squared error, largest error and condition number by generation", 4.6, draw)
+    return plot(name, caption, f"Best {error}, largest error and condition number by generation", 4.6, draw)
 
 
-def squared_error_unit(model: Source) -> str:
-    """Name the unit of the mean squared error that the search minimised.
+def first_objective(model: Source) -> tuple[str, str]:
+    """Name the error that the search minimised, and its unit.
 
     Parameters
     ----------
@@ -57,7 +57,9 @@ def squared_error_unit(model: Source) -> str:
 
     Returns
     -------
-    str
-        Over a rigid body every axis is divided by its own scale, so the error is a pure number.
+    name, unit : str
+        Over a rigid body it is the error on blocks left out in turn, every axis divided by its own scale.
     """
-    return "scaled torque²" if model.artifact.text("model/base") == "rigid-body" else "(N m)²"
+    if model.artifact.text("model/base") == "rigid-body":
+        return "cross-validated error", "scaled torque²"
+    return "mean squared error", "(N m)²"

@@ -1,4 +1,4 @@
-"""The Pareto front: mean squared error against condition number."""
+"""The Pareto front: the first objective against the condition number."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Plot
-from cpfls_cli.report.figures.convergence import squared_error_unit
+from cpfls_cli.report.figures.convergence import first_objective
 from cpfls_cli.report.source import Source
 
 
@@ -25,6 +25,7 @@ def front_figure(name: str, model: Source) -> Plot:
     """
     objectives = model.artifact.array("front/objectives")
     chosen = int(model.artifact.number("front/chosen"))
+    error, unit = first_objective(model)
     others = np.arange(len(objectives)) != chosen
 
     def draw(figure: Figure) -> None:
@@ -42,7 +43,7 @@ def front_figure(name: str, model: Source) -> Plot:
             label="chosen",
         )
         axes.set_xlabel("condition number")
-        axes.set_ylabel(f"mean squared error, {squared_error_unit(model)}")
+        axes.set_ylabel(f"{error}, {unit}")
         plain_ticks(axes.yaxis)
         axes.set_xscale("log")
         legend_above(axes)
@@ -50,10 +51,8 @@ def front_figure(name: str, model: Source) -> Plot:
     members = f"{len(objectives)} member{'s' if len(objectives) > 1 else ''}"
     rule = model.config["identification"]["choice"]
     caption = (
-        f"Pareto front of {model.label}, {members}: mean squared error against condition number, as the "
-        f"search saw them. The third objective, the largest error, is not shown, so a member may look dominated "
+        f"Pareto front of {model.label}, {members}: {error} against condition number, as the search saw "
+        f"them. The third objective, the largest error, is not shown, so a member may look dominated "
         f"here. The chosen one follows the rule {rule}."
     )
-    return plot(
-        name, caption, "Scatter of mean squared error against condition number, the chosen member marked", 3.0, draw
-    )
+    return plot(name, caption, f"Scatter of {error} against condition number, the chosen member marked", 3.0, draw)

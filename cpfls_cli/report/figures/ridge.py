@@ -52,7 +52,7 @@ def ridge_figure(name: str, model: Source) -> Plot:
         axes.set_yscale("log", nonpositive="clip")
         axes.set_xticks(shown, [_word(weight[index]) for index in shown])
         axes.set_xlabel("ridge weight on the fuzzy part")
-        axes.set_ylabel("error, scaled torque squared")
+        axes.set_ylabel("cross-validated error, scaled torque²")
         legend_above(axes)
 
     caption = (

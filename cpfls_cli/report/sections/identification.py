@@ -76,7 +76,7 @@ def _table(sources: Sources) -> Table:
     rows = [[name, *(column[place] for column in columns)] for place, name in enumerate(_ROWS)]
     caption = (
         "Table 5. Results of the identification on the whole training part: mean squared error over the axes, largest "
-        "error, and largest error over largest torque (worst axis)."
+        "error and condition number of the selected model, and its largest error over the largest torque (worst axis)."
     )
     return Table("table-5-identification", caption, header, rows)
 
@@ -87,8 +87,8 @@ def _column(model: Source) -> list[str]:
         {"cpfls": "cpFLS", "fls": "FLS"}[settings["structure"]]
         + (" on rigid body" if artifact.text("model/base") == "rigid-body" else ""),
         str(len(artifact.array("training/indices"))),
-        str(settings["population"]),
-        str(settings["generations"]),
+        str(settings["population"]) if model.searched else "no search",
+        str(settings["generations"]) if model.searched else "no search",
         count(artifact.array("history/evaluations")[-1]),
         number(float(np.mean(scores.of("mse", MODEL, TRAINING))), 3),
         number(float(np.max(scores.of("max_error", MODEL, TRAINING))), 3),

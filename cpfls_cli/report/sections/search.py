@@ -31,9 +31,19 @@ def search_section(sources: Sources) -> Section | None:
 
 
 def _search(model: Source, index: int) -> Iterator[Block]:
-    if model.artifact.array("model/weights").size == 0:
-        yield Text(f"{model.label} has one rule per input, so there is no partition to search for.", "note")
-    elif fuzzy_part_off(model):
+    if model.searched:
+        yield from _found(model, index)
+    else:
+        yield Text(
+            f"No search: one chromosome. {model.label} has one rule per input, so there is no partition to search for.",
+            "note",
+        )
+    if "ridge/weight" in model.artifact.data:
+        yield ridge_figure(f"ridge-curve-{index}", model)
+
+
+def _found(model: Source, index: int) -> Iterator[Block]:
+    if fuzzy_part_off(model):
         yield Text(
             f"The fuzzy part of {model.label} is off, so all chromosomes may give one and the same model, and the "
             "search decides nothing.",
@@ -41,5 +51,3 @@ def _search(model: Source, index: int) -> Iterator[Block]:
         )
     yield convergence_figure(f"convergence-{index}", model)
     yield front_figure(f"pareto-front-{index}", model)
-    if "ridge/weight" in model.artifact.data:
-        yield ridge_figure(f"ridge-curve-{index}", model)

@@ -54,7 +54,7 @@ def _model(model: Source, sources: Sources, number: int) -> Iterator[Block]:
 
 
 def _facts(model: Source) -> list[tuple[str, str]]:
-    artifact, settings = model.artifact, model.config["identification"]
+    artifact = model.artifact
     learned = len(artifact.array("training/indices"))
     training = int(artifact.array("judged/samples")[0])
     source = artifact.header.inputs.get("flight")
@@ -64,13 +64,17 @@ def _facts(model: Source) -> list[tuple[str, str]]:
         ("Learned from", f"{flight}: {learned} of {training} training samples{chosen}"),
         ("Structure", structure(model)),
         ("Parameters", parameters(model)),
-        ("Search", f"population {settings['population']}, {_generations(settings['generations'])}"),
+        ("Search", _search(model)),
         ("Made by", f"cpfls {artifact.header.version}, seed {artifact.header.seed}"),
     ]
 
 
-def _generations(number: int) -> str:
-    return f"{number} generation{'' if number == 1 else 's'}"
+def _search(model: Source) -> str:
+    if not model.searched:
+        return "no search: one chromosome"
+    settings = model.config["identification"]
+    number = settings["generations"]
+    return f"population {settings['population']}, {number} generation{'' if number == 1 else 's'}"
 
 
 def structure(model: Source) -> str:

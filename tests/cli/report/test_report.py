@@ -269,6 +269,35 @@ def test_an_existing_page_is_kept_and_a_dry_run_writes_nothing(study, full, tmp_
     assert not list(tmp_path.iterdir())
 
 
+def test_where_there_is_nothing_to_search_for_no_search_is_shown(study, tmp_path):
+    model = tmp_path / "single.h5"
+    single = ("--set", "identification.membership_functions=1", "--set", "identification.base=rigid-body")
+    cpfls("identify", study.config, study.noisy, "-o", model, *single, "--set", "identification.ridge.count=3")
+    summary, html, _ = report(study, tmp_path, model)
+    text = Page(html).text
+    assert not [name for name in summary["figures"] if name.startswith(("convergence", "pareto-front"))]
+    assert "ridge-curve-1" in summary["figures"]
+    assert text.count("no search: one chromosome") == 1
+    assert "No search: one chromosome. single.h5 has one rule per input" in text
+    assert "population 10" not in text
+    table = html[html.index('id="table-5-identification"') :]
+    assert table[: table.index("</table>")].count(">no search<") == 2
+
+
+def test_the_search_is_labelled_by_the_error_that_it_minimised(study, tmp_path):
+    for model, error, other in (
+        (study.model, "mean squared error, (N m)²", "cross-validated error"),
+        (study.ridge, "cross-validated error, scaled torque²", "mean squared error against"),
+    ):
+        _, html, _ = report(study, tmp_path, model, options=("--force",))
+        section = html[html.index('id="search"') : html.index('id="partitions"')]
+        assert error in section
+        assert other not in section
+        assert f"smallest {error.split(',')[0]}" in section
+        assert f"Pareto front of {model.name}, " in section
+        assert f"{error.split(',')[0]} against condition number, as the search saw them" in section
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to show the page in")
 def test_a_browser_shows_all_figures(full, tmp_path):
     picture = tmp_path / "page.png"

@@ -96,3 +96,14 @@ def test_a_path_that_falls_freely_is_refused():
     settings = TrajectorySettings(path="straight", direction=(0.0, 0.0, 1.0), displacement_m=400.0)
     with pytest.raises(ComputationError, match="free fall"):
         plan(settings, GRAVITY)
+
+
+def test_what_numbers_cannot_hold_ends_with_a_message():
+    """Without a warning of the numerics, which would be an error here."""
+    with pytest.raises(ComputationError, match="the attitude's derivatives are too large for numbers to hold"):
+        plan(TrajectorySettings(sample_time_s=0.1, yaw_turn_rad=1e300), GRAVITY)
+
+
+def test_the_largest_move_that_settings_allow_gives_no_warning():
+    with pytest.raises(ComputationError, match="free fall"):
+        plan(TrajectorySettings(sample_time_s=0.1, displacement_m=9e99), GRAVITY)
