@@ -71,12 +71,13 @@ def _wrong_gains(gain: dict[int, float]) -> Iterator[str]:
 
 
 def _explanation(gain: float) -> str:
-    units = "units of import.signals.body_rate (or attitude_rate) and import.signals.attitude, and import.time_unit"
-    if abs(log(gain / _DEGREES)) < log(_NEAR):
-        return "that is 180/pi; is import.signals.body_rate.unit (or attitude_rate.unit) deg/s?"
-    if abs(log(gain * _DEGREES)) < log(_NEAR):
-        return "that is pi/180; is import.signals.body_rate.unit (or attitude_rate.unit) rad/s, or attitude.unit deg?"
-    return f"check the {units}"
+    for factor, name, rate, angle in ((_DEGREES, "180/pi", "deg/s", "rad"), (1 / _DEGREES, "pi/180", "rad/s", "deg")):
+        if abs(log(gain / factor)) < log(_NEAR):
+            return (
+                f"about {name}; does the log hold rates in {rate} (import.signals.body_rate.unit or attitude_rate.unit),"
+                f" or angles in {angle} (import.signals.attitude.unit)?"
+            )
+    return "check the units of import.signals.body_rate (or attitude_rate) and attitude, and import.time_unit"
 
 
 def _slow_part(time: Array, values: Array) -> Array:
