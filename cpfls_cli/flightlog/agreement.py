@@ -74,7 +74,7 @@ def _explanation(gain: float) -> str:
     for factor, name, rate, angle in ((_DEGREES, "180/pi", "deg/s", "rad"), (1 / _DEGREES, "pi/180", "rad/s", "deg")):
         if abs(log(gain / factor)) < log(_NEAR):
             return (
-                f"about {name}; does the log hold rates in {rate} (import.signals.body_rate.unit or attitude_rate.unit),"
+                f"about {name}; does the log hold rates in {rate} (import.signals.body_rate.unit, attitude_rate.unit),"
                 f" or angles in {angle} (import.signals.attitude.unit)?"
             )
     return "check the units of import.signals.body_rate (or attitude_rate) and attitude, and import.time_unit"
