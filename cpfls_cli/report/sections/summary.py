@@ -43,7 +43,7 @@ def _model(model: Source, sources: Sources, number: int) -> Iterator[Block]:
     yield _scores(model, number)
     found = model.artifact.texts("findings")
     yield Heading("Findings")
-    yield from [Text(f"{finding[:1].upper()}{finding[1:]}.", "warning") for finding in found]
+    yield from [Text(f"{finding}.", "warning") for finding in found]
     if not found:
         yield Text(
             "None: the rank is full, every rule and every axis is excited, and the rigid body is not better on data "
