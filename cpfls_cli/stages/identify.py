@@ -18,8 +18,9 @@ from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.search import SearchStep
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
-from cpfls_cli.stages.job import Job, Outcome, Started, begin, finish, generator, settings_of
+from cpfls_cli.stages.job import Job, Outcome, Started, begin, finish
 from cpfls_cli.stages.model_file import model_data
+from cpfls_cli.stages.study import generator, settings_of
 from cpfls_cli.stages.training import TrainingData, read_torque_data, read_training
 
 REST = "held-out rest"

@@ -17,9 +17,10 @@ from cpfls_cli.errors import CpflsError
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import ImportSettings
-from cpfls_cli.stages.job import Job, Outcome, begin, finish, settings_of
+from cpfls_cli.stages.job import Job, Outcome, begin, finish
 from cpfls_cli.stages.log_quality import found_and_done, missing_signals
 from cpfls_cli.stages.rotor_torque import rotor_torque, rotor_torque_words
+from cpfls_cli.stages.study import settings_of
 from cpfls_cli.stages.table import read_csv
 
 

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import json
-import zlib
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-
 import cpfls_cli
-from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.hashing import file_sha256
 from cpfls_cli.artifacts.output import check_output
-from cpfls_cli.artifacts.reading import format_name, read_artifact
+from cpfls_cli.artifacts.reading import format_name
 from cpfls_cli.artifacts.records import Artifact, Header, InputFile
 from cpfls_cli.artifacts.spec import ArtifactSpec
 from cpfls_cli.artifacts.writing import write_artifact
-from cpfls_cli.config.resolved import resolved, resolved_yaml
+from cpfls_cli.config.resolved import resolved_yaml
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import ConfigError, InputError, SettingError
+from cpfls_cli.errors import InputError
 
 
 class Progress(Protocol):
@@ -155,102 +149,3 @@ def input_file(path: Path) -> InputFile:
     InputFile
     """
     return InputFile(path.name, file_sha256(path), format_name(path) or path.suffix.lstrip("."))
-
-
-def read_with(path: Path, spec: ArtifactSpec, *needed: str) -> Artifact:
-    """Read an artifact that must hold certain signals.
-
-    Parameters
-    ----------
-    path : Path
-    spec : ArtifactSpec
-    *needed : str
-        Dataset paths.
-
-    Returns
-    -------
-    Artifact
-
-    Raises
-    ------
-    InputError
-        If one is missing or breaks the format; the message names the file and the signal.
-    """
-    artifact = read_good(path, spec)
-    missing = [name for name in needed if name not in artifact.data]
-    if missing:
-        raise InputError(f"{path}: lacks {', '.join(missing)}; this stage needs {', '.join(needed)}")
-    if any(artifact.array(name).size == 0 for name in needed):
-        raise InputError(f"{path}: holds no samples")
-    return artifact
-
-
-def read_good(path: Path, spec: ArtifactSpec) -> Artifact:
-    """Read an artifact that keeps to its format.
-
-    Parameters
-    ----------
-    path : Path
-    spec : ArtifactSpec
-
-    Returns
-    -------
-    Artifact
-
-    Raises
-    ------
-    InputError
-        Naming every dataset that has a wrong shape or kind, or is not finite where it must be.
-    """
-    artifact = read_artifact(path, spec)
-    findings = check_artifact(artifact)
-    if findings:
-        raise InputError("\n".join(f"{path}: {finding}" for finding in findings))
-    return artifact
-
-
-@contextmanager
-def settings_of(section: str, study: Study) -> Iterator[None]:
-    """Name the config key and its value where the numerics refuse a setting that does not suit the data.
-
-    Parameters
-    ----------
-    section : str
-        Section of the config whose settings are in use.
-    study : Study
-
-    Yields
-    ------
-    None
-
-    Raises
-    ------
-    ConfigError
-    """
-    try:
-        yield
-    except SettingError as error:
-        key = f"{section}.{error.key}"
-        raise ConfigError(f"{key} = {json.dumps(_value(study, key))}: {error}") from None
-
-
-def _value(study: Study, key: str) -> Any:
-    value: Any = resolved(study, [key])
-    for part in key.split("."):
-        value = value[part]
-    return value
-
-
-def generator(study: Study, stage: str) -> np.random.Generator:
-    """Make the random generator of a stage, so that stages draw independently of each other.
-
-    Parameters
-    ----------
-    study : Study
-    stage : str
-
-    Returns
-    -------
-    numpy.random.Generator
-    """
-    return np.random.default_rng([study.seed, zlib.crc32(stage.encode())])

@@ -14,8 +14,9 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import score
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.physics import not_positive_definite
-from cpfls_cli.stages.job import Job, Outcome, begin, finish, read_good, read_with
+from cpfls_cli.stages.job import Job, Outcome, begin, finish
 from cpfls_cli.stages.model_file import read_model
+from cpfls_cli.stages.sources import read_good, read_with
 from cpfls_cli.stages.training import MOTION, flight_motion
 
 

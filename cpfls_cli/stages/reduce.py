@@ -20,7 +20,9 @@ from cpfls_cli.reduction.greedy import check_reducible, reduce
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
-from cpfls_cli.stages.job import Job, Outcome, begin, finish, generator, read_with, settings_of
+from cpfls_cli.stages.job import Job, Outcome, begin, finish
+from cpfls_cli.stages.sources import read_with
+from cpfls_cli.stages.study import generator, settings_of
 from cpfls_cli.stages.training import MOTION, flight_motion
 
 RANDOM_DRAWS = 20

@@ -11,7 +11,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT, TRAJECTORY
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.simulation.simulate import SimulatedFlight, simulate
-from cpfls_cli.stages.job import Job, Outcome, begin, finish, generator, read_with
+from cpfls_cli.stages.job import Job, Outcome, begin, finish
+from cpfls_cli.stages.sources import read_with
+from cpfls_cli.stages.study import generator
 from cpfls_cli.vehicle.violations import RotorViolation
 
 _PLANNED = ("attitude", "attitude_rate", "attitude_acceleration", "position", "velocity", "acceleration")

@@ -15,7 +15,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.identification.data import Split, TorqueData, split_flight
 from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.stages.job import read_good, read_with
+from cpfls_cli.stages.sources import read_good, read_with
 
 MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
 
