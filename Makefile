@@ -14,7 +14,7 @@ export OPENBLAS_NUM_THREADS := 1
 .PHONY: help reproduce quick hexarotor crazyflie test lint bench clean FORCE
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | head -4
+	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
 	@echo "  make quick       the same study with a small search, in a minute"
 	@echo "  make hexarotor   a six-rotor study with a rigid body under the fuzzy part"
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
@@ -31,8 +31,13 @@ quick: data/quick/report.html
 hexarotor: data/hexarotor/report.html
 	@echo "open data/hexarotor/report.html"
 
+ifdef LOGS
 crazyflie: data/crazyflie/report.html
 	@echo "open data/crazyflie/report.html"
+else
+crazyflie:
+	@echo "make crazyflie needs LOGS=FOLDER, where FOLDER holds log119.csv and log149.csv" >&2; exit 2
+endif
 
 $(INSTALLED): pyproject.toml
 	$(PYTHON) -m venv .venv
@@ -90,13 +95,15 @@ data/%/model.h5: data/%/flight.h5 data/%/selection.h5 data/%/unseen.h5 data/%/.p
 data/%/prediction.h5: data/%/model.h5 data/%/flight.h5
 	$(CPFLS) predict configs/$*.yaml $^ -o $@ --force
 
-ARTIFACTS := trajectory flight selection model prediction
+data/%/prediction-unseen.h5: data/%/model.h5 data/%/unseen.h5
+	$(CPFLS) predict configs/$*.yaml $^ -o $@ --force
+
+ARTIFACTS := trajectory flight unseen selection model prediction prediction-unseen
 
 data/%/report.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
 	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) -o $@ --force
 
 # The real flight: its logs are in the folder LOGS.
-LOGS ?= ../shared/data/real/crazyswarm2_lee
 REAL := data/crazyflie
 $(REAL)/log%.h5: $(LOGS)/log%.csv $(REAL)/.part/import.yaml
 	$(CPFLS) import configs/crazyflie.yaml $< -o $@ --force

@@ -28,7 +28,7 @@ def main(config: Path, flight: Path, selection: Path) -> None:
     learned = data.flight[data.learned]
     whole = model_evaluator(data.flight[data.split.training], learned, study.identification)
     evaluators = {
-        "selected samples": replace(whole, judge=Judge.of(learned, whole.regressor)),
+        "selected samples": replace(whole, judge=Judge.of(learned, whole.solver.regressor)),
         "whole training part": whole,
     }
     print("| judged on | members of the front | with relative error above 100 % | relative error of the chosen one |")
@@ -43,9 +43,11 @@ def relative_error(evaluator: Evaluator, chromosome) -> float:
     """Largest error over largest torque on the whole training part, worst axis."""
     fit = evaluator.fit(chromosome)
     assert fit is not None
-    error = evaluator.judge.error(decode(evaluator.regressor.structure, chromosome.astype(float)), fit)
+    error = evaluator.judge.error(decode(evaluator.structure, chromosome.astype(float)), fit)
     return float(np.max(np.max(np.abs(error), axis=0) / np.max(np.abs(evaluator.judge.torque), axis=0)))
 
 
 if __name__ == "__main__":
-    main(*(Path(argument) for argument in sys.argv[1:4]))
+    if len(sys.argv) != 4:
+        sys.exit(__doc__)
+    main(*(Path(argument) for argument in sys.argv[1:]))

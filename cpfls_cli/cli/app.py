@@ -109,10 +109,14 @@ def identify(
     flight: FlightArgument,
     output: OutputOption,
     selection: Annotated[
-        Path | None, typer.Option("--selection", help="Learn from these samples only (made by `cpfls reduce`).")
+        Path | None,
+        typer.Option(
+            "--selection", metavar="SELECTION", help="Learn from these samples only (made by `cpfls reduce`)."
+        ),
     ] = None,
     validate: Annotated[
-        list[Path] | None, typer.Option("--validate", help="Judge on another flight too; may be repeated.")
+        list[Path] | None,
+        typer.Option("--validate", metavar="FLIGHT", help="Judge on another flight too; may be repeated."),
     ] = None,
     *,
     common: Common,

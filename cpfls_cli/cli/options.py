@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from cpfls_cli.config.study import Study
 
 ConfigArgument = Annotated[Path, typer.Argument(metavar="CONFIG", help="Study config (YAML).", show_default=False)]
-OutputOption = Annotated[Path, typer.Option("--output", "-o", help="File to write.", show_default=False)]
+OutputOption = Annotated[
+    Path, typer.Option("--output", "-o", metavar="FILE", help="File to write.", show_default=False)
+]
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,9 @@ class Common:
         list[str] | None,
         typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override a key of the config; may be repeated."),
     ] = None
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Override the seed of the config.")] = None
+    seed: Annotated[int | None, typer.Option("--seed", metavar="N", min=0, help="Override the seed of the config.")] = (
+        None
+    )
     force: Annotated[bool, typer.Option("--force", help="Replace an existing output.")] = False
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False
     verbose: Annotated[

@@ -146,21 +146,25 @@ def _silent_rules(evidence: Evidence) -> Iterator[str]:
 
 def _fuzzy_part_off(evidence: Evidence) -> Iterator[str]:
     if np.isinf(evidence.fit.ridge_weight):
-        left = " ".join(f"{100 * (1 - r2):.3g}" for r2 in evidence.scores[_training(evidence)]["model"].r2_body)
+        left = _percent(1 - evidence.scores[_training(evidence)]["model"].r2_body)
         yield (
             "cross-validation switched the fuzzy part off: no evidence for an inertia that depends on attitude; what "
-            f"the rigid body leaves unexplained of roll, pitch, yaw ({left} %) is noise or an effect that has no term"
+            f"the rigid body leaves unexplained of roll, pitch, yaw ({left}; above 100 % a constant explains more) is "
+            "noise or an effect that has no term"
         )
 
 
 def _beaten(evidence: Evidence) -> Iterator[str]:
-    """Name the parts of the data on which a simpler model explains more, all axes counted alike."""
+    """Name the parts of the data on which a simpler model explains more about most axes."""
     for part, by_model in evidence.scores.items():
-        ours = by_model["model"]
+        ours = by_model["model"].r2_body
         for rival, words in RIVALS.items():
-            if rival in by_model and _unexplained(by_model[rival]) < _unexplained(ours) * (1 - 1e-9):
-                shares = f"{_by_axis(by_model[rival])} of roll, pitch, yaw; the model {_by_axis(ours)}"
-                yield f"{part}: {words} leaves less of the torque unexplained ({shares})"
+            theirs = by_model[rival].r2_body if rival in by_model else ours
+            better = (1 - theirs) < (1 - ours) * (1 - 1e-9)
+            if np.sum(better) > 1:
+                axes = ", ".join(np.array(AXES)[better])
+                shares = f"{_percent(1 - theirs[better])}; the model {_percent(1 - ours[better])}"
+                yield f"{part}: {words} leaves less of the torque about {axes} unexplained ({shares})"
 
 
 def _badly_explained(evidence: Evidence) -> Iterator[str]:
@@ -178,12 +182,8 @@ def _badly_explained(evidence: Evidence) -> Iterator[str]:
             yield f"{part}: the model explains less than half of the torque about {', '.join(bad)}"
 
 
-def _by_axis(score: Score) -> str:
-    return " ".join(f"{share:.2g}" for share in 1.0 - score.r2)
-
-
-def _unexplained(score: Score) -> float:
-    return float(np.nansum(1.0 - score.r2))
+def _percent(shares: Array) -> str:
+    return " ".join(f"{100 * share:.3g}" for share in shares) + " %"
 
 
 def _outside(evidence: Evidence) -> Iterator[str]:

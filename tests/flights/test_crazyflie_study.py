@@ -74,6 +74,7 @@ def test_roll_and_pitch_of_the_held_out_rest_are_explained(study):
 
 
 def test_the_model_is_not_worse_than_a_rigid_body_on_the_held_out_rest(study):
+    assert study.identified["fuzzy_part"] == "off"
     rest = study.identified["held_out"]["held-out rest"]
     assert rest["mse"] <= rest["baselines"]["rigid-body"]["mse"] * (1 + 1e-6)
     assert rest["mse"] < 0.1 * rest["baselines"]["torque-zero"]["mse"]

@@ -52,10 +52,7 @@ def partitions_figure(name: str, model: Source) -> Plot:
             axes.set_xlabel("input, scaled to 0 .. 1")
 
     circle = "; the first and the last are one function (1), which closes the circle" if joined else ""
-    caption = (
-        f"Figure 6. Membership functions of the partitions of {model.label}, numbered at their peaks{circle}. "
-        "The paper shows D33."
-    )
+    caption = f"Figure 6. Membership functions of the partitions of {model.label}, numbered at their peaks{circle}."
     return plot(name, caption, "Membership functions of each fuzzy partition on the interval 0 to 1", 1.75 * rows, draw)
 
 

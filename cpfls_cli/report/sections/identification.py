@@ -11,15 +11,17 @@ from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, TRAINING, Judged, j
 from cpfls_cli.report.numbers import UNKNOWN, count, number, percent, r_squared
 from cpfls_cli.report.source import Source, Sources
 
+# Units are not torn apart at the end of a line.
+TORQUE, SQUARED = "N\N{NO-BREAK SPACE}m", "(N\N{NO-BREAK SPACE}m)²"
 _ROWS = (
     "system",
     "training points",
     "population",
     "generations",
     "evaluations",
-    "MSE selected, (N m)²",
-    "maxE selected, N m",
-    "Cond selected",
+    f"MSE of the chosen model, {SQUARED}",
+    f"largest error of the chosen model, {TORQUE}",
+    "its condition number",
     "relative error",
 )
 _PAPER = (
@@ -33,8 +35,8 @@ _PAPER = (
 _SMALLEST_MAX_ERROR = 0.1531
 _RELATIVE_BOUND = 0.1
 _MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
-    ("mse", "MSE, (N m)²", lambda value: number(value, 3)),
-    ("max_error", "Largest error, N m", lambda value: number(value, 3)),
+    ("mse", f"MSE, {SQUARED}", lambda value: number(value, 3)),
+    ("max_error", f"Largest error, {TORQUE}", lambda value: number(value, 3)),
     ("relative_error", "Relative error", percent),
     ("r2", "R²", r_squared),
     ("r2_body", "R² of body torque", r_squared),
@@ -102,8 +104,8 @@ def _scale_sentence(sources: Sources) -> str:
     ours = max(_largest_torque(judged(model)) for model in sources.models)
     theirs = _SMALLEST_MAX_ERROR / _RELATIVE_BOUND
     return (
-        f"Compare the relative errors, not MSE and maxE: the largest torque here is {number(ours, 2)} N m, whereas "
-        f"an error of {_SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in the "
+        f"Compare the relative errors, not MSE and largest error: the largest torque here is {number(ours, 2)} N m, "
+        f"whereas an error of {_SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in the "
         "paper. Its condition numbers belong to its own training path, which it does not define in full."
     )
 

@@ -8,6 +8,7 @@ from cpfls_cli.report.content import Block, Folded, Section, Table, Text
 from cpfls_cli.report.figures.partitions import partitions_figure, partitions_of
 from cpfls_cli.report.numbers import count, number
 from cpfls_cli.report.source import Source, Sources
+from cpfls_cli.report.verdict import fuzzy_part_off
 
 _INERTIA = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 
@@ -35,7 +36,9 @@ def partitions_section(sources: Sources) -> Section | None:
 
 
 def _model(model: Source, index: int) -> Iterator[Block]:
-    if max(len(peaks) for peaks in partitions_of(model).values()) > 1:
+    if fuzzy_part_off(model):
+        yield Text(f"The fuzzy part of {model.label} is off: no membership function takes part in it.", "note")
+    elif max(len(peaks) for peaks in partitions_of(model).values()) > 1:
         yield partitions_figure(f"figure-6-partitions-{index}", model)
     else:
         yield Text(f"{model.label} has one rule per input: its one membership function is 1 everywhere.", "note")

@@ -64,5 +64,7 @@ def _seen(prediction: Source, sources: Sources) -> str:
     if model is None:
         return f"{names}. The model was not given, so it is not known here whether it learned from this flight."
     if model.made_from("flight") == prediction.made_from("flight"):
-        return f"{names}: the flight that it learned from."
+        samples, training = len(prediction.artifact.array("time")), int(model.artifact.array("judged/samples")[0])
+        part = "" if training == samples else f" (its first {training} of {samples} samples; the rest was held out)"
+        return f"{names}: the flight that it learned from{part}."
     return f"{names}: a flight that it did not learn from."

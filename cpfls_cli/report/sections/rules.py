@@ -9,6 +9,7 @@ import numpy as np
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import count, number, percent
 from cpfls_cli.report.source import Source, Sources
+from cpfls_cli.report.verdict import fuzzy_part_off
 
 
 def rules_section(sources: Sources) -> Section | None:
@@ -55,4 +56,6 @@ def _rules(model: Source, index: int) -> Iterator[Block]:
         "Rules that are not excited: largest firing strength in training, and the share of the rule's coefficients "
         "that the data determine. What the model says there is not learned."
     )
+    if fuzzy_part_off(model):
+        caption += " The fuzzy part is off, so the model uses none of them."
     yield Table(f"silent-rules-{index}", caption, ("Rule", "Largest firing", "Determined"), rows)
