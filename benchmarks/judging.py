@@ -18,7 +18,7 @@ from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.evaluator import Evaluator, Judge
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.search import search
-from cpfls_cli.stages.job import generator
+from cpfls_cli.stages.study import generator
 from cpfls_cli.stages.training import read_training
 
 

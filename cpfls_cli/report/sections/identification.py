@@ -105,8 +105,8 @@ def _scale_sentence(sources: Sources) -> str:
     theirs = _SMALLEST_MAX_ERROR / _RELATIVE_BOUND
     return (
         f"Compare the relative errors, not MSE and largest error: the largest torque here is {number(ours, 2)} N m, "
-        f"whereas an error of {_SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in the "
-        "paper. Its condition numbers belong to its own training path, which it does not define in full."
+        f"whereas an error of {_SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in "
+        "the paper. Its condition numbers belong to its own training path, which it does not define in full."
     )
 
 
