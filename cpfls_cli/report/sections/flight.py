@@ -10,6 +10,7 @@ from cpfls_cli.report.content import Block, Facts, Heading, Section, Table, Text
 from cpfls_cli.report.figures.attitude import attitude_figure
 from cpfls_cli.report.figures.torque import torque_figure
 from cpfls_cli.report.numbers import count, number, plain
+from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 
 
@@ -25,12 +26,7 @@ def flight_section(sources: Sources) -> Section | None:
     Section or None
         None where no flight was given.
     """
-    if not sources.flights:
-        return None
-    blocks: list[Block] = []
-    for index, flight in enumerate(sources.flights, start=1):
-        blocks += _flight(flight, index, sources)
-    return Section("flights", "Flights", blocks)
+    return section_of_each("flights", "Flights", sources.flights, lambda flight, index: _flight(flight, index, sources))
 
 
 def _flight(flight: Source, index: int, sources: Sources) -> Iterator[Block]:

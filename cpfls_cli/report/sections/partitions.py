@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.report.content import Block, Folded, Section, Table, Text
 from cpfls_cli.report.figures.partitions import partitions_figure, partitions_of
 from cpfls_cli.report.numbers import count, number
+from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.report.verdict import fuzzy_part_off
-
-_INERTIA = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 
 
 def partitions_section(sources: Sources) -> Section | None:
@@ -29,10 +29,7 @@ def partitions_section(sources: Sources) -> Section | None:
     ----------
     Figure 6 and section 10 of the paper.
     """
-    if not sources.models:
-        return None
-    blocks = [block for index, model in enumerate(sources.models, start=1) for block in _model(model, index)]
-    return Section("partitions", "Partitions and parameters", blocks)
+    return section_of_each("partitions", "Partitions and parameters", sources.models, _model)
 
 
 def _model(model: Source, index: int) -> Iterator[Block]:
@@ -62,7 +59,7 @@ def _inertia(model: Source, index: int) -> Table:
     own = artifact.array("model/rigid_body") if artifact.text("model/base") == "rigid-body" else None
     rows = [
         [name, number(float(own[place])) if own is not None else "none", number(float(fitted[place]))]
-        for place, name in enumerate(_INERTIA)
+        for place, name in enumerate(INERTIA_PARAMETERS)
     ]
     header = ("kg m²", "Under the fuzzy part", "Rigid body alone")
     return Table(f"inertia-{index}", "Inertia found by least squares.", header, rows)

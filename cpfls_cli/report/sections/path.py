@@ -9,6 +9,7 @@ from cpfls_cli.report.figures.attitude import attitude_figure
 from cpfls_cli.report.figures.derivatives import derivatives_figure
 from cpfls_cli.report.leg import DERIVATIVES, UNITS, peaks
 from cpfls_cli.report.numbers import number
+from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 
 _PRINTED = ("2π = 6.283", "2", "1", "1", "2", "8", "64")
@@ -26,12 +27,8 @@ def path_section(sources: Sources) -> Section | None:
     Section or None
         None where no trajectory was given.
     """
-    if not sources.trajectories:
-        return None
-    blocks: list[Block] = []
-    for index, trajectory in enumerate(sources.trajectories, start=1):
-        blocks += _path(trajectory, index, sources.settings.paper)
-    return Section("path", "Training path", blocks)
+    paper = sources.settings.paper
+    return section_of_each("path", "Training path", sources.trajectories, lambda path, index: _path(path, index, paper))
 
 
 def _path(trajectory: Source, index: int, paper: bool) -> Iterator[Block]:

@@ -9,6 +9,7 @@ import numpy as np
 from cpfls_cli.report.content import Block, Heading, Section, Text
 from cpfls_cli.report.figures.inertia import inertia_figure
 from cpfls_cli.report.figures.prediction import error_figure, torques_figure
+from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 
 
@@ -28,14 +29,12 @@ def prediction_section(sources: Sources) -> Section | None:
     ----------
     Figure 7 of the paper.
     """
-    if not sources.predictions:
-        return None
-    blocks = [
-        block
-        for index, given in enumerate(sources.predictions, start=1)
-        for block in _prediction(given, index, sources)
-    ]
-    return Section("prediction", "Torque along a flight", blocks)
+    return section_of_each(
+        "prediction",
+        "Torque along a flight",
+        sources.predictions,
+        lambda given, index: _prediction(given, index, sources),
+    )
 
 
 def _prediction(prediction: Source, index: int, sources: Sources) -> Iterator[Block]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import count, number, percent
+from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.report.verdict import fuzzy_part_off
 
@@ -24,10 +25,7 @@ def rules_section(sources: Sources) -> Section | None:
     Section or None
         None where no model was given.
     """
-    if not sources.models:
-        return None
-    blocks = [block for index, model in enumerate(sources.models, start=1) for block in _rules(model, index)]
-    return Section("rules", "Excitation of the rules", blocks)
+    return section_of_each("rules", "Excitation of the rules", sources.models, _rules)
 
 
 def _rules(model: Source, index: int) -> Iterator[Block]:

@@ -8,6 +8,7 @@ from cpfls_cli.report.content import Block, Section, Text
 from cpfls_cli.report.figures.convergence import convergence_figure
 from cpfls_cli.report.figures.front import front_figure
 from cpfls_cli.report.figures.ridge import ridge_figure
+from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.report.verdict import fuzzy_part_off
 
@@ -24,10 +25,7 @@ def search_section(sources: Sources) -> Section | None:
     Section or None
         None where no model was given.
     """
-    if not sources.models:
-        return None
-    blocks = [block for index, model in enumerate(sources.models, start=1) for block in _search(model, index)]
-    return Section("search", "Search", blocks)
+    return section_of_each("search", "Search", sources.models, _search)
 
 
 def _search(model: Source, index: int) -> Iterator[Block]:

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.report.content import Block, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, plain
 from cpfls_cli.report.source import Sources
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_MOMENTS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 _PAPER = ("9.81", "6", "4", "0.3", "121.5 × 10⁻⁶", "2.7 × 10⁻⁶", "0.6", "0.6", "1.2")
 _PAPER_DURATION = "55"
 
@@ -50,7 +50,7 @@ def _rows(sources: Sources) -> list[tuple[str, str, str]]:
     values = [plain(vehicle.gravity_m_s2), plain(vehicle.mass_kg), *_rotors(vehicle)]
     values += [plain(moment) for moment in vehicle.inertia_kg_m2]
     names = ["gravity g, m/s²", "mass m, kg", "rotors", "arm l, m", "thrust factor k, N s²", "drag factor b, N m s²"]
-    names += [f"{name}, kg m²" for name in _MOMENTS[: len(vehicle.inertia_kg_m2)]]
+    names += [f"{name}, kg m²" for name in INERTIA_PARAMETERS[: len(vehicle.inertia_kg_m2)]]
     printed = [*_PAPER, *["0"] * (len(values) - len(_PAPER))]
     rows = list(zip(names, values, printed, strict=True))
     return [*rows, ("flight time T, s", _durations(sources), _PAPER_DURATION)]
