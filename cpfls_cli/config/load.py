@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
-from cpfls_cli.config.messages import describe_errors
+from cpfls_cli.config.messages import describe_errors, without_unknown_keys
 from cpfls_cli.config.overrides import apply_override
 from cpfls_cli.config.study import SECTIONS, Study
 from cpfls_cli.config.yaml_text import parse_yaml
@@ -119,4 +120,14 @@ def validate(data: dict[str, Any], source: str) -> Study:
     try:
         return Study.model_validate_json(json.dumps(filled))
     except ValidationError as error:
-        raise ConfigError("\n".join(describe_errors(error.errors(), filled, source))) from None
+        errors = [*error.errors(), *_hidden_errors(filled, error.errors())]
+        raise ConfigError("\n".join(describe_errors(errors, filled, source))) from None
+
+
+def _hidden_errors(data: dict[str, Any], found: list[ErrorDetails]) -> list[ErrorDetails]:
+    """Find what an unknown key hides: rules between the keys of a section run only where all its keys are known."""
+    try:
+        Study.model_validate_json(json.dumps(without_unknown_keys(data, found)))
+    except ValidationError as error:
+        return error.errors()
+    return []

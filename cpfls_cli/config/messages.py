@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
 import json
 from collections.abc import Iterable, Sequence
@@ -48,6 +49,7 @@ def describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], source
     """
     # Where a key allows several types, each of them has its own complaint; a line joins them.
     reasons: dict[Location, dict[Sequence[int | str], str]] = {}
+    not_of_length: set[Location] = set()
     for detail in errors:
         alternative = detail["loc"]
         location = _location(detail, data)
@@ -55,7 +57,41 @@ def describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], source
             alternative, location = alternative[:-1], location[:-1]
         if (reason := _reason(detail, location, data)) is not None:
             reasons.setdefault(location, {})[alternative] = reason
-    return [_line(location, found.values(), data, source) for location, found in reasons.items()]
+            not_of_length |= set() if _lacks_entry(detail) or detail["type"] in _LENGTH else {location}
+    # Where an entry of a list is wrong, only alternatives of another length complain about the list itself.
+    entries = [location for location in reasons if location in not_of_length]
+    told = [
+        location
+        for location in reasons
+        if location in not_of_length or not any(_is_below(entry, location) for entry in entries)
+    ]
+    return [_line(location, reasons[location].values(), data, source) for location in told]
+
+
+def _is_below(location: Location, place: Location) -> bool:
+    return len(location) > len(place) and location[: len(place)] == place
+
+
+def without_unknown_keys(data: dict[str, Any], errors: Iterable[ErrorDetails]) -> dict[str, Any]:
+    """Copy the data of a config without the keys that no section has.
+
+    Parameters
+    ----------
+    data : dict
+    errors : iterable of ErrorDetails
+        What the validating library says of the data.
+
+    Returns
+    -------
+    dict
+    """
+    kept = copy.deepcopy(data)
+    for detail in errors:
+        *parents, last = _location(detail, data) or ("",)
+        known, place = _value(kept, tuple(parents))
+        if detail["type"] in _UNKNOWN and known and isinstance(place, dict):
+            place.pop(last, None)
+    return kept
 
 
 def _line(location: Location, reasons: Iterable[str], data: dict[str, Any], source: str) -> str:

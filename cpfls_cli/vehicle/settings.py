@@ -13,6 +13,8 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.settings import Settings
 
+_Moment = Annotated[float, Gt(0)]
+
 
 @dataclass(frozen=True, kw_only=True)
 class RotorSettings(Settings):
@@ -45,7 +47,7 @@ class VehicleSettings(Settings):
     gravity_m_s2: Annotated[float, Gt(0), Doc("gravitational acceleration, m/s^2")] = 9.81
     mass_kg: Annotated[float, Gt(0), Doc("mass, kg")] = 6.0
     inertia_kg_m2: Annotated[
-        tuple[float, float, float] | tuple[float, float, float, float, float, float],
+        tuple[_Moment, _Moment, _Moment] | tuple[_Moment, _Moment, _Moment, float, float, float],
         Doc("inertia tensor, kg m^2: Ixx, Iyy, Izz, or Ixx, Iyy, Izz, Ixy, Ixz, Iyz with the sign of the entry"),
     ] = (0.6, 0.6, 1.2)
     rotors: Annotated[tuple[RotorSettings, ...], MinLen(1), Doc("the rotors, one entry each")] = _QUAD_PLUS

@@ -68,8 +68,29 @@ def test_one_wrong_value(wrong, content, message):
 
 def test_negative_inertia_names_its_key(wrong):
     (line,) = wrong("vehicle: {inertia_kg_m2: [-0.6, 0.6, 1.2]}")
-    assert line.startswith("FILE: vehicle.inertia_kg_m2 = [-0.6, 0.6, 1.2]: ")
-    assert "greater than 0" in line
+    assert line == "FILE: vehicle.inertia_kg_m2.0 = -0.6: must be greater than 0"
+
+
+def test_wrong_values_of_one_section_come_together(wrong):
+    lines = wrong("vehicle: {mass_kg: -1, inertia_kg_m2: [0.6, 0.6, -1.2, 0, 0, x], rotor_speed_max_rad_s: 0}")
+    assert sorted(lines) == [
+        "FILE: vehicle.inertia_kg_m2.2 = -1.2: must be greater than 0",
+        'FILE: vehicle.inertia_kg_m2.5 = "x": must be a number',
+        "FILE: vehicle.mass_kg = -1: must be greater than 0",
+        "FILE: vehicle.rotor_speed_max_rad_s = 0: must be greater than 0",
+    ]
+
+
+def test_an_unknown_key_does_not_hide_a_rule_between_keys(wrong):
+    lines = wrong("vehicle: {mass: 3, inertia_kg_m2: [1, 1, 1, 2, 0, 0]}\nimport: {crop: 1, crop_s: [5, 2]}")
+    assert [line.split(" = ")[0] for line in sorted(lines)] == [
+        "FILE: import.crop",
+        "FILE: import.crop_s",
+        "FILE: vehicle.inertia_kg_m2",
+        "FILE: vehicle.mass",
+    ]
+    assert any("is not positive definite" in line for line in lines)
+    assert any("needs 0 <= begin < end" in line for line in lines)
 
 
 def test_errors_of_all_sections_come_together(wrong):
