@@ -1,0 +1,1 @@
+"""Physical effects that a model can miss: a catalogue, one file an effect."""

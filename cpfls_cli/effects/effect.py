@@ -1,0 +1,228 @@
+"""What an effect is: columns of wrench that are linear in its coefficients, and what a reader has to know of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+Kind = Literal["wrench", "actuator", "sensor", "parameter"]
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One number that an effect needs.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+    low, high : float
+        What is physically possible, not what is usual, in multiples of `scale`.
+    meaning : str
+    scale : callable or None
+        Natural size on a vehicle, in `unit`; None for 1.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    scale: Callable[[VehicleSettings], float] | None = None
+
+    def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
+        """Bound the coefficient on a vehicle.
+
+        Parameters
+        ----------
+        vehicle : VehicleSettings
+
+        Returns
+        -------
+        tuple of float
+            In `unit`.
+        """
+        scale = 1.0 if self.scale is None else self.scale(vehicle)
+        return self.low * scale, self.high * scale
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A parameter that an effect depends on nonlinearly.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+    grid : tuple of float
+        Ascending; values that a search starts from. The first and the last bound it.
+    meaning : str
+    """
+
+    name: str
+    unit: str
+    grid: tuple[float, ...]
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Wrench columns along a flight: ``wrench = direct @ c + d/dt (momentum @ c)``.
+
+    Attributes
+    ----------
+    direct : array, shape (time, 6, coefficient)
+        Torque (3) and force (3) about the body axes for one unit of each coefficient.
+    momentum : array, shape (time, 6, coefficient), or None
+        What has to be differentiated in time; None for nothing. Nobody differentiates it: windows are integrated by
+        parts.
+    """
+
+    direct: Array
+    momentum: Array | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect:
+    """A physical effect that a model may miss.
+
+    Attributes
+    ----------
+    name : str
+        Identifier.
+    title : str
+        What people call it.
+    kind : {"wrench", "actuator", "sensor", "parameter"}
+        Adds torque and force; changes what the rotors do; changes what the sensors say; a wrong number of the vehicle.
+    formula : str
+        One line.
+    sentence : str
+        What a pilot understands.
+    coefficients : tuple of Coefficient
+        Physical, as reported; those of `shapes` not among them.
+    shapes : tuple of Shape
+    needs : frozenset of str
+        Of `Signals.available`.
+    excitation : str
+        The flight that shows it.
+    rivals : mapping of str to str
+        Effects that look alike, each with the flight that tells them apart.
+    source : str
+    columns : callable or None
+        ``columns(signals, shape) -> Columns``, linear in the linear coefficients; None for what only the audit of the
+        sensors can see.
+    unit_coefficient : bool
+        The columns are right only with the coefficient 1: everything is in the shape.
+    physical : callable or None
+        From linear to physical coefficients, NaN where the data left one open; None: they are the same, and the
+        bounds of the physical ones bound the linear ones.
+    linear : callable or None
+        The reverse.
+    apply : callable or None
+        For actuator and sensor effects: ``apply(signals, shape) -> Signals`` as they would be without the effect's
+        error, so that all other columns can be computed from them.
+    """
+
+    name: str
+    title: str
+    kind: Kind
+    formula: str
+    sentence: str
+    coefficients: tuple[Coefficient, ...]
+    needs: frozenset[str]
+    excitation: str
+    rivals: Mapping[str, str]
+    source: str
+    columns: Callable[[Signals, Mapping[str, float]], Columns] | None
+    shapes: tuple[Shape, ...] = ()
+    unit_coefficient: bool = False
+    physical: Callable[[Array], Array] | None = None
+    linear: Callable[[Array], Array] | None = None
+    apply: Callable[[Signals, Mapping[str, float]], Signals] | None = None
+
+    def missing(self, signals: Signals) -> tuple[str, ...]:
+        """Name the signals that the effect needs and the flight lacks.
+
+        Parameters
+        ----------
+        signals : Signals
+
+        Returns
+        -------
+        tuple of str
+        """
+        return tuple(sorted(self.needs - signals.available))
+
+
+def stack(*wrenches: Array) -> Array:
+    """Arrange wrenches, one for each coefficient, as columns.
+
+    Parameters
+    ----------
+    *wrenches : array, shape (time, 6)
+
+    Returns
+    -------
+    array, shape (time, 6, coefficient)
+    """
+    return np.stack(wrenches, axis=2)
+
+
+def wrench(torque: Array | None = None, force: Array | None = None, samples: int | None = None) -> Array:
+    """Join a body torque and a body force.
+
+    Parameters
+    ----------
+    torque, force : array, shape (time, 3), or None
+        None for zero.
+    samples : int or None
+        Needed where both are None.
+
+    Returns
+    -------
+    array, shape (time, 6), N m and N
+    """
+    given = torque if torque is not None else force
+    length = samples if given is None else len(given)
+    assert length is not None, "torque, force or samples"
+    zero = np.zeros((length, 3))
+    return np.concatenate([zero if torque is None else torque, zero if force is None else force], axis=1)
+
+
+def hub_wrench(hubs: Array, force: Array) -> Array:
+    """Sum forces at the hubs to a wrench about the centre of mass, ``(sum r_i x F_i, sum F_i)``.
+
+    Parameters
+    ----------
+    hubs : array, shape (rotor, 3), m
+    force : array, shape (time, rotor, 3), N
+
+    Returns
+    -------
+    array, shape (time, 6)
+    """
+    return wrench(np.cross(hubs[None], force).sum(axis=1), force.sum(axis=1))
+
+
+def thrust_wrench(hubs: Array, thrust: Array) -> Array:
+    """Sum changes of thrust along body z to a wrench.
+
+    Parameters
+    ----------
+    hubs : array, shape (rotor, 3), m
+    thrust : array, shape (time, rotor), N
+
+    Returns
+    -------
+    array, shape (time, 6)
+    """
+    force = np.zeros((*thrust.shape, 3))
+    force[..., 2] = thrust
+    return hub_wrench(hubs, force)

@@ -1,0 +1,182 @@
+"""What a flight tells an effect: motion, actuation and environment, with everything derived from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array
+from cpfls_cli.vehicle.rotors import body_wrench
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signals:
+    """A flight on a uniform clock, in SI, body frame FLU, world z up.
+
+    Attributes
+    ----------
+    time : array, shape (time,), s
+    body_rate : array, shape (time, 3), rad/s, body frame
+    vehicle : VehicleSettings
+    attitude : array, shape (time, 3), rad, or None
+        Roll, pitch, yaw.
+    velocity : array, shape (time, 3), m/s, world frame, or None
+        Relative to the ground.
+    position : array, shape (time, 3), m, world frame, or None
+    acceleration : array, shape (time, 3), m/s^2, world frame, or None
+    specific_force : array, shape (time, 3), m/s^2, body frame, or None
+        What an accelerometer senses; with attitude it follows from the acceleration too.
+    rotor_speed : array, shape (time, rotor), rad/s, or None
+        Measured, or commanded where `commanded`.
+    commanded : bool
+        Whether actuation is what was asked for, not what was measured.
+    stated_torque : array, shape (time, 3), N m, body frame, or None
+        Torque of a log that has no rotor speeds.
+    stated_thrust : array, shape (time,), N, or None
+        Thrust of such a log.
+    voltage : array, shape (time,), or None
+        As a fraction of the full battery.
+    ground_height_m : float
+        Height of the ground in the world frame.
+    """
+
+    time: Array
+    body_rate: Array
+    vehicle: VehicleSettings
+    attitude: Array | None = None
+    velocity: Array | None = None
+    position: Array | None = None
+    acceleration: Array | None = None
+    specific_force: Array | None = None
+    rotor_speed: Array | None = None
+    commanded: bool = False
+    stated_torque: Array | None = None
+    stated_thrust: Array | None = None
+    voltage: Array | None = None
+    ground_height_m: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def period(self) -> float:
+        """Sampling period, s."""
+        return float(self.time[1] - self.time[0])
+
+    @cached_property
+    def available(self) -> frozenset[str]:
+        """Names of what effects can ask for and this flight has."""
+        radius = all(rotor.radius_m is not None for rotor in self.vehicle.rotors)
+        found = {
+            "attitude": self.attitude is not None,
+            "velocity": self.velocity is not None and self.attitude is not None,
+            "height": self.position is not None and self.attitude is not None,
+            "rotor_speed": self.rotor_speed is not None,
+            "measured_rotor_speed": self.rotor_speed is not None and not self.commanded,
+            "command": self.commanded,
+            "torque": self.torque is not None,
+            "thrust": self.thrust is not None,
+            "voltage": self.voltage is not None,
+            "rotor_radius": radius,
+            "force": self.has_force,
+        }
+        return frozenset(name for name, there in found.items() if there)
+
+    @property
+    def has_force(self) -> bool:
+        """Whether the force balance can be written down."""
+        known = self.specific_force is not None or (
+            self.attitude is not None and (self.acceleration is not None or self.velocity is not None)
+        )
+        return known and self.thrust is not None
+
+    @cached_property
+    def torque(self) -> Array | None:
+        """Body torque of the rotors, shape (time, 3), N m."""
+        if self.rotor_speed is None:
+            return self.stated_torque
+        return body_wrench(self.vehicle, self.rotor_speed).body_torque
+
+    @cached_property
+    def thrust(self) -> Array | None:
+        """Thrust along body z, shape (time,), N."""
+        if self.rotor_speed is None:
+            return self.stated_thrust
+        return body_wrench(self.vehicle, self.rotor_speed).thrust
+
+    @cached_property
+    def wrench(self) -> Array:
+        """Torque and force of the rotors, shape (time, 6), N m and N, body frame; unknown parts are 0."""
+        wrench = np.zeros((len(self), 6))
+        if self.torque is not None:
+            wrench[:, :3] = self.torque
+        if self.thrust is not None:
+            wrench[:, 5] = self.thrust
+        return wrench
+
+    @cached_property
+    def speed(self) -> Array:
+        """Rotor speeds, shape (time, rotor), rad/s."""
+        assert self.rotor_speed is not None, "an effect that needs rotor speeds declares so"
+        return self.rotor_speed
+
+    @cached_property
+    def rotation(self) -> Array:
+        """Body to world, shape (time, 3, 3)."""
+        assert self.attitude is not None, "an effect that needs the attitude declares so"
+        return rotations.rotation_matrix(self.attitude)
+
+    @cached_property
+    def air_velocity(self) -> Array:
+        """Velocity of the centre of mass through still air, shape (time, 3), m/s, body frame."""
+        assert self.velocity is not None, "an effect that needs velocity declares so"
+        return np.asarray(np.einsum("tji,tj->ti", self.rotation, self.velocity))
+
+    @cached_property
+    def hubs(self) -> Array:
+        """Hub positions relative to the centre of mass, shape (rotor, 3), m, body frame."""
+        return np.array([rotor.position_m for rotor in self.vehicle.rotors])
+
+    @cached_property
+    def spins(self) -> Array:
+        """Spin directions, shape (rotor,), +1 counter-clockwise from above."""
+        return np.array([float(rotor.spin) for rotor in self.vehicle.rotors])
+
+    @cached_property
+    def rotor_thrust(self) -> Array:
+        """Thrust of each rotor, shape (time, rotor), N."""
+        return np.asarray(self.speed**2 * [rotor.thrust_factor_n_s2 for rotor in self.vehicle.rotors])
+
+    @cached_property
+    def hub_velocity(self) -> Array:
+        """Velocity of each hub through still air, ``v + omega x r_i``, shape (time, rotor, 3), m/s, body frame."""
+        return np.asarray(self.air_velocity[:, None] + np.cross(self.body_rate[:, None], self.hubs[None]))
+
+    @cached_property
+    def hub_height(self) -> Array:
+        """Height of each hub above the ground, shape (time, rotor), m."""
+        assert self.position is not None, "an effect that needs the height declares so"
+        above = np.einsum("tj,rj->tr", self.rotation[:, 2], self.hubs)
+        return np.asarray(self.position[:, 2, None] - self.ground_height_m + above)
+
+    @cached_property
+    def radii(self) -> Array:
+        """Radius of each propeller, shape (rotor,), m."""
+        return np.array([rotor.radius_m for rotor in self.vehicle.rotors], dtype=float)
+
+    def with_rotor_speed(self, rotor_speed: Array) -> Signals:
+        """Exchange the rotor speeds.
+
+        Parameters
+        ----------
+        rotor_speed : array, shape (time, rotor), rad/s
+
+        Returns
+        -------
+        Signals
+        """
+        return replace(self, rotor_speed=rotor_speed)
