@@ -33,6 +33,8 @@ UnitName = Literal[
     "N·m",
     "N m",
     "N mm",
+    "N",
+    "V",
 ]
 
 
@@ -73,6 +75,8 @@ KNOWN_UNITS: Final = MappingProxyType[str, Unit](
         "N·m": Unit(1.0, "N m"),
         "N m": Unit(1.0, "N m"),
         "N mm": Unit(1e-3, "N m"),
+        "N": Unit(1.0, "N"),
+        "V": Unit(1.0, "V"),
     }
 )
 

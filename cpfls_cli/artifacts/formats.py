@@ -49,9 +49,11 @@ FLIGHT = ArtifactSpec(
         _vector("body_rate", "rad/s", BODY, "body rates p, q, r", required=False),
         _vector("torque", "N m", EULER, "generalised torque, W^T body_torque", required=False),
         _vector("body_torque", "N m", BODY, "torque about the body axes", required=False),
+        DatasetSpec("thrust", ("time",), "N", BODY, "total thrust along body z", required=False),
         _vector("position", "m", WORLD, "position", required=False),
         _vector("velocity", "m/s", WORLD, "velocity", required=False),
         _vector("acceleration", "m/s^2", WORLD, "acceleration", required=False),
+        _vector("specific_force", "m/s^2", BODY, "what an accelerometer senses: +g along z in hover", required=False),
         DatasetSpec("rotor_speed", ("time", "rotor"), "rad/s", BODY, "rotor speeds", required=False, gaps=True),
         DatasetSpec(
             "rotor_command",
@@ -59,6 +61,14 @@ FLIGHT = ArtifactSpec(
             "SI",
             BODY,
             "commands to the rotors, aligned and filtered; SI unit of import.signals.rotor_command.unit",
+            required=False,
+        ),
+        DatasetSpec(
+            "voltage",
+            ("time",),
+            "SI",
+            NO_FRAME,
+            "of the battery: V, or share of the full one where import.signals.voltage.unit is 1",
             required=False,
         ),
         DatasetSpec(

@@ -6,7 +6,8 @@ from cpfls_cli.flightlog.deriving import derive_flight
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.reading import read_signals
 from cpfls_cli.flightlog.results import DelayEstimate, ImportedFlight, ImportReport, LogSignals
-from cpfls_cli.flightlog.settings import ImportSettings, SignalMap, SignalName
+from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.flightlog.signal_map import SignalMap, SignalName
 
 __all__ = [
     "DelayEstimate",

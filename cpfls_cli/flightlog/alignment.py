@@ -14,13 +14,22 @@ from cpfls_cli.flightlog.motion import body_rate_of
 from cpfls_cli.flightlog.results import DelayEstimate, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 
-_COMMANDS = ("body_torque", "rotor_command")
-_MOTION = ("attitude", "body_rate", "position", "velocity", "acceleration", "rotor_speed")
+_COMMANDS = ("body_torque", "thrust", "rotor_command")
+_MOTION = (
+    "attitude",
+    "body_rate",
+    "position",
+    "velocity",
+    "acceleration",
+    "specific_force",
+    "rotor_speed",
+    "voltage",
+)
 _POOR_R2 = 0.5
 
 
 def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: float = 1.0) -> LogSignals:
-    """Shift torque and rotor commands by the delay, stated or estimated, and cut the front that they then miss.
+    """Shift torque, thrust and rotor commands by the delay, stated or estimated, and cut the front that they then miss.
 
     Measured rotor speeds are motion and stay where they are, unless the torque is computed from them.
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.flightlog.signal_map import SignalMap
 from cpfls_cli.units import to_si
 
 

@@ -18,6 +18,7 @@ from cpfls_cli.flightlog.settings import ImportSettings
 _WORLD_SIGNALS = ("position", "velocity", "acceleration")
 _BODY_SIGNALS = ("body_rate", "body_torque")
 _ROTOR_SIGNALS = ("rotor_speed", "rotor_command")
+_SCALAR_SIGNALS = ("thrust", "voltage")
 
 
 def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:
@@ -37,14 +38,21 @@ def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) ->
     """
     in_body = _as_body_vectors(signals, settings)
     converted = {name: signals[name] for name in _ROTOR_SIGNALS if name in signals}
+    converted |= {name: signals[name][:, 0] for name in _SCALAR_SIGNALS if name in signals}
     converted |= {name: body_to_flu(in_body[name], settings.body_frame) for name in _BODY_SIGNALS if name in in_body}
-    converted |= {name: world_to_enu(signals[name], settings.world_frame) for name in _WORLD_SIGNALS if name in signals}
+    world = [name for name in _WORLD_SIGNALS if name in signals and not _is_specific_force(name, settings)]
+    converted |= {name: world_to_enu(signals[name], settings.world_frame) for name in world}
     if "attitude" in in_body:
         converted["attitude"] = attitude_to_enu_flu(in_body["attitude"], settings.body_frame, settings.world_frame)
-    if "acceleration" in signals and settings.acceleration_frame == "body-specific-force":
-        sensed = body_to_flu(signals["acceleration"], settings.body_frame)
-        converted["acceleration"] = acceleration_from_specific_force(converted["attitude"], sensed)
+    if "acceleration" in signals and _is_specific_force("acceleration", settings):
+        sensed = converted["specific_force"] = body_to_flu(signals["acceleration"], settings.body_frame)
+        if "attitude" in converted:
+            converted["acceleration"] = acceleration_from_specific_force(converted["attitude"], sensed)
     return converted
+
+
+def _is_specific_force(name: str, settings: ImportSettings) -> bool:
+    return name == "acceleration" and settings.acceleration_frame == "body-specific-force"
 
 
 def _as_body_vectors(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:

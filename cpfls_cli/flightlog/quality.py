@@ -13,6 +13,8 @@ from cpfls_cli.flightlog.repair import count_saturated
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.table import Table
 
+_NEVER_SATURATED = {"quaternion", "voltage"}
+
 
 @dataclass(frozen=True)
 class ValueCounts:
@@ -25,7 +27,7 @@ class ValueCounts:
     spikes, suspected_spikes : dict from str to int
         Spikes that are interpolated, and spikes that are left alone; one of the two is empty.
     saturated : dict from str to int
-        In long runs at an extreme; not of a quaternion, and not of rotors at rest.
+        In long runs at an extreme; not of a quaternion or a voltage, and not of rotors at rest.
     """
 
     missing: dict[str, int]
@@ -61,10 +63,10 @@ def count_values(table: Table, spikes: Mapping[str, BoolArray], settings: Import
 
 
 def _saturated(table: Table, settings: ImportSettings) -> dict[str, int]:
-    """Count saturated values; a hovering vehicle's quaternion stands at 1, and a parked one's rotors at 0."""
+    """Count saturated values; a hovering quaternion stands at 1, parked rotors at 0, and a voltage is coarse."""
     length = settings.saturation_samples
     rotors = {name: signal for name, signal in table.signals.items() if name.startswith("rotor")}
-    others = {name: signal for name, signal in table.signals.items() if name != "quaternion" and name not in rotors}
+    others = {name: signal for name, signal in table.signals.items() if name not in _NEVER_SATURATED | rotors.keys()}
     return _by_column(rotors, settings, lambda column: count_saturated(column, length, rest=0.0)) | _by_column(
         others, settings, lambda column: count_saturated(column, length)
     )

@@ -11,6 +11,7 @@ from cpfls_cli.flightlog.angles import refuse_steep_pitch, warn_of_angles
 from cpfls_cli.flightlog.clock import longest_stretch
 from cpfls_cli.flightlog.columns import select_columns
 from cpfls_cli.flightlog.conversion import to_program_frames
+from cpfls_cli.flightlog.presence import of_present_signals
 from cpfls_cli.flightlog.quality import count_values, warn_of_values
 from cpfls_cli.flightlog.repair import fill
 from cpfls_cli.flightlog.results import ImportReport, LogSignals
@@ -45,9 +46,10 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     SettingError
         If the crop leaves fewer than two rows.
     InputError
-        If columns are missing, a gap is too long, the clock goes backward and stays behind, or the pitch is larger
-        than any pitch.
+        If columns are missing, too few signals are left, a gap is too long, the clock goes backward and stays
+        behind, or the pitch is larger than any pitch.
     """
+    settings = of_present_signals(columns, settings)
     read = Table(*select_columns(columns, settings))
     table, dropped = in_order_and_cropped(read, settings)
     table = made_continuous(table)

@@ -106,9 +106,13 @@ class LogSignals:
         Roll, pitch, yaw; roll and yaw without jumps of a full turn.
     body_rate : array, shape (time, 3), rad/s, body frame, or None
     body_torque : array, shape (time, 3), N m, body frame, or None
+    thrust : array, shape (time,), N, along body z, or None
     position, velocity, acceleration : array, shape (time, 3), m, m/s, m/s^2, world frame, or None
+    specific_force : array, shape (time, 3), m/s^2, body frame, or None
+        What an accelerometer senses, `R^T (a + g e_z)`.
     rotor_speed : array, shape (time, rotor), rad/s, or None
     rotor_command : array, shape (time, rotor), SI unit of the signal's `unit`, or None
+    voltage : array, shape (time,), V, or 1 as a share of the full battery's, or None
     report : ImportReport
     """
 
@@ -116,11 +120,14 @@ class LogSignals:
     attitude: Array | None = None
     body_rate: Array | None = None
     body_torque: Array | None = None
+    thrust: Array | None = None
     position: Array | None = None
     velocity: Array | None = None
     acceleration: Array | None = None
+    specific_force: Array | None = None
     rotor_speed: Array | None = None
     rotor_command: Array | None = None
+    voltage: Array | None = None
     report: ImportReport = field(repr=False)
 
 

@@ -4,65 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt, Le, MinLen
+from annotated_types import Ge, Gt, Le
 from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
+from cpfls_cli.flightlog.signal_map import SignalMap, SignalName, check_signal
 from cpfls_cli.settings import Settings
-from cpfls_cli.units import KNOWN_UNITS, UnitName
-
-SignalName = Literal[
-    "attitude",
-    "quaternion",
-    "body_rate",
-    "attitude_rate",
-    "position",
-    "velocity",
-    "acceleration",
-    "torque",
-    "body_torque",
-    "rotor_speed",
-    "rotor_command",
-]
-
-_UNITS_OF_SIGNAL: Final = MappingProxyType(
-    {
-        "attitude": ("rad",),
-        "quaternion": ("1",),
-        "body_rate": ("rad/s",),
-        "attitude_rate": ("rad/s",),
-        "position": ("m",),
-        "velocity": ("m/s",),
-        "acceleration": ("m/s^2",),
-        "torque": ("N m",),
-        "body_torque": ("N m",),
-        "rotor_speed": ("rad/s",),
-        "rotor_command": ("1", "s", "rad/s"),
-    }
-)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SignalMap(Settings):
-    """Where one signal stands in the log: ``signal = sign * (scale * column + offset)`` in `unit`."""
-
-    columns: Annotated[tuple[str, ...], MinLen(1), Doc("names of the columns, in the order of the axes")]
-    unit: Annotated[UnitName, Doc("unit of the columns after scale and offset")]
-    sign: Annotated[tuple[float, ...] | None, Doc("+1 or -1 for each column; null: all +1")] = None
-    scale: Annotated[float, Doc("factor on the logged numbers")] = 1.0
-    offset: Annotated[float, Doc("added after the factor, in the unit above")] = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the signs against the columns."""
-        if len(set(self.columns)) < len(self.columns):
-            raise SettingError("columns", "a column is named twice")
-        if self.scale == 0:
-            raise SettingError("scale", "must not be 0")
-        if self.sign is not None and (len(self.sign) != len(self.columns) or {abs(s) for s in self.sign} != {1}):
-            raise SettingError("sign", f"needs {len(self.columns)} numbers, one for each column, each +1 or -1")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +27,8 @@ class ImportSettings(Settings):
     body_frame: Annotated[Literal["FLU", "FRD"], Doc("body axes of the log; converted to FLU")] = "FLU"
     world_frame: Annotated[Literal["ENU", "NED"], Doc("world axes of the log; converted to ENU")] = "ENU"
     acceleration_frame: Annotated[
-        Literal["world", "body-specific-force"], Doc("acceleration in the world, or what an accelerometer senses")
+        Literal["world", "body-specific-force"],
+        Doc("acceleration in the world, or what an accelerometer senses; the latter is kept as specific_force too"),
     ] = "world"
     torque_source: Annotated[
         Literal["column", "rotor-speed", "rotor-command"] | None,
@@ -119,19 +69,10 @@ class ImportSettings(Settings):
         if self.crop_s is not None and not 0 <= self.crop_s[0] < self.crop_s[1]:
             raise SettingError("crop_s", "needs 0 <= begin < end")
         for name, signal in self.signals.items():
-            _check_signal(name, signal)
+            check_signal(name, signal)
         if self.signals:
             _check_attitude(self)
             _check_torque(self)
-
-
-def _check_signal(name: SignalName, signal: SignalMap) -> None:
-    expected = 4 if name == "quaternion" else 3
-    if not name.startswith("rotor") and len(signal.columns) != expected:
-        raise SettingError(f"signals.{name}.columns", f"needs {expected} columns, got {len(signal.columns)}")
-    if KNOWN_UNITS[signal.unit].si not in _UNITS_OF_SIGNAL[name]:
-        wanted = [unit for unit, entry in KNOWN_UNITS.items() if entry.si in _UNITS_OF_SIGNAL[name]]
-        raise SettingError(f"signals.{name}.unit", f"{signal.unit!r} does not measure it; one of {', '.join(wanted)}")
 
 
 def _check_attitude(settings: ImportSettings) -> None:
@@ -140,9 +81,7 @@ def _check_attitude(settings: ImportSettings) -> None:
         raise SettingError("signals", "attitude and quaternion are both given; keep one")
     if {"body_rate", "attitude_rate"} <= names:
         raise SettingError("signals", "body_rate and attitude_rate are both given; keep one")
-    needing: list[str] = [name for name in ("attitude_rate", "torque") if name in names]
-    if settings.acceleration_frame == "body-specific-force" and "acceleration" in names:
-        needing.append("acceleration")
+    needing = [name for name in ("attitude_rate", "torque") if name in names]
     if needing and not {"attitude", "quaternion"} & names:
         raise SettingError("signals", f"{', '.join(needing)} needs attitude or quaternion to be converted")
 

@@ -60,6 +60,11 @@ def missing_signals(flight: ImportedFlight) -> tuple[str, ...]:
             "the flight has no attitude, so reduce, identify and predict will refuse it: map one with"
             " import.signals.attitude or import.signals.quaternion"
         )
+    if flight.attitude is None and flight.body_rate is None:
+        sentences.append(
+            "the flight has neither attitude nor body rates: only the balance of its rotors where it hovers can be read"
+            " from it"
+        )
     if flight.body_torque is None:
         sentences.append(
             "the flight has no torque, so identify will refuse it: map one with import.signals.body_torque, or"

@@ -31,7 +31,7 @@ def rotor_torque(study: Study) -> Callable[[LogSignals], Array]:
             speed = signals.rotor_speed
         else:
             unit = study.import_.signals["rotor_command"].unit
-            speed = _commanded_speed(signals.rotor_command, unit, study.vehicle.rotor_speed_max_rad_s)
+            speed = commanded_speed(signals.rotor_command, unit, study.vehicle.rotor_speed_max_rad_s)
         rotors = len(study.vehicle.rotors)
         if speed is None or speed.shape[1] != rotors:
             raise InputError(
@@ -65,8 +65,28 @@ def rotor_torque_words(study: Study) -> list[str]:
     return [f"body torque: of vehicle.rotors, speed = command * vehicle.rotor_speed_max_rad_s ({largest:g} rad/s)"]
 
 
-def _commanded_speed(command: Array | None, unit: str, speed_max: float) -> Array | None:
-    """Take a command in 0..1 as a share of the largest rotor speed; speeds are taken as they are."""
+def commanded_speed(command: Array | None, unit: str, speed_max: float) -> Array | None:
+    """Take a command in 0..1 as a share of the largest rotor speed; speeds are taken as they are.
+
+    Parameters
+    ----------
+    command : array, shape (time, rotor), or None
+        In the SI unit of `unit`, as a flight holds it.
+    unit : str
+        `import.signals.rotor_command.unit` of the study; a flight carries it in `/config`.
+    speed_max : float
+        `vehicle.rotor_speed_max_rad_s`, rad/s.
+
+    Returns
+    -------
+    array, shape (time, rotor), rad/s, or None
+        None where there is no command.
+
+    Raises
+    ------
+    InputError
+        If the unit is neither a share nor a speed.
+    """
     if command is None or unit in _SPEED_UNITS:
         return command
     if unit != "1":

@@ -30,6 +30,7 @@ class RotorSettings(Settings):
     ] = 1
     thrust_factor_n_s2: Annotated[float, Gt(0), Doc("thrust over squared speed k, N s^2")] = 121.5e-6
     drag_factor_n_m_s2: Annotated[float, Gt(0), Doc("reaction torque over squared speed b, N m s^2")] = 2.7e-6
+    radius_m: Annotated[Annotated[float, Gt(0)] | None, Doc("radius of the propeller, m; null if not known")] = None
 
 
 _QUAD_PLUS = (
