@@ -18,6 +18,8 @@ from cpfls_cli.units import KNOWN_UNITS, UnitName, to_si
         (250.0, "N mm", 0.25),
         (3.0, "N·m", 3.0),
         (7.0, "mm/s", 0.007),
+        (0.3, "N", 0.3),
+        (16.8, "V", 16.8),
     ],
 )
 def test_a_value_converts_to_si(value, unit, expected):

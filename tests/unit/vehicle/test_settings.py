@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.vehicle import VehicleSettings, inertia_tensor
+from cpfls_cli.vehicle.settings import RotorSettings
 
 
 @pytest.mark.parametrize(
@@ -29,3 +31,11 @@ def test_six_elements_fill_the_tensor():
 
 def test_three_elements_are_the_diagonal():
     np.testing.assert_array_equal(inertia_tensor(VehicleSettings()), np.diag([0.6, 0.6, 1.2]))
+
+
+def test_the_radius_of_a_propeller_is_positive_or_not_known():
+    read = TypeAdapter(RotorSettings).validate_json
+    texts = ("{}", '{"radius_m": null}', '{"radius_m": 0.2}')
+    assert [read(text).radius_m for text in texts] == [None, None, 0.2]
+    with pytest.raises(ValidationError):
+        read('{"radius_m": 0.0}')
