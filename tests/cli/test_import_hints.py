@@ -13,6 +13,7 @@ SIGNALS = {
     "rotor_speed": "rotor_speed: {columns: [u1, u2, u3, u4], unit: rad/s}",
 }
 NO_ATTITUDE = "the flight has no attitude, so reduce, identify and predict will refuse it: map one with import.signals."
+NO_ROTATION = "the flight has neither attitude nor body rates: only the balance of its rotors"
 NO_TORQUE = "the flight has no torque, so identify will refuse it: map one with import.signals.body_torque"
 
 
@@ -41,6 +42,7 @@ def imported(cpfls, tmp_path):
     [
         (("body_rate",), "null", [NO_ATTITUDE, NO_TORQUE]),
         (("body_rate", "body_torque"), "column", [NO_ATTITUDE]),
+        (("rotor_command",), "null", [NO_ATTITUDE, NO_ROTATION, NO_TORQUE]),
         (("attitude",), "null", [NO_TORQUE]),
         (("attitude", "body_torque"), "column", []),
         (("attitude", "rotor_command"), "rotor-command", []),
