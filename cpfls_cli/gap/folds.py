@@ -1,0 +1,154 @@
+"""Blocks that cross-validation leaves out, as normal equations: every subset of columns costs one small solve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+
+_LARGEST_NUMBER = 24
+_RIDGE = 1e-9
+
+
+@dataclass(frozen=True)
+class Folds:
+    """Normal equations of each block.
+
+    Attributes
+    ----------
+    gram : array, shape (block, column, column)
+    moment : array, shape (block, column, draw)
+        Columns times right side; several right sides are draws.
+    square : array, shape (block, draw)
+        Sum of squares of the right side.
+    """
+
+    gram: Array
+    moment: Array
+    square: Array
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return len(self.gram)
+
+    def solve(self, columns: IntArray) -> tuple[Array, Array]:
+        """Fit a subset of columns without each block, and judge it on that block.
+
+        Parameters
+        ----------
+        columns : array of int
+
+        Returns
+        -------
+        coefficients : array, shape (block, column, draw)
+        error : array, shape (block, draw)
+            Sum of squares left on the block that the fit did not see.
+        """
+        gram, moment = self.gram[:, columns[:, None], columns], self.moment[:, columns]
+        coefficients = _solve(gram.sum(axis=0) - gram, moment.sum(axis=0) - moment)
+        return coefficients, self._left(gram, moment, coefficients)
+
+    def fit(self, columns: IntArray) -> tuple[Array, Array]:
+        """Fit a subset of columns on all blocks.
+
+        Parameters
+        ----------
+        columns : array of int
+
+        Returns
+        -------
+        coefficients : array, shape (column, draw)
+        error : array, shape (block, draw)
+        """
+        gram, moment = self.gram[:, columns[:, None], columns], self.moment[:, columns]
+        coefficients = _solve(gram.sum(axis=0), moment.sum(axis=0))
+        return coefficients, self._left(gram, moment, coefficients[None])
+
+    def _left(self, gram: Array, moment: Array, coefficients: Array) -> Array:
+        explained = np.einsum(
+            "bcd,bcd->bd", 2 * moment - gram @ coefficients, np.broadcast_to(coefficients, moment.shape)
+        )
+        return np.asarray(self.square - explained)
+
+    def subtracted(self, column: int) -> Folds:
+        """Subtract a column with coefficient 1 from the right side.
+
+        Parameters
+        ----------
+        column : int
+
+        Returns
+        -------
+        Folds
+        """
+        inner = self.gram[:, :, column]
+        square = self.square - 2 * self.moment[:, column] + self.gram[:, column, column, None]
+        return Folds(self.gram, self.moment - inner[..., None], square)
+
+
+def folds(columns: Array, right: Array, block: IntArray) -> Folds:
+    """Build the normal equations of each block.
+
+    Parameters
+    ----------
+    columns : array, shape (window, channel, column)
+        Weighted.
+    right : array, shape (window, channel) or (window, channel, draw)
+        Weighted.
+    block : array of int, shape (window,)
+
+    Returns
+    -------
+    Folds
+    """
+    draws = right.reshape(*right.shape[:2], -1)
+    parts = [
+        (columns[block == b].reshape(-1, columns.shape[2]), draws[block == b].reshape(-1, draws.shape[2]))
+        for b in range(int(block.max()) + 1)
+    ]
+    return Folds(
+        np.array([x.T @ x for x, _ in parts]),
+        np.array([x.T @ y for x, y in parts]),
+        np.array([(y**2).sum(axis=0) for _, y in parts]),
+    )
+
+
+def blocks_of(flight_index: IntArray, centres: Array, block_s: float) -> IntArray:
+    """Cut flights into contiguous blocks of about equal length.
+
+    Parameters
+    ----------
+    flight_index : array of int, shape (window,)
+    centres : array, shape (window,), s
+        Middle of each window in its own flight.
+    block_s : float
+        Wanted length; longer where there would be too many.
+
+    Returns
+    -------
+    array of int, shape (window,)
+        Blocks from 0, without gaps.
+    """
+    spans = [np.ptp(centres[flight_index == f]) for f in np.unique(flight_index)]
+    length = max(block_s, sum(spans) / _LARGEST_NUMBER)
+    block = np.zeros(len(centres), dtype=int)
+    first = 0
+    for flight, span in zip(np.unique(flight_index), spans, strict=True):
+        own = flight_index == flight
+        number = max(1, round(span / length))
+        order = np.arange(own.sum()) * number // max(1, own.sum())
+        block[own] = first + order
+        first += number
+    return block
+
+
+def _solve(gram: Array, moment: Array) -> Array:
+    """Solve normal equations with columns brought to one length; a column of zeros gets the coefficient 0."""
+    length = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
+    scale = 1.0 / np.where(length > 0, length, 1.0)
+    scaled = gram * scale[..., :, None] * scale[..., None, :] + _RIDGE * np.eye(gram.shape[-1])
+    empty = (length <= 0)[..., None] * np.eye(gram.shape[-1])
+    return np.asarray(np.linalg.solve(scaled + empty, moment * scale[..., None]) * scale[..., None])

@@ -1,0 +1,217 @@
+"""What each candidate explains of blocks that its fit did not see, and what chance explains as well."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.gap.balance_system import System
+from cpfls_cli.gap.bounds import within_bounds
+from cpfls_cli.gap.folds import Folds, folds
+from cpfls_cli.gap.weak_flight import Candidate
+
+REFUSED = -np.inf
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A candidate and what it explains.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    columns : array of int
+        Of the layout; without those that a bound at 0 took out.
+    gain : float
+        Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
+    block_error : array, shape (block,)
+        What is left on each block.
+    coefficients : array, shape (coefficient,)
+        Linear, of a fit on all blocks; 0 where a bound took one out.
+    """
+
+    candidate: Candidate
+    columns: IntArray
+    gain: float
+    block_error: Array
+    coefficients: Array
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Base columns and candidates side by side.
+
+    Attributes
+    ----------
+    matrix : array, shape (window, 6, column)
+        Weighted.
+    base : array of int
+    candidates : tuple of (Candidate, array of int)
+    """
+
+    matrix: Array
+    base: IntArray
+    candidates: tuple[tuple[Candidate, IntArray], ...]
+
+
+def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
+    """List effects at all points of their grids.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+
+    Returns
+    -------
+    list of Candidate
+    """
+    return [
+        Candidate(effect, dict(zip((shape.name for shape in effect.shapes), values, strict=True)))
+        for effect in effects
+        for values in product(*(shape.grid for shape in effect.shapes))
+    ]
+
+
+def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> Layout:
+    """Arrange base and candidates, in floors.
+
+    Parameters
+    ----------
+    hypothesis : System
+    candidates : sequence of Candidate
+    floor : array, shape (6,)
+
+    Returns
+    -------
+    Layout
+    """
+    parts, places, first = [hypothesis.base], [], hypothesis.base.shape[2]
+    base = np.arange(first)
+    for candidate in candidates:
+        columns = hypothesis.columns(candidate)
+        parts.append(columns)
+        places.append((candidate, np.arange(first, first + columns.shape[2])))
+        first += columns.shape[2]
+    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(places))
+
+
+def score(arranged: Layout, normal: Folds, hypothesis: System) -> list[Scored]:
+    """Score every candidate.
+
+    Parameters
+    ----------
+    arranged : Layout
+    normal : Folds
+        Of one right side.
+    hypothesis : System
+
+    Returns
+    -------
+    list of Scored
+        Best first.
+    """
+    _, before = normal.solve(arranged.base)
+    vehicle = hypothesis.flights[0].signals.vehicle
+    scored = [_scored(place, arranged.base, normal, before[:, 0], vehicle) for place in arranged.candidates]
+    return sorted(scored, key=lambda found: -found.gain)
+
+
+def chance(arranged: Layout, normal: Folds) -> Array:
+    """Find what the best candidate explains of each draw of shifted residuals.
+
+    Signs and bounds are not used, so chance is given more than its due.
+
+    Parameters
+    ----------
+    arranged : Layout
+    normal : Folds
+        Of many right sides.
+
+    Returns
+    -------
+    array, shape (draw,)
+    """
+    _, before = normal.solve(arranged.base)
+    best = np.full(before.shape[1], -np.inf)
+    for candidate, columns in arranged.candidates:
+        best = np.maximum(best, (before - _error(candidate, columns, arranged.base, normal)).sum(axis=0))
+    return best
+
+
+def shifted(residual: Array, flight_index: IntArray, shifts: int, rng: np.random.Generator) -> Array:
+    """Shift the residual of each flight in time, with random signs: what is left of it when nothing causes it.
+
+    The mean of each flight is taken out first, because a constant survives every shift.
+
+    Parameters
+    ----------
+    residual : array, shape (window, 6)
+    flight_index : array of int, shape (window,)
+    shifts : int
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array, shape (window, 6, shift)
+    """
+    draws = np.zeros((*residual.shape, shifts))
+    for flight in np.unique(flight_index):
+        own = np.flatnonzero(flight_index == flight)
+        rows = residual[own] - residual[own].mean(axis=0)
+        least = max(1, len(own) // 10)
+        offsets = rng.integers(least, max(least + 1, len(own) - least + 1), size=shifts)
+        signs = rng.choice([-1.0, 1.0], size=shifts)
+        places = (np.arange(len(own))[:, None] - offsets) % len(own)
+        draws[own] = np.moveaxis(rows[places], 1, 2) * signs
+    return draws
+
+
+def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArray) -> Folds:
+    """Build the normal equations of a layout.
+
+    Parameters
+    ----------
+    arranged : Layout
+    right : array, shape (window, 6) or (window, 6, draw), N m and N
+    floor : array, shape (6,)
+    block : array of int, shape (window,)
+
+    Returns
+    -------
+    Folds
+    """
+    weighted = right / (floor if right.ndim == 2 else floor[:, None])
+    return folds(arranged.matrix, weighted, block)
+
+
+def _error(candidate: Candidate, columns: IntArray, base: IntArray, normal: Folds) -> Array:
+    if candidate.effect.unit_coefficient:
+        return normal.subtracted(int(columns[0])).solve(base)[1]
+    return normal.solve(np.concatenate([base, columns]))[1]
+
+
+def _scored(place: tuple[Candidate, IntArray], base: IntArray, normal: Folds, before: Array, vehicle: object) -> Scored:
+    candidate, columns = place
+    if len(columns) == 0:
+        return Scored(candidate, columns, REFUSED, before, np.zeros(0))
+    if candidate.effect.unit_coefficient:
+        error = _error(candidate, columns, base, normal)[:, 0]
+        return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
+    kept = np.ones(len(columns), dtype=bool)
+    for _ in range(len(columns)):
+        fitted = np.zeros(len(columns))
+        fitted[kept] = normal.fit(np.concatenate([base, columns[kept]]))[0][len(base) :, 0]
+        keep, admissible = within_bounds(candidate.effect, fitted, vehicle)  # type: ignore[arg-type]
+        if not admissible or not (kept & keep).any():
+            return Scored(candidate, columns, REFUSED, before, fitted)
+        if (kept & keep == kept).all():
+            break
+        kept &= keep
+    used = columns[kept]
+    error = _error(candidate, used, base, normal)[:, 0]
+    return Scored(candidate, used, float((before - error).sum()), error, fitted)

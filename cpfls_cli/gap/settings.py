@@ -1,0 +1,46 @@
+"""Settings of the section `gap`: how flights and simulation are compared, and how an effect is named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Le, Lt
+from typing_extensions import Doc
+
+from cpfls_cli.errors import SettingError
+from cpfls_cli.settings import Settings
+
+
+@dataclass(frozen=True, kw_only=True)
+class GapSettings(Settings):
+    """Settings of `cpfls compare`, `diagnose`, `extend` and `gap`."""
+
+    window_s: Annotated[float, Gt(0), Doc("length of the smooth windows over which torques are compared, s")] = 0.4
+    overlap: Annotated[float, Ge(0), Lt(1), Doc("share that neighbouring windows have in common")] = 0.5
+    block_s: Annotated[float, Gt(0), Doc("length of the blocks that cross-validation leaves out, s")] = 4.0
+    shifts: Annotated[int, Ge(39), Doc("circular time shifts that say what chance alone explains")] = 199
+    significance: Annotated[
+        float, Gt(0), Lt(0.5), Doc("largest probability that an accepted effect is chance, over the whole catalogue")
+    ] = 0.01
+    effects_max: Annotated[int, Ge(1), Le(10), Doc("largest number of effects in one diagnosis")] = 4
+    named_share: Annotated[
+        float, Gt(0.5), Le(1), Doc("share of the gap above the noise floor from which on effects count as the answer")
+    ] = 0.9
+    partial_share: Annotated[
+        float, Gt(0), Lt(1), Doc("share from which on effects are called the closest, not all")
+    ] = 0.5
+    ground_height_m: Annotated[float, Doc("height of the ground in the world frame of the flights, m")] = 0.0
+    ignore: Annotated[tuple[str, ...], Doc("effects that are not considered")] = ()
+    force: Annotated[bool, Doc("use the force balance too, where a flight has velocity or acceleration")] = True
+    horizon: Annotated[int, Ge(1), Doc("longest replay of measured rotor speeds, samples")] = 50
+
+    def __post_init__(self) -> None:
+        """Check the shares against each other.
+
+        Raises
+        ------
+        SettingError
+        """
+        if self.partial_share >= self.named_share:
+            raise SettingError("partial_share", "must be below named_share")

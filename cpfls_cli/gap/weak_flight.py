@@ -1,0 +1,162 @@
+"""A flight as rows of the balance: one window, three torques and three forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.effects.effect import Columns, Effect
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.inertial import Balance, InertiaModel, rotation_balance, translation_balance
+from cpfls_cli.gap.windows import Windows
+
+CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
+"""Rows of the balance in each window, body axes, N m and N."""
+
+
+class Candidate(NamedTuple):
+    """An effect with a value for each of its shapes.
+
+    Attributes
+    ----------
+    effect : Effect
+    shape : mapping of str to float
+    """
+
+    effect: Effect
+    shape: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class WeakFlight:
+    """A flight with the inertial side of its balance.
+
+    Attributes
+    ----------
+    name : str
+    signals : Signals
+    windows : Windows
+    inertial : Columns
+        Momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
+    known : array of bool, shape (6,)
+        Channels that the flight has.
+    """
+
+    name: str
+    signals: Signals
+    windows: Windows
+    inertial: Columns
+    known: BoolArray
+
+    def __len__(self) -> int:
+        return self.windows.count(len(self.signals))
+
+    def residual(self, signals: Signals) -> Columns:
+        """Subtract what the rotors do from the inertial side.
+
+        Parameters
+        ----------
+        signals : Signals
+            As they are, or with actuator effects applied.
+
+        Returns
+        -------
+        Columns
+            Of shape (time, 6), N m and N.
+        """
+        return Columns((self.inertial.direct - signals.wrench) * self.known, self.inertial.momentum)
+
+    def averaged(self, columns: Columns) -> Array:
+        """Average columns, or a residual, over the windows.
+
+        Parameters
+        ----------
+        columns : Columns
+
+        Returns
+        -------
+        array, shape (window, 6, ...)
+        """
+        rows = self.windows.average(columns.direct)
+        if columns.momentum is not None:
+            rows = rows + self.windows.derivative(columns.momentum)
+        return np.asarray(rows * self.known.reshape(-1, *[1] * (rows.ndim - 2)))
+
+
+def weak_flight(name: str, signals: Signals, windows: Windows, model: InertiaModel | None, force: bool) -> WeakFlight:
+    """Write down the inertial side of a flight.
+
+    Parameters
+    ----------
+    name : str
+    signals : Signals
+    windows : Windows
+    model : InertiaModel or None
+    force : bool
+        Whether to use the force balance where the flight allows it.
+
+    Returns
+    -------
+    WeakFlight
+    """
+    with_force = force and signals.has_force
+    rotation = rotation_balance(signals, model)
+    nothing = np.zeros((len(signals), 3))
+    translation = translation_balance(signals) if with_force else Balance(nothing, nothing)
+    inertial = Columns(
+        np.concatenate([rotation.direct, translation.direct], axis=1),
+        np.concatenate([rotation.momentum, translation.momentum], axis=1),
+    )
+    known = np.array([signals.torque is not None] * 3 + [with_force] * 3)
+    return WeakFlight(name, signals, windows, inertial, known)
+
+
+def columns_of(candidate: Candidate, signals: Signals) -> Columns:
+    """Evaluate the columns of an effect.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Of an effect with columns.
+    signals : Signals
+
+    Returns
+    -------
+    Columns
+        Of shape (time, 6, coefficient).
+    """
+    assert candidate.effect.columns is not None, "only effects with columns are candidates"
+    return candidate.effect.columns(signals, candidate.shape)
+
+
+def nuisance() -> Candidate:
+    """Give the parameters of the vehicle that stay free in every fit.
+
+    Returns
+    -------
+    Candidate
+    """
+    return Candidate(CATALOGUE["parameter_error"], {})
+
+
+def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
+    """Apply the actuator effects among those chosen.
+
+    Parameters
+    ----------
+    signals : Signals
+    chosen : iterable of Candidate
+
+    Returns
+    -------
+    Signals
+    """
+    for candidate in chosen:
+        if candidate.effect.apply is not None and candidate.effect.kind == "actuator":
+            signals = candidate.effect.apply(signals, candidate.shape)
+    return signals

@@ -1,0 +1,128 @@
+"""Weak form: averages over smooth windows, with derivatives moved onto the window by integration by parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+
+_FEWEST_SAMPLES = 8
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows ``phi(s) = sin(pi s)^4``, scaled to integral 1 and repeated at a hop.
+
+    Attributes
+    ----------
+    weight : array, shape (window,)
+        phi dt.
+    slope : array, shape (window,), 1/s
+        phi' dt.
+    hop : int
+        Samples from one window to the next.
+    period : float
+        Sampling period, s.
+    """
+
+    weight: Array
+    slope: Array
+    hop: int
+    period: float
+
+    def count(self, samples: int) -> int:
+        """Count the windows that fit into a flight.
+
+        Parameters
+        ----------
+        samples : int
+
+        Returns
+        -------
+        int
+        """
+        return max(0, (samples - len(self.weight)) // self.hop + 1)
+
+    def centres(self, time: Array) -> Array:
+        """Give the middle of each window.
+
+        Parameters
+        ----------
+        time : array, shape (time,), s
+
+        Returns
+        -------
+        array, shape (window,), s
+        """
+        first = time[0] + 0.5 * (len(self.weight) - 1) * self.period
+        return np.asarray(first + np.arange(self.count(len(time))) * self.hop * self.period)
+
+    def average(self, values: Array) -> Array:
+        """Average over each window, ``int phi x dt``.
+
+        Parameters
+        ----------
+        values : array, shape (time, ...)
+
+        Returns
+        -------
+        array, shape (window, ...)
+        """
+        return self._apply(values, self.weight)
+
+    def derivative(self, values: Array) -> Array:
+        """Average the time derivative over each window, ``-int phi' x dt``; nothing is differentiated.
+
+        Parameters
+        ----------
+        values : array, shape (time, ...)
+
+        Returns
+        -------
+        array, shape (window, ...)
+        """
+        return -self._apply(values, self.slope)
+
+    def _apply(self, values: Array, kernel: Array) -> Array:
+        views = sliding_window_view(values, len(kernel), axis=0)[:: self.hop]
+        return np.asarray(views @ kernel)
+
+
+def windows(period: float, window_s: float, overlap: float) -> Windows:
+    """Make windows of a length for a sampling period.
+
+    Parameters
+    ----------
+    period : float
+        s.
+    window_s : float
+        Length, s.
+    overlap : float
+        Share that neighbours have in common.
+
+    Returns
+    -------
+    Windows
+
+    Raises
+    ------
+    InputError
+        If a window holds too few samples.
+
+    References
+    ----------
+    Weak form of differential equations: Shinbrot 1957 (modulating functions); Messenger and Bortz 2021.
+    """
+    samples = round(window_s / period)
+    if samples < _FEWEST_SAMPLES:
+        raise InputError(
+            f"gap.window_s = {window_s:g}: holds {samples} samples at {1 / period:.4g} Hz; at least {_FEWEST_SAMPLES}"
+        )
+    phase = np.pi * (np.arange(samples) + 0.5) / samples
+    shape = np.sin(phase) ** 4
+    slope = 4 * np.sin(phase) ** 3 * np.cos(phase) * np.pi / (samples * period)
+    return Windows(shape / shape.sum(), slope / shape.sum(), max(1, round(samples * (1 - overlap))), period)
