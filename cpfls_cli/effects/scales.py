@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import sqrt
 
 import numpy as np
@@ -50,3 +51,159 @@ def drag_per_rotor_speed(vehicle: VehicleSettings) -> float:
     float
     """
     return vehicle.mass_kg / (len(vehicle.rotors) * hover_speed(vehicle))
+
+
+def arm_drag(vehicle: VehicleSettings) -> float:
+    """Size a moment at each rotor by a rotor drag at the end of the arm, kg m/rad.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return drag_per_rotor_speed(vehicle) * arm(vehicle)
+
+
+def weight(vehicle: VehicleSettings) -> float:
+    """Compute the weight, N.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return vehicle.mass_kg * vehicle.gravity_m_s2
+
+
+def arm_weight(vehicle: VehicleSettings) -> float:
+    """Size a torque by the weight at the end of an arm, N m.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return weight(vehicle) * arm(vehicle)
+
+
+def mass(vehicle: VehicleSettings) -> float:
+    """Give the mass, kg.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return vehicle.mass_kg
+
+
+def arm_mass(vehicle: VehicleSettings) -> float:
+    """Size a mass on a lever by the vehicle's own at the end of an arm, kg m.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return vehicle.mass_kg * arm(vehicle)
+
+
+def drag_at_ten_metres_per_second(vehicle: VehicleSettings) -> float:
+    """Size a quadratic drag that equals the weight at 10 m/s, N s^2/m^2.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return weight(vehicle) / 10.0**2
+
+
+def arm_drag_at_ten_metres_per_second(vehicle: VehicleSettings) -> float:
+    """Size the torque of a quadratic drag that equals the weight at 10 m/s and acts at the end of an arm, N s^2/m.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return drag_at_ten_metres_per_second(vehicle) * arm(vehicle)
+
+
+def lift_at_ten_metres_per_second(vehicle: VehicleSettings) -> float:
+    """Size a gain that doubles the hover thrust of a rotor at 10 m/s, N s^2/m^2.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return drag_at_ten_metres_per_second(vehicle) / len(vehicle.rotors)
+
+
+def moment_of_inertia(axis: int) -> Callable[[VehicleSettings], float]:
+    """Size a damping that takes 1 rad/s off each rad/s in a second, or any share of the inertia about an axis.
+
+    Parameters
+    ----------
+    axis : int
+        0, 1, 2 for x, y, z.
+
+    Returns
+    -------
+    callable
+        Gives the moment of inertia of a vehicle, kg m^2.
+    """
+    return lambda vehicle: float(vehicle.inertia_kg_m2[axis])
+
+
+def smallest_inertia(vehicle: VehicleSettings) -> float:
+    """Find the smallest of the moments Ixx, Iyy, Izz, kg m^2.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return float(min(vehicle.inertia_kg_m2[:3]))
+
+
+def inertia_per_rotor_speed(vehicle: VehicleSettings) -> float:
+    """Size a rotor damping that takes 1 rad/s off each rad/s in a second while hovering, N m s^2/rad^2.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return smallest_inertia(vehicle) / (len(vehicle.rotors) * hover_speed(vehicle))

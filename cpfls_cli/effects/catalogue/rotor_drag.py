@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, hub_wrench, stack
 from cpfls_cli.effects.signals import Signals
 
 
-def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:  # noqa: ARG001
+def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     in_plane = signals.hub_velocity * [1.0, 1.0, 0.0]
     return Columns(stack(hub_wrench(signals.hubs, -signals.speed[..., None] * in_plane)))
 

@@ -1,0 +1,90 @@
+"""Actuation that comes late: filtered or shifted, with the change of wrench that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import exp
+
+import numpy as np
+from scipy import signal
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import Columns, stack
+from cpfls_cli.effects.signals import Signals
+
+
+def lagged(values: Array, period: float, time_constant: float) -> Array:
+    """Filter signals by a first-order lag, ``tau y' + y = u``, exactly for u linear between samples.
+
+    Parameters
+    ----------
+    values : array, shape (time, ...)
+        u; y starts at its first value.
+    period : float, s
+    time_constant : float, s
+        tau, greater than 0.
+
+    Returns
+    -------
+    array, shape (time, ...)
+        y.
+    """
+    decay = exp(-period / time_constant)
+    held = (1 - decay) * time_constant / period
+    new, old = 1 - held, held - decay
+    return np.asarray(signal.lfilter([new, old], [1.0, -decay], values, axis=0, zi=(1 - new) * values[:1])[0])
+
+
+def delayed(values: Array, time: Array, delay: float) -> Array:
+    """Shift signals in time by linear interpolation; beyond the ends the last known value is held.
+
+    Parameters
+    ----------
+    values : array, shape (time,) or (time, channel)
+    time : array, shape (time,), s
+    delay : float, s
+        Below 0 brings them forward.
+
+    Returns
+    -------
+    array of the same shape
+    """
+    channels = values.reshape(len(time), -1).T
+    moved = [np.interp(time - delay, time, channel) for channel in channels]
+    return np.column_stack(moved).reshape(values.shape)
+
+
+def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signals:
+    """Change the rotor speeds, or the stated torque and thrust of a flight without rotor speeds.
+
+    Parameters
+    ----------
+    signals : Signals
+    change : callable
+        From a signal to the changed one, time first.
+
+    Returns
+    -------
+    Signals
+    """
+    if signals.rotor_speed is not None:
+        return signals.with_rotor_speed(change(signals.rotor_speed))
+    torque = None if signals.stated_torque is None else change(signals.stated_torque)
+    thrust = None if signals.stated_thrust is None else change(signals.stated_thrust)
+    return replace(signals, stated_torque=torque, stated_thrust=thrust)
+
+
+def wrench_change(before: Signals, after: Signals) -> Columns:
+    """Make a column of what another actuation does to the wrench.
+
+    Parameters
+    ----------
+    before, after : Signals
+
+    Returns
+    -------
+    Columns
+        One column.
+    """
+    return Columns(stack(after.wrench - before.wrench))

@@ -1,0 +1,41 @@
+"""Battery sag: a motor that is told a speed turns slower on an empty battery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cpfls_cli.effects.actuation import wrench_change
+from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.signals import Signals
+
+
+def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
+    assert signals.voltage is not None, "declared among the needs"
+    # Thrust and drag torque go with the square of the speed.
+    return signals.with_rotor_speed(signals.speed * signals.voltage[:, None] ** (shape["exponent"] / 2))
+
+
+def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    return wrench_change(signals, _apply(signals, shape))
+
+
+EFFECT = Effect(
+    name="battery_sag",
+    title="battery sag",
+    kind="actuator",
+    formula="T_i = k w_i,commanded^2 (V/V_0)^n, drag torque alike;  M = M_rot(T) - M_rot(commanded)",
+    sentence="As the battery empties, the same command gives less thrust.",
+    coefficients=(),
+    needs=frozenset({"command", "voltage", "rotor_speed"}),
+    excitation="a flight from a full to an empty battery",
+    rivals={
+        "parameter_error": "compare the start with the end of a flight: a wrong parameter stays",
+        "motor_lag": "compare slow with fast torque: sag acts in both",
+        "vertical_descent": "repeat the descent with a full and with an empty battery",
+    },
+    source="SkyFlow (motor.py, motor_electrical.py); SkyDreamer (thrust over a discharge)",
+    columns=_columns,
+    shapes=(Shape("exponent", "1", (0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0), "power of the voltage"),),
+    unit_coefficient=True,
+    apply=_apply,
+)

@@ -1,0 +1,45 @@
+"""Rotor speeds that are logged on another clock than the gyro."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cpfls_cli.effects.actuation import delayed, with_actuation, wrench_change
+from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.signals import Signals
+
+
+def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
+    return with_actuation(signals, lambda values: delayed(values, signals.time, shape["delay_s"]))
+
+
+def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    return wrench_change(signals, _apply(signals, shape))
+
+
+EFFECT = Effect(
+    name="channel_delay",
+    title="time shift between rotor and gyro channels",
+    kind="sensor",
+    formula="w(t) = w_logged(t - d);  M = M_rot(w) - M_rot(w_logged)",
+    sentence="Rotor speeds and rates are logged at different times, so that cause and effect do not meet.",
+    coefficients=(),
+    needs=frozenset({"measured_rotor_speed"}),
+    excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
+    rivals={
+        "linear_damping": "correlate gyro and attitude first; a shift acts on all axes alike",
+        "rotor_acceleration": "compare yaw with roll and pitch: a shift acts on all axes alike",
+    },
+    source="alignment of clocks; SkyDreamer (11 ms)",
+    columns=_columns,
+    shapes=(
+        Shape(
+            "delay_s",
+            "s",
+            (-0.05, -0.035, -0.02, -0.012, -0.006, 0.006, 0.012, 0.02, 0.03, 0.045, 0.06),
+            "the rotors act this much later than logged",
+        ),
+    ),
+    unit_coefficient=True,
+    apply=_apply,
+)

@@ -1,0 +1,40 @@
+"""Centre of mass beside the point that the hub positions are measured from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cpfls_cli.effects import scales
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect
+from cpfls_cli.effects.signals import Signals
+
+
+def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    direct = np.zeros((len(signals), 6, 2))
+    direct[:, 1, 0] = signals.wrench[:, 5]
+    direct[:, 0, 1] = -signals.wrench[:, 5]
+    return Columns(direct)
+
+
+EFFECT = Effect(
+    name="com_offset",
+    title="offset of the centre of mass",
+    kind="wrench",
+    formula="M = -c x T z = (-c_y T, c_x T, 0)",
+    sentence="The centre of mass is not where the model has it, so that thrust tilts the vehicle.",
+    coefficients=(
+        Coefficient("c_x", "m", -0.4, 0.4, "true centre of mass, forward of that of the model", scales.arm),
+        Coefficient("c_y", "m", -0.4, 0.4, "true centre of mass, left of that of the model", scales.arm),
+    ),
+    needs=frozenset({"thrust"}),
+    excitation="changes of thrust: climbs, descents, hard stops",
+    rivals={
+        "torque_bias": "change the thrust: a bias stays, the torque of an offset grows with thrust",
+        "rotor_mismatch": "make yaw effort: it loads one pair of rotors more than the other",
+        "wind": "turn in yaw, and change the thrust",
+    },
+    source="geometry; RotorPy (hub positions relative to the centre of mass)",
+    columns=_columns,
+)

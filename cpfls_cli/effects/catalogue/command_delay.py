@@ -1,0 +1,38 @@
+"""Delay between a command and the rotors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cpfls_cli.effects.actuation import delayed, with_actuation, wrench_change
+from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.signals import Signals
+
+
+def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
+    return with_actuation(signals, lambda values: delayed(values, signals.time, shape["delay_s"]))
+
+
+def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    return wrench_change(signals, _apply(signals, shape))
+
+
+EFFECT = Effect(
+    name="command_delay",
+    title="delay of the command",
+    kind="actuator",
+    formula="w(t) = w_commanded(t - d);  M = M_rot(w) - M_rot(w_commanded)",
+    sentence="The command takes time to reach the motors.",
+    coefficients=(),
+    needs=frozenset({"command", "torque"}),
+    excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
+    rivals={
+        "motor_lag": "sweep the torque up to 3 Hz and above: lag also weakens it, a delay does not",
+        "linear_damping": "log measured rotor speeds; a delay looks like damping below zero",
+    },
+    source="SkyFlow (command transport delay)",
+    columns=_columns,
+    shapes=(Shape("delay_s", "s", (0.004, 0.008, 0.012, 0.02, 0.03, 0.04, 0.055, 0.07, 0.09, 0.12), "time of travel"),),
+    unit_coefficient=True,
+    apply=_apply,
+)

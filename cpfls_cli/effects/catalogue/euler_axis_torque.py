@@ -1,0 +1,35 @@
+"""Rotor torque taken for the generalised torque on the Euler angles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cpfls_cli import rotations
+from cpfls_cli.effects.effect import Columns, Effect, stack, wrench
+from cpfls_cli.effects.signals import Signals
+
+
+def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    assert signals.attitude is not None, "declared among the needs"
+    torque = signals.wrench[:, :3]
+    return Columns(stack(wrench(rotations.body_torque(signals.attitude, torque) - torque)))
+
+
+EFFECT = Effect(
+    name="euler_axis_torque",
+    title="torque about the Euler axes instead of the body axes",
+    kind="wrench",
+    formula="M = (W^-T - 1) M_rot",
+    sentence="The log gives torques about the axes of the Euler angles, and the model takes them for body axes; they "
+    "differ as soon as the vehicle tilts.",
+    coefficients=(),
+    needs=frozenset({"attitude", "torque"}),
+    excitation="roll, pitch and yaw torque at large tilt",
+    rivals={
+        "torque_bias": "fly level: the wrong convention vanishes there",
+        "products_of_inertia": "fly level: the wrong convention vanishes there",
+    },
+    source="definition of the generalised torque, tau = W^T M",
+    columns=_columns,
+    unit_coefficient=True,
+)

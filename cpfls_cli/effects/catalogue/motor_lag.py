@@ -1,0 +1,47 @@
+"""Motor lag: rotors reach the commanded speed late."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cpfls_cli.effects.actuation import lagged, with_actuation, wrench_change
+from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.signals import Signals
+
+
+def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
+    return with_actuation(signals, lambda values: lagged(values, signals.period, shape["time_constant_s"]))
+
+
+def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    return wrench_change(signals, _apply(signals, shape))
+
+
+EFFECT = Effect(
+    name="motor_lag",
+    title="motor lag",
+    kind="actuator",
+    formula="tau w_i' + w_i = w_i,commanded;  M = M_rot(w) - M_rot(w_commanded)",
+    sentence="The motors need time to reach the speed that they are told.",
+    coefficients=(),
+    needs=frozenset({"command", "torque"}),
+    excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
+    rivals={
+        "command_delay": "sweep the torque up to 3 Hz and above: lag also weakens it, a delay does not",
+        "linear_damping": "log measured rotor speeds; lag looks like damping below zero",
+        "battery_sag": "compare slow with fast torque: sag acts in both",
+        "parameter_error": "compare slow with fast torque: a wrong inertia acts in both",
+    },
+    source="RotorS and PX4 (first-order filter, 12.5 and 25 ms); RotorPy (tau_m)",
+    columns=_columns,
+    shapes=(
+        Shape(
+            "time_constant_s",
+            "s",
+            (0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.065, 0.08, 0.1, 0.125, 0.15),
+            "time to reach 63 % of a step",
+        ),
+    ),
+    unit_coefficient=True,
+    apply=_apply,
+)

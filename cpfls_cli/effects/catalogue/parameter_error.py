@@ -1,0 +1,49 @@
+"""Wrong numbers of the vehicle: moments of inertia and scale of the thrust."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect
+from cpfls_cli.effects.signals import Signals
+
+
+def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    moments = np.array(signals.vehicle.inertia_kg_m2[:3])
+    turning = (moments * signals.body_rate)[:, :, None] * np.eye(3)
+    momentum = np.zeros((len(signals), 6, 4))
+    direct = np.zeros_like(momentum)
+    momentum[:, :3, :3] = -turning
+    direct[:, :3, :3] = -np.cross(signals.body_rate[:, :, None], turning, axis=1)
+    direct[:, 5, 3] = signals.wrench[:, 5]
+    return Columns(direct, momentum)
+
+
+EFFECT = Effect(
+    name="parameter_error",
+    title="wrong inertia or thrust scale",
+    kind="parameter",
+    formula="M = -(d/dt (dI omega) + omega x dI omega),  dI = diag(e_i I_ii);  F_z = e_T T",
+    sentence="The vehicle is as modelled, but a number of it is wrong. Rates and rotor speeds show only the ratio of "
+    "inertia to rotor torque; the force balance shows the scale of the thrust.",
+    coefficients=(
+        *(
+            Coefficient(f"inertia_{axis}", "1", -0.9, 3.0, f"true I{axis}{axis} over that of the model, less 1")
+            for axis in "xyz"
+        ),
+        Coefficient("thrust_scale", "1", -0.9, 3.0, "true thrust over that of the model, less 1; seen in force only"),
+    ),
+    needs=frozenset({"torque"}),
+    excitation="roll, pitch and yaw sweeps; hover, with a known mass, for the thrust",
+    rivals={
+        "battery_sag": "compare the start with the end of a flight: a wrong parameter stays",
+        "gyro_scale": "compare the gyro with the attitude: a wrong inertia leaves them equal",
+        "rotor_mismatch": "make yaw effort at constant roll and pitch",
+        "rotor_acceleration": "compare slow with fast yaw: a wrong Izz acts in both",
+        "motor_lag": "compare slow with fast torque: a wrong inertia acts in both",
+    },
+    source="Newton-Euler equations",
+    columns=_columns,
+)

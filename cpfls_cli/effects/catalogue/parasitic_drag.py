@@ -1,0 +1,50 @@
+"""Parasitic drag of the fuselage, which acts at a centre of pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cpfls_cli.effects import scales
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect
+from cpfls_cli.effects.signals import Signals
+
+
+def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    velocity = signals.air_velocity
+    drag = -np.linalg.norm(velocity, axis=1, keepdims=True) * velocity
+    direct = np.zeros((len(signals), 6, 6))
+    direct[:, 3:, :3] = drag[:, :, None] * np.eye(3)
+    direct[:, :3, 3:] = np.cross(np.eye(3)[None], drag[:, None]).swapaxes(1, 2)
+    return Columns(direct)
+
+
+def _force(letter: str) -> Coefficient:
+    meaning = f"half of air density times drag area along {letter}"
+    return Coefficient(f"c_{letter}", "N s^2/m^2", 0.0, 0.6, meaning, scales.drag_at_ten_metres_per_second)
+
+
+def _torque(letter: str) -> Coefficient:
+    meaning = f"drag times the {letter} of the centre of pressure"
+    return Coefficient(f"cr_{letter}", "N s^2/m", -0.2, 0.2, meaning, scales.arm_drag_at_ten_metres_per_second)
+
+
+EFFECT = Effect(
+    name="parasitic_drag",
+    title="parasitic drag of the fuselage",
+    kind="wrench",
+    formula="F = -|v| (c_x v_x, c_y v_y, c_z v_z),  M = cr x (-|v| v)",
+    sentence="The fuselage drags behind with the square of the air speed, and turns the vehicle where the drag acts "
+    "beside the centre of mass.",
+    coefficients=(*(_force(letter) for letter in "xyz"), *(_torque(letter) for letter in "xyz")),
+    needs=frozenset({"velocity"}),
+    excitation="legs at two or more speeds, in both directions",
+    rivals={
+        "rotor_drag": "fly legs at two speeds, one twice the other; change the thrust at constant speed",
+        "flapping_moment": "fly legs at two speeds, one twice the other",
+        "wind": "fly legs in opposite directions, and at two speeds",
+    },
+    source="RotorPy multirotor.py (c_Dx, c_Dy, c_Dz); AirSim (drag of each face)",
+    columns=_columns,
+)

@@ -1,0 +1,41 @@
+"""Products of inertia: the principal axes are not the body axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cpfls_cli.effects import scales
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric_columns
+
+
+def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    turned = symmetric_columns(signals.body_rate)[:, :, 3:]
+    none = np.zeros_like(turned)
+    gyroscopic = np.cross(signals.body_rate[:, :, None], turned, axis=1)
+    return Columns(np.concatenate([-gyroscopic, none], axis=1), np.concatenate([-turned, none], axis=1))
+
+
+EFFECT = Effect(
+    name="products_of_inertia",
+    title="products of inertia",
+    kind="wrench",
+    formula="M = -(d/dt (dI omega) + omega x dI omega),  dI off the diagonal",
+    sentence="The mass is spread askew, so that turning about one axis turns the vehicle about another.",
+    coefficients=tuple(
+        Coefficient(name, "kg m^2", -0.5, 0.5, f"entry {name} of the inertia tensor, added", scales.smallest_inertia)
+        for name in INERTIA_PARAMETERS[3:]
+    ),
+    needs=frozenset(),
+    excitation="roll, pitch and yaw rates at the same time",
+    rivals={
+        "imu_misalignment": "compare roll on pitch with pitch on roll: products have one sign, misalignment has two",
+        "rotor_gyroscopic": "repeat the roll rates with the yaw effort reversed: products stay",
+        "wind": "turn in yaw without rolling or pitching",
+    },
+    source="Newton-Euler equations; RotorPy and PX4 sih.cpp (Ixy, Ixz, Iyz)",
+    columns=_columns,
+)

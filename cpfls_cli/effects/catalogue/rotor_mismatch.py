@@ -1,0 +1,121 @@
+"""Rotors that pull or drag differently from what the model says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, thrust_wrench, wrench
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_SAME_PLACE = 1e-6
+
+
+def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
+    """Find the pairs of rotors that face each other across the centre of mass and spin the same way.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    tuple of tuple of int
+        Indices from 0, in the order of the first rotor of each pair.
+    """
+    hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
+    spins = np.array([rotor.spin for rotor in vehicle.rotors])
+    apart = np.linalg.norm(hubs[:, None] + hubs[None], axis=2)
+    facing = (apart <= _SAME_PLACE * np.abs(hubs).max()) & (spins[:, None] == spins)
+    return tuple((int(first), int(second)) for first, second in np.argwhere(facing) if first < second)
+
+
+def gain_modes(vehicle: VehicleSettings) -> Array:
+    """Choose two patterns of thrust gain that no wrong inertia can stand in for.
+
+    For a quadrotor they are the differences of its two opposite pairs. For other vehicles they grow along x and y.
+    What all rotors, or all rotors of one spin, have in common is taken out: it trades with Ixx and Iyy.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    array, shape (rotor, 2)
+        Gain of each rotor for a difference of 1 from end to end.
+    """
+    spins = np.array([float(rotor.spin) for rotor in vehicle.rotors])
+    common = np.column_stack([np.ones_like(spins), spins])
+    seeds = _seeds(vehicle)
+    return np.asarray(seeds - common @ np.linalg.lstsq(common, seeds, rcond=None)[0])
+
+
+def gains(vehicle: VehicleSettings, differences: Array) -> Array:
+    """Blame each difference on the weaker rotor of its pair.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+    differences : array, shape (2,)
+        The first two coefficients.
+
+    Returns
+    -------
+    array, shape (rotor,)
+        Relative error of each thrust, at most 0; on vehicles without two opposite pairs, the patterns themselves.
+    """
+    pairs = opposite_pairs(vehicle)
+    patterns = gain_modes(vehicle) @ differences
+    if len(pairs) != 2 or len(vehicle.rotors) != 4:
+        return np.asarray(patterns)
+    loss = np.zeros(len(vehicle.rotors))
+    for pair, difference in zip(pairs, differences, strict=True):
+        loss[pair[0] if difference < 0 else pair[1]] = -abs(difference)
+    return loss
+
+
+def _seeds(vehicle: VehicleSettings) -> Array:
+    hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
+    pairs = opposite_pairs(vehicle)
+    if len(pairs) != 2 or len(hubs) != 4:
+        return np.asarray(hubs / np.ptp(hubs, axis=0))
+    seeds = np.zeros((4, 2))
+    for mode, (first, second) in enumerate(pairs):
+        seeds[[first, second], mode] = 0.5, -0.5
+    return seeds
+
+
+def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    drag = np.zeros((len(signals), 3))
+    drag[:, 2] = signals.speed**2 @ [rotor.drag_factor_n_m_s2 for rotor in signals.vehicle.rotors]
+    thrusts = (signals.rotor_thrust * mode for mode in gain_modes(signals.vehicle).T)
+    return Columns(stack(*(thrust_wrench(signals.hubs, thrust) for thrust in thrusts), wrench(drag)))
+
+
+EFFECT = Effect(
+    name="rotor_mismatch",
+    title="rotors that differ",
+    kind="wrench",
+    formula="dT_i = kappa_i T_i,  M = sum r_i x dT_i z;  M_z += delta sum b_i w_i^2",
+    sentence="One rotor pulls less than its opposite: a worn propeller, a weak motor.",
+    coefficients=(
+        Coefficient("difference_1", "1", -0.25, 0.25, "kappa of the first opposite pair, first rotor less second"),
+        Coefficient("difference_2", "1", -0.25, 0.25, "kappa of the second opposite pair, first rotor less second"),
+        Coefficient(
+            "drag_imbalance", "1", -0.5, 0.5, "clockwise rotors drag this much more than modelled, the others less"
+        ),
+    ),
+    needs=frozenset({"rotor_speed"}),
+    excitation="yaw effort to both sides, and changes of thrust",
+    rivals={
+        "com_offset": "make yaw effort: it loads one pair of rotors more than the other",
+        "torque_bias": "change the thrust and make yaw effort",
+        "parameter_error": "make yaw effort at constant roll and pitch",
+    },
+    source="rotor by rotor thrust factors in quad_race_env (tudelft) and SkyFlow",
+    columns=_columns,
+)

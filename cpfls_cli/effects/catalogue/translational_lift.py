@@ -1,0 +1,35 @@
+"""Translational lift: thrust grows with the air speed in the rotor plane."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cpfls_cli.effects import scales
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, thrust_wrench
+from cpfls_cli.effects.signals import Signals
+
+
+def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    return Columns(stack(thrust_wrench(signals.hubs, (signals.hub_velocity[..., :2] ** 2).sum(axis=-1))))
+
+
+EFFECT = Effect(
+    name="translational_lift",
+    title="translational lift",
+    kind="wrench",
+    formula="dT_i = k_h (u_ix^2 + u_iy^2),  M = sum r_i x dT_i z",
+    sentence="Rotors pull more in fast level flight, because they meet fresh air.",
+    coefficients=(
+        Coefficient(
+            "k_h", "N s^2/m^2", 0.0, 2.0, "thrust gained per squared air speed", scales.lift_at_ten_metres_per_second
+        ),
+    ),
+    needs=frozenset({"velocity"}),
+    excitation="fast flight while yawing; with the force known, straight flight at several speeds",
+    rivals={
+        "parasitic_drag": "log acceleration: the lift acts along body z, the drag against the motion",
+        "inflow": "fly level and fast, without climbing",
+    },
+    source="RotorPy multirotor.py (k_h)",
+    columns=_columns,
+)

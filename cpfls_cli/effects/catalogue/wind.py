@@ -1,0 +1,59 @@
+"""Steady wind: the rotor drag of a vehicle that does not move over the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects import scales
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, hub_wrench, stack
+from cpfls_cli.effects.signals import Signals
+
+_IN_PLANE = np.array([1.0, 1.0, 0.0])
+
+
+def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    speed = signals.speed[..., None]
+    still_air = -speed * signals.hub_velocity * _IN_PLANE
+    pushed = [speed * (signals.rotation[:, axis] * _IN_PLANE)[:, None] for axis in (0, 1)]
+    return Columns(stack(*(hub_wrench(signals.hubs, force) for force in (still_air, *pushed))))
+
+
+def _physical(linear: Array) -> Array:
+    drag = linear[0]
+    return np.array([drag, *(linear[1:] / drag if drag > 0 else (np.nan, np.nan))])
+
+
+def _linear(physical: Array) -> Array:
+    drag, x, y = physical
+    return np.array([drag, drag * x, drag * y])
+
+
+EFFECT = Effect(
+    name="wind",
+    title="steady wind",
+    kind="wrench",
+    formula="F_i = -k_d w_i (u_i - R^T W) in the rotor plane,  M = sum r_i x F_i",
+    sentence="A steady wind pushes the vehicle to one side of the world, whichever way it points.",
+    coefficients=(
+        Coefficient(
+            "k_d", "N s^2/(m rad)", 0.0, 5.0, "drag per rotor, rotor speed and air speed", scales.drag_per_rotor_speed
+        ),
+        Coefficient("W_x", "m/s", -15.0, 15.0, "wind along x of the world"),
+        Coefficient("W_y", "m/s", -15.0, 15.0, "wind along y of the world"),
+    ),
+    needs=frozenset({"velocity", "rotor_speed"}),
+    excitation="legs in opposite directions, and yaw turns in place",
+    rivals={
+        "torque_bias": "turn in yaw: a bias turns with the vehicle, the wind does not",
+        "com_offset": "turn in yaw, and change the thrust",
+        "rotor_drag": "fly legs in opposite directions",
+        "products_of_inertia": "turn in yaw without rolling or pitching",
+    },
+    source="RotorPy multirotor.py (wind state); PX4 sih.cpp (v_apparent)",
+    columns=_columns,
+    physical=_physical,
+    linear=_linear,
+)
