@@ -31,6 +31,9 @@ from cpfls_cli.gap.weak_flight import Candidate, WeakFlight
 _LEAST_SHARE = 0.05
 """Share of the remaining gap above the floor that an effect has to explain."""
 
+_LEAST_IN_FLOORS = 0.2
+"""Root mean square that an effect has to explain of one channel, in floors."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -172,7 +175,8 @@ def acceptable(step: Step, settings: GapSettings) -> bool:
     if not step.ranking or step.ranking[0].gain == REFUSED:
         return False
     best = step.ranking[0]
-    enough = best.gain >= _LEAST_SHARE * step.above_floor
+    windows = len(step.hypothesis.residual)
+    enough = best.gain >= max(_LEAST_SHARE * step.above_floor, _LEAST_IN_FLOORS**2 * windows)
     return enough and step.p_value(best.gain) <= settings.significance
 
 

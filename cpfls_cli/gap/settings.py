@@ -23,7 +23,7 @@ class GapSettings(Settings):
     significance: Annotated[
         float, Gt(0), Lt(0.5), Doc("largest probability that an accepted effect is chance, over the whole catalogue")
     ] = 0.01
-    effects_max: Annotated[int, Ge(1), Le(10), Doc("largest number of effects in one diagnosis")] = 4
+    effects_max: Annotated[int, Ge(1), Le(10), Doc("largest number of effects in one diagnosis")] = 6
     named_share: Annotated[
         float, Gt(0.5), Le(1), Doc("share of the gap above the noise floor from which on effects count as the answer")
     ] = 0.9
