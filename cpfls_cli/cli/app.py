@@ -199,6 +199,22 @@ def config_(
         tell(show(config, section or [], common.overrides or [], common.seed), common)
 
 
+@app.command()
+@with_common
+def effects(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="An effect, such as rotor_drag; without it, all are listed.")
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Show the effects that a model can miss, and the flights that tell them apart."""
+    with messages_for_errors():
+        from cpfls_cli.stages.effects import show
+
+        tell(show(name), common)
+
+
 def _run(title: str, config: Path, output: Path, common: Common, call: Callable[[Job], Outcome]) -> None:
     """Load the study, run one stage with a progress bar, and print what it says."""
     with messages_for_errors():

@@ -9,7 +9,19 @@ import typer
 from cpfls_cli import __version__
 from cpfls_cli.cli.app import app
 
-COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "predict", "report", "info", "check", "config")
+COMMANDS = (
+    "trajectory",
+    "simulate",
+    "import",
+    "reduce",
+    "identify",
+    "predict",
+    "report",
+    "info",
+    "check",
+    "config",
+    "effects",
+)
 COMMON = ("--json", "--set", "--seed", "--force", "--quiet", "-q", "--verbose", "-v", "--dry-run", "--help", "-h")
 
 
@@ -22,7 +34,7 @@ def test_help_of_every_command_lists_the_common_options(cpfls, command):
     result = cpfls(command, "--help")
     assert result.exit_code == 0
     assert all(option in result.stdout for option in COMMON)
-    assert ("--output" in result.stdout) == (command not in {"info", "check", "config"})
+    assert ("--output" in result.stdout) == (command not in {"info", "check", "config", "effects"})
 
 
 def test_version_loads_nothing_heavy():

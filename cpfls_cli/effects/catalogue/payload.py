@@ -35,9 +35,9 @@ def swing(signals: Signals, length: float, damping: float) -> Array:
     """
     assert signals.velocity is not None, "declared among the needs"
     gravity = signals.vehicle.gravity_m_s2
-    transfer = signal.TransferFunction([-1 / length, 0.0], [1.0, damping, gravity / length])
-    sampled = transfer.to_discrete(signals.period, method="foh")
-    b, a = sampled.num, sampled.den
+    transfer = (np.array([-1 / length, 0.0]), np.array([1.0, damping, gravity / length]))
+    numerator, a, _ = signal.cont2discrete(transfer, signals.period, method="foh")
+    b = numerator.ravel()
     velocity = signals.velocity[:, :2]
     start = signal.lfilter_zi(b, a)[:, None] * velocity[0]
     return np.asarray(signal.lfilter(b, a, velocity, axis=0, zi=start)[0])

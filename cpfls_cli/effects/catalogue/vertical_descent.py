@@ -99,7 +99,7 @@ EFFECT = Effect(
     name="vertical_descent",
     title="vertical descent (vortex ring, turbulent wake, windmill brake)",
     kind="wrench",
-    formula="dT_i = T_i exp(-(u_xy/v_h)^2) sum_n a_n f_n(x_i),  x_i = max(-u_iz/v_h, 0),  f_n = x P_n-1 (Legendre)",
+    formula="dT_i = T_i exp(-(u_xy/v_h)^2) sum a_n t P_n-1(2t - 1),  t = x_i/2.5,  x_i = max(-u_iz/v_h, 0)",
     sentence="A vehicle that sinks into its own wake loses thrust and shakes; sinking faster, it gains thrust.",
     coefficients=tuple(
         Coefficient(f"a_{n + 1}", "1", -3.0, 3.0, f"share of thrust, polynomial of degree {n + 1}")

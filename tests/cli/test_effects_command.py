@@ -1,0 +1,28 @@
+"""`cpfls effects`: the table, one effect in full, and a name that is none."""
+
+import json
+
+from cpfls_cli.effects.registry import CATALOGUE
+
+
+def test_table_lists_every_effect(cpfls):
+    lines = cpfls("effects").stdout.splitlines()
+    assert [line.split()[0] for line in lines[:-1]] == list(CATALOGUE)
+
+
+def test_one_effect_tells_its_range_and_its_rivals(cpfls):
+    text = cpfls("effects", "wind").stdout
+    assert "W_x from -15 to 15 m/s" in text
+    assert "default, 6 kg with 4 rotors" in text
+    assert all(f"looks like  {rival}; to tell: " in text for rival in CATALOGUE["wind"].rivals)
+
+
+def test_machines_get_the_same(cpfls):
+    summary = json.loads(cpfls("effects", "motor_lag", "--json").stdout)
+    assert (summary["kind"], summary["shapes"][0]["name"]) == ("actuator", "time_constant_s")
+    assert set(summary["rivals"]) == set(CATALOGUE["motor_lag"].rivals)
+    assert len(json.loads(cpfls("effects", "--json").stdout)["effects"]) == len(CATALOGUE)
+
+
+def test_an_unknown_name_is_refused(refuse):
+    assert refuse("effects", "rotor_drug")[0].startswith("rotor_drug: no such effect (did you mean rotor_drag")

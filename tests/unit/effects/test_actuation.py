@@ -1,0 +1,62 @@
+"""Late and weak actuation against an integrator, exact shifts and the law of the battery."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import odeint
+
+from cpfls_cli.effects.actuation import delayed, lagged
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.vehicle.rotors import body_wrench
+
+
+def test_lag_is_the_solution_of_its_equation(flight):
+    command, tau = flight.rotor_speed[:, 0], 0.05
+    rate = lambda y, t: (np.interp(t, flight.time, command) - y) / tau  # noqa: E731
+    expected = odeint(rate, command[0], flight.time, rtol=1e-10, atol=1e-10, hmax=0.005)[:, 0]
+    np.testing.assert_allclose(lagged(command, 0.005, tau), expected, rtol=1e-7)
+
+
+def test_lag_leaves_a_constant_alone():
+    np.testing.assert_allclose(lagged(np.full((50, 4), 348.0), 0.01, 0.03), 348.0)
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.0025, -0.02])
+def test_delay_shifts_a_line_exactly_and_holds_its_ends(delay):
+    time = np.arange(100) * 0.005
+    expected = np.clip(3.0 * (time - delay), 0.0, 3.0 * time[-1])
+    np.testing.assert_allclose(delayed(3.0 * time, time, delay), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"), [("motor_lag", {"time_constant_s": 0.05}), ("command_delay", {"delay_s": 0.03})]
+)
+def test_column_is_true_minus_commanded_wrench(columns, commanded, name, shape):
+    true = CATALOGUE[name].apply(commanded, shape)
+    assert true.commanded
+    change = body_wrench(commanded.vehicle, true.rotor_speed).body_torque - commanded.torque
+    found = columns(name, commanded, **shape).direct
+    np.testing.assert_allclose(found[:, :3, 0], change, atol=1e-12)
+    assert np.abs(found[:, :3]).max() > 0.1
+
+
+def test_stated_torque_lags_where_rotor_speeds_are_not_logged(columns, flight):
+    stated = np.sin(np.outer(flight.time, [3.0, 4.0, 5.0]))
+    known = replace(flight, rotor_speed=None, stated_torque=stated, commanded=True)
+    found = columns("motor_lag", known, time_constant_s=0.05).direct[..., 0]
+    np.testing.assert_allclose(found[:, :3], lagged(stated, 0.005, 0.05) - stated, atol=1e-12)
+    assert not found[:, 3:].any()
+
+
+def test_battery_takes_the_same_share_of_thrust_and_torque(columns, commanded):
+    found = columns("battery_sag", commanded, exponent=1.5).direct[..., 0]
+    np.testing.assert_allclose(found, (commanded.voltage**1.5 - 1)[:, None] * commanded.wrench, atol=1e-9)
+
+
+def test_only_measured_rotors_can_be_late_and_only_commands_can_lag(flight, commanded):
+    assert CATALOGUE["channel_delay"].missing(commanded) == ("measured_rotor_speed",)
+    assert not CATALOGUE["channel_delay"].missing(flight)
+    for name in ("motor_lag", "command_delay", "battery_sag"):
+        assert CATALOGUE[name].missing(flight) == ("command",)
+        assert not CATALOGUE[name].missing(commanded)
