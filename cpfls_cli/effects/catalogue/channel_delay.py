@@ -20,7 +20,7 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
 EFFECT = Effect(
     name="channel_delay",
     title="time shift between rotor and gyro channels",
-    kind="sensor",
+    kind="actuator",
     formula="w(t) = w_logged(t - d);  M = M_rot(w) - M_rot(w_logged)",
     sentence="Rotor speeds and rates are logged at different times, so that cause and effect do not meet.",
     coefficients=(),

@@ -60,3 +60,14 @@ def test_only_measured_rotors_can_be_late_and_only_commands_can_lag(flight, comm
     for name in ("motor_lag", "command_delay", "battery_sag"):
         assert CATALOGUE[name].missing(flight) == ("command",)
         assert not CATALOGUE[name].missing(commanded)
+
+
+def test_what_is_applied_before_other_columns_is_what_its_column_says(columns, flight, commanded):
+    """The search exchanges the actuation instead of subtracting a column; both must mean the same."""
+    actuators = [entry for entry in CATALOGUE.values() if entry.kind == "actuator"]
+    assert {entry.name for entry in actuators} == {"motor_lag", "command_delay", "battery_sag", "channel_delay"}
+    for entry in actuators:
+        known = flight if entry.name == "channel_delay" else commanded
+        shape = {one.name: one.grid[-1] for one in entry.shapes}
+        change = entry.apply(known, shape).wrench - known.wrench
+        np.testing.assert_allclose(columns(entry.name, known, **shape).direct[..., 0], change, atol=1e-12)
