@@ -1,0 +1,229 @@
+"""The study: which craft hides which effects, and what its log leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .strengths import CATALOGUE, FORMS, OUTSIDE, strength
+from .vehicles import VEHICLES
+
+ROTOR_COLUMNS = ("om1", "om2", "om3", "om4")
+VELOCITY_COLUMNS = ("x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az")
+FORCE_COLUMNS = ("ax", "ay", "az")
+COMMAND_ONLY = frozenset({"motor_lag", "command_delay", "battery_sag", "lag_second_order", "lag_uneven"})
+LAGGED = frozenset({"motor_lag", "lag_second_order", "lag_uneven"})
+
+
+@dataclass(frozen=True)
+class Case:
+    """One craft and what is hidden in it.
+
+    ``hidden`` maps effects to their parameters; ``truth`` holds the catalogue names a perfect judge would give,
+    ``outside`` what no catalogue lists, ``nearest`` the catalogue name of an effect whose form differs.
+    ``esc_speed`` logs rotor speeds as a controller believes them, without the loss of voltage;
+    ``ideal_command`` logs a command that the rotors follow exactly.
+    """
+
+    name: str
+    group: str
+    vehicle: str
+    hidden: dict = field(default_factory=dict)
+    truth: tuple = ()
+    outside: tuple = ()
+    nearest: tuple = ()
+    dominant: str = ""
+    hover_only: bool = False
+    left_out: tuple = ()
+    esc_speed: bool = False
+    ideal_command: bool = False
+
+    def key(self):
+        """Give what is hidden as plain data."""
+        return {
+            "case": self.name,
+            "group": self.group,
+            "vehicle": self.vehicle,
+            "truth": list(self.truth),
+            "outside": list(self.outside),
+            "nearest": list(self.nearest),
+            "dominant": self.dominant,
+            "hidden": self.hidden,
+            "hover_only": self.hover_only,
+            "left_out": list(self.left_out),
+        }
+
+
+def make(name, group, vehicle, effects, rng, level=None, **options):
+    """Draw one case; effects that need company (wind needs rotor drag, a command without speeds has lag) get it."""
+    effects = list(effects)
+    if "wind" in effects and "rotor_drag" not in effects:
+        effects.append("rotor_drag")
+    levels = level if isinstance(level, dict) else dict.fromkeys(effects, level)
+    hidden = {effect: strength(effect, VEHICLES[vehicle], rng, levels.get(effect)) for effect in effects}
+    if "rotor_gyroscopic" in hidden and "rotor_acceleration" in hidden:
+        hidden["rotor_gyroscopic"] = hidden["rotor_acceleration"]
+    truth = [effect for effect in effects if effect in CATALOGUE]
+    left_out = list(options.pop("left_out", ()))
+    if COMMAND_ONLY & set(effects) and not options.get("esc_speed"):
+        left_out += ROTOR_COLUMNS
+        # Rotors always lag by 50 ms behind their command, so a log of commands hides that too.
+        if not LAGGED & set(effects):
+            truth.append("motor_lag")
+    nearest = tuple(FORMS[effect][1] for effect in effects if effect in FORMS)
+    outside = tuple(effect for effect in effects if effect in OUTSIDE)
+    if options.get("ideal_command"):
+        left_out += ROTOR_COLUMNS
+    return Case(
+        name, group, vehicle, hidden, tuple(truth), outside, nearest, left_out=tuple(dict.fromkeys(left_out)), **options
+    )
+
+
+SUITABLE = {name: tuple(VEHICLES) for name in CATALOGUE}
+# The hubs of the Hummingbird lie in the plane of its centre of mass: leaning thrust has no lever.
+SUITABLE["rotor_plane_damping"] = ("sixkg", "xquad", "crazyflie")
+
+PAIRS = (
+    ("rotor_drag", "com_offset"),
+    ("linear_damping", "motor_lag"),
+    ("rotor_gyroscopic", "rotor_acceleration"),
+    ("ground_effect", "rotor_mismatch"),
+    ("inflow", "parasitic_drag"),
+    ("payload", "torque_bias"),
+    ("vertical_descent", "rotor_drag"),
+    ("products_of_inertia", "flapping_moment"),
+    ("battery_sag", "com_offset"),
+    ("wind", "torque_bias"),
+    ("gyro_bias", "linear_damping"),
+    ("imu_misalignment", "rotor_drag"),
+    ("com_offset", "gust_turbulence"),
+    ("rotor_drag", "yaw_cogging"),
+    ("linear_damping", "fuel_slosh"),
+)
+TRIPLES = (
+    ("rotor_drag", "inflow", "com_offset"),
+    ("linear_damping", "rotor_acceleration", "torque_bias"),
+    ("motor_lag", "com_offset", "rotor_drag"),
+    ("ground_effect", "rotor_mismatch", "rotor_acceleration"),
+    ("flapping_moment", "products_of_inertia", "quadratic_damping"),
+    ("inflow", "parasitic_drag", "magnetic_torque"),
+)
+BACKGROUND = (
+    "linear_damping",
+    "quadratic_damping",
+    "rotor_drag",
+    "inflow",
+    "translational_lift",
+    "parasitic_drag",
+    "ground_effect",
+    "rotor_gyroscopic",
+    "rotor_acceleration",
+    "com_offset",
+    "products_of_inertia",
+)
+DOMINANT = (
+    "com_offset",
+    "payload",
+    "rotor_drag",
+    "torque_bias",
+    "linear_damping",
+    "rotor_mismatch",
+    "flapping_moment",
+    "inflow",
+    "rotor_acceleration",
+    "vertical_descent",
+    "ground_effect",
+    "motor_lag",
+)
+LIMITED = (
+    "linear_damping",
+    "rotor_drag",
+    "inflow",
+    "ground_effect",
+    "vertical_descent",
+    "parasitic_drag",
+    "wind",
+    "payload",
+    "com_offset",
+    "rotor_acceleration",
+    "products_of_inertia",
+    "rotor_mismatch",
+)
+
+
+def _singles(draws):
+    for effect in CATALOGUE:
+        for draw in range(draws):
+            yield f"single-sixkg-{effect}-{draw}", "single", "sixkg", (effect,), {}
+        for vehicle in SUITABLE[effect]:
+            if vehicle != "sixkg":
+                yield f"single-{vehicle}-{effect}-0", "single", vehicle, (effect,), {}
+    for draw in range(draws):
+        yield f"single-sixkg-battery_sag_esc-{draw}", "single", "sixkg", ("battery_sag",), {"esc_speed": True}
+
+
+def _none(draws):
+    for vehicle in VEHICLES:
+        for draw in range(2 * draws if vehicle == "sixkg" else draws):
+            yield f"none-{vehicle}-{draw}", "none", vehicle, (), {}
+    for draw in range(draws):
+        yield f"none-sixkg-ideal_command-{draw}", "none", "sixkg", (), {"ideal_command": True}
+        yield f"none-sixkg-hover-{draw}", "none", "sixkg", (), {"hover_only": True}
+
+
+def _strange(draws):
+    for group, effects in (("outside", OUTSIDE), ("form", FORMS)):
+        for effect in effects:
+            for draw in range(draws):
+                vehicle = ("sixkg", "xquad", "crazyflie", "hummingbird")[draw % 4]
+                yield f"{group}-{vehicle}-{effect}-{draw}", group, vehicle, (effect,), {}
+
+
+def _several(draws):
+    for group, sets in (("pair", PAIRS), ("triple", TRIPLES)):
+        for effects in sets:
+            for draw in range(max(1, draws // 2)):
+                options = {"level": dict.fromkeys(effects, 0.6)} if draw == 0 else {}
+                yield f"{group}-sixkg-{'+'.join(effects)}-{draw}", group, "sixkg", effects, options
+
+
+def _background(draws):
+    for effect in DOMINANT:
+        for draw in range(max(1, draws // 2)):
+            effects = (effect, *(other for other in BACKGROUND if other != effect))
+            level = dict.fromkeys(effects, -0.4) | {effect: 0.8}
+            yield (
+                f"background-sixkg-{effect}-{draw}",
+                "background",
+                "sixkg",
+                effects,
+                {"level": level, "dominant": effect},
+            )
+
+
+def _limited(draws):
+    for effect in LIMITED:
+        for draw in range(max(1, draws // 2)):
+            yield f"hover-sixkg-{effect}-{draw}", "hover", "sixkg", (effect,), {"hover_only": True}
+            columns = {"left_out": VELOCITY_COLUMNS}
+            yield f"no_velocity-sixkg-{effect}-{draw}", "no_velocity", "sixkg", (effect,), dict(columns)
+            yield f"no_force-sixkg-{effect}-{draw}", "no_force", "sixkg", (effect,), {"left_out": FORCE_COLUMNS}
+
+
+def cases(study_seed, draws=3):
+    """List the whole study; the same seed gives the same cases.
+
+    Parameters
+    ----------
+    study_seed : int
+    draws : int
+        Repeats of each single effect on the 6 kg craft; other groups follow.
+    """
+    parts = (_singles(draws), _none(draws), _strange(draws), _several(draws), _background(draws), _limited(draws))
+    out = []
+    for part in parts:
+        for name, group, vehicle, effects, options in part:
+            rng = np.random.default_rng([study_seed, *name.encode()])
+            out.append(make(name, group, vehicle, effects, rng, **options))
+    return out

@@ -1,0 +1,75 @@
+"""From commanded to true rotor speeds: transport delay, lag of motor and rotor, voltage of the battery."""
+
+from __future__ import annotations
+
+import numpy as np
+
+LONGEST_DELAY = 0.12
+
+
+class Drive:
+    """Rotor speeds of a batch; exact between two steps for a held command."""
+
+    def __init__(self, plants, vehicles, dt):
+        def collect(name):
+            return np.array([getattr(p, name) for p in plants])
+
+        self.dt = dt
+        self.hover = np.array([v.hover_speed for v in vehicles])
+        self.lag_up, self.lag_down = collect("lag_up"), collect("lag_down")
+        self.keep_up, self.keep_down = np.exp(-dt / 2 / self.lag_up), np.exp(-dt / 2 / self.lag_down)
+        self.behind = collect("delay") / dt
+        self.exponent, self.depth = collect("sag_exponent"), collect("sag_depth")
+        self.start, self.load = collect("sag_start"), collect("sag_load")
+        self.second = np.array([i for i, p in enumerate(plants) if p.resonance], dtype=int)
+        self.natural = np.array([p.resonance[0] for p in plants if p.resonance])
+        self.ratio = np.array([p.resonance[1] for p in plants if p.resonance])
+        self.speed = np.tile(self.hover, (4, 1))
+        self.extra = np.zeros((4, len(self.second)))
+        self.past = np.tile(self.hover, (int(LONGEST_DELAY / dt) + 2, 4, 1))
+        self.used = self.start.copy()
+        self.volt = 1 - self.depth * self.start - self.load
+
+    def receive(self, step, command):
+        """Take a command; return what arrives at the motor controllers now."""
+        length = len(self.past)
+        self.past[step % length] = command
+        whole = self.behind.astype(int)
+        share = self.behind - whole
+        flights = np.arange(command.shape[1])
+        newer = self.past[(step - whole) % length, :, flights].T
+        older = self.past[(step - whole - 1) % length, :, flights].T
+        arrived = (1 - share) * newer + share * older
+        return np.where(self.exponent > 0, arrived * self.volt**self.exponent, arrived)
+
+    def rate(self, target):
+        """Rotor acceleration, rad/s^2."""
+        lag = np.where(target > self.speed, self.lag_up, self.lag_down)
+        out = (target - self.speed) / lag
+        if len(self.second):
+            out[:, self.second] = self.extra
+        return out
+
+    def half_step(self, target):
+        """Advance the rotors by half a step."""
+        keep = np.where(target > self.speed, self.keep_up, self.keep_down)
+        before = self.speed
+        self.speed = target + (before - target) * keep
+        if len(self.second):
+            self._oscillate(before[:, self.second], target[:, self.second])
+
+    def _oscillate(self, before, target):
+        """Advance second-order rotors (underdamped) exactly."""
+        h, wn, zeta = self.dt / 2, self.natural, self.ratio
+        wd = wn * np.sqrt(1 - zeta**2)
+        decay, c, s = np.exp(-zeta * wn * h), np.cos(wd * h), np.sin(wd * h)
+        off, rate = before - target, self.extra
+        swing = (rate + zeta * wn * off) / wd
+        self.speed[:, self.second] = target + decay * (off * c + swing * s)
+        self.extra = decay * (rate * c - (wn**2 * off + zeta * wn * rate) / wd * s)
+
+    def discharge(self):
+        """Let the battery feel the power of the rotors for one step; a load drop and an emptying cell."""
+        power = ((self.speed / self.hover) ** 3).mean(0)
+        self.used += power * self.dt / 30.0
+        self.volt = 1 - self.depth * (self.used + 0.35 * self.used**2) / 1.35 - self.load * power

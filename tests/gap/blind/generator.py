@@ -1,0 +1,158 @@
+"""Flights with hidden effects, made from physics alone: nothing here knows how they will be judged.
+
+``cases(seed)`` lists a study, ``simulate_many(cases, seed)`` flies it, ``write`` gives noisy CSV logs and ``write_key``
+puts what is hidden into another folder.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from . import turning
+from .cases import Case, cases
+from .measure import COLUMNS, KINDS, NOISE, disturb, observe, save
+from .missions import MISSIONS, mission
+from .plant import ALTERATIONS, nominal
+from .simulate import FlightPlan, simulate
+from .vehicles import VEHICLES, Vehicle
+
+__all__ = [
+    "COLUMNS", "KINDS", "NOISE", "VEHICLES", "Case", "Flight", "Flights", "Vehicle",
+    "cases", "generate", "residual", "simulate_in_parts", "simulate_many", "write", "write_key",
+]  # fmt: skip
+
+DURATION = 30.0
+ROLES = ("train", "held_out")
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One flight: ``table`` is the noiseless log (time, columns), ``truth`` the motion as integrated."""
+
+    role: str
+    mission: str
+    table: np.ndarray
+    truth: dict
+
+
+@dataclass(frozen=True)
+class Flights:
+    """The six flights of a case."""
+
+    case: Case
+    vehicle: Vehicle
+    flights: tuple[Flight, ...]
+
+
+def _plans(case, seed, duration):
+    vehicle = VEHICLES[case.vehicle]
+    plans = []
+    for number in range(2 * len(MISSIONS)):
+        name = "hover" if case.hover_only else MISSIONS[number % len(MISSIONS)]
+        flight_seed = (seed, number, *case.name.encode())
+        plant = nominal(vehicle)
+        rng = np.random.default_rng([*flight_seed, 1])
+        # Each flight starts with another charge.
+        charge = rng.uniform(0.0, 0.6)
+        for effect, parameters in case.hidden.items():
+            if effect in ALTERATIONS:
+                ALTERATIONS[effect](plant, **parameters)
+        plant.sag_start = charge
+        wind = np.array(case.hidden.get("wind", {}).get("velocity", (0.0, 0.0, 0.0)))
+        plans.append(FlightPlan(vehicle, plant, mission(name, vehicle, duration, rng), case.hidden, wind, flight_seed))
+    return plans
+
+
+def _collect(case, plans, record, first):
+    flights = []
+    for number, plan in enumerate(plans):
+        truth = {name: values[first + number] for name, values in record.items()}
+        role = ROLES[number // len(MISSIONS)]
+        flights.append(Flight(role, plan.mission.name, observe(truth, case), truth))
+    return Flights(case, plans[0].vehicle, tuple(flights))
+
+
+def simulate_many(cases, seed, duration=DURATION):
+    """Fly all cases in one batch.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    seed : int
+        The flights of a case depend on this and on the name of the case, not on its company.
+    duration : float, s
+
+    Returns
+    -------
+    list of Flights
+        In the order of the cases: three flights to train, then three held out.
+    """
+    plans = [_plans(case, seed, duration) for case in cases]
+    record = simulate([plan for group in plans for plan in group], duration)
+    count = 2 * len(MISSIONS)
+    return [_collect(case, group, record, i * count) for i, (case, group) in enumerate(zip(cases, plans, strict=True))]
+
+
+def simulate_in_parts(cases, seed, duration=DURATION, part=120) -> Iterator[Flights]:
+    """Fly many cases, ``part`` at a time, to spare memory."""
+    for start in range(0, len(cases), part):
+        yield from simulate_many(cases[start : start + part], seed, duration)
+
+
+def generate(case: Case, rng: np.random.Generator, duration=DURATION) -> Flights:
+    """Fly one case."""
+    return simulate_many([case], int(rng.integers(2**31)), duration)[0]
+
+
+def residual(flight, case):
+    """Torque the nominal craft cannot explain, from the noiseless log, shape (time, 3), N m.
+
+    Uses the rotor speeds that the log shows: commands where the speeds are left out.
+    """
+    vehicle = VEHICLES[case.vehicle]
+    inertia = np.array(vehicle.inertia)
+    rate = flight.table[:, 4:7]
+    first = COLUMNS.index("omcmd1" if "om1" in case.left_out else "om1")
+    speed = flight.table[:, first : first + 4]
+    turn = CubicSpline(flight.table[:, 0], rate).derivative()(flight.table[:, 0])
+    return turn * inertia + np.cross(rate, rate * inertia) - (speed**2) @ vehicle.allocation()[1:].T
+
+
+def write(flights: Flights, folder, noise_level, kind, rng) -> list[Path]:
+    """Write the noisy logs ``train_1.csv`` to ``held_out_3.csv`` and the nominal craft ``vehicle.json``."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for number, flight in enumerate(flights.flights):
+        path = folder / f"{flight.role}_{number % len(MISSIONS) + 1}.csv"
+        save(disturb(flight.table, flights.vehicle, noise_level, kind, rng), flights.case.left_out, path)
+        paths.append(path)
+    (folder / "vehicle.json").write_text(json.dumps(flights.vehicle.as_dict(), indent=1) + "\n", encoding="ascii")
+    return paths
+
+
+def write_key(flights: Flights, folder) -> Path:
+    """Write what is hidden, with the size of its residual torque, as ``key.json``."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    key = flights.case.key()
+    key["residual_rms_n_m"] = {
+        f"{flight.role}_{i % 3 + 1}": np.sqrt((residual(flight, flights.case) ** 2).mean(0)).tolist()
+        for i, flight in enumerate(flights.flights)
+    }
+    path = folder / "key.json"
+    path.write_text(json.dumps(key, indent=1) + "\n", encoding="ascii")
+    return path
+
+
+def bounds(flights: Flights):
+    """Give the largest tilt (degrees), the least height over rotor radius and the fastest speed of all flights."""
+    tilt = max(np.degrees(np.arccos(turning.matrix(f.truth["q"].T)[2, 2].min())) for f in flights.flights)
+    height = min(f.truth["x"][:, 2].min() for f in flights.flights) / flights.vehicle.rotor_radius
+    return tilt, height, max(np.linalg.norm(f.truth["v"], axis=1).max() for f in flights.flights)

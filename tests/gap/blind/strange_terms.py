@@ -1,0 +1,97 @@
+"""Disturbances that no catalogue lists."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .instant import Term
+from .rotor_terms import at_time, coloured
+from .turning import to_body
+
+
+class MagneticTorque(Term):
+    """Torque that varies over the place, like a compass near iron."""
+
+    def apply(self, now):
+        r = self.rows
+        x, y = now.x[0, r] / self.length, now.x[1, r] / self.length
+        now.torque[:, r] += self.torque * np.stack((np.sin(x + 0.4), np.cos(y), np.sin(x - y)))
+
+
+class YawCogging(Term):
+    """Torque periodic in five times the yaw angle."""
+
+    def apply(self, now):
+        r = self.rows
+        yaw = np.arctan2(now.R[1, 0, r], now.R[0, 0, r])
+        now.torque[:, r] += self.torque * np.stack((np.sin(5 * yaw), np.cos(5 * yaw + 1), np.sin(5 * yaw + 2)))
+
+
+class GustTurbulence(Term):
+    """Random torque with a Dryden-like spectrum."""
+
+    def prepare(self):
+        self.noise = np.stack([coloured(rng, 3, 0.4) for rng in self.rngs], axis=2)
+
+    def apply(self, now):
+        now.torque[:, self.rows] += self.torque * at_time(self.noise, now.time)
+
+
+class StickSlipGimbal(Term):
+    """A gimballed mass held by dry friction: it turns along until it slips."""
+
+    def prepare(self):
+        self.state = np.zeros((6, len(self.rows)))
+
+    def apply(self, now):
+        r = self.rows
+        angle, rate = self.state[:3], self.state[3:]
+        slip = now.w[:, r] - rate
+        grip = 1 + 0.8 * np.exp(-((slip / 0.15) ** 2))
+        friction = self.friction * np.tanh(slip / 0.03) * grip
+        inertia = self.friction / 1.2
+        self.rate = np.concatenate((rate, friction / inertia - 6.0 * angle))
+        now.torque[:, r] -= friction
+
+
+class ThermalDrift(Term):
+    """Torque that grows with the square of time."""
+
+    def apply(self, now):
+        now.torque[:, self.rows] += self.torque * (max(now.time, 0.0) / 30) ** 2
+
+
+class AttitudeProduct(Term):
+    """Torque from products of roll and pitch."""
+
+    def apply(self, now):
+        r = self.rows
+        lean_x, lean_y = now.R[2, 0, r], now.R[2, 1, r]
+        now.torque[:, r] += self.torque * np.stack((lean_x * lean_y, lean_y**2 - lean_x**2, lean_x**2)) / 0.03
+
+
+class WallEffect(Term):
+    """Pull towards walls that stand along x, fading with the distance."""
+
+    def apply(self, now):
+        r = self.rows
+        distance = np.abs((now.x[0, r] - self.place + 6) % 12 - 6)
+        direction = np.stack((np.zeros(len(r)), np.ones(len(r)), np.zeros(len(r))))
+        body = to_body(now.R[:, :, r], direction)
+        now.torque[:, r] += self.torque * np.exp(-distance / 1.2) * body
+
+
+class SlidingBattery(Term):
+    """A loose battery slides between two stops when pushed hard enough: the torque jumps."""
+
+    def prepare(self):
+        self.state = np.zeros((2, len(self.rows)))
+        self.side = np.ones((2, len(self.rows)))
+
+    def apply(self, now):
+        r = self.rows
+        push = now.w[[1, 0]][:, r]
+        flips = np.abs(push) > 0.45
+        self.side = np.where(flips, np.sign(push), self.side)
+        self.rate = 12.0 * (self.side - self.state)
+        now.torque[:2, r] += self.torque[:2] * self.state * now.thrust[:, r].sum(0) / self.of("weight")

@@ -1,0 +1,298 @@
+"""How strong each hidden effect is: drawn log-uniformly between bounds for the 6 kg craft, scaled to the vehicle.
+
+Torques scale with the moments of inertia, so that every craft feels about the same angular acceleration; where a
+coefficient also makes a force or is a fixed share of the thrust, the scale leans a little to the physical one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .vehicles import SIXKG
+
+
+class Scale:
+    """Ratios of a vehicle to the 6 kg craft."""
+
+    def __init__(self, vehicle):
+        self.vehicle = vehicle
+        self.roll = vehicle.inertia[0] / SIXKG.inertia[0]
+        self.yaw = vehicle.inertia[2] / SIXKG.inertia[2]
+        self.speed = vehicle.hover_speed / SIXKG.hover_speed
+        self.arm = vehicle.arm / SIXKG.arm
+        self.mass = vehicle.mass / SIXKG.mass
+        # Share of thrust that turns this craft nearly as much as the whole thrust turns the 6 kg craft.
+        self.share = float((self.roll / (self.mass * self.arm)) ** 0.9)
+        # Small craft need smaller differences of rotor speed to yaw; their rotors are heavier for it.
+        reaction = vehicle.torque_factor / SIXKG.torque_factor * self.speed**2
+        self.spin_difference = float(np.sqrt(self.yaw / reaction))
+        self.axes = np.array([self.roll, self.roll, self.yaw])
+
+
+def between(rng, low, high, level):
+    """Draw log-uniformly, or take the given level between 0 and 1."""
+    share = rng.random() if level is None else level
+    return low * (high / low) ** share
+
+
+def direction(rng, size=2):
+    """Draw a unit vector."""
+    vector = rng.standard_normal(size)
+    return vector / np.linalg.norm(vector)
+
+
+def signs(rng, size):
+    """Draw signs with magnitudes around one."""
+    return rng.choice([-1.0, 1.0], size) * rng.uniform(0.5, 1.0, size)
+
+
+def _damping(low, high):
+    def draw(rng, s, level):
+        return {"damping": between(rng, low, high, level) * s.axes * [1, rng.uniform(0.8, 1.2), rng.uniform(0.3, 0.7)]}
+
+    return draw
+
+
+def _torque(low, high, **more):
+    def draw(rng, s, level):
+        torque = between(rng, low, high, level) * s.axes * signs(rng, 3) * [1, 1, 0.4]
+        return {"torque": torque} | {key: rng.uniform(*span) for key, span in more.items()}
+
+    return draw
+
+
+def _drag_rate(s):
+    """Scale of the drag rate: lever times force should turn small craft nearly like the big one."""
+    height = s.vehicle.hubs[2, 0]
+    return float((s.roll / (s.mass * height / 0.05)) ** 0.9) if height else 1.0
+
+
+def rotor_drag(rng, s, level):
+    rate = between(rng, 0.19, 0.55, level) * _drag_rate(s)
+    return {"drag": rate * s.vehicle.mass / (4 * s.vehicle.hover_speed)}
+
+
+def flapping_moment(rng, s, level):
+    return {"moment": rng.choice([-1, 1]) * between(rng, 1.5e-5, 2e-4, level) * s.roll / s.speed}
+
+
+def rolling_moment(rng, s, level):
+    return {"moment": between(rng, 1e-5, 1e-4, level) * s.roll / s.speed / s.spin_difference}
+
+
+def rotor_plane_damping(rng, _scale, level):
+    return {"lock_number": 1 / between(rng, 0.25, 1.0, level)}
+
+
+def inflow(rng, s, level):
+    return {"gain": between(rng, 0.0008, 0.004, level) * s.roll / (s.arm**2 * s.speed)}
+
+
+def translational_lift(rng, s, level):
+    lift = between(rng, 0.01, 0.08, level) * s.roll / s.arm
+    return {"gain": lift * 4 * s.vehicle.induced_speed / s.vehicle.hover_speed}
+
+
+def _parasitic(power):
+    def draw(rng, s, level):
+        drag = between(rng, 0.015, 0.08, level) * s.roll ** (2 / 3) * (8.0 ** (2 - power))
+        centre = np.append(rng.uniform(-0.02, 0.02, 2), -0.06) * s.roll ** (1 / 3)
+        return {"drag": drag, "centre": centre, "power": power}
+
+    return draw
+
+
+def ground_effect(rng, _scale, level):
+    return {"gain": between(rng, 1.0, 11.0, level)}
+
+
+def vertical_descent(rng, s, level):
+    return {"mean": 1.0, "jitter": between(rng, 0.02, 0.15, level) * s.share}
+
+
+def wind(rng, _scale, level):
+    return {"velocity": np.append(between(rng, 2.0, 8.0, level) * direction(rng), 0.0)}
+
+
+def rotor_inertia(rng, s, level):
+    return {"inertia": between(rng, 0.0002, 0.001, level) * s.yaw / s.speed / s.spin_difference}
+
+
+def motor_lag(rng, _scale, level):
+    return {"time_constant": between(rng, 0.02, 0.1, level)}
+
+
+def command_delay(rng, _scale, level):
+    return {"delay": between(rng, 0.01, 0.05, level)}
+
+
+def battery_sag(rng, _scale, level):
+    exponent = rng.uniform(0.6, 1.0)
+    loss = between(rng, 0.05, 0.2, level) / (2 * exponent)
+    return {"depth": loss / 1.5, "exponent": exponent, "start": 0.0, "load": 0.2 * loss}
+
+
+def com_offset(rng, s, level):
+    size = between(rng, 0.003, 0.03, level) * s.arm * s.share
+    return {"offset": size * np.append(direction(rng), rng.uniform(-0.3, 0.3))}
+
+
+def products_of_inertia(rng, s, level):
+    size = between(rng, 0.012, 0.1, level) * s.roll
+    return dict(zip(("xy", "xz", "yz"), size * rng.uniform(-1, 1, 3), strict=True))
+
+
+def rotor_mismatch(rng, s, level):
+    size = between(rng, 0.02, 0.15, level) * s.share
+    gain = 0.15 * size * rng.uniform(-1, 1, 4)
+    gain[rng.integers(4)] = -size
+    return {"gain": gain}
+
+
+def payload(rng, s, level):
+    mass = between(rng, 0.2, 1.5, level) * s.mass * s.share
+    point = np.append(rng.uniform(-0.01, 0.01, 2), -rng.uniform(0.06, 0.16)) * s.arm
+    return {"mass": mass, "point": point, "length": rng.uniform(0.7, 2.5), "damping": rng.uniform(0.05, 0.25)}
+
+
+def parameter_error(rng, _scale, level):
+    size = between(rng, 0.5, 1.5, level)
+    wrong = size * signs(rng, 7) * [0.06, 0.12, 0.12, 0.12, 0.04, 0.06, 0.12]
+    return dict(zip(("mass", "arm", "thrust", "torque"), wrong[[0, 4, 5, 6]], strict=True)) | {"inertia": wrong[1:4]}
+
+
+def gyro_bias(rng, _scale, level):
+    return {"bias": between(rng, 0.005, 0.1, level) * direction(rng, 3)}
+
+
+def gyro_scale(rng, _scale, level):
+    return {"scale": between(rng, 0.005, 0.05, level) * signs(rng, 3)}
+
+
+def imu_misalignment(rng, _scale, level):
+    return {"rotation": between(rng, 0.01, 0.09, level) * direction(rng, 3)}
+
+
+def channel_delay(rng, _scale, level):
+    delay = between(rng, 0.005, 0.04, level)
+    return {"gyro": delay, "rotor": 0.0} if rng.random() < 0.7 else {"gyro": 0.0, "rotor": delay}
+
+
+def euler_axis_torque(_rng, _scale, _level):
+    return {}
+
+
+CATALOGUE = {
+    "linear_damping": _damping(0.03, 0.4),
+    "quadratic_damping": _damping(0.01, 0.1),
+    "rotor_plane_damping": rotor_plane_damping,
+    "rotor_drag": rotor_drag,
+    "flapping_moment": flapping_moment,
+    "rolling_moment": rolling_moment,
+    "inflow": inflow,
+    "translational_lift": translational_lift,
+    "parasitic_drag": _parasitic(2.0),
+    "ground_effect": ground_effect,
+    "vertical_descent": vertical_descent,
+    "wind": wind,
+    "rotor_gyroscopic": rotor_inertia,
+    "rotor_acceleration": rotor_inertia,
+    "motor_lag": motor_lag,
+    "command_delay": command_delay,
+    "battery_sag": battery_sag,
+    "com_offset": com_offset,
+    "products_of_inertia": products_of_inertia,
+    "rotor_mismatch": rotor_mismatch,
+    "torque_bias": _torque(0.05, 0.5),
+    "payload": payload,
+    "euler_axis_torque": euler_axis_torque,
+    "gyro_bias": gyro_bias,
+    "gyro_scale": gyro_scale,
+    "imu_misalignment": imu_misalignment,
+    "channel_delay": channel_delay,
+    "parameter_error": parameter_error,
+}
+"""Effects with the form that the literature gives."""
+
+
+def loose_arm(rng, s, level):
+    drive = between(rng, 0.02, 0.08, level) * s.share
+    return {
+        "rotor": int(rng.integers(4)),
+        "drive": drive,
+        "frequency": rng.uniform(0.8, 2.5),
+        "damping": rng.uniform(0.05, 0.15),
+    }
+
+
+def fuel_slosh(rng, s, level):
+    return {
+        "mass": between(rng, 0.5, 1.5, level) * s.mass * s.share**2,
+        "height": -rng.uniform(0.2, 0.3) * s.arm,
+        "frequency": rng.uniform(0.8, 1.6),
+        "damping": rng.uniform(0.05, 0.15),
+    }
+
+
+def stick_slip_gimbal(rng, s, level):
+    return {"friction": between(rng, 0.05, 0.2, level) * s.axes * [1, 1, 0.5]}
+
+
+def rotor_interference(rng, s, level):
+    return {"loss": between(rng, 0.03, 0.2, level) * s.share}
+
+
+OUTSIDE = {
+    "magnetic_torque": _torque(0.15, 0.5, length=(3.0, 8.0)),
+    "fuel_slosh": fuel_slosh,
+    "loose_arm": loose_arm,
+    "yaw_cogging": _torque(0.1, 0.4),
+    "gust_turbulence": _torque(0.1, 0.4),
+    "stick_slip_gimbal": stick_slip_gimbal,
+    "thermal_drift": _torque(0.2, 0.6),
+    "rotor_interference": rotor_interference,
+    "attitude_product": _torque(0.1, 0.4),
+    "wall_effect": _torque(0.2, 0.8, place=(0.0, 12.0)),
+    "sliding_battery": _torque(0.1, 0.4),
+}
+"""Effects that no catalogue lists."""
+
+
+def thrust_tilt(rng, s, level):
+    lean = np.zeros((2, 4))
+    for rotor in rng.choice(4, 2, replace=False):
+        lean[:, rotor] = between(rng, 0.005, 0.05, level) * s.share * direction(rng)
+    return {"lean": lean}
+
+
+def lag_uneven(rng, _scale, level):
+    up = between(rng, 0.02, 0.06, level)
+    return {"up": up, "down": up * rng.uniform(1.8, 2.8)}
+
+
+def lag_second_order(rng, _scale, level):
+    return {"frequency": between(rng, 40.0, 15.0, level), "damping": rng.uniform(0.5, 0.8)}
+
+
+FORMS = {
+    "stribeck_damping": (_damping(0.05, 0.3), "linear_damping"),
+    "cubic_damping": (_damping(0.03, 0.2), "quadratic_damping"),
+    "ground_exponential": (ground_effect, "ground_effect"),
+    "parasitic_power": (_parasitic(1.5), "parasitic_drag"),
+    "inflow_momentum": (inflow, "inflow"),
+    "lag_second_order": (lag_second_order, "motor_lag"),
+    "lag_uneven": (lag_uneven, "motor_lag"),
+    "thrust_tilt": (thrust_tilt, "torque_bias"),
+}
+"""Effects close to one of the catalogue, in another form: draw, and the nearest effect of the catalogue."""
+
+_DRAWS = CATALOGUE | OUTSIDE | {name: draw for name, (draw, _) in FORMS.items()}
+
+
+def strength(name, vehicle, rng, level=None):
+    """Draw the parameters of an effect as plain numbers and lists.
+
+    ``level`` between 0 and 1 fixes the place between the weakest and the strongest; below 0 is weaker still.
+    """
+    drawn = _DRAWS[name](rng, Scale(vehicle), level)
+    return {key: np.asarray(value).tolist() for key, value in drawn.items()}
