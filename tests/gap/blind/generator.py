@@ -19,6 +19,7 @@ from .cases import Case, cases
 from .measure import COLUMNS, KINDS, NOISE, disturb, observe, save
 from .missions import MISSIONS, mission
 from .plant import ALTERATIONS, nominal
+from .rotor_terms import LEAD_IN
 from .simulate import FlightPlan, simulate
 from .vehicles import VEHICLES, Vehicle
 
@@ -78,7 +79,7 @@ def _collect(case, plans, record, first):
     return Flights(case, plans[0].vehicle, tuple(flights))
 
 
-def simulate_many(cases, seed, duration=DURATION):
+def simulate_many(cases, seed, duration=DURATION, lead_in=LEAD_IN):
     """Fly all cases in one batch.
 
     Parameters
@@ -86,7 +87,8 @@ def simulate_many(cases, seed, duration=DURATION):
     cases : sequence of Case
     seed : int
         The flights of a case depend on this and on the name of the case, not on its company.
-    duration : float, s
+    duration, lead_in : float, s
+        Length of the log, and of the flight before it.
 
     Returns
     -------
@@ -94,7 +96,7 @@ def simulate_many(cases, seed, duration=DURATION):
         In the order of the cases: three flights to train, then three held out.
     """
     plans = [_plans(case, seed, duration) for case in cases]
-    record = simulate([plan for group in plans for plan in group], duration)
+    record = simulate([plan for group in plans for plan in group], duration, lead_in)
     count = 2 * len(MISSIONS)
     return [_collect(case, group, record, i * count) for i, (case, group) in enumerate(zip(cases, plans, strict=True))]
 

@@ -129,7 +129,7 @@ def mission(name, vehicle, duration, rng):
     if name == "ground":
         radius = vehicle.rotor_radius
         # Craft with small rotors still need room for their tracking error.
-        lowest = max(1.1 * radius, 0.07)
+        lowest = max(1.1 * radius, 0.09)
         height = legs(rng, time, lambda: np.array([rng.uniform(lowest, lowest + 2.4 * radius)]), 2.5, 4.5)
         position[:, 2] = smooth(height, 1.5)[:, 0]
         velocity[:, 2] = np.gradient(position[:, 2], STEP)

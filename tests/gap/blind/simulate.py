@@ -41,7 +41,7 @@ class FlightPlan:
 class Fleet:
     """State and physics of a batch of flights."""
 
-    def __init__(self, plans):
+    def __init__(self, plans, height=0.0):
         plants = [plan.plant for plan in plans]
         self.mass = np.array([p.mass for p in plants])
         self.inertia = np.moveaxis(np.array([p.inertia for p in plants]), 0, 2).copy()
@@ -56,7 +56,7 @@ class Fleet:
         self.terms = build(plans)
         self.with_state = [t for stage in STAGES for t in self.terms[stage] if t.state is not None]
         start = np.array([plan.mission.position[0] for plan in plans]).T
-        start[2] += LEAD_HEIGHT
+        start[2] += height
         yaw = np.array([plan.mission.yaw[0] for plan in plans])
         self.y = np.concatenate((start, np.zeros_like(start), turning.from_yaw(yaw), np.zeros_like(start)))
 
@@ -131,20 +131,20 @@ def along_euler_axes(R, torque):
     return np.stack((tx, c_roll * ty + s_roll * lifted, -s_roll * ty + c_roll * lifted))
 
 
-def simulate(plans, duration):
+def simulate(plans, duration, lead_in=LEAD_IN):
     """Fly all plans together.
 
     Returns a dict of arrays (flights, time, ...) sampled at 100 Hz: true state, accelerations, rotor speeds, commands,
     voltage. The craft fly a short lead-in that is not recorded.
     """
-    fleet = Fleet(plans)
+    fleet = Fleet(plans, LEAD_HEIGHT * np.clip(3 * lead_in / LEAD_IN - 1, 0, 1))
     vehicles = [plan.vehicle for plan in plans]
     drive = Drive([plan.plant for plan in plans], vehicles, DT)
     control = Controller(vehicles, [plan.generator("gains") for plan in plans], CONTROL_EVERY * DT)
     references = np.stack([plan.mission.table() for plan in plans], axis=2)
     count = round(duration / STEP) + 1
     log = {name: np.empty((count, rows, len(plans))) for name, rows in _RECORD.items()}
-    lead = round(LEAD_IN / DT)
+    lead = round(lead_in / DT)
     noise = [plan.generator("senses") for plan in plans]
     senses = np.stack([rng.standard_normal((count + lead // LOG_EVERY + 1, 9)).astype(np.float32) for rng in noise], 2)
     command = drive.speed

@@ -1,0 +1,214 @@
+"""The flights must obey mechanics, repeat from their seed, and know nothing of the package they judge."""
+
+import ast
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from tests.gap.blind import generator
+from tests.gap.blind.cases import cases, make
+from tests.gap.blind.missions import mission
+from tests.gap.blind.plant import nominal
+from tests.gap.blind.simulate import DT, Fleet, FlightPlan
+from tests.gap.blind.strengths import CATALOGUE, FORMS, OUTSIDE, strength
+from tests.gap.blind.vehicles import SIXKG, VEHICLES
+
+EFFECTS = ("com_offset", "euler_axis_torque", "ground_effect", "wind", "payload", "battery_sag", "gyro_bias")
+
+
+class StillRotors:
+    """Stands in for a drive whose rotors do not turn."""
+
+    def __init__(self, flights):
+        self.speed = np.zeros((4, flights))
+
+    def rate(self, _target):
+        return np.zeros_like(self.speed)
+
+    def half_step(self, _target):
+        pass
+
+
+@pytest.fixture(scope="module")
+def flown():
+    rng = np.random.default_rng(4)
+    hidden = [make(f"none-{name}", "none", name, (), rng) for name in VEHICLES]
+    hidden += [make(effect, "single", "sixkg", (effect,), rng, level=0.5) for effect in EFFECTS]
+    flights = generator.simulate_many(hidden, 7, duration=2.0, lead_in=1.0)
+    return {group.case.name: group for group in flights}
+
+
+def falling(hidden, seconds, inertia=None):
+    """Let one tumbling craft fall without thrust; return the fleet and its energies over time."""
+    plant = nominal(SIXKG)
+    plant.inertia = plant.inertia if inertia is None else inertia
+    path = mission("hover", SIXKG, 1.0, np.random.default_rng(1))
+    fleet = Fleet([FlightPlan(SIXKG, plant, path, hidden, np.zeros(3), (1,))])
+    fleet.y[10:13] = [[1.2], [-0.7], [0.5]]
+    drive = StillRotors(1)
+    trail = []
+    for step in range(round(seconds / DT)):
+        first, _ = fleet.rates(step * DT, fleet.y, drive.speed, drive.speed)
+        trail.append((fleet.y.copy(), [term.state.copy() for term in fleet.with_state]))
+        fleet.advance(step * DT, drive, drive.speed, first)
+    return fleet, trail
+
+
+def turned(y):
+    return Rotation.from_quat(y[[7, 8, 9, 6], 0])
+
+
+def rigid_energy(fleet, y):
+    inertia = fleet.inertia[:, :, 0]
+    return 3.0 * (y[3:6] ** 2).sum() + 0.5 * y[10:13, 0] @ inertia @ y[10:13, 0] + 6 * 9.81 * y[2, 0]
+
+
+def test_generator_does_not_import_the_package_it_judges():
+    for path in Path(generator.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not [name for name in names if name.startswith("cpfls")], path.name
+
+
+def test_tumbling_craft_keeps_energy_and_angular_momentum():
+    inertia = np.array([[0.6, 0.05, -0.03], [0.05, 0.7, 0.04], [-0.03, 0.04, 1.1]])
+    fleet, trail = falling({}, 2.0, inertia)
+    momentum = [turned(y).apply(inertia @ y[10:13, 0]) for y, _ in (trail[0], trail[-1])]
+    np.testing.assert_allclose(momentum[1], momentum[0], atol=1e-5)
+    energy = [rigid_energy(fleet, y) for y, _ in (trail[0], trail[-1])]
+    assert energy[1] == pytest.approx(energy[0], rel=1e-7)
+
+
+def test_payload_and_craft_keep_their_energy_and_momentum_together():
+    point, mass, length = np.array([0.02, -0.01, -0.1]), 1.5, 0.8
+    hidden = {"payload": {"mass": mass, "point": point.tolist(), "length": length, "damping": 0.0}}
+    fleet, trail = falling(hidden, 2.0)
+
+    def total(y, cable):
+        turn = turned(y)
+        velocity = y[3:6, 0] + turn.apply(np.cross(y[10:13, 0], point)) + length * cable[3:, 0]
+        height = y[2, 0] + turn.apply(point)[2] + length * cable[2, 0]
+        energy = rigid_energy(fleet, y) + 0.5 * mass * velocity @ velocity + mass * 9.81 * height
+        return energy, 6 * y[3:6, 0] + mass * velocity
+
+    (before, push), (after, end_push) = (total(y, states[0]) for y, states in (trail[0], trail[-1]))
+    fallen = np.array([0, 0, -9.81 * (6 + mass) * DT * (len(trail) - 1)])
+    assert after == pytest.approx(before, rel=2e-6)
+    np.testing.assert_allclose(end_push - push, fallen, atol=2e-3)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_rotor_torque_alone_turns_a_craft_that_hides_nothing(flown, name):
+    group = flown[f"none-{name}"]
+    inertia = np.array(group.vehicle.inertia)
+    for flight in group.flights:
+        time, speed, rate = flight.table[:, 0], flight.table[:, 16:20], flight.table[:, 4:7]
+        torque = speed**2 @ group.vehicle.allocation()[1:].T - np.cross(rate, rate * inertia)
+        turned_by = CubicSpline(time, torque / inertia).antiderivative()(time)
+        # Rotors are told a new speed every 4 ms, so a spline through 100 Hz samples is good to about 1e-3 rad/s.
+        np.testing.assert_allclose(rate - rate[0], turned_by, atol=2e-3)
+
+
+def test_offset_centre_of_mass_leaves_the_torque_of_the_thrust(flown):
+    group = flown["com_offset"]
+    offset = np.array(group.case.hidden["com_offset"]["offset"])
+    for flight in group.flights:
+        thrust = (flight.table[:, 16:20] ** 2).sum(1) * SIXKG.thrust_factor
+        expected = np.outer(thrust, [-offset[1], offset[0], 0.0])
+        inner = slice(20, -20)
+        np.testing.assert_allclose(generator.residual(flight, group.case)[inner], expected[inner], atol=0.03)
+
+
+def test_logged_acceleration_differentiates_the_logged_velocity(flown):
+    for group in flown.values():
+        for flight in group.flights:
+            time = flight.table[:, 0]
+            moved = CubicSpline(time, flight.table[:, 13:16]).antiderivative()(time)
+            np.testing.assert_allclose(flight.table[:, 10:13] - flight.table[0, 10:13], moved, atol=3e-3)
+
+
+def test_torque_along_euler_axes_differs_by_the_inverse_transpose(flown):
+    group = flown["euler_axis_torque"]
+    flight = group.flights[0]
+    roll, pitch = flight.table[:, 1], flight.table[:, 2]
+    s, c = np.sin(roll), np.cos(roll)
+    zero, one = np.zeros_like(s), np.ones_like(s)
+    W = np.array([[one, zero, -np.sin(pitch)], [zero, c, s * np.cos(pitch)], [zero, -s, c * np.cos(pitch)]])
+    nominal_torque = flight.table[:, 16:20] ** 2 @ SIXKG.allocation()[1:].T
+    true_torque = np.linalg.solve(np.moveaxis(W, 2, 0).transpose(0, 2, 1), nominal_torque[:, :, None])[:, :, 0]
+    inner = slice(20, -20)
+    expected = (true_torque - nominal_torque)[inner]
+    np.testing.assert_allclose(generator.residual(flight, group.case)[inner], expected, atol=0.03)
+
+
+def test_flights_stay_in_the_air(flown):
+    for group in flown.values():
+        tilt, height, _ = generator.bounds(group)
+        assert tilt < 60
+        assert height > 0.5
+
+
+def test_a_case_flies_the_same_in_other_company(flown):
+    alone = generator.simulate_many([flown["payload"].case], 7, duration=2.0, lead_in=1.0)[0]
+    for one, other in zip(alone.flights, flown["payload"].flights, strict=True):
+        np.testing.assert_allclose(one.table, other.table, atol=1e-9)
+
+
+def test_study_repeats_from_its_seed_and_covers_every_effect():
+    study = cases(5)
+    assert [case.key() for case in study] == [case.key() for case in cases(5)]
+    assert [case.key() for case in study] != [case.key() for case in cases(6)]
+    assert len({case.name for case in study}) == len(study)
+    hidden = {effect for case in study for effect in case.hidden}
+    assert hidden == {*CATALOGUE, *OUTSIDE, *FORMS}
+
+
+def test_log_without_rotor_speeds_names_the_lag_too():
+    case = make("sag", "single", "sixkg", ("battery_sag",), np.random.default_rng(1))
+    assert {"om1", "om4"} <= set(case.left_out)
+    assert case.truth == ("battery_sag", "motor_lag")
+
+
+def test_controller_speed_hides_only_the_voltage():
+    case = make("sag", "single", "sixkg", ("battery_sag",), np.random.default_rng(1), esc_speed=True)
+    assert case.truth == ("battery_sag",)
+    flight = generator.simulate_many([case], 3, duration=1.0, lead_in=1.0)[0].flights[0]
+    exponent = case.hidden["battery_sag"]["exponent"]
+    np.testing.assert_allclose(flight.table[:, 16:20] * flight.table[:, 24:] ** exponent, flight.truth["speed"])
+
+
+@pytest.mark.parametrize("kind", generator.KINDS)
+def test_noise_has_its_stated_size(flown, kind):
+    flight = flown["none-sixkg"].flights[0]
+    long = np.tile(flight.table, (40, 1))
+    noisy = generator.disturb(long, SIXKG, "mid", kind, np.random.default_rng(2))
+    spread = (noisy - long)[:, [1, 4, 7, 10, 13, 16]].std(axis=0)
+    stated = [np.radians(0.2), 0.005, 0.02, 0.05, 0.05, 1.0]
+    np.testing.assert_allclose(spread, stated, rtol=0.1)
+
+
+def test_written_logs_hold_no_key(flown, tmp_path):
+    group = flown["battery_sag"]
+    paths = generator.write(group, tmp_path / "logs", "low", "white", np.random.default_rng(1))
+    key = json.loads(generator.write_key(group, tmp_path / "keys").read_text())
+    with paths[0].open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(paths) == 6
+    assert len(rows) == 201
+    assert "om1" not in rows[0]
+    assert float(rows[5]["omcmd2"]) > 0
+    assert key["truth"] == ["battery_sag", "motor_lag"]
+    assert "battery_sag" not in "".join(p.read_text() for p in (tmp_path / "logs").iterdir())
+
+
+def test_strength_grows_with_its_level():
+    def damping(level):
+        return strength("linear_damping", SIXKG, np.random.default_rng(1), level)["damping"][0]
+
+    assert [damping(level) for level in (0.0, 1.0)] == pytest.approx([0.03, 0.4])
