@@ -10,6 +10,7 @@ from scipy.stats import gumbel_r
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
+from cpfls_cli.gap.ambiguity import simplest, unbeaten
 from cpfls_cli.gap.balance_system import System, system
 from cpfls_cli.gap.floor import floors
 from cpfls_cli.gap.folds import blocks_of
@@ -156,7 +157,8 @@ def forward(
         progress(len(steps))
         if len(chosen) >= settings.effects_max or not acceptable(step, settings):
             return chosen, steps
-        found = refined(flights, [*chosen, step.ranking[0].candidate], step.floor)
+        best = simplest(step.ranking, step.above_floor)
+        found = refined(flights, [*chosen, best.candidate], step.floor)
         chosen = exchanged(flights, found.chosen, effects, settings) if len(found.chosen) > 1 else found.chosen
 
 
@@ -205,29 +207,11 @@ def exchanged(
             kept = others
             continue
         best = step.ranking[0]
-        if best.candidate.effect.name != candidate.effect.name and beaten(best, own):
+        if best.candidate.effect.name != candidate.effect.name and own not in unbeaten(
+            best, step.ranking, step.above_floor
+        ):
             kept = list(refined(flights, [*others, best.candidate], step.floor).chosen)
     return tuple(kept)
-
-
-def beaten(winner: Scored, other: Scored, errors: float = 1.7) -> bool:
-    """Tell whether a candidate explains more than another by more than its scatter over blocks.
-
-    Parameters
-    ----------
-    winner, other : Scored
-    errors : float
-        Standard errors.
-
-    Returns
-    -------
-    bool
-    """
-    margin = other.block_error - winner.block_error
-    if not np.isfinite(other.gain):
-        return True
-    spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin))) if len(margin) > 1 else np.inf
-    return bool(margin.sum() > errors * spread)
 
 
 def best_floor(hypothesis: System) -> Array:
