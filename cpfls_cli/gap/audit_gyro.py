@@ -1,4 +1,4 @@
-"""The gyroscope judged by the attitude: bias, scale, misalignment and delay, with errors that survive autocorrelation."""
+"""The gyroscope judged by the attitude: bias, scale, misalignment, delay, and errors that survive autocorrelation."""
 
 from __future__ import annotations
 
@@ -196,9 +196,7 @@ def _faults(found: Array, base: float) -> Array:
     turned, stretched = polar(inverse, side="left")
     misalignment = -Rotation.from_matrix(turned).as_rotvec()
     cross = [stretched[1, 2], stretched[2, 0], stretched[0, 1]]
-    return np.concatenate(
-        [inverse @ found[9:12], np.diag(stretched) - 1, misalignment, cross, [base + found[12]]]
-    )
+    return np.concatenate([inverse @ found[9:12], np.diag(stretched) - 1, misalignment, cross, [base + found[12]]])
 
 
 def _pull(read: Array, variance: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -14,7 +14,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.windows import Windows
 
 LONGEST_DELAY_S = 0.1
-"""Longest shift between gyroscope and attitude that is looked for, s; one second's tenth is already a broken log."""
+"""Longest shift between gyroscope and attitude that is looked for, s; a log beyond that is broken, not late."""
 
 
 @dataclass(frozen=True)
@@ -128,18 +128,3 @@ def _relative(turned: Array) -> Array:
 def _turning(relative: Array) -> Array:
     x, y, z, scalar = np.moveaxis(relative, -1, 0)
     return np.stack([scalar, -z, y, z, scalar, -x, -y, x, scalar], axis=-1).reshape(*relative.shape[:-1], 3, 3)
-
-
-def without(kinematic: Kinematics, bias: Array) -> Kinematics:
-    """Subtract a bias from the gyroscope.
-
-    Parameters
-    ----------
-    kinematic : Kinematics
-    bias : array, shape (3,), rad/s
-
-    Returns
-    -------
-    Kinematics
-    """
-    return replace(kinematic, gyro=CubicSpline(kinematic.gyro.x, kinematic.gyro(kinematic.gyro.x) - bias))
