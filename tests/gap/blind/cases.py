@@ -52,6 +52,8 @@ class Case:
             "hidden": self.hidden,
             "hover_only": self.hover_only,
             "left_out": list(self.left_out),
+            "esc_speed": self.esc_speed,
+            "ideal_command": self.ideal_command,
         }
 
 

@@ -101,7 +101,7 @@ def simulate_many(cases, seed, duration=DURATION, lead_in=LEAD_IN):
     return [_collect(case, group, record, i * count) for i, (case, group) in enumerate(zip(cases, plans, strict=True))]
 
 
-def simulate_in_parts(cases, seed, duration=DURATION, part=120) -> Iterator[Flights]:
+def simulate_in_parts(cases, seed, duration=DURATION, part=60) -> Iterator[Flights]:
     """Fly many cases, ``part`` at a time, to spare memory."""
     for start in range(0, len(cases), part):
         yield from simulate_many(cases[start : start + part], seed, duration)
