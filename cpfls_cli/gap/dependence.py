@@ -10,7 +10,7 @@ from numpy.polynomial import chebyshev
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.gap.folds import folds
-from cpfls_cli.gap.scoring import shifted
+from cpfls_cli.gap.mirrored import about_flight_mean, mirror_shifted
 from cpfls_cli.gap.state_signals import ANGLES
 from cpfls_cli.gap.weak_flight import CHANNELS
 
@@ -54,7 +54,7 @@ def rank_dependence(
     The curve is a quartic polynomial of the scaled signal, for roll and yaw three harmonics. Curve and residual are
     taken about their mean over each flight, so that differences between flights, of which there are few, explain
     nothing. Neighbouring windows are alike, which makes tests for independent rows useless: here the residual of each
-    flight is shifted in time against the signals with random signs, and the best share of all channels and signals is
+    flight is shifted in time against the signals (`mirror_shifted`), and the best share of all channels and signals is
     what chance has to offer (family-wise).
 
     Parameters
@@ -79,15 +79,14 @@ def rank_dependence(
     ----------
     Winkler et al. 2014, permutation inference with the largest statistic; Politis and Romano 1992, circular blocks.
     """
-    draws = np.concatenate(
-        [_about_flight_mean(residual, flight_index)[..., None], shifted(residual, flight_index, shifts, rng)], axis=2
-    )
+    shifted = mirror_shifted(residual, flight_index, shifts, rng)
+    draws = np.concatenate([about_flight_mean(residual, flight_index)[..., None], shifted], axis=2)
     judged: list[tuple[int, str, Array]] = []
     for name, signal in state.items():
         for channels, rows in _where_known(residual, flight_index, np.isfinite(signal)):
             curve = _curve(name, signal[rows])
             if curve.size and len(np.unique(block[rows])) >= _FEWEST_BLOCKS:
-                curve = _about_flight_mean(curve, flight_index[rows])
+                curve = about_flight_mean(curve, flight_index[rows])
                 share = _share(curve, draws[np.ix_(rows, channels)], block[rows])
                 judged += [(int(channel), name, own) for channel, own in zip(channels, share, strict=True)]
     return _ranked(judged, shifts)
@@ -133,8 +132,3 @@ def _share(curve: Array, draws: Array, block: IntArray) -> Array:
     _, error = normal.solve(np.arange(curve.shape[1]))
     total = np.maximum(normal.square.sum(axis=0), np.finfo(float).tiny)
     return np.asarray((1 - error.sum(axis=0) / total).reshape(draws.shape[1:]))
-
-
-def _about_flight_mean(values: Array, flight_index: IntArray) -> Array:
-    flights, own = np.unique(flight_index, return_inverse=True)
-    return np.asarray(values - np.array([values[own == f].mean(axis=0) for f in range(len(flights))])[own])

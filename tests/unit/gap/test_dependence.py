@@ -1,0 +1,121 @@
+"""Dependence of a residual on one signal: named when it is there, not when it is not."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import f as f_law
+
+from cpfls_cli.gap.dependence import rank_dependence
+from cpfls_cli.gap.mirrored import mirror_shifted
+
+FLIGHTS, LENGTH = 3, 120
+FLIGHT_INDEX = np.repeat(np.arange(FLIGHTS), LENGTH)
+BLOCK = np.arange(FLIGHTS * LENGTH) // 20
+
+
+def correlated(rng, channels, correlation):
+    """Stationary first-order autoregression of unit variance, flight by flight."""
+    drive = rng.standard_normal((FLIGHTS, LENGTH + 200, channels)) * np.sqrt(1 - correlation**2)
+    return lfilter([1], [1, -correlation], drive, axis=1)[:, 200:].reshape(-1, channels)
+
+
+def state_of(rng):
+    slow = correlated(rng, 4, 0.95)
+    yaw = (2 * slow[:, 3] + np.pi) % (2 * np.pi) - np.pi
+    return {"speed": slow[:, 0], "height": slow[:, 1], "thrust": slow[:, 2], "yaw": yaw}
+
+
+def residual_of(rng, channels=2):
+    return np.column_stack([correlated(rng, channels, 0.9), np.zeros((FLIGHTS * LENGTH, 6 - channels))])
+
+
+def ranked(residual, state, rng, shifts=99):
+    return rank_dependence(residual, FLIGHT_INDEX, BLOCK, state, shifts, rng)
+
+
+def f_test(residual, signal):
+    """Smallest p-value of a quartic under independent rows."""
+    powers = np.vander((signal - signal.mean()) / signal.std(), 5)
+    left = residual - powers @ np.linalg.lstsq(powers, residual, rcond=None)[0]
+    freedom = len(signal) - 5
+    explained = ((residual - residual.mean()) ** 2).sum() - (left**2).sum()
+    return f_law.sf(explained / 4 / ((left**2).sum() / freedom), 4, freedom)
+
+
+def test_chance_is_named_as_rarely_as_promised_where_an_f_test_names_it_always():
+    named, named_by_f = 0, 0
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        state, residual = state_of(rng), residual_of(rng)
+        named += min(one.p_value for one in ranked(residual, state, rng)) <= 0.05
+        signals = [state[name] for name in ("speed", "height", "thrust")]
+        named_by_f += min(f_test(residual[:, c], s) for c in (0, 1) for s in signals) <= 0.05
+    # 5 of 100 are expected; 11 or more have a probability of 1 %.
+    assert named <= 10
+    assert named_by_f >= 90
+
+
+def test_a_curve_of_one_signal_is_found_under_correlated_noise():
+    rng = np.random.default_rng(1)
+    state, residual = state_of(rng), residual_of(rng)
+    residual[:, 1] += 1.5 * state["height"] * np.abs(state["height"])
+    best = ranked(residual, state, rng)[0]
+    assert (best.channel, best.signal) == ("torque y", "height")
+    assert best.p_value <= 0.02
+    assert 0.4 < best.r2 < 1
+
+
+def test_three_turns_of_yaw_need_harmonics():
+    rng = np.random.default_rng(2)
+    state, residual = state_of(rng), residual_of(rng)
+    residual[:, 0] += 2 * np.cos(3 * state["yaw"])
+    best = ranked(residual, state, rng)[0]
+    assert (best.channel, best.signal, best.p_value <= 0.02) == ("torque x", "yaw", True)
+
+
+def test_the_share_is_that_of_an_explicit_cross_validation():
+    rng = np.random.default_rng(3)
+    state, residual = state_of(rng), residual_of(rng)
+    residual[:, 0] += state["speed"]
+    low, high = np.percentile(state["speed"], [0.5, 99.5])
+    scaled = np.clip((state["speed"] - low) / (high - low), 0, 1)
+
+    def within(values):
+        return np.concatenate([v - v.mean(axis=0) for v in np.split(values, FLIGHTS)])
+
+    powers, right = within(scaled[:, None] ** np.arange(1, 5)), within(residual[:, 0])
+    error = 0.0
+    for block in range(BLOCK.max() + 1):
+        out = block == BLOCK
+        fitted = np.linalg.lstsq(powers[~out], right[~out], rcond=None)[0]
+        error += ((right[out] - powers[out] @ fitted) ** 2).sum()
+    found = next(one for one in ranked(residual, state, rng) if (one.channel, one.signal) == ("torque x", "speed"))
+    assert found.r2 == pytest.approx(1 - error / (right**2).sum(), abs=1e-5)
+
+
+def test_a_signal_that_one_flight_lacks_is_judged_on_the_others():
+    rng = np.random.default_rng(4)
+    state, residual = state_of(rng), residual_of(rng)
+    residual[:, 0] += 3 * state["speed"]
+    full = {one.signal: one.r2 for one in ranked(residual, state, rng) if one.channel == "torque x"}
+    state["speed"] = np.where(FLIGHT_INDEX == 2, np.nan, state["speed"])
+    residual[FLIGHT_INDEX == 2, 0] += 50 * rng.standard_normal(LENGTH)
+    part = {one.signal: one.r2 for one in ranked(residual, state, rng) if one.channel == "torque x"}
+    assert part["speed"] > 0.8
+    assert part["height"] < full["speed"]
+
+
+def test_nothing_to_judge_ranks_nothing():
+    rng = np.random.default_rng(5)
+    state = state_of(rng)
+    assert ranked(np.zeros((FLIGHTS * LENGTH, 6)), state, rng) == ()
+    assert ranked(residual_of(rng), {"height": np.ones(FLIGHTS * LENGTH)}, rng) == ()
+
+
+def test_shifted_residuals_keep_neighbours_together():
+    rng = np.random.default_rng(6)
+    line = np.linspace(0, 1, FLIGHTS * LENGTH)[:, None]
+    draws = mirror_shifted(line, FLIGHT_INDEX, 20, rng)
+    steps = np.abs(np.diff(draws.reshape(FLIGHTS, LENGTH, 20), axis=1))
+    assert steps.max() < 1.01 * np.diff(line[:, 0]).max()
+    np.testing.assert_allclose(draws.reshape(FLIGHTS, LENGTH, 20).mean(axis=1), 0, atol=1e-12)

@@ -1,0 +1,44 @@
+"""Stretches of a large gap: found where they were put."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.gap.stretches import stretches
+
+HOP = 0.2
+CENTRES = np.tile(0.3 + HOP * np.arange(200), 2)
+FLIGHT_INDEX = np.repeat([0, 1], 200)
+
+
+def quiet():
+    return np.random.default_rng(0).standard_normal((400, 6))
+
+
+def test_a_burst_is_one_stretch_with_its_flight_and_times():
+    residual = quiet()
+    swing = 8 * (-1.0) ** np.arange(20)
+    residual[260:280, 2] += swing
+    (found,) = stretches(residual, CENTRES, FLIGHT_INDEX)
+    assert (found.flight, found.channel) == (1, "torque z")
+    assert found.start_s == pytest.approx(CENTRES[260], abs=3 * HOP)
+    assert found.end_s == pytest.approx(CENTRES[279], abs=3 * HOP)
+    assert 6 < found.rms_floors < 9
+
+
+def test_a_short_pause_joins_and_a_long_one_does_not():
+    residual = quiet()
+    residual[[*range(20, 30), *range(35, 45), *range(150, 160)], 0] += 9
+    found = sorted(stretches(residual, CENTRES, FLIGHT_INDEX), key=lambda one: one.start_s)
+    assert len(found) == 2
+    assert found[0].end_s - found[0].start_s > 25 * HOP - 2 * HOP
+
+
+def test_noise_alone_has_no_stretch_and_many_bursts_are_cut_to_the_largest():
+    assert stretches(quiet(), CENTRES, FLIGHT_INDEX) == ()
+    residual = quiet()
+    for number in range(8):
+        residual[20 + 45 * number : 24 + 45 * number, 4] += 10 + number
+    found = stretches(residual, CENTRES, FLIGHT_INDEX, most=3)
+    assert len(found) == 3
+    assert found[0].rms_floors >= found[-1].rms_floors
+    assert {one.channel for one in found} == {"force y"}
