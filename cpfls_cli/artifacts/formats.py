@@ -60,7 +60,7 @@ FLIGHT = ArtifactSpec(
             ("time", "rotor"),
             "SI",
             BODY,
-            "commands to the rotors, aligned and filtered; SI unit of import.signals.rotor_command.unit",
+            "commands to the rotors; rad/s if simulated, else aligned, filtered, in import.signals.rotor_command.unit",
             required=False,
         ),
         DatasetSpec(
@@ -68,7 +68,7 @@ FLIGHT = ArtifactSpec(
             ("time",),
             "SI",
             NO_FRAME,
-            "of the battery: V, or share of the full one where import.signals.voltage.unit is 1",
+            "of the battery: V; share of the full one if simulated or where import.signals.voltage.unit is 1",
             required=False,
         ),
         DatasetSpec(
@@ -88,6 +88,10 @@ FLIGHT = ArtifactSpec(
         ),
         DatasetSpec("noise/signal", ("noisy",), "text", NO_FRAME, "signals with added noise", required=False),
         DatasetSpec("noise/std", ("noisy", "axis"), "SI", NO_FRAME, "standard deviation added", required=False),
+        DatasetSpec(
+            "effects/name", ("flown",), "text", NO_FRAME, "what was flown beyond the model, by value", required=False
+        ),
+        DatasetSpec("effects/value", ("flown",), "SI", NO_FRAME, "the true value of each", required=False),
     ),
     ("trajectory", "log"),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,8 +66,36 @@ def trajectory(config: ConfigArgument, output: OutputOption, *, common: Common) 
 
 @app.command()
 @with_common
-def simulate(config: ConfigArgument, trajectory: TrajectoryArgument, output: OutputOption, *, common: Common) -> None:
-    """Fly a trajectory with the exact vehicle."""
+def simulate(
+    config: ConfigArgument,
+    trajectory: TrajectoryArgument,
+    output: OutputOption,
+    mode: Annotated[
+        str | None,
+        typer.Option(
+            "--mode",
+            metavar="MODE",
+            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it. "
+            "Overrides simulation.mode.",
+        ),
+    ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effect",
+            metavar="NAME=VALUE[,VALUE...]",
+            help="Fly with an effect of `cpfls effects`, in closed loop: its coefficients, then shapes; or "
+            "NAME.coefficient=VALUE; may be repeated.",
+        ),
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Fly a trajectory with the exact vehicle, or in closed loop with effects that its model lacks."""
+    with messages_for_errors():
+        from cpfls_cli.stages.effect_options import simulation_overrides
+
+        common = replace(common, overrides=[*(common.overrides or []), *simulation_overrides(mode, effect or [])])
 
     def call(job: Job) -> Outcome:
         from cpfls_cli.stages import simulate as stage

@@ -1,6 +1,18 @@
-"""Simulation: the torques and rotor speeds with which the exact vehicle flies a planned motion."""
+"""Simulation: the exact vehicle along a planned motion, or a flight in closed loop with what its model lacks."""
 
-from cpfls_cli.simulation.settings import SimulationSettings
+from cpfls_cli.simulation.flown_effects import FlownEffect, FlownEffects, flown_effects
+from cpfls_cli.simulation.measured import MeasuredFlight, measure
+from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.simulation.simulate import SimulatedFlight, simulate
 
-__all__ = ["SimulatedFlight", "SimulationSettings", "simulate"]
+__all__ = [
+    "ClosedLoopSettings",
+    "FlownEffect",
+    "FlownEffects",
+    "MeasuredFlight",
+    "SimulatedFlight",
+    "SimulationSettings",
+    "flown_effects",
+    "measure",
+    "simulate",
+]

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from annotated_types import Ge
+from annotated_types import Ge, Gt, Le
 from typing_extensions import Doc
 
+from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
 
 NoisySignal = Literal[
@@ -19,13 +20,51 @@ NoisySignal = Literal[
     "velocity",
     "acceleration",
     "rotor_speed",
+    "body_rate",
+    "rotor_command",
+    "voltage",
 ]
+
+# Inverse dynamics has no such sensors: body rates follow from the attitude, and nothing is commanded.
+_MEASURED_ONLY = frozenset({"body_rate", "rotor_command", "voltage"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoopSettings(Settings):
+    """The autopilot, the actuators, and what the flown vehicle has that its model lacks."""
+
+    effects: Annotated[
+        dict[str, tuple[float, ...] | dict[str, float]],
+        Doc("effects to fly by name (`cpfls effects`): a list of coefficients, then shapes, or values by name"),
+    ] = field(default_factory=dict)
+    rotor_time_constant_s: Annotated[
+        float, Gt(0), Doc("time in which the rotors reach 63 % of a step, s; the effect motor_lag replaces it")
+    ] = 0.05
+    integration_rate_hz: Annotated[
+        float, Gt(0), Doc("steps of the integration in a second, at least one for each sample of the trajectory")
+    ] = 500.0
+    position_frequency_hz: Annotated[float, Gt(0), Doc("natural frequency of the position control, Hz")] = 0.25
+    position_damping: Annotated[float, Gt(0), Doc("damping of the position control, 1 is critical")] = 0.9
+    attitude_frequency_hz: Annotated[float, Gt(0), Doc("natural frequency of roll and pitch control, Hz")] = 1.2
+    attitude_damping: Annotated[float, Gt(0), Doc("damping of the attitude control, 1 is critical")] = 0.8
+    yaw_frequency_hz: Annotated[float, Gt(0), Doc("natural frequency of the yaw control, Hz")] = 0.5
+    battery_use: Annotated[
+        float, Ge(0), Le(0.9), Doc("share of its voltage that the battery loses by the end; for battery_sag")
+    ] = 0.2
+    battery_load: Annotated[
+        float, Ge(0), Le(0.5), Doc("share of its voltage that the battery loses under twice the hover power")
+    ] = 0.02
+    deviation_max_m: Annotated[float, Gt(0), Doc("distance from the path at which the flight is given up, m")] = 50.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class SimulationSettings(Settings):
-    """What a simulated flight gets beside the vehicle's exact dynamics."""
+    """How a flight is simulated, and what it gets beside the vehicle's exact dynamics."""
 
+    mode: Annotated[
+        Literal["inverse", "closed-loop"],
+        Doc("inverse: the torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it"),
+    ] = "inverse"
     noise: Annotated[
         dict[NoisySignal, Annotated[float, Ge(0)]],
         Doc("standard deviation of white noise by signal, in SI units; none if empty"),
@@ -40,3 +79,21 @@ class SimulationSettings(Settings):
             "a rotor asked for negative squared speed or more than its limit: stop, or go on with a gap in rotor_speed"
         ),
     ] = "stop"
+    closed_loop: Annotated[ClosedLoopSettings, Doc("for mode closed-loop")] = ClosedLoopSettings()
+
+    def __post_init__(self) -> None:
+        """Refuse what inverse dynamics cannot do.
+
+        Raises
+        ------
+        SettingError
+            If effects, or noise of sensors that it lacks, are asked of the mode inverse.
+        """
+        if self.mode == "closed-loop":
+            return
+        if self.closed_loop.effects:
+            raise SettingError("closed_loop.effects", "effects are flown in closed loop only; add --mode closed-loop")
+        for key in ("noise", "relative_noise"):
+            extra = sorted(_MEASURED_ONLY & set(getattr(self, key)))
+            if extra:
+                raise SettingError(key, f"{', '.join(extra)}: only a flight in mode closed-loop has such a sensor")

@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.simulation.noise import noisy
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.vehicle.rigid_body import inertia_tensor, torque
 from cpfls_cli.vehicle.rotors import rotor_demand
@@ -63,21 +64,7 @@ def simulate(
     thrust = vehicle.mass_kg * np.linalg.norm(planned["acceleration"] + [0.0, 0.0, vehicle.gravity_m_s2], axis=1)
     demand = rotor_demand(vehicle, thrust, rotations.body_torque(q, tau))
     exact = {**planned, "torque": tau, "rotor_speed": demand.speed}
-    noise_std = {name: std for name in exact if np.any(std := _noise_std(name, exact[name], settings))}
-    signals = {
-        name: values + noise_std[name] * rng.standard_normal(values.shape) if name in noise_std else values
-        for name, values in exact.items()
-    }
+    signals, noise_std = noisy(exact, settings, rng)
     signals["body_torque"] = rotations.body_torque(signals["attitude"], signals["torque"])
     signals["body_rate"] = rotations.body_rate(signals["attitude"], signals["attitude_rate"])
     return SimulatedFlight(signals, demand.violations, noise_std)
-
-
-def _noise_std(name: str, values: Array, settings: SimulationSettings) -> Array:
-    """Combine the noise of each channel: absolute and relative noise are independent of each other."""
-    absolute = {str(key): value for key, value in settings.noise.items()}.get(name, 0.0)
-    relative = {str(key): value for key, value in settings.relative_noise.items()}.get(name, 0.0)
-    if relative == 0.0:
-        return np.full(values.shape[1:], absolute)
-    own = [float(np.std(channel[np.isfinite(channel)])) if np.isfinite(channel).any() else 0.0 for channel in values.T]
-    return np.hypot(absolute, relative * np.array(own))

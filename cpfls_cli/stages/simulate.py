@@ -1,20 +1,17 @@
-"""Stage `simulate`: fly a trajectory with the exact vehicle."""
+"""Stage `simulate`: fly a trajectory, with the exact vehicle or in closed loop."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT, TRAJECTORY
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.simulation.simulate import SimulatedFlight, simulate
-from cpfls_cli.stages.job import Job, Outcome, begin, finish
+from cpfls_cli.simulation import flown_effects, measure, simulate
+from cpfls_cli.stages.flown import closed_loop_outcome, effect_record, exact_outcome, noise_record, violation_sentence
+from cpfls_cli.stages.job import Job, Outcome, Started, begin, finish
 from cpfls_cli.stages.sources import read_with
-from cpfls_cli.stages.study import generator
-from cpfls_cli.vehicle.violations import RotorViolation
+from cpfls_cli.stages.study import generator, settings_of
 
 _PLANNED = ("attitude", "attitude_rate", "attitude_acceleration", "position", "velocity", "acceleration")
 
@@ -33,51 +30,37 @@ def run(job: Job, trajectory: Path) -> Outcome:
 
     Raises
     ------
+    InputError
+        If an effect is unknown or has impossible values.
     ComputationError
-        If a rotor would have to do what it cannot, unless `simulation.infeasible` is ``report``.
+        If a rotor would have to do what it cannot, unless `simulation.infeasible` is ``report``, or a flight in closed
+        loop loses its path.
     """
     started = begin(job, {"trajectory": trajectory})
     source = read_with(trajectory, TRAJECTORY, "time", *_PLANNED)
+    with settings_of("simulation", job.study):
+        flown_effects(job.study.simulation.closed_loop.effects, job.study.vehicle)
     if started.dry_run is not None:
         return started.dry_run
     planned = {name: source.array(name) for name in _PLANNED}
+    if job.study.simulation.mode == "closed-loop":
+        return _closed_loop(job, started, source.array("time"), planned)
+    return _inverse(job, started, source.array("time"), planned, trajectory)
+
+
+def _inverse(job: Job, started: Started, time: Array, planned: dict[str, Array], trajectory: Path) -> Outcome:
     flight = simulate(planned, job.study.vehicle, job.study.simulation, generator(job.study, "simulate"))
-    time = source.array("time")
-    problems = tuple(_sentence(violation, time) for violation in flight.violations)
+    problems = tuple(violation_sentence(violation, time) for violation in flight.violations)
     if problems and job.study.simulation.infeasible == "stop":
         remedy = "fly gentler, change the vehicle, or set simulation.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
-    finish(job, FLIGHT, {"time": time, **flight.signals, **_noise(flight)}, started.inputs)
-    return _outcome(flight, time, problems)
+    finish(job, FLIGHT, {"time": time, **flight.signals, **noise_record(flight.noise_std)}, started.inputs)
+    return exact_outcome(flight, time, problems)
 
 
-def _outcome(flight: SimulatedFlight, time: Array, problems: tuple[str, ...]) -> Outcome:
-    largest = [float(value) for value in np.max(np.abs(flight.signals["torque"]), axis=0)]
-    summary = {
-        "samples": len(time),
-        "max_torque": largest,
-        "noise": sorted(flight.noise_std),
-        "infeasible": [
-            {"rotor": v.rotor + 1, "kind": v.kind, "first_s": float(time[v.first]), "samples": v.count}
-            for v in flight.violations
-        ],
-    }
-    line = "{} samples; largest generalised torque {:.4g} {:.4g} {:.4g} N m (roll pitch yaw)".format(
-        len(time), *largest
-    )
-    return Outcome(summary, (line,), problems)
-
-
-def _sentence(violation: RotorViolation, time: Array) -> str:
-    start, end = time[violation.first], time[violation.last]
-    return (
-        f"rotor {violation.rotor + 1}: {violation.kind} asked for at {violation.count} samples from {start:.2f} s to "
-        f"{end:.2f} s (worst squared speed {violation.worst:.6g} rad^2/s^2)"
-    )
-
-
-def _noise(flight: SimulatedFlight) -> dict[str, Any]:
-    names = [name for name, std in flight.noise_std.items() if len(std) == 3]
-    if not names:
-        return {}
-    return {"noise/signal": np.array(names), "noise/std": np.array([flight.noise_std[name] for name in names])}
+def _closed_loop(job: Job, started: Started, time: Array, planned: dict[str, Array]) -> Outcome:
+    rng = generator(job.study, "simulate")
+    flight = measure(time, planned, job.study.vehicle, job.study.simulation, rng, job.progress)
+    records = {**noise_record(flight.noise_std), **effect_record(flight.effects)}
+    finish(job, FLIGHT, {"time": time, **flight.signals, **records}, started.inputs)
+    return closed_loop_outcome(flight, time)

@@ -1,0 +1,99 @@
+"""The autopilot: position control by thrust and attitude, geometric attitude control, allocation to the rotors."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.simulation.reference import Reference
+from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.vehicle.rigid_body import inertia_tensor
+from cpfls_cli.vehicle.rotors import rotor_demand
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+class Autopilot:
+    """Follow a planned motion with the vehicle's model; what the model lacks, it does not know.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+    settings : ClosedLoopSettings
+    planned : Reference
+
+    References
+    ----------
+    Lee, Leok and McClamroch 2010, Geometric tracking control of a quadrotor UAV on SE(3).
+    """
+
+    def __init__(self, vehicle: VehicleSettings, settings: ClosedLoopSettings, planned: Reference) -> None:
+        position = 2 * pi * settings.position_frequency_hz
+        attitude = 2 * pi * np.array([settings.attitude_frequency_hz] * 2 + [settings.yaw_frequency_hz])
+        self._position_gain, self._velocity_gain = position**2, 2 * settings.position_damping * position
+        self._attitude_gain, self._rate_gain = attitude**2, 2 * settings.attitude_damping * attitude
+        self._planned = planned
+        self._inertia = inertia_tensor(vehicle)
+        self._mass = vehicle.mass_kg
+        self._gravity = np.array([0.0, 0.0, vehicle.gravity_m_s2])
+        self._allocation = _allocation_inverse(vehicle)
+
+    def squared_speed(self, step: int, position: Array, velocity: Array, rotation: Array, body_rate: Array) -> Array:
+        """Compute the squared rotor speeds that the motion asks for.
+
+        Parameters
+        ----------
+        step : int
+            Index into the planned motion.
+        position, velocity : array, shape (3,), m and m/s, world frame
+        rotation : array, shape (3, 3)
+            Body to world.
+        body_rate : array, shape (3,), rad/s, body frame
+
+        Returns
+        -------
+        array, shape (rotor,), rad^2/s^2
+            Not clipped.
+        """
+        planned = self._planned
+        pull = self._gravity + planned.acceleration[step] + self._position_gain * (planned.position[step] - position)
+        pull += self._velocity_gain * (planned.velocity[step] - velocity)
+        target = upright(pull, planned.attitude[step, 2])
+        torque = self._torque(step, target.T @ rotation, body_rate)
+        wrench = np.array([self._mass * (pull @ rotation[:, 2]), *torque])
+        return np.asarray(wrench @ self._allocation)
+
+    def _torque(self, step: int, turned: Array, body_rate: Array) -> Array:
+        """Turn the body to the target, of which the body is turned away by the given rotation."""
+        skew = 0.5 * (turned - turned.T)
+        error = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+        rate_error = body_rate - turned.T @ self._planned.body_rate[step]
+        wanted = turned.T @ self._planned.body_acceleration[step]
+        wanted = wanted - self._attitude_gain * error - self._rate_gain * rate_error
+        return np.asarray(self._inertia @ wanted + np.cross(body_rate, self._inertia @ body_rate))
+
+
+def upright(pull: Array, yaw: float) -> Array:
+    """Orient a body whose z axis points along the pull, with a given yaw.
+
+    Parameters
+    ----------
+    pull : array, shape (3,), world frame
+    yaw : float, rad
+
+    Returns
+    -------
+    array, shape (3, 3)
+        Body to world.
+    """
+    up = pull / np.sqrt(pull @ pull)
+    left = np.cross(up, [np.cos(yaw), np.sin(yaw), 0.0])
+    left /= np.sqrt(left @ left)
+    return np.column_stack([np.cross(left, up), left, up])
+
+
+def _allocation_inverse(vehicle: VehicleSettings) -> Array:
+    """Squared speeds for one unit of thrust and of each torque, shape (4, rotor)."""
+    units = np.eye(4)
+    return rotor_demand(vehicle, units[:, 0], units[:, 1:]).squared_speed

@@ -1,0 +1,144 @@
+"""Autopilot, actuators and vehicle, closed to a loop that steps through time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.simulation.actuators import Actuators, Rotors
+from cpfls_cli.simulation.autopilot import Autopilot
+from cpfls_cli.simulation.battery import Battery
+from cpfls_cli.simulation.flown_effects import FlownEffects
+from cpfls_cli.simulation.missing_wrench import missing_wrench
+from cpfls_cli.simulation.payload import Payload
+from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY, Plant, instant
+from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.vehicle.rigid_body import inertia_tensor
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one step passes through.
+
+    Attributes
+    ----------
+    change : array, shape (16,)
+        Derivative of the state, in the middle of the step.
+    rotors : Rotors
+        In the middle of the step.
+    demand : array, shape (rotor,), rad^2/s^2
+        Squared speeds that the autopilot asked for, not clipped.
+    """
+
+    change: Array
+    rotors: Rotors
+    demand: Array
+
+
+@dataclass
+class Loop:
+    """The midpoint rule with one evaluation a step.
+
+    The middle of a step is reached with the derivative of the step before, so that the rule is of second order.
+
+    Attributes
+    ----------
+    autopilot : Autopilot
+    actuators : Actuators
+    plant : Plant
+    state : array, shape (16,)
+    change : array, shape (16,)
+        Derivative of the state in the step before.
+    """
+
+    autopilot: Autopilot
+    actuators: Actuators
+    plant: Plant
+    state: Array
+    change: Array
+
+    def advance(self, number: int) -> Step:
+        """Take one step.
+
+        Parameters
+        ----------
+        number : int
+            Index into the planned motion.
+
+        Returns
+        -------
+        Step
+        """
+        middle = self.state + 0.5 * self.actuators.step * self.change
+        demand = _demand(self.autopilot, number, middle)
+        rotors = self.actuators.advance(_limited(demand, self.plant.vehicle))
+        self.change = self.plant.derivative(middle, rotors)
+        self.state = self.state + self.actuators.step * self.change
+        return Step(self.change, rotors, demand)
+
+
+def loop(
+    vehicle: VehicleSettings,
+    settings: ClosedLoopSettings,
+    effects: FlownEffects,
+    autopilot: Autopilot,
+    state: Array,
+    step: float,
+    duration: float,
+) -> Loop:
+    """Put a vehicle at the start, its rotors as the autopilot wants them there.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+    settings : ClosedLoopSettings
+    effects : FlownEffects
+    autopilot : Autopilot
+    state : array, shape (16,)
+    step, duration : float, s
+
+    Returns
+    -------
+    Loop
+    """
+    speed = _limited(_demand(autopilot, 0, state), vehicle)
+    missing = missing_wrench(effects, instant(vehicle, state, speed))
+    plant = Plant(vehicle, inertia_tensor(vehicle), missing, _payload(effects, vehicle))
+    change = plant.derivative(state, Rotors(speed, speed, speed, np.zeros_like(speed), 1.0))
+    lag, delay, sag = (effects.values(name) or {} for name in ("motor_lag", "command_delay", "battery_sag"))
+    actuators = Actuators(
+        time_constant=lag.get("time_constant_s", settings.rotor_time_constant_s),
+        delay=delay.get("delay_s", 0.0),
+        exponent=sag.get("exponent", 0.0),
+        battery=_battery(vehicle, settings, duration),
+        step=step,
+        speed=speed,
+    )
+    return Loop(autopilot, actuators, plant, state, change)
+
+
+def _demand(autopilot: Autopilot, number: int, state: Array) -> Array:
+    rotation = rotations.rotation_matrix(state[None, ATTITUDE])[0]
+    return autopilot.squared_speed(number, state[POSITION], state[VELOCITY], rotation, state[BODY_RATE])
+
+
+def _limited(demand: Array, vehicle: VehicleSettings) -> Array:
+    return np.sqrt(np.clip(demand, 0.0, vehicle.rotor_speed_max_rad_s**2))
+
+
+def _payload(effects: FlownEffects, vehicle: VehicleSettings) -> Payload | None:
+    values = effects.values("payload")
+    if values is None:
+        return None
+    lever, length = values["mass_times_attachment"], values["length_m"]
+    return Payload(values["mass"], lever, length, values["damping_1_s"], vehicle.gravity_m_s2)
+
+
+def _battery(vehicle: VehicleSettings, settings: ClosedLoopSettings, duration: float) -> Battery:
+    hover = len(vehicle.rotors) * hover_speed(vehicle) ** 3
+    return Battery(settings.battery_use, settings.battery_load, duration, hover)
