@@ -133,6 +133,12 @@ def frame_warnings(name: str, first: Array, second: Array, floor: float) -> list
     moving = (first.std(axis=0) > floor) & (second.std(axis=0) > 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = np.nan_to_num(np.corrcoef(first.T, second.T)[:3, 3:])
+    # Noise on one side that brings the correlation below a half makes that side more than twice as large.
+    larger, smaller = (
+        np.maximum(first.std(axis=0), second.std(axis=0)),
+        np.minimum(first.std(axis=0), second.std(axis=0)),
+    )
+    alike = (smaller > floor) & (larger < 2 * smaller)
     said = []
     for axis in np.flatnonzero(moving):
         own, best = correlation[axis, axis], int(np.argmax(np.abs(correlation[axis])))
@@ -140,7 +146,7 @@ def frame_warnings(name: str, first: Array, second: Array, floor: float) -> list
             said.append(f"{name} have opposite signs along {_AXES[axis]}")
         elif abs(own) < _OTHER and abs(correlation[axis, best]) > _SAME:
             said.append(f"{_AXES[axis]} of the one is {_AXES[best]} of the other in {name}: axes are swapped")
-        elif abs(own) < _OTHER and second[:, axis].std() > floor:
+        elif abs(own) < _OTHER and alike[axis]:
             said.append(f"{name} do not belong together along {_AXES[axis]}: their correlation is {own:.2f}")
     return [f"{sentence[0].upper()}{sentence[1:]}." for sentence in said]
 

@@ -107,7 +107,7 @@ def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
         return None
     # At an overlap of three quarters the windows add up to a constant, so attitude noise cancels between neighbours.
     hop = max(1, length // 4)
-    turned = Rotation.from_euler("ZYX", signals.attitude[inside, ::-1]).as_quat()
+    turned = _continuous(Rotation.from_euler("ZYX", signals.attitude[inside, ::-1]).as_quat())
     relative = _relative(np.moveaxis(sliding_window_view(turned, length, axis=0)[::hop], 1, 2))
     time = sliding_window_view(signals.time[inside], length)[::hop]
     rate = -2 * np.einsum("wsi,s->wi", relative[..., :3], windows.slope)
@@ -115,14 +115,20 @@ def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
     return Kinematics(rate, turning, np.asarray(time), CubicSpline(signals.time, signals.body_rate))
 
 
+def _continuous(turned: Array) -> Array:
+    """Choose of each quaternion and its negative the one near the sample before."""
+    flips = np.where((turned[1:] * turned[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    return turned * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+
+
 def _relative(turned: Array) -> Array:
-    """Take quaternions (x, y, z, scalar) relative to the middle of their window, with positive scalar part."""
+    """Take quaternions (x, y, z, scalar) relative to the middle of their window."""
     vector, scalar = turned[..., :3], turned[..., 3:]
     middle = turned[:, [turned.shape[1] // 2]]
     own, known = -middle[..., :3], middle[..., 3:]
     product = known * vector + scalar * own + np.cross(own, vector)
     rest = known * scalar - (own * vector).sum(axis=-1, keepdims=True)
-    return np.concatenate([product, rest], axis=-1) * np.where(rest < 0, -1.0, 1.0)
+    return np.concatenate([product, rest], axis=-1)
 
 
 def _turning(relative: Array) -> Array:

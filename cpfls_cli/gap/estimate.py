@@ -8,12 +8,11 @@ import numpy as np
 from scipy.stats import t as student
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.gap.balance_system import System, is_free, system
+from cpfls_cli.gap.balance_system import System, is_free
 from cpfls_cli.gap.refine import fit
 from cpfls_cli.gap.results import Estimate
+from cpfls_cli.gap.shape_columns import free_shapes, shape_columns
 from cpfls_cli.gap.weak_flight import Candidate
-
-_STEP = 1e-3
 
 
 @dataclass(frozen=True)
@@ -28,11 +27,14 @@ class Estimates:
         Of each chosen effect: physical coefficients, then shapes.
     parameters : tuple of Estimate
         Of the vehicle's own numbers.
+    of_effect : tuple of array, shape (coefficient,)
+        Linear coefficients of each chosen effect; empty where it has none.
     """
 
     linear: Array
     effects: tuple[tuple[Estimate, ...], ...]
     parameters: tuple[Estimate, ...]
+    of_effect: tuple[Array, ...]
 
 
 def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
@@ -58,12 +60,12 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     Efron and Tibshirani 1993, chapter 11 (delete-a-group jackknife).
     """
     linear = fit(hypothesis, weight)
-    shapes = _shapes(hypothesis)
-    values = np.concatenate([linear, [candidate.shape[name] for candidate, name in shapes]])
-    jacobian = np.concatenate([hypothesis.base, _shape_columns(hypothesis, linear, shapes)], axis=2)
+    shapes = [candidate.shape[name] for candidate, name in free_shapes(hypothesis)]
+    values = np.concatenate([linear, shapes])
+    jacobian = np.concatenate([hypothesis.base, shape_columns(hypothesis, linear)], axis=2)
     rows = (jacobian / weight[:, None], (hypothesis.residual - hypothesis.base @ linear) / weight)
     left_out = values + _one_step(*rows, block)
-    found, first = [], hypothesis.columns(hypothesis.free[0]).shape[2]
+    found, own_linear, first = [], [], hypothesis.columns(hypothesis.free[0]).shape[2]
     parameters = _of(hypothesis.free[0], hypothesis, values[:first], left_out[:, :first], np.zeros(0), left_out[:, :0])
     place, shape_place = first, len(linear)
     for candidate in hypothesis.chosen:
@@ -71,8 +73,9 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
         depth = len(candidate.effect.shapes)
         own, shaped = slice(place, place + width), slice(shape_place, shape_place + depth)
         found.append(_of(candidate, hypothesis, values[own], left_out[:, own], values[shaped], left_out[:, shaped]))
+        own_linear.append(linear[own])
         place, shape_place = place + width, shape_place + depth
-    return Estimates(linear, tuple(found), parameters)
+    return Estimates(linear, tuple(found), parameters, tuple(own_linear))
 
 
 def _of(
@@ -119,23 +122,3 @@ def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:
     ridge = 1e-9 * np.eye(gram.shape[1])
     change = -np.linalg.solve(gram.sum(axis=0) - gram + ridge, moment[..., None])[..., 0]
     return np.asarray(change / np.where(scale > 0, scale, 1.0))
-
-
-def _shapes(hypothesis: System) -> list[tuple[Candidate, str]]:
-    return [(candidate, shape.name) for candidate in hypothesis.chosen for shape in candidate.effect.shapes]
-
-
-def _shape_columns(hypothesis: System, linear: Array, shapes: list[tuple[Candidate, str]]) -> Array:
-    columns = np.zeros((*hypothesis.residual.shape, len(shapes)))
-    for place, (candidate, name) in enumerate(shapes):
-        value = candidate.shape[name]
-        step = _STEP * (abs(value) or 1.0)
-        ahead, behind = (_left(hypothesis, linear, candidate, name, value + s) for s in (step, -step))
-        columns[..., place] = (behind - ahead) / (2 * step)
-    return columns
-
-
-def _left(hypothesis: System, linear: Array, moved: Candidate, name: str, value: float) -> Array:
-    chosen = [Candidate(c.effect, {**c.shape, name: value}) if c is moved else c for c in hypothesis.chosen]
-    there = system(hypothesis.flights, chosen)
-    return np.asarray(there.residual - there.base @ linear)

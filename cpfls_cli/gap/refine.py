@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import least_squares, minimize_scalar
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Shape
@@ -13,17 +13,20 @@ from cpfls_cli.gap.balance_system import System, system
 from cpfls_cli.gap.weak_flight import Candidate, WeakFlight
 
 _EVALUATIONS = 14
+_JOINT_EVALUATIONS = 8
 
 
-def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, rounds: int = 1) -> System:
-    """Improve the shapes of the chosen effects one after another, by the error of the fit.
+def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
+    """Improve the shapes of the chosen effects by the error of the fit.
+
+    The newest shapes first, one by one between the points of their grids; then, where there are several, all together,
+    because a lag and a delay, say, trade with each other.
 
     Parameters
     ----------
     flights : sequence of WeakFlight
     chosen : sequence of Candidate
     floor : array, shape (6,)
-    rounds : int
 
     Returns
     -------
@@ -31,10 +34,10 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     """
     best = list(chosen)
     shapes = [(place, shape) for place, candidate in enumerate(best) for shape in candidate.effect.shapes]
-    for _ in range(rounds if len(shapes) > 1 else min(rounds, 1)):
-        for place, shape in shapes:
+    for place, shape in shapes:
+        if place == len(best) - 1:
             best[place] = _improved(flights, best, place, shape, floor)
-    return system(flights, best)
+    return system(flights, _together(flights, best, shapes, floor) if len(shapes) > 1 else best)
 
 
 def fit(hypothesis: System, floor: Array) -> Array:
@@ -94,3 +97,31 @@ def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
     """Find the neighbours of a value on its grid."""
     place = int(np.argmin(np.abs(np.asarray(grid) - value)))
     return float(grid[max(0, place - 1)]), float(grid[min(len(grid) - 1, place + 1)])
+
+
+def _together(
+    flights: Sequence[WeakFlight], chosen: list[Candidate], shapes: list[tuple[int, Shape]], floor: Array
+) -> list[Candidate]:
+    low = np.array([shape.grid[0] for _, shape in shapes])
+    high = np.array([shape.grid[-1] for _, shape in shapes])
+    start = np.array([chosen[place].shape[shape.name] for place, shape in shapes])
+
+    def moved(values: Array) -> list[Candidate]:
+        there = list(chosen)
+        for (place, shape), value in zip(shapes, low + values * (high - low), strict=True):
+            there[place] = Candidate(there[place].effect, {**there[place].shape, shape.name: float(value)})
+        return there
+
+    def error(values: Array) -> Array:
+        return left(system(flights, moved(values)), floor).reshape(-1)
+
+    found = least_squares(
+        error,
+        np.clip((start - low) / (high - low), 1e-6, 1 - 1e-6),
+        bounds=(0.0, 1.0),
+        diff_step=[1e-3],
+        max_nfev=_JOINT_EVALUATIONS,
+        xtol=1e-4,
+        ftol=1e-5,
+    )
+    return moved(found.x)

@@ -13,6 +13,8 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance_system import System
 from cpfls_cli.gap.bounds import within_bounds
 from cpfls_cli.gap.folds import Folds, folds
+from cpfls_cli.gap.refine import fit
+from cpfls_cli.gap.shape_columns import shape_columns
 from cpfls_cli.gap.weak_flight import Candidate
 
 REFUSED = -np.inf
@@ -80,6 +82,9 @@ def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
 def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> Layout:
     """Arrange base and candidates, in floors.
 
+    The shapes of the chosen effects stand in the base by their derivatives, so that a candidate is judged by what it
+    adds after they have moved.
+
     Parameters
     ----------
     hypothesis : System
@@ -90,7 +95,10 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
     -------
     Layout
     """
-    parts, places, first = [hypothesis.base], [], hypothesis.base.shape[2]
+    moving = shape_columns(hypothesis, fit(hypothesis, floor))
+    parts: list[Array] = [hypothesis.base, moving]
+    places: list[tuple[Candidate, IntArray]] = []
+    first = hypothesis.base.shape[2] + moving.shape[2]
     base = np.arange(first)
     for candidate in candidates:
         columns = hypothesis.columns(candidate)
@@ -141,34 +149,6 @@ def chance(arranged: Layout, normal: Folds) -> Array:
     for candidate, columns in arranged.candidates:
         best = np.maximum(best, (before - _error(candidate, columns, arranged.base, normal)).sum(axis=0))
     return best
-
-
-def shifted(residual: Array, flight_index: IntArray, shifts: int, rng: np.random.Generator) -> Array:
-    """Shift the residual of each flight in time, with random signs: what is left of it when nothing causes it.
-
-    The mean of each flight is taken out first, because a constant survives every shift.
-
-    Parameters
-    ----------
-    residual : array, shape (window, 6)
-    flight_index : array of int, shape (window,)
-    shifts : int
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    array, shape (window, 6, shift)
-    """
-    draws = np.zeros((*residual.shape, shifts))
-    for flight in np.unique(flight_index):
-        own = np.flatnonzero(flight_index == flight)
-        rows = residual[own] - residual[own].mean(axis=0)
-        least = max(1, len(own) // 10)
-        offsets = rng.integers(least, max(least + 1, len(own) - least + 1), size=shifts)
-        signs = rng.choice([-1.0, 1.0], size=shifts)
-        places = (np.arange(len(own))[:, None] - offsets) % len(own)
-        draws[own] = np.moveaxis(rows[places], 1, 2) * signs
-    return draws
 
 
 def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArray) -> Folds:

@@ -14,6 +14,7 @@ from cpfls_cli.gap.ambiguity import simplest, unbeaten
 from cpfls_cli.gap.balance_system import System, system
 from cpfls_cli.gap.floor import floors
 from cpfls_cli.gap.folds import blocks_of
+from cpfls_cli.gap.mirrored import mirror_shifted
 from cpfls_cli.gap.refine import fit, refined
 from cpfls_cli.gap.scoring import (
     REFUSED,
@@ -24,7 +25,6 @@ from cpfls_cli.gap.scoring import (
     layout,
     normal_equations,
     score,
-    shifted,
 )
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.weak_flight import Candidate, WeakFlight
@@ -88,6 +88,7 @@ def look(
     effects: Sequence[Effect],
     settings: GapSettings,
     rng: np.random.Generator | None,
+    also: Sequence[Candidate] = (),
 ) -> Step:
     """Score all effects beside those chosen.
 
@@ -100,6 +101,8 @@ def look(
     settings : GapSettings
     rng : numpy.random.Generator or None
         Of the shifts; None for none.
+    also : sequence of Candidate
+        Tried beside the grids, with shapes of their own.
 
     Returns
     -------
@@ -108,7 +111,8 @@ def look(
     hypothesis = system(flights, chosen)
     floor = best_floor(hypothesis)
     names = {candidate.effect.name for candidate in chosen}
-    tried = [c for c in candidates_of([e for e in effects if e.name not in names]) if hypothesis.can(c)]
+    listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
+    tried = [candidate for candidate in listed if hypothesis.can(candidate)]
     arranged = layout(hypothesis, tried, floor)
     block = block_index(hypothesis, settings)
     normal = normal_equations(arranged, hypothesis.residual, floor, block)
@@ -201,7 +205,7 @@ def exchanged(
     kept = list(chosen)
     for candidate in list(chosen):
         others = [other for other in kept if other is not candidate]
-        step = look(flights, others, effects, settings, None)
+        step = look(flights, others, effects, settings, None, also=(candidate,))
         own = next((s for s in step.ranking if s.candidate.effect.name == candidate.effect.name), None)
         if own is None or own.gain < _LEAST_SHARE * step.above_floor:
             kept = others
@@ -261,7 +265,7 @@ def _chance(
 ) -> Array:
     if rng is None:
         return np.zeros(0)
-    draws = shifted(left, hypothesis.flight_index, settings.shifts, rng)
+    draws = mirror_shifted(left, hypothesis.flight_index, settings.shifts, rng)
     return chance(arranged, normal_equations(arranged, draws, floor, block))
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
 
@@ -13,24 +14,43 @@ from cpfls_cli.effects.signals import Signals
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     moments = np.array(signals.vehicle.inertia_kg_m2[:3])
     turning = (moments * signals.body_rate)[:, :, None] * np.eye(3)
-    momentum = np.zeros((len(signals), 6, 4))
+    momentum = np.zeros((len(signals), 6, 7))
     direct = np.zeros_like(momentum)
     momentum[:, :3, :3] = -turning
     direct[:, :3, :3] = -np.cross(signals.body_rate[:, :, None], turning, axis=1)
-    direct[:, 5, 3] = signals.wrench[:, 5]
+    direct[:, :3, 3:6] = -_coupling(signals.body_rate, moments)[:, :, None] * np.eye(3)
+    direct[:, 5, 6] = signals.wrench[:, 5]
     return Columns(direct, momentum)
+
+
+def _coupling(body_rate: Array, moments: Array) -> Array:
+    """Products of the two other rates times the mean of their moments of inertia, shape (time, 3), N m."""
+    after, later = (1, 2, 0), (2, 0, 1)
+    mean = 0.5 * (moments[list(after)] + moments[list(later)])
+    return np.asarray(mean * body_rate[:, after] * body_rate[:, later])
 
 
 EFFECT = Effect(
     name="parameter_error",
     title="wrong inertia or thrust scale",
     kind="parameter",
-    formula="M = -(d/dt (dI omega) + omega x dI omega),  dI = diag(e_i I_ii);  F_z = e_T T",
+    formula="M = -(d/dt (dI omega) + omega x dI omega) - g_i I omega_j omega_k,  dI = diag(e_i I_ii);  F_z = e_T T",
     sentence="The vehicle is as modelled, but a number of it is wrong. Rates and rotor speeds show only the ratio of "
     "inertia to rotor torque; the force balance shows the scale of the thrust.",
     coefficients=(
         *(
             Coefficient(f"inertia_{axis}", "1", -0.9, 3.0, f"true I{axis}{axis} over that of the model, less 1")
+            for axis in "xyz"
+        ),
+        *(
+            Coefficient(
+                f"coupling_{axis}",
+                "1",
+                -3.0,
+                3.0,
+                "coupling of the two other rates beyond that of the moments of inertia, which a wrong scale of the"
+                " rotor torque leaves",
+            )
             for axis in "xyz"
         ),
         Coefficient("thrust_scale", "1", -0.9, 3.0, "true thrust over that of the model, less 1; seen in force only"),

@@ -1,0 +1,293 @@
+"""Diagnosis: which physical effect is missing in a model, found on some flights and judged on others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
+from cpfls_cli.gap.audit import Audit, audit
+from cpfls_cli.gap.balance_system import System, system
+from cpfls_cli.gap.estimate import Estimates, estimates
+from cpfls_cli.gap.held_out import HeldOut, held_out, share_removed
+from cpfls_cli.gap.inertial import InertiaModel
+from cpfls_cli.gap.judged import Judged, judge_effect
+from cpfls_cli.gap.leftover import Leftover, leftover
+from cpfls_cli.gap.refine import fit
+from cpfls_cli.gap.results import Diagnosis, Estimate, NamedEffect, Verdict
+from cpfls_cli.gap.search import Step, block_index, forward, look
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.unseen import not_excited
+from cpfls_cli.gap.vehicle_numbers import parameter_error
+from cpfls_cli.gap.verdict import verdict_of
+from cpfls_cli.gap.weak_flight import WeakFlight, weak_flight
+from cpfls_cli.gap.windows import Windows, windows
+
+_FEWEST_WINDOWS = 16
+_EXCITED_FLOORS = 3.0
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A flight and its name.
+
+    Attributes
+    ----------
+    name : str
+    signals : Signals
+    """
+
+    name: str
+    signals: Signals
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A diagnosis with what it was made from.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+    audit : Audit
+    hypothesis : System
+        Of the training flights, with the chosen effects.
+    found : Estimates
+    leftover : Leftover
+        Of the training flights with the effects.
+    held_out : HeldOut
+    """
+
+    diagnosis: Diagnosis
+    audit: Audit
+    hypothesis: System
+    found: Estimates
+    leftover: Leftover
+    held_out: HeldOut
+
+
+def diagnose(
+    training: Sequence[Recording],
+    held: Sequence[Recording],
+    settings: GapSettings,
+    rng: np.random.Generator,
+    *,
+    model: InertiaModel | None = None,
+    progress: Callable[[float, str], None] = lambda _done, _note: None,
+) -> Diagnosed:
+    """Name what a model misses.
+
+    The sensors are audited first and repaired where they are at fault. Effects are then added one at a time while each
+    explains more of blocks it has not seen than chance does anywhere in the catalogue; what is chosen is judged on
+    the held-out flights, once.
+
+    Parameters
+    ----------
+    training, held : sequence of Recording
+        At least one each.
+    settings : GapSettings
+    rng : numpy.random.Generator
+    model : InertiaModel or None
+        None for the rigid body of the vehicle.
+    progress : callable
+        Takes the share of the work that is done and a note.
+
+    Returns
+    -------
+    Diagnosed
+
+    Raises
+    ------
+    InputError
+        If the flights are too short, of different rates, or have nothing in common with the catalogue.
+    """
+    progress(0.0, "sensor audit")
+    own = common_windows([*training, *held], settings)
+    checked = audit([recording.signals for recording in training], own)
+    weak = [_weak(r, own, model, settings, checked) for r in training]
+    effects = considered(settings)
+    chosen, steps = forward(weak, effects, settings, rng, lambda n: progress(0.1 + 0.1 * min(n, 5), "search"))
+    progress(0.65, "estimates")
+    hypothesis = system(weak, chosen)
+    block = block_index(hypothesis, settings)
+    found = _estimated(hypothesis, steps[-1].floor, block)
+    unseen = _unseen(held, own, model, settings, checked, hypothesis, found)
+    progress(0.75, "rivals")
+    gap = steps[0].above_floor
+    judged = [judge_effect(weak, chosen, place, found, gap, effects, settings, rng) for place in range(len(chosen))]
+    progress(0.9, "what is left")
+    left = leftover(hypothesis, found.linear, steps[-1].floor, block, settings, rng)
+    faults = [_fault(finding, training, weak, own, model, settings) for finding in checked.named]
+    torque_alone = _torque_alone(training, own, model, settings, checked, effects)
+    diagnosis = _concluded(judged, faults, found, unseen, left, steps, hypothesis, settings, torque_alone, checked)
+    return Diagnosed(diagnosis, checked, hypothesis, found, left, unseen)
+
+
+def common_windows(recordings: Sequence[Recording], settings: GapSettings) -> Windows:
+    """Make the windows that all flights share.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    settings : GapSettings
+
+    Returns
+    -------
+    Windows
+
+    Raises
+    ------
+    InputError
+        If a flight is too short or has another sampling period than the first.
+    """
+    period = recordings[0].signals.period
+    for recording in recordings:
+        other = recording.signals.period
+        if abs(other - period) > 1e-6 * period + 1e-9:
+            raise InputError(
+                f"{recording.name}: sampled at {1 / other:.6g} Hz, {recordings[0].name} at {1 / period:.6g} Hz; set "
+                "import.rate_hz to one rate for all flights"
+            )
+    own = windows(period, settings.window_s, settings.overlap)
+    for recording in recordings:
+        if own.count(len(recording.signals)) < _FEWEST_WINDOWS:
+            raise InputError(
+                f"{recording.name}: {len(recording.signals) * period:.3g} s are too short; "
+                f"{_FEWEST_WINDOWS} windows of gap.window_s = {settings.window_s:g} s are needed"
+            )
+    return own
+
+
+def considered(settings: GapSettings) -> list[Effect]:
+    """List the effects that the search tries.
+
+    Parameters
+    ----------
+    settings : GapSettings
+
+    Returns
+    -------
+    list of Effect
+    """
+    return [
+        effect
+        for name, effect in CATALOGUE.items()
+        if effect.columns is not None and effect.kind != "parameter" and name not in settings.ignore
+    ]
+
+
+def _weak(
+    recording: Recording, own: Windows, model: InertiaModel | None, settings: GapSettings, checked: Audit | None
+) -> WeakFlight:
+    signals = recording.signals if checked is None else checked.repaired(recording.signals)
+    return weak_flight(recording.name, signals, own, model, settings.force)
+
+
+def _estimated(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
+    """Fit once with the floors as weights, then with what is left, which is more where something is unexplained."""
+    left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+    weight = np.maximum(floor, np.sqrt(np.mean(left**2, axis=0)))
+    return estimates(hypothesis, weight, block)
+
+
+def _unseen(
+    held: Sequence[Recording],
+    own: Windows,
+    model: InertiaModel | None,
+    settings: GapSettings,
+    checked: Audit,
+    hypothesis: System,
+    found: Estimates,
+) -> HeldOut:
+    plain = system(hypothesis.flights)
+    weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
+    return held_out(
+        [_weak(r, own, model, settings, None) for r in held],
+        [_weak(r, own, model, settings, checked) for r in held],
+        hypothesis,
+        found.linear,
+        fit(plain, weight),
+    )
+
+
+def _fault(finding, training, weak, own, model, settings) -> NamedEffect:  # type: ignore[no-untyped-def] # noqa: ANN001
+    logged = system([_weak(recording, own, model, settings, None) for recording in training])
+    repaired = system(weak)
+    weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
+    before, after = ((s.residual - s.base @ fit(s, weight)) / weight for s in (logged, repaired))
+    share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
+    bounds = {c.name: c.bounds(training[0].signals.vehicle) for c in CATALOGUE[finding.name].coefficients}
+    coefficients = tuple(
+        Estimate(c.name, c.unit, c.value, c.low, c.high, bounds.get(c.name, (-np.inf, np.inf)))
+        for c in finding.coefficients
+        if c.named
+    )
+    return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)
+
+
+def _torque_alone(
+    training: Sequence[Recording],
+    own: Windows,
+    model: InertiaModel | None,
+    settings: GapSettings,
+    checked: Audit,
+    effects: Sequence[Effect],
+) -> tuple[tuple[str, float], ...]:
+    """Tell what the torques alone would name first, where the force balance was used too."""
+    weak = [weak_flight(r.name, checked.repaired(r.signals), own, model, False) for r in training]
+    if not settings.force or not any(r.signals.has_force for r in training):
+        return ()
+    step = look(weak, (), effects, settings, None)
+    best = [scored for scored in step.ranking[:3] if np.isfinite(scored.gain) and scored.gain > 0]
+    return tuple((s.candidate.effect.name, float(min(1.0, s.gain / step.above_floor))) for s in best)
+
+
+def _concluded(
+    judged: Sequence[Judged],
+    faults: Sequence[NamedEffect],
+    found: Estimates,
+    unseen: HeldOut,
+    left: Leftover,
+    steps: Sequence[Step],
+    hypothesis: System,
+    settings: GapSettings,
+    torque_alone: tuple[tuple[str, float], ...],
+    checked: Audit,
+) -> Diagnosis:
+    named = sorted((each.effect for each in judged), key=lambda effect: -effect.share)
+    effects = [*faults, *named]
+    numbers = parameter_error(found, effects, _parameter_share(unseen))
+    effects += [numbers] if numbers is not None else []
+    share = unseen.share() if named else 1.0
+    rivals = tuple(rival for each in judged for rival in each.alternatives)
+    verdict = verdict_of(effects, rivals, left.unexplained, share, _excited(hypothesis, steps[-1].floor), settings)
+    refused = verdict is Verdict.UNEXPLAINED
+    return Diagnosis(
+        verdict,
+        tuple(effect for effect in effects if not refused or effect.candidate is None),
+        tuple(effects) if refused else (),
+        rivals,
+        left.unexplained,
+        not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], steps[-1].floor),
+        {number.name: number for number in found.parameters},
+        share,
+        unseen.size(unseen.before),
+        unseen.size(unseen.after),
+        unseen.floor,
+        torque_alone,
+        (*checked.warnings, *checked.notes),
+    )
+
+
+def _parameter_share(unseen: HeldOut) -> float:
+    return share_removed(unseen.before / unseen.floor, unseen.parameters / unseen.floor, unseen.known)
+
+
+def _excited(hypothesis: System, floor: Array) -> bool:
+    rows = np.concatenate([flight.averaged(flight.inertial) for flight in hypothesis.flights])
+    return bool((rows[:, :3].std(axis=0) > _EXCITED_FLOORS * floor[:3]).any())

@@ -1,0 +1,121 @@
+"""The gap on flights that no fit has seen: how large it was, how large it is with the effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.gap.balance_system import System, system
+from cpfls_cli.gap.floor import floors
+from cpfls_cli.gap.results import GapSize
+from cpfls_cli.gap.weak_flight import WeakFlight
+
+_MARGIN = 1.15
+"""Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Residuals of held-out flights under three models.
+
+    Attributes
+    ----------
+    before : array, shape (window, 6), N m and N
+        Of the model as given, on signals as logged.
+    parameters : array, shape (window, 6)
+        Of the model with its own numbers refitted on the training flights.
+    after : array, shape (window, 6)
+        Of the model with effects.
+    floor : array, shape (6,)
+    known : array of bool, shape (window, 6)
+    """
+
+    before: Array
+    parameters: Array
+    after: Array
+    floor: Array
+    known: Array
+
+    def size(self, residual: Array) -> GapSize:
+        """Measure a residual.
+
+        Parameters
+        ----------
+        residual : array, shape (window, 6)
+
+        Returns
+        -------
+        GapSize
+        """
+        count = self.known.sum(axis=0)
+        square = (residual**2 * self.known).sum(axis=0)
+        value = np.sqrt(np.where(count > 0, square / np.maximum(count, 1), np.nan))
+        return GapSize(value, value / self.floor)
+
+    def share(self) -> float:
+        """Give the share of the gap above the floor that the effects take off."""
+        return share_removed(self.parameters / self.floor, self.after / self.floor, self.known)
+
+
+def share_removed(before: Array, after: Array, known: Array) -> float:
+    """Give the share of a gap above the floor that is gone.
+
+    Parameters
+    ----------
+    before, after : array, shape (window, 6), floors
+    known : array of bool, shape (window, 6)
+
+    Returns
+    -------
+    float
+        0 where nothing is gained.
+    """
+    rows = known.sum(axis=0)
+    gone = float(((before**2 - after**2) * known).sum())
+    left = float(np.maximum((after**2 * known).sum(axis=0) - _MARGIN * rows, 0.0).sum())
+    return max(0.0, gone / (gone + left)) if gone > 0 else 0.0
+
+
+def held_out(
+    logged: Sequence[WeakFlight],
+    repaired: Sequence[WeakFlight],
+    fitted: System,
+    linear: Array,
+    parameters: Array,
+) -> HeldOut:
+    """Apply a fitted hypothesis to flights that it has not seen.
+
+    Parameters
+    ----------
+    logged, repaired : sequence of WeakFlight
+        The flights as logged, and after repair of the sensors.
+    fitted : System
+        Of the training flights.
+    linear : array, shape (column,)
+    parameters : array, shape (parameter,)
+        The vehicle's own numbers where nothing else is fitted.
+
+    Returns
+    -------
+    HeldOut
+
+    Raises
+    ------
+    InputError
+        If they lack a signal that the effects need.
+    """
+    raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
+    if full.base.shape[2] != len(linear):
+        raise InputError("the held-out flights lack a signal that a named effect needs; hold out others")
+    known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in repaired])
+    return HeldOut(
+        raw.residual,
+        plain.residual - plain.base @ parameters,
+        full.residual - full.base @ linear,
+        floors(full, linear),
+        known,
+    )

@@ -1,0 +1,48 @@
+"""From what was found to one word: named, partly, ambiguous, unexplained, no gap, or not excited."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cpfls_cli.gap.results import Alternative, NamedEffect, Unexplained, Verdict
+from cpfls_cli.gap.settings import GapSettings
+
+_MAIN = 0.1
+"""Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
+
+
+def verdict_of(
+    effects: Sequence[NamedEffect],
+    alternatives: Sequence[Alternative],
+    unexplained: Sequence[Unexplained],
+    share: float,
+    excited: bool,
+    settings: GapSettings,
+) -> Verdict:
+    """Give the verdict.
+
+    Parameters
+    ----------
+    effects : sequence of NamedEffect
+    alternatives : sequence of Alternative
+    unexplained : sequence of Unexplained
+    share : float
+        Of the gap above the floor that the effects take off flights not seen.
+    excited : bool
+        Whether anything moved enough to show a gap.
+    settings : GapSettings
+
+    Returns
+    -------
+    Verdict
+    """
+    if not effects:
+        if unexplained:
+            return Verdict.UNEXPLAINED
+        return Verdict.NO_GAP if excited else Verdict.NOT_EXCITED
+    if share < settings.partial_share:
+        return Verdict.UNEXPLAINED
+    if share < settings.named_share or unexplained:
+        return Verdict.PARTIAL
+    main = {effect.name for effect in effects if effect.share >= _MAIN}
+    return Verdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else Verdict.NAMED
