@@ -1,4 +1,4 @@
-"""The autopilot: position control by thrust and attitude, geometric attitude control, allocation to the rotors."""
+"""The autopilot: position control by thrust and attitude, geometric attitude control."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.simulation.reference import Reference
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.rigid_body import inertia_tensor
-from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -37,10 +36,9 @@ class Autopilot:
         self._inertia = inertia_tensor(vehicle)
         self._mass = vehicle.mass_kg
         self._gravity = np.array([0.0, 0.0, vehicle.gravity_m_s2])
-        self._allocation = _allocation_inverse(vehicle)
 
-    def squared_speed(self, step: int, position: Array, velocity: Array, rotation: Array, body_rate: Array) -> Array:
-        """Compute the squared rotor speeds that the motion asks for.
+    def wrench(self, step: int, position: Array, velocity: Array, rotation: Array, body_rate: Array) -> Array:
+        """Compute the thrust and the torque that the motion asks for.
 
         Parameters
         ----------
@@ -53,16 +51,15 @@ class Autopilot:
 
         Returns
         -------
-        array, shape (rotor,), rad^2/s^2
-            Not clipped.
+        array, shape (4,), N and N m
+            Thrust along body z, body torque.
         """
         planned = self._planned
         pull = self._gravity + planned.acceleration[step] + self._position_gain * (planned.position[step] - position)
         pull += self._velocity_gain * (planned.velocity[step] - velocity)
         target = upright(pull, planned.attitude[step, 2])
         torque = self._torque(step, target.T @ rotation, body_rate)
-        wrench = np.array([self._mass * (pull @ rotation[:, 2]), *torque])
-        return np.asarray(wrench @ self._allocation)
+        return np.array([self._mass * (pull @ rotation[:, 2]), *torque])
 
     def _torque(self, step: int, turned: Array, body_rate: Array) -> Array:
         """Turn the body to the target, of which the body is turned away by the given rotation."""
@@ -91,9 +88,3 @@ def upright(pull: Array, yaw: float) -> Array:
     left = np.cross(up, [np.cos(yaw), np.sin(yaw), 0.0])
     left /= np.sqrt(left @ left)
     return np.column_stack([np.cross(left, up), left, up])
-
-
-def _allocation_inverse(vehicle: VehicleSettings) -> Array:
-    """Squared speeds for one unit of thrust and of each torque, shape (4, rotor)."""
-    units = np.eye(4)
-    return rotor_demand(vehicle, units[:, 0], units[:, 1:]).squared_speed

@@ -59,14 +59,14 @@ class Clock:
         Steps from sample to sample.
     steps : int
     step : float, s
-    middles : array, shape (step,), s
-        Middle of each step.
+    instants : array, shape (1 + step,), s
+        The start, then the middle of each step.
     """
 
     parts: int
     steps: int
     step: float
-    middles: Array
+    instants: Array
 
 
 def fly(
@@ -102,7 +102,7 @@ def fly(
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
     clock = _clock(time, settings.integration_rate_hz)
-    autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.middles))
+    autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
     flight = loop(vehicle, settings, effects, autopilot, _start(planned), clock.step, float(time[-1] - time[0]))
     states, steps = [flight.state], []
     # A vehicle that is lost may reach infinity before the next sample, where it is told.
@@ -125,7 +125,7 @@ def _clock(time: Array, rate: float) -> Clock:
     period = float(time[-1] - time[0]) / (len(time) - 1)
     parts = ceil(period * rate - _ROUNDING)
     steps, step = (len(time) - 1) * parts, period / parts
-    return Clock(parts, steps, step, time[0] + (np.arange(steps) + 0.5) * step)
+    return Clock(parts, steps, step, time[0] + step * np.concatenate([[0.0], np.arange(steps) + 0.5]))
 
 
 def _start(planned: Mapping[str, Array]) -> Array:

@@ -14,6 +14,7 @@ from cpfls_cli.simulation.autopilot import Autopilot
 from cpfls_cli.simulation.battery import Battery
 from cpfls_cli.simulation.flown_effects import FlownEffects
 from cpfls_cli.simulation.missing_wrench import missing_wrench
+from cpfls_cli.simulation.mixer import Mixer, mixer
 from cpfls_cli.simulation.payload import Payload
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY, Plant, instant
 from cpfls_cli.simulation.settings import ClosedLoopSettings
@@ -49,6 +50,7 @@ class Loop:
     Attributes
     ----------
     autopilot : Autopilot
+    mixer : Mixer
     actuators : Actuators
     plant : Plant
     state : array, shape (16,)
@@ -57,6 +59,7 @@ class Loop:
     """
 
     autopilot: Autopilot
+    mixer: Mixer
     actuators: Actuators
     plant: Plant
     state: Array
@@ -68,18 +71,19 @@ class Loop:
         Parameters
         ----------
         number : int
-            Index into the planned motion.
+            Steps done so far.
 
         Returns
         -------
         Step
         """
         middle = self.state + 0.5 * self.actuators.step * self.change
-        demand = _demand(self.autopilot, number, middle)
-        rotors = self.actuators.advance(_limited(demand, self.plant.vehicle))
+        # The plan has the start before the middle of each step.
+        wrench = _wrench(self.autopilot, number + 1, middle)
+        rotors = self.actuators.advance(self.mixer.command(wrench))
         self.change = self.plant.derivative(middle, rotors)
         self.state = self.state + self.actuators.step * self.change
-        return Step(self.change, rotors, demand)
+        return Step(self.change, rotors, self.mixer.demand(wrench))
 
 
 def loop(
@@ -106,7 +110,8 @@ def loop(
     -------
     Loop
     """
-    speed = _limited(_demand(autopilot, 0, state), vehicle)
+    mix = mixer(vehicle)
+    speed = mix.command(_wrench(autopilot, 0, state))
     missing = missing_wrench(effects, instant(vehicle, state, speed))
     plant = Plant(vehicle, inertia_tensor(vehicle), missing, _payload(effects, vehicle))
     change = plant.derivative(state, Rotors(speed, speed, speed, np.zeros_like(speed), 1.0))
@@ -119,16 +124,12 @@ def loop(
         step=step,
         speed=speed,
     )
-    return Loop(autopilot, actuators, plant, state, change)
+    return Loop(autopilot, mix, actuators, plant, state, change)
 
 
-def _demand(autopilot: Autopilot, number: int, state: Array) -> Array:
+def _wrench(autopilot: Autopilot, number: int, state: Array) -> Array:
     rotation = rotations.rotation_matrix(state[None, ATTITUDE])[0]
-    return autopilot.squared_speed(number, state[POSITION], state[VELOCITY], rotation, state[BODY_RATE])
-
-
-def _limited(demand: Array, vehicle: VehicleSettings) -> Array:
-    return np.sqrt(np.clip(demand, 0.0, vehicle.rotor_speed_max_rad_s**2))
+    return autopilot.wrench(number, state[POSITION], state[VELOCITY], rotation, state[BODY_RATE])
 
 
 def _payload(effects: FlownEffects, vehicle: VehicleSettings) -> Payload | None:

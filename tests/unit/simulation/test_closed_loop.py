@@ -1,0 +1,257 @@
+"""Flights in closed loop: the balance of what is logged, effect by effect, against the formulas of the catalogue."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli import rotations
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.gap.weak_flight import weak_flight
+from cpfls_cli.gap.windows import windows
+from cpfls_cli.simulation import ClosedLoopSettings, SimulationSettings, measure
+from cpfls_cli.trajectory.attitude import flat_attitude
+from cpfls_cli.vehicle import RotorSettings, VehicleSettings
+
+HUBS = (((0.3, 0.0, 0.05), 1), ((0.0, -0.3, 0.05), -1), ((-0.3, 0.0, 0.05), 1), ((0.0, 0.3, 0.05), -1))
+VEHICLE = VehicleSettings(rotors=tuple(RotorSettings(position_m=hub, spin=spin, radius_m=0.2) for hub, spin in HUBS))
+PERIOD = 0.01
+TYPICAL = {
+    "linear_damping": [0.12, 0.12, 0.06],
+    "quadratic_damping": [0.05, 0.05, 0.02],
+    "rotor_plane_damping": [1e-4],
+    "rotor_drag": [1.3e-3],
+    "flapping_moment": [6e-5],
+    "rolling_moment": [2e-4],
+    "inflow": [2e-3],
+    "translational_lift": [0.05],
+    "parasitic_drag": [0.05, 0.04, 0.03, 0.004, 0.01, -0.006],
+    "ground_effect": [4.0],
+    "vertical_descent": [-0.4, 0.2, 0.1, -0.1],
+    "wind": [1.3e-3, 3.0, -2.0],
+    "rotor_gyroscopic": [1e-3],
+    "rotor_acceleration": [5e-4],
+    "motor_lag": [0.04],
+    "command_delay": [0.025],
+    "battery_sag": [2.0],
+    "com_offset": [0.01, -0.008],
+    "products_of_inertia": [0.03, -0.02, 0.02],
+    "rotor_mismatch": [0.05, -0.04, 0.02],
+    "torque_bias": [0.2, -0.1, 0.05],
+    "payload": [0.05, 0.5, 1.0, 0.2],
+    "euler_axis_torque": [],
+    "gyro_bias": [0.02, -0.01, 0.03],
+    "gyro_scale": [0.02, -0.01, 0.03],
+    "imu_misalignment": [0.02, -0.01, 0.03],
+    "channel_delay": [0.025],
+    "parameter_error": {"inertia_x": 0.05, "inertia_y": -0.05, "inertia_z": 0.1, "thrust_scale": -0.03},
+}
+SEEN_BY_BALANCE = [name for name, effect in CATALOGUE.items() if effect.columns is not None]
+
+
+def planned(duration=3.0):
+    """Swings along all axes that a multirotor can fly exactly, 1.5 m above the ground."""
+    time = PERIOD * np.arange(round(duration / PERIOD) + 1)
+    size, pulsation, phase = np.array([0.35, 0.25, 0.2]), np.array([2.4, 2.9, 1.7]), np.array([0.3, 1.0, 2.0])
+    angle = np.outer(time, pulsation) + phase
+    motion = [size * pulsation**n * np.sin(angle + n * np.pi / 2) for n in range(5)]
+    heading = np.stack([0.15 * 1.5**n * np.sin(1.5 * time + n * np.pi / 2) for n in range(3)])
+    flat = flat_attitude(time, np.stack(motion[2:]), heading, 9.81)
+    path = {"position": motion[0] + [0, 0, 1.5], "velocity": motion[1], "acceleration": motion[2]}
+    return time, {**path, **vars(flat)}
+
+
+def flown(duration=3.0, seed=1, vehicle=VEHICLE, noise=None, relative_noise=None, **closed_loop):
+    time, plan = planned(duration)
+    settings = SimulationSettings(
+        mode="closed-loop",
+        noise=noise or {},
+        relative_noise=relative_noise or {},
+        closed_loop=ClosedLoopSettings(**closed_loop),
+    )
+    return measure(time, plan, vehicle, settings, np.random.default_rng(seed))
+
+
+def signals_of(flight):
+    logged = flight.signals
+    hidden = "rotor_speed" not in logged
+    names = ("attitude", "body_rate", "position", "velocity", "acceleration")
+    return Signals(
+        time=PERIOD * np.arange(len(logged["attitude"])),
+        vehicle=VEHICLE,
+        rotor_speed=logged["rotor_command" if hidden else "rotor_speed"],
+        commanded=hidden,
+        voltage=logged.get("voltage"),
+        **{name: logged[name] for name in names},
+    )
+
+
+def balance(signals):
+    weak = weak_flight("flight", signals, windows(PERIOD, 0.4, 0.75), None, True)
+    return weak, weak.averaged(weak.residual(signals))
+
+
+def rms(values):
+    return np.sqrt((values**2).mean(axis=0))
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return flown()
+
+
+def test_without_effects_the_balance_closes_to_the_accuracy_of_the_integration(plain):
+    weak, left = balance(signals_of(plain))
+    size = rms(weak.averaged(weak.inertial))
+    assert size[:3].min() > 0.3
+    assert rms(left)[:3].max() < 2e-5
+    assert rms(left)[3:].max() < 2e-4
+
+
+def test_accuracy_is_of_second_order_in_the_step():
+    fine, coarse, reference = (flown(integration_rate_hz=rate).signals["position"] for rate in (400, 200, 1600))
+    ratio = rms(coarse - reference) / rms(fine - reference)
+    assert (ratio > 3.0).all()
+
+
+def test_path_is_followed_and_no_rotor_is_clipped(plain):
+    assert rms(plain.position_error).max() < 0.05
+    assert rms(plain.attitude_error).max() < 0.03
+    assert plain.violations == ()
+
+
+def test_typical_values_cover_the_catalogue():
+    assert set(TYPICAL) == set(CATALOGUE)
+
+
+@pytest.mark.parametrize("name", SEEN_BY_BALANCE)
+def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
+    flight = flown(effects={name: TYPICAL[name]})
+    (one,) = flight.effects.flown
+    signals = signals_of(flight)
+    weak, left = balance(signals)
+    if one.effect.kind == "actuator":
+        corrected = one.effect.apply(signals, one.shape)
+        expected = left - weak.averaged(weak.residual(corrected))
+    else:
+        expected = weak.averaged(one.effect.columns(signals, one.shape)) @ one.linear
+    assert rms(expected)[:3].max() > 1e-3
+    # The log shows what is late only at its samples, with a straight line between them.
+    between = 20 if one.effect.kind == "actuator" else 1
+    np.testing.assert_array_less(rms(left - expected), between * np.array([2e-5] * 3 + [2e-4] * 3))
+
+
+def test_momentum_of_every_effect_is_linear_in_rates_and_rotor_speeds():
+    rng = np.random.default_rng(3)
+
+    def momentum(effect, rate, speed):
+        still = {name: np.zeros((1, 3)) for name in ("attitude", "velocity", "position")}
+        signals = Signals(time=np.zeros(1), vehicle=VEHICLE, body_rate=rate, rotor_speed=speed, **still)
+        return effect.columns(signals, {}).momentum
+
+    for effect in CATALOGUE.values():
+        if effect.columns is None or effect.shapes or effect.name == "payload":
+            continue
+        (rate, other), (speed, faster) = rng.normal(size=(2, 1, 3)), rng.uniform(200, 500, size=(2, 1, 4))
+        first = momentum(effect, rate, speed)
+        if first is not None:
+            both = momentum(effect, rate + 2 * other, speed + 2 * faster)
+            np.testing.assert_allclose(both, first + 2 * momentum(effect, other, faster), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "reading"),
+    [
+        ("gyro_bias", lambda rate, value: rate + value),
+        ("gyro_scale", lambda rate, value: rate * (1 + value)),
+        ("imu_misalignment", lambda rate, value: rate - np.cross(value, rate)),
+    ],
+)
+def test_faulty_gyro_reads_what_the_catalogue_says_and_the_flight_is_the_same(name, reading, plain):
+    faulty = flown(effects={name: TYPICAL[name]})
+    expected = reading(plain.signals["body_rate"], np.array(TYPICAL[name]))
+    np.testing.assert_allclose(faulty.signals["body_rate"], expected, atol=1e-12)
+    np.testing.assert_array_equal(faulty.signals["attitude"], plain.signals["attitude"])
+
+
+def test_logged_rates_and_accelerations_are_derivatives_of_the_attitude(plain):
+    signals = plain.signals
+    for name, derivative in (("attitude", "attitude_rate"), ("attitude_rate", "attitude_acceleration")):
+        slope = np.gradient(signals[name], PERIOD, axis=0)[5:-5]
+        assert np.abs(slope - signals[derivative][5:-5]).max() < 0.01 * np.abs(slope).max()
+    speed = np.gradient(signals["velocity"], PERIOD, axis=0)[5:-5]
+    np.testing.assert_allclose(signals["acceleration"][5:-5], speed, atol=0.02)
+
+
+def test_torque_is_that_of_the_logged_rotor_speeds(plain):
+    signals = plain.signals
+    first, second, third, fourth = signals["rotor_speed"].T ** 2
+    k, b, arm = 121.5e-6, 2.7e-6, 0.3
+    torque = np.column_stack([arm * k * (fourth - second), arm * k * (third - first), -b * (first + third)])
+    torque[:, 2] += b * (second + fourth)
+    np.testing.assert_allclose(signals["body_torque"], torque, atol=1e-9)
+    W = rotations.euler_rate_matrix(signals["attitude"])
+    np.testing.assert_allclose(signals["torque"], np.einsum("nji,nj->ni", W, torque), atol=1e-9)
+
+
+def test_rotors_lag_behind_the_command(plain):
+    command, speed = plain.signals["rotor_command"], plain.signals["rotor_speed"]
+    slope = np.gradient(speed, PERIOD, axis=0)[20:-5]
+    lag = 0.05 * slope
+    np.testing.assert_allclose((command - speed)[20:-5], lag, atol=0.02 * np.abs(lag).max())
+
+
+@pytest.mark.parametrize("name", ["motor_lag", "command_delay", "battery_sag"])
+def test_actuator_effects_hide_the_rotor_speed(name):
+    logged = flown(0.5, effects={name: TYPICAL[name]}).signals
+    assert "rotor_speed" not in logged
+    assert ("voltage" in logged) == (name == "battery_sag")
+
+
+def test_battery_empties_by_the_share_that_was_asked_for():
+    voltage = flown(effects={"battery_sag": [1.0]}, battery_use=0.3, battery_load=0.0).signals["voltage"]
+    np.testing.assert_allclose(voltage, np.linspace(1.0, 0.7, len(voltage)), atol=1e-12)
+
+
+def test_effects_add_up():
+    names = ("com_offset", "rotor_drag", "products_of_inertia", "rotor_acceleration")
+    flight = flown(effects={name: TYPICAL[name] for name in names})
+    signals = signals_of(flight)
+    weak, left = balance(signals)
+    expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in flight.effects.flown)
+    np.testing.assert_array_less(rms(left - expected), [3e-5] * 3 + [2e-4] * 3)
+
+
+def test_noise_lies_on_the_log_and_not_in_the_loop(plain):
+    noisy = flown(noise={"body_rate": 0.01, "rotor_speed": 1.0}, relative_noise={"position": 0.1})
+    assert set(noisy.noise_std) == {"body_rate", "rotor_speed", "position"}
+    assert (noisy.signals["body_rate"] - plain.signals["body_rate"]).std() == pytest.approx(0.01, rel=0.1)
+    np.testing.assert_array_equal(noisy.signals["velocity"], plain.signals["velocity"])
+    again, other = (flown(0.3, seed, noise={"body_rate": 0.01}).signals["body_rate"] for seed in (1, 2))
+    np.testing.assert_array_equal(flown(0.3, 1, noise={"body_rate": 0.01}).signals["body_rate"], again)
+    assert np.abs(again - other).max() > 1e-3
+
+
+def test_more_than_four_rotors_fly_too():
+    angles = np.pi / 3 * np.arange(6)
+    hubs = [(0.4 * np.cos(angle), 0.4 * np.sin(angle), 0.0) for angle in angles]
+    spun = tuple(RotorSettings(position_m=hub, spin=1 if n % 2 else -1) for n, hub in enumerate(hubs))
+    flight = flown(1.0, vehicle=replace(VEHICLE, rotors=spun))
+    assert flight.signals["rotor_speed"].shape == (101, 6)
+    assert rms(flight.position_error).max() < 0.05
+
+
+def test_vehicle_that_cannot_stay_on_its_path_is_given_up():
+    with pytest.raises(ComputationError, match=r"m away from the path at t = .* fly gentler"):
+        flown(deviation_max_m=0.2, effects={"parameter_error": {"thrust_scale": -0.5}})
+    with pytest.raises(ComputationError, match=r"tilts over 90 degrees|out of control"):
+        flown(attitude_frequency_hz=8.0, effects={"command_delay": [0.12]})
+
+
+def test_trajectory_of_changing_rate_is_refused():
+    time, plan = planned(0.5)
+    settings = SimulationSettings(mode="closed-loop")
+    with pytest.raises(ComputationError, match="at one rate"):
+        measure(time**2, plan, VEHICLE, settings, np.random.default_rng(1))
