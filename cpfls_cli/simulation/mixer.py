@@ -10,6 +10,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+_ROUNDING = 1e-12
+
 
 @dataclass(frozen=True)
 class Mixer:
@@ -52,8 +54,9 @@ class Mixer:
         """
         upright, yaw = wrench[:3] @ self.inverse[:3], wrench[3] * self.inverse[3]
         room = np.where(yaw > 0, self.limit - upright, upright)
-        # Rotors that yaw does not load set no limit.
-        share = np.min(room / np.maximum(np.abs(yaw), np.finfo(float).tiny), initial=1.0)
+        # What yaw does not change by more than rounding sets no limit.
+        loaded = np.abs(yaw) > _ROUNDING * self.limit
+        share = np.min(room[loaded] / np.abs(yaw[loaded]), initial=1.0)
         return np.asarray(np.sqrt(np.clip(upright + max(share, 0.0) * yaw, 0.0, self.limit)))
 
 
