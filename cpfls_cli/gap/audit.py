@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import comb
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -172,9 +173,9 @@ _PLACES = {"gyro_scale": slice(3, 6), "imu_misalignment": slice(6, 9), "channel_
 
 
 def _gyro_noise(flights: Sequence[Signals], windows: Windows) -> float:
-    """Bound the noise of a window from below by third differences, which motion hardly reaches, rad/s."""
-    third = np.concatenate([np.diff(signals.body_rate, 3, axis=0) for signals in flights])
-    return float(np.sqrt((third**2).mean(axis=0).min() / 20 * (windows.weight**2).sum()))
+    """Bound the noise of a window from below by fifth differences, which motion hardly reaches, rad/s."""
+    fifth = np.concatenate([np.diff(signals.body_rate, 5, axis=0) for signals in flights])
+    return float(np.sqrt((fifth**2).mean(axis=0).min() / comb(10, 5) * (windows.weight**2).sum()))
 
 
 def _gyro_notes(fit: GyroFit) -> tuple[str, ...]:

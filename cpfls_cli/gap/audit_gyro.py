@@ -96,8 +96,7 @@ def scan(flights: Sequence[Kinematics]) -> Scan:
     half = int(LONGEST_DELAY_S / step)
     delays = step * np.arange(-half, half + 1)
     seen = np.concatenate([flight.rate for flight in flights])
-    left = [seen - _read(flights, delay) for delay in delays]
-    delay = float(delays[np.argmin([rest.var(axis=0).sum() for rest in left])])
+    delay = float(delays[np.argmin([_unexplained(seen, _read(flights, delay)) for delay in delays])])
     read = _read(flights, delay)
     variance = np.maximum((seen - read).var(axis=0), np.finfo(float).tiny)
     return Scan(delay, variance, _alone(read) > _EXCITED * variance, seen, read)
@@ -105,6 +104,13 @@ def scan(flights: Sequence[Kinematics]) -> Scan:
 
 def _read(flights: Sequence[Kinematics], delay: float) -> Array:
     return np.concatenate([flight.gyro_rate(delay) for flight in flights])
+
+
+def _unexplained(seen: Array, read: Array) -> float:
+    """Log-likelihood of any matrix on the readings, so that a swapped axis does not shift the delay."""
+    right, left = seen - seen.mean(axis=0), read - read.mean(axis=0)
+    rest = right - left @ np.linalg.lstsq(left, right, rcond=None)[0]
+    return float(np.log(np.maximum((rest**2).mean(axis=0), np.finfo(float).tiny)).sum())
 
 
 def _alone(read: Array) -> Array:

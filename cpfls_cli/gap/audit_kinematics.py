@@ -118,7 +118,7 @@ def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
 def _continuous(turned: Array) -> Array:
     """Choose of each quaternion and its negative the one near the sample before."""
     flips = np.where((turned[1:] * turned[:-1]).sum(axis=1) < 0, -1.0, 1.0)
-    return turned * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+    return np.asarray(turned * np.concatenate([[1.0], np.cumprod(flips)])[:, None])
 
 
 def _relative(turned: Array) -> Array:

@@ -1,0 +1,155 @@
+"""What the audit says where it cannot test, and what it says about the other channels."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.gap.audit import audit
+from cpfls_cli.gap.windows import windows
+from cpfls_cli.vehicle.rotors import body_wrench
+from tests.recovery.gap.audit_flights import LEVELS, Faults, flight
+
+WINDOWS = windows(0.01, 0.4, 0.5)
+UP = np.array([0, 0, 9.81])
+FAULTS = {"gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay"}
+
+
+@pytest.fixture(scope="module")
+def turning():
+    return flight(np.random.default_rng(0), Faults(), LEVELS["mid"], duration=40.0)
+
+
+def moved(signals, amplitude=2.0):
+    """Position, velocity and acceleration of one motion, by hand."""
+    speed = 2 * np.pi * np.array([0.2, 0.27, 0.15])
+    phase = speed * signals.time[:, None]
+    return replace(
+        signals,
+        position=amplitude * np.sin(phase),
+        velocity=amplitude * speed * np.cos(phase),
+        acceleration=-amplitude * speed**2 * np.sin(phase),
+    )
+
+
+def test_without_attitude_nothing_is_tested(turning):
+    found = audit([replace(turning, attitude=None)], WINDOWS)
+    assert found.findings == ()
+    assert set(found.untested) == FAULTS
+    assert found.repaired(turning) is turning
+
+
+def test_too_short_a_flight_is_not_tested():
+    found = audit([flight(np.random.default_rng(0), Faults(), LEVELS["mid"], duration=5.0)], WINDOWS)
+    assert found.findings == ()
+    assert set(found.untested.values()) == {"the flights are too short"}
+
+
+def integrated(signals):
+    steps = Rotation.from_rotvec(0.5 * (signals.body_rate[1:] + signals.body_rate[:-1]) * signals.period)
+    turned = [Rotation.identity()]
+    for step in steps:
+        turned.append(turned[-1] * step)
+    return replace(signals, attitude=np.unwrap(Rotation.concatenate(turned).as_euler("ZYX")[:, ::-1], axis=0))
+
+
+def test_an_attitude_integrated_from_the_gyroscope_tells_no_scale(turning):
+    found = audit([integrated(turning)], WINDOWS)
+    assert {"gyro_scale", "imu_misalignment"} <= set(found.untested)
+    assert found.named == ()
+
+
+def test_an_attitude_integrated_from_the_corrected_gyroscope_still_tells_the_bias(turning):
+    estimated = integrated(turning)
+    found = audit([replace(estimated, body_rate=estimated.body_rate + np.array([0.02, 0, 0]))], WINDOWS)
+    assert [finding.name for finding in found.named] == ["gyro_bias"]
+    assert "+0.0200 rad/s about x" in found.named[0].sentence
+
+
+def test_swapped_and_turned_axes_of_the_gyroscope_are_a_warning_not_a_fault(turning):
+    swapped = audit([replace(turning, body_rate=turning.body_rate[:, [1, 0, 2]])], WINDOWS)
+    turned = audit([replace(turning, body_rate=turning.body_rate * [1, -1, -1])], WINDOWS)
+    assert swapped.findings == turned.findings == ()
+    assert any("axes are swapped" in sentence for sentence in swapped.warnings)
+    assert any("opposite signs along y" in sentence for sentence in turned.warnings)
+    assert set(turned.untested) == FAULTS
+
+
+def test_channels_that_agree_are_not_warned_about(turning):
+    found = audit([moved(turning)], WINDOWS)
+    assert found.warnings == ()
+    assert {match.channels for match in found.matches} == {"position and velocity", "velocity and acceleration"}
+    np.testing.assert_allclose([match.scale for match in found.matches], 1.0, atol=1e-3)
+    np.testing.assert_allclose([match.delay_s for match in found.matches], 0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: replace(s, velocity=1.5 * s.velocity, acceleration=1.5 * s.acceleration), "factor of 1.50"),
+        (lambda s: replace(s, velocity=s.velocity[:, [1, 0, 2]], acceleration=None), "axes are swapped"),
+        (lambda s: replace(s, acceleration=s.acceleration * [1, -1, -1]), "opposite signs along y"),
+        (lambda s: replace(s, acceleration=s.acceleration + UP), "gravity"),
+        (lambda s: replace(s, velocity=np.roll(s.velocity, 6, axis=0), acceleration=None), "late by 6"),
+        (lambda s: replace(s, velocity=s.velocity[::-1] ** 2 - 2.0, acceleration=None), "do not belong together"),
+    ],
+)
+def test_channels_that_disagree_are_warned_about(turning, change, words):
+    found = audit([change(moved(turning))], WINDOWS)
+    assert any(words in sentence for sentence in found.warnings)
+
+
+def test_noise_of_a_hover_is_not_taken_for_disagreement(turning):
+    rng = np.random.default_rng(1)
+    noisy = replace(
+        turning,
+        position=rng.normal(0, 0.05, turning.body_rate.shape),
+        velocity=rng.normal(0, 0.15, turning.body_rate.shape),
+        acceleration=rng.normal(0, 0.5, turning.body_rate.shape),
+    )
+    assert audit([noisy], WINDOWS).warnings == ()
+
+
+def test_the_accelerometer_is_compared_with_the_velocity(turning):
+    flying = moved(turning)
+    felt = np.einsum("tji,tj->ti", flying.rotation, flying.acceleration + UP)
+    good, bad = (audit([replace(flying, specific_force=sign * felt)], WINDOWS).warnings for sign in (1, -1))
+    assert good == ()
+    assert any("accelerometer" in sentence for sentence in bad)
+
+
+def test_constant_clipped_and_rounded_channels_are_named(turning):
+    rate = turning.body_rate.copy()
+    rate[:, 0] = np.clip(rate[:, 0], -0.5, 0.5)
+    rate[:, 1] = np.round(rate[:, 1] / 0.05) * 0.05
+    told = " ".join(audit([replace(turning, body_rate=rate, voltage=np.ones(len(turning)))], WINDOWS).warnings)
+    assert "about x is clipped at 0.5 rad/s" in told
+    assert "about y is rounded to steps of 0.05 rad/s" in told
+    assert "The channel voltage never changes" in told
+
+
+@pytest.mark.parametrize(("commanded", "whom"), [(True, "commands"), (False, "measured rotors")])
+def test_the_motion_follows_the_torque(turning, commanded, whom):
+    clean = flight(np.random.default_rng(3), Faults(), duration=20.0)
+    inertia = np.diag(clean.vehicle.inertia_kg_m2)
+    momentum = clean.body_rate @ inertia
+    torque = np.gradient(momentum, clean.time, axis=0) + np.cross(clean.body_rate, momentum)
+    early = np.roll(torque, -5, axis=0)
+    found = audit([replace(clean, stated_torque=early, commanded=commanded)], WINDOWS)
+    assert found.actuation.delay_s == pytest.approx(0.05, abs=0.003)
+    assert found.notes == (f"The motion follows the {whom} by about 50 ms.",)
+    assert audit([turning], WINDOWS).actuation is None
+
+
+def test_a_torque_that_moves_nothing_tells_no_delay(turning):
+    noise = np.random.default_rng(4).normal(size=turning.body_rate.shape)
+    assert audit([replace(turning, stated_torque=noise)], WINDOWS).actuation is None
+    assert audit([replace(turning, stated_torque=np.zeros_like(noise))], WINDOWS).actuation is None
+
+
+def test_rotors_that_hold_one_speed_are_named(turning):
+    speed = np.full((len(turning), 4), 348.0)
+    assert body_wrench(turning.vehicle, speed).thrust.std() == 0
+    told = audit([replace(turning, rotor_speed=speed)], WINDOWS).warnings
+    assert sum("rotor speed" in sentence for sentence in told) == 4
