@@ -85,6 +85,7 @@ def upright(pull: Array, yaw: float) -> Array:
         Body to world.
     """
     up = pull / np.sqrt(pull @ pull)
-    left = np.cross(up, [np.cos(yaw), np.sin(yaw), 0.0])
-    left /= np.sqrt(left @ left)
-    return np.column_stack([np.cross(left, up), left, up])
+    # By the definition of yaw the x axis lies in the vertical plane of the heading, however the body rolls.
+    forward = np.cross([-np.sin(yaw), np.cos(yaw), 0.0], up)
+    forward /= np.sqrt(forward @ forward)
+    return np.column_stack([forward, np.cross(up, forward), up])

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from cpfls_cli import rotations
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.simulation import ClosedLoopSettings, SimulationSettings, flown_effects
+from cpfls_cli.simulation.autopilot import upright
 from cpfls_cli.simulation.mixer import mixer
 from cpfls_cli.vehicle import VehicleSettings, body_wrench
 
@@ -82,3 +84,9 @@ def test_commands_stay_within_what_a_rotor_can_do():
         speed = mixer(VEHICLE).command(wrench)
         assert (speed >= 0).all()
         assert (speed <= VEHICLE.rotor_speed_max_rad_s).all()
+
+
+def test_upright_body_has_the_yaw_and_the_thrust_of_the_plan():
+    attitude = np.array([[0.3, -0.2, 2.5], [-0.5, 0.1, -1.0]])
+    for planned, rotation in zip(attitude, rotations.rotation_matrix(attitude), strict=True):
+        np.testing.assert_allclose(upright(7.0 * rotation[:, 2], planned[2]), rotation, atol=1e-12)
