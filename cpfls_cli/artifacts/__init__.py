@@ -2,6 +2,7 @@
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.formats import FLIGHT, FORMATS, MODEL, PREDICTION, SELECTION, TRAJECTORY, format_of
+from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.hashing import file_sha256
 from cpfls_cli.artifacts.output import check_output, write_text
 from cpfls_cli.artifacts.reading import format_name, read_artifact
@@ -10,6 +11,9 @@ from cpfls_cli.artifacts.spec import SCHEMA_VERSION, ArtifactSpec, DatasetSpec
 from cpfls_cli.artifacts.writing import write_artifact
 
 __all__ = [
+    "DIAGNOSIS",
+    "DISAGREEMENT",
+    "EXTENDED",
     "FLIGHT",
     "FORMATS",
     "MODEL",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.spec import BODY, EULER, NO_FRAME, WORLD, ArtifactSpec, DatasetSpec
 
 _TIME = DatasetSpec("time", ("time",), "s", NO_FRAME, "time from the first sample")
@@ -211,7 +212,7 @@ PREDICTION = ArtifactSpec(
     ("model", "flight"),
 )
 
-FORMATS = (TRAJECTORY, FLIGHT, SELECTION, MODEL, PREDICTION)
+FORMATS = (TRAJECTORY, FLIGHT, SELECTION, MODEL, PREDICTION, DISAGREEMENT, DIAGNOSIS, EXTENDED)
 """Every artifact format, in the order of the pipeline."""
 
 
