@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, cos
+from math import cos
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.simulation.autopilot import Autopilot
+from cpfls_cli.simulation.clock import between, clock_of
 from cpfls_cli.simulation.flown_effects import FlownEffects
 from cpfls_cli.simulation.loop import Step, loop
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, STATES, VELOCITY
@@ -19,7 +20,6 @@ from cpfls_cli.simulation.reference import reference
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_ROUNDING = 1e-6
 _STEPS_BETWEEN_REPORTS = 100
 _REMEDY = "fly gentler, make the effects smaller, or change the frequencies of simulation.closed_loop"
 
@@ -47,26 +47,6 @@ class FlownMotion:
     speed: Array
     voltage: Array
     demand: Array
-
-
-@dataclass(frozen=True)
-class Clock:
-    """Steps of the integration between the samples of the plan.
-
-    Attributes
-    ----------
-    parts : int
-        Steps from sample to sample.
-    steps : int
-    step : float, s
-    instants : array, shape (1 + step,), s
-        The start, then the middle of each step.
-    """
-
-    parts: int
-    steps: int
-    step: float
-    instants: Array
 
 
 def fly(
@@ -101,7 +81,7 @@ def fly(
     ComputationError
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
-    clock = _clock(time, settings.integration_rate_hz)
+    clock = clock_of(time, settings.integration_rate_hz)
     autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
     flight = loop(vehicle, settings, effects, autopilot, _start(planned), clock.step, float(time[-1] - time[0]))
     states, steps = [flight.state], []
@@ -117,15 +97,6 @@ def fly(
                 progress(number, clock.steps)
     progress(clock.steps, clock.steps)
     return _sampled(np.array(states), steps, clock.parts)
-
-
-def _clock(time: Array, rate: float) -> Clock:
-    if len(time) < 2 or np.ptp(np.diff(time)) > _ROUNDING * (time[1] - time[0]):
-        raise ComputationError("a flight in closed loop needs a trajectory of two or more samples at one rate")
-    period = float(time[-1] - time[0]) / (len(time) - 1)
-    parts = ceil(period * rate - _ROUNDING)
-    steps, step = (len(time) - 1) * parts, period / parts
-    return Clock(parts, steps, step, time[0] + step * np.concatenate([[0.0], np.arange(steps) + 0.5]))
 
 
 def _start(planned: Mapping[str, Array]) -> Array:
@@ -155,17 +126,8 @@ def _sampled(states: Array, steps: Sequence[Step], parts: int) -> FlownMotion:
     change, demand = ([getattr(step, name) for step in steps] for name in ("change", "demand"))
     rotors = [step.rotors for step in steps]
     told, followed, speed, voltage = (
-        _between(np.array([getattr(one, name) for one in rotors]))[::parts]
+        between(np.array([getattr(one, name) for one in rotors]))[::parts]
         for name in ("told", "followed", "speed", "voltage")
     )
-    change_, demand_ = (_between(np.array(values))[::parts] for values in (change, demand))
+    change_, demand_ = (between(np.array(values))[::parts] for values in (change, demand))
     return FlownMotion(states, change_, told, followed, speed, voltage, demand_)
-
-
-def _between(middles: Array) -> Array:
-    """Average neighbours, and go on straight beyond the ends; one more than there are middles."""
-    if len(middles) < 2:
-        return np.concatenate([middles, middles])
-    ends = 2 * middles[0] - middles[1], 2 * middles[-1] - middles[-2]
-    longer = np.concatenate([ends[0][None], middles, ends[1][None]])
-    return np.asarray(0.5 * (longer[1:] + longer[:-1]))
