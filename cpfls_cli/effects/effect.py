@@ -128,6 +128,9 @@ class Effect:
     apply : callable or None
         For actuator and sensor effects: ``apply(signals, shape) -> Signals`` as they would be without the effect's
         error, so that all other columns can be computed from them.
+    scatter : callable or None
+        For effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque and
+        force for a unit of relative scatter.
     """
 
     name: str
@@ -146,6 +149,7 @@ class Effect:
     physical: Callable[[Array], Array] | None = None
     linear: Callable[[Array], Array] | None = None
     apply: Callable[[Signals, Mapping[str, float]], Signals] | None = None
+    scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that the effect needs and the flight lacks.

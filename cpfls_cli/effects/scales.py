@@ -207,3 +207,17 @@ def inertia_per_rotor_speed(vehicle: VehicleSettings) -> float:
     float
     """
     return smallest_inertia(vehicle) / (len(vehicle.rotors) * hover_speed(vehicle))
+
+
+def lean_per_rotor_speed(vehicle: VehicleSettings) -> float:
+    """Size a thrust that leans by the rate over the rotor speed, N s^2/rad^2.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    float
+    """
+    return sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors) / len(vehicle.rotors)

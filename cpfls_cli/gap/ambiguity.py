@@ -13,8 +13,8 @@ from cpfls_cli.gap.scoring import Scored
 from cpfls_cli.gap.weak_flight import Candidate
 
 _SPANS = 0.999
-_CLOSE = 0.03
-_ERRORS = 1.7
+_CLOSE = 0.01
+_ERRORS = 2.0
 
 
 def unbeaten(own: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:

@@ -8,15 +8,22 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+_ERRORS = 2.0
 
-def within_bounds(effect: Effect, linear: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:
+
+def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:
     """Hold coefficients against the bounds of their effect.
+
+    What the data leave open is no reason to refuse: a coefficient counts as beyond a bound only by more than its
+    uncertainty.
 
     Parameters
     ----------
     effect : Effect
     linear : array, shape (coefficient,)
-        NaN-free; linear coefficients of a fit.
+        Linear coefficients of a fit.
+    error : array, shape (coefficient,)
+        Their standard errors.
     vehicle : VehicleSettings
 
     Returns
@@ -28,11 +35,12 @@ def within_bounds(effect: Effect, linear: Array, vehicle: VehicleSettings) -> tu
     """
     keep = np.ones(len(linear), dtype=bool)
     if effect.physical is not None:
+        ends = np.array([effect.physical(linear + way * _ERRORS * error) for way in (-1, 1)])
         physical = effect.physical(linear)
-        bounds = np.array([c.bounds(vehicle) for c in effect.coefficients])[: len(physical)]
-        open_ = np.isnan(physical)
-        return keep, bool(np.all(open_ | ((physical >= bounds[:, 0]) & (physical <= bounds[:, 1]))))
-    bounds = np.array([c.bounds(vehicle) for c in effect.coefficients])
-    below, above = linear < bounds[:, 0], linear > bounds[:, 1]
-    at_zero = (below & (bounds[:, 0] == 0)) | (above & (bounds[:, 1] == 0))
-    return ~at_zero, bool(not np.any((below | above) & ~at_zero))
+        low, high = np.array([c.bounds(vehicle) for c in effect.coefficients])[: len(physical)].T
+        unsure = np.isnan(ends).any(axis=0) | np.isnan(physical)
+        return keep, bool(np.all(unsure | ((ends.max(axis=0) >= low) & (ends.min(axis=0) <= high))))
+    low, high = np.array([c.bounds(vehicle) for c in effect.coefficients]).T
+    at_zero = ((linear < low) & (low == 0)) | ((linear > high) & (high == 0))
+    beyond = (linear + _ERRORS * error < low) | (linear - _ERRORS * error > high)
+    return ~at_zero, bool(not np.any(beyond & ~at_zero))

@@ -23,11 +23,14 @@ class Folds:
         Columns times right side; several right sides are draws.
     square : array, shape (block, draw)
         Sum of squares of the right side.
+    rows : int
+        Rows of all blocks.
     """
 
     gram: Array
     moment: Array
     square: Array
+    rows: int
 
     @property
     def blocks(self) -> int:
@@ -67,6 +70,22 @@ class Folds:
         coefficients = _solve(gram.sum(axis=0), moment.sum(axis=0))
         return coefficients, self._left(gram, moment, coefficients[None])
 
+    def errors(self, columns: IntArray) -> Array:
+        """Give standard errors of a fit on all blocks as if rows were independent; one draw.
+
+        Parameters
+        ----------
+        columns : array of int
+
+        Returns
+        -------
+        array, shape (column,)
+        """
+        gram = self.gram[:, columns[:, None], columns].sum(axis=0)
+        _, left = self.fit(columns)
+        inverse = _solve(gram, np.eye(len(columns)))
+        return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse), 0.0) * max(left.sum() / self.rows, 1.0)))
+
     def _left(self, gram: Array, moment: Array, coefficients: Array) -> Array:
         explained = np.einsum(
             "bcd,bcd->bd", 2 * moment - gram @ coefficients, np.broadcast_to(coefficients, moment.shape)
@@ -86,7 +105,7 @@ class Folds:
         """
         inner = self.gram[:, :, column]
         square = self.square - 2 * self.moment[:, column] + self.gram[:, column, column, None]
-        return Folds(self.gram, self.moment - inner[..., None], square)
+        return Folds(self.gram, self.moment - inner[..., None], square, self.rows)
 
 
 def folds(columns: Array, right: Array, block: IntArray) -> Folds:
@@ -113,6 +132,7 @@ def folds(columns: Array, right: Array, block: IntArray) -> Folds:
         np.array([x.T @ x for x, _ in parts]),
         np.array([x.T @ y for x, y in parts]),
         np.array([(y**2).sum(axis=0) for _, y in parts]),
+        columns.shape[0] * columns.shape[1],
     )
 
 

@@ -134,24 +134,22 @@ def _mean_power(
     if channel >= body_rate[0].shape[1]:
         return 0.0, 0.0
     length = int(np.ceil(_PERIODS_PER_SEGMENT / (frequency * hop_s)))
+    pairs = zip(residual, body_rate, strict=True)
     products = np.concatenate(
-        [
-            (_amplitude(rows[:, channel], length, frequency, hop_s)
-            * _amplitude(rate[:, channel], length, frequency, hop_s).conj()).real / 2
-            for rows, rate in zip(residual, body_rate, strict=True)
-        ]
-    )  # fmt: skip
+        [_products(rows[:, channel], rate[:, channel], length, frequency * hop_s) for rows, rate in pairs]
+    )
     if len(products) < 2:
         return float(products.mean()) if len(products) else 0.0, float(np.inf)
     return float(products.mean()), float(products.std(ddof=1) / np.sqrt(len(products)))
 
 
-def _amplitude(values: Array, length: int, frequency: float, hop_s: float) -> Array:
-    """Demodulate segments: complex amplitude at the frequency, shape (segment,)."""
-    segments = values[: len(values) // length * length].reshape(-1, length)
+def _products(residual: Array, rate: Array, length: int, cycles_per_row: float) -> Array:
+    """Average the product of two signals in a band, from their complex amplitudes, shape (segment,)."""
     taper = np.hanning(length + 2)[1:-1]
-    wave = np.exp(-2j * np.pi * frequency * hop_s * np.arange(length)) * taper * 2 / taper.sum()
-    return np.asarray((segments - segments.mean(axis=1, keepdims=True)) @ wave)
+    wave = np.exp(-2j * np.pi * cycles_per_row * np.arange(length)) * taper * 2 / taper.sum()
+    segments = np.stack([residual, rate])[:, : len(rate) // length * length].reshape(2, -1, length)
+    first, second = (segments - segments.mean(axis=2, keepdims=True)) @ wave
+    return np.asarray((first * second.conj()).real / 2)
 
 
 def _energy(mean: float, error: float) -> Energy:

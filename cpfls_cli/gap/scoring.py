@@ -16,6 +16,7 @@ from cpfls_cli.gap.folds import Folds, folds
 from cpfls_cli.gap.refine import fit
 from cpfls_cli.gap.shape_columns import shape_columns
 from cpfls_cli.gap.weak_flight import Candidate
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 REFUSED = -np.inf
 
@@ -175,7 +176,9 @@ def _error(candidate: Candidate, columns: IntArray, base: IntArray, normal: Fold
     return normal.solve(np.concatenate([base, columns]))[1]
 
 
-def _scored(place: tuple[Candidate, IntArray], base: IntArray, normal: Folds, before: Array, vehicle: object) -> Scored:
+def _scored(
+    place: tuple[Candidate, IntArray], base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings
+) -> Scored:
     candidate, columns = place
     if len(columns) == 0:
         return Scored(candidate, columns, REFUSED, before, np.zeros(0))
@@ -184,9 +187,10 @@ def _scored(place: tuple[Candidate, IntArray], base: IntArray, normal: Folds, be
         return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
     for _ in range(len(columns)):
-        fitted = np.zeros(len(columns))
-        fitted[kept] = normal.fit(np.concatenate([base, columns[kept]]))[0][len(base) :, 0]
-        keep, admissible = within_bounds(candidate.effect, fitted, vehicle)  # type: ignore[arg-type]
+        fitted, unsure = np.zeros(len(columns)), np.zeros(len(columns))
+        together = np.concatenate([base, columns[kept]])
+        fitted[kept], unsure[kept] = normal.fit(together)[0][len(base) :, 0], normal.errors(together)[len(base) :]
+        keep, admissible = within_bounds(candidate.effect, fitted, unsure, vehicle)
         if not admissible or not (kept & keep).any():
             return Scored(candidate, columns, REFUSED, before, fitted)
         if (kept & keep == kept).all():

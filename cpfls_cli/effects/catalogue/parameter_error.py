@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
 
@@ -14,12 +15,16 @@ from cpfls_cli.effects.signals import Signals
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     moments = np.array(signals.vehicle.inertia_kg_m2[:3])
     turning = (moments * signals.body_rate)[:, :, None] * np.eye(3)
-    momentum = np.zeros((len(signals), 6, 7))
+    momentum = np.zeros((len(signals), 6, 10))
     direct = np.zeros_like(momentum)
     momentum[:, :3, :3] = -turning
     direct[:, :3, :3] = -np.cross(signals.body_rate[:, :, None], turning, axis=1)
     direct[:, :3, 3:6] = -_coupling(signals.body_rate, moments)[:, :, None] * np.eye(3)
     direct[:, 5, 6] = signals.wrench[:, 5]
+    # A point at r moves with omega' x r + omega x (omega x r) beyond the centre of mass.
+    levers = np.cross(signals.body_rate[:, :, None], signals.vehicle.mass_kg * np.eye(3), axis=1)
+    momentum[:, 3:, 7:] = levers
+    direct[:, 3:, 7:] = np.cross(signals.body_rate[:, :, None], levers, axis=1)
     return Columns(direct, momentum)
 
 
@@ -54,6 +59,17 @@ EFFECT = Effect(
             for axis in "xyz"
         ),
         Coefficient("thrust_scale", "1", -0.9, 3.0, "true thrust over that of the model, less 1; seen in force only"),
+        *(
+            Coefficient(
+                f"reference_{axis}",
+                "m",
+                -1.0,
+                1.0,
+                "where acceleration or velocity is measured, relative to the centre of mass; seen in force only",
+                scales.arm,
+            )
+            for axis in "xyz"
+        ),
     ),
     needs=frozenset({"torque"}),
     excitation="roll, pitch and yaw sweeps; hover, with a known mass, for the thrust",

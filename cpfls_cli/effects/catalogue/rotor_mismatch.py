@@ -93,7 +93,11 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     drag = np.zeros((len(signals), 3))
     drag[:, 2] = signals.speed**2 @ [rotor.drag_factor_n_m_s2 for rotor in signals.vehicle.rotors]
     thrusts = (signals.rotor_thrust * mode for mode in gain_modes(signals.vehicle).T)
-    return Columns(stack(*(thrust_wrench(signals.hubs, thrust) for thrust in thrusts), wrench(drag)))
+    # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force tells.
+    lift = np.zeros((len(signals), 3))
+    lift[:, 2] = signals.rotor_thrust @ signals.spins
+    levers = (thrust_wrench(signals.hubs, thrust) for thrust in thrusts)
+    return Columns(stack(*levers, wrench(drag), wrench(force=lift)))
 
 
 EFFECT = Effect(
@@ -107,6 +111,13 @@ EFFECT = Effect(
         Coefficient("difference_2", "1", -0.25, 0.25, "kappa of the second opposite pair, first rotor less second"),
         Coefficient(
             "drag_imbalance", "1", -0.5, 0.5, "clockwise rotors drag this much more than modelled, the others less"
+        ),
+        Coefficient(
+            "lift_imbalance",
+            "1",
+            -0.25,
+            0.25,
+            "counter-clockwise rotors pull this much more, the others less; force only",
         ),
     ),
     needs=frozenset({"rotor_speed"}),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, stack, wrench
 from cpfls_cli.effects.signals import Signals
@@ -11,18 +13,33 @@ from cpfls_cli.effects.signals import Signals
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     total = signals.speed.sum(axis=1, keepdims=True)
-    return Columns(stack(wrench(-total * signals.body_rate * [1.0, 1.0, 0.0])))
+    damping = -total * signals.body_rate * [1.0, 1.0, 0.0]
+    # Thrust that leans with the disc; its lever about roll and pitch is part of the damping already.
+    p, q = signals.body_rate[:, 0], signals.body_rate[:, 1]
+    lean = np.column_stack([-q, p, np.zeros(len(signals))])
+    arms = signals.speed @ signals.hubs
+    yaw = np.zeros((len(signals), 3))
+    yaw[:, 2] = arms[:, 0] * p + arms[:, 1] * q
+    return Columns(stack(wrench(damping), wrench(yaw, total * lean)))
 
 
 EFFECT = Effect(
     name="rotor_plane_damping",
     title="rotor-plane damping",
     kind="wrench",
-    formula="M = -k_w sum(w_i) (p, q, 0)",
+    formula="M = -k_w sum(w_i) (p, q, 0),  F_i = k_F w_i (-q, p, 0)",
     sentence="The rotor discs tilt late behind a rolling or pitching body, and brake it the more the faster they spin.",
     coefficients=(
         Coefficient(
             "k_w", "N m s^2/rad^2", 0.0, 1.0, "damping per rotor speed and rate", scales.inertia_per_rotor_speed
+        ),
+        Coefficient(
+            "k_F",
+            "N s^2/rad^2",
+            0.0,
+            20.0,
+            "sideways force of the leaning thrust; only the force balance shows it",
+            scales.lean_per_rotor_speed,
         ),
     ),
     needs=frozenset({"rotor_speed"}),

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.special import eval_sh_legendre
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, thrust_wrench
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, thrust_wrench
 from cpfls_cli.effects.signals import Signals
 
 _AIR_DENSITY = 1.225
 _LARGEST_RATIO = 2.5
-_ORDER = 4
+_KNOTS = (0.0, 0.5, 1.0, 1.25, 1.6, 2.0, 2.5)
+_SHAKING = (0.5, 1.7)
 _STATES = ((0.5, "normal working state"), (1.6, "vortex ring"), (2.0, "turbulent wake"), (np.inf, "windmill brake"))
 
 
@@ -71,9 +71,9 @@ def descent_state(ratio: float) -> str:
 
 
 def thrust_basis(ratio: Array) -> Array:
-    """Evaluate the columns, ``f_n(x) = t P_{n-1}(2t - 1)`` with ``t = x / 2.5`` and Legendre polynomials P.
+    """Evaluate a hat function for each knot: 1 there, 0 at its neighbours and beyond, and 0 without descent.
 
-    They span ``x, x^2, x^3, x^4``, vanish without descent, and are far less alike than the powers.
+    Hats are local, so that a ratio that no flight has reached says nothing about the others.
 
     Parameters
     ----------
@@ -81,29 +81,40 @@ def thrust_basis(ratio: Array) -> Array:
 
     Returns
     -------
-    array, shape (..., 4)
+    array, shape (..., 6)
     """
-    scaled = np.asarray(ratio)[..., None] / _LARGEST_RATIO
-    return np.asarray(scaled * eval_sh_legendre(np.arange(_ORDER), scaled))
+    hats = [np.interp(ratio, _KNOTS, unit) for unit in np.eye(len(_KNOTS))[1:]]
+    return np.stack(hats, axis=-1)
 
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    # Forward flight leaves the wake behind: at v_h sideways a third of the effect is left, at 2 v_h nothing.
+def _gated_thrust(signals: Signals, shape: Mapping[str, float]) -> Array:
+    # Forward flight leaves the wake behind: how fast is enough, no two sources agree on.
     sideways = np.linalg.norm(signals.hub_velocity[..., :2], axis=-1) / induced_velocity(signals)
-    thrust = signals.rotor_thrust * np.exp(-(sideways**2))
-    change = thrust[..., None] * thrust_basis(descent_ratio(signals))
-    return Columns(np.stack([thrust_wrench(signals.hubs, change[..., n]) for n in range(_ORDER)], axis=2))
+    return np.asarray(signals.rotor_thrust * np.exp(-((sideways / shape["sideways"]) ** 2)))
+
+
+def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    change = _gated_thrust(signals, shape)[..., None] * thrust_basis(descent_ratio(signals))
+    return Columns(np.stack([thrust_wrench(signals.hubs, change[..., n]) for n in range(change.shape[2])], axis=2))
+
+
+def _scatter(signals: Signals, shape: Mapping[str, float]) -> Array:
+    ratio = descent_ratio(signals)
+    shaken = _gated_thrust(signals, shape) * ((ratio > _SHAKING[0]) & (ratio < _SHAKING[1]))
+    levers = np.column_stack([signals.hubs[:, 1], -signals.hubs[:, 0], np.zeros(len(signals.hubs))])
+    per_thrust = np.concatenate([levers, np.tile([0.0, 0.0, 1.0], (len(levers), 1))], axis=1)
+    return np.asarray(shaken**2 @ per_thrust**2)
 
 
 EFFECT = Effect(
     name="vertical_descent",
     title="vertical descent (vortex ring, turbulent wake, windmill brake)",
     kind="wrench",
-    formula="dT_i = T_i exp(-(u_xy/v_h)^2) sum a_n t P_n-1(2t - 1),  t = x_i/2.5,  x_i = max(-u_iz/v_h, 0)",
+    formula="dT_i = T_i exp(-(u_xy/(s v_h))^2) f(x_i),  f linear between knots, f(0) = 0,  x_i = max(-u_iz/v_h, 0)",
     sentence="A vehicle that sinks into its own wake loses thrust and shakes; sinking faster, it gains thrust.",
     coefficients=tuple(
-        Coefficient(f"a_{n + 1}", "1", -3.0, 3.0, f"share of thrust, polynomial of degree {n + 1}")
-        for n in range(_ORDER)
+        Coefficient(f"f_{knot:g}".replace(".", "_"), "1", -0.8, 1.5, f"share of thrust gained at x = {knot:g}")
+        for knot in _KNOTS[1:]
     ),
     needs=frozenset({"velocity", "rotor_speed", "rotor_radius"}),
     excitation="vertical descents in steps up to twice the induced velocity, then the same with forward speed",
@@ -114,4 +125,6 @@ EFFECT = Effect(
     },
     source="Bauersfeld et al. 2021, NeuroBEM, eq. 19; Bangura and Mahony (0.5 < x < 2); the sources disagree in sign",
     columns=_columns,
+    shapes=(Shape("sideways", "1", (0.4, 0.7, 1.0, 1.5), "sideways speed over v_h that blows the effect away"),),
+    scatter=_scatter,
 )

@@ -1,0 +1,167 @@
+"""Comparison: where a model and flights disagree, on which axis, when, in which state, and what was never flown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.audit import Audit, audit
+from cpfls_cli.gap.balance_system import System
+from cpfls_cli.gap.dependence import Dependence, rank_dependence
+from cpfls_cli.gap.diagnose import Recording, common_windows
+from cpfls_cli.gap.extended import ExtendedModel
+from cpfls_cli.gap.heat_map import HeatMap, heat_map
+from cpfls_cli.gap.results import NotExcited
+from cpfls_cli.gap.search import best_floor, block_index
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.state_signals import joined_states, state_signals
+from cpfls_cli.gap.stretches import Stretch, stretches
+from cpfls_cli.gap.unseen import not_excited
+from cpfls_cli.gap.weak_flight import CHANNELS, WeakFlight, weak_flight
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The channel with the largest gap over the two signals that tell most about it.
+
+    Attributes
+    ----------
+    channel : str
+    signals : tuple of str
+    heat_map : HeatMap
+        Of the gap in N m or N.
+    """
+
+    channel: str
+    signals: tuple[str, str]
+    heat_map: HeatMap
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """Where a model and flights disagree.
+
+    Attributes
+    ----------
+    audit : Audit
+    rms, floor, activity : array, shape (6,), N m and N
+        Of the gap, of noise, and of what moves the vehicle; NaN where unknown.
+    residual : array, shape (window, 6), N m and N
+        NaN where unknown.
+    centres : array, shape (window,), s
+    flight_index : array of int, shape (window,)
+    states : mapping of str to array, shape (window,)
+    stretches : tuple of Stretch
+    dependence : tuple of Dependence
+    worst : Worst or None
+        None where no two signals tell anything.
+    not_excited : tuple of NotExcited
+    """
+
+    audit: Audit
+    rms: Array
+    floor: Array
+    activity: Array
+    residual: Array
+    centres: Array
+    flight_index: IntArray
+    states: dict[str, Array]
+    stretches: tuple[Stretch, ...]
+    dependence: tuple[Dependence, ...]
+    worst: Worst | None
+    not_excited: tuple[NotExcited, ...]
+
+    @property
+    def floors(self) -> Array:
+        """Gap of each channel in floors, shape (6,); NaN where unknown."""
+        return np.asarray(self.rms / self.floor)
+
+
+def compare(
+    recordings: Sequence[Recording],
+    model: ExtendedModel,
+    settings: GapSettings,
+    rng: np.random.Generator,
+    progress: Callable[[float, str], None] = lambda _done, _note: None,
+) -> Disagreement:
+    """Compare a model with flights.
+
+    Faults of the sensors are repaired where they are sure; the gap is that of the model with its own numbers.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    model : ExtendedModel
+    settings : GapSettings
+    rng : numpy.random.Generator
+        Of the shifts that say what chance explains.
+    progress : callable
+        Takes the share of the work that is done and a note.
+
+    Returns
+    -------
+    Disagreement
+
+    Raises
+    ------
+    InputError
+        If the flights are too short or of different rates, or lack a signal that the model needs.
+    """
+    own = common_windows(recordings, settings)
+    progress(0.0, "sensor audit")
+    checked = model.audit or audit([recording.signals for recording in recordings], own)
+    flights = [weak_flight(r.name, checked.repaired(r.signals), own, model.base, settings.force) for r in recordings]
+    progress(0.3, "noise floor")
+    hypothesis = model.system(flights)
+    floor = best_floor(hypothesis)
+    residual = model.residual(flights)
+    progress(0.5, "what the gap follows")
+    states = joined_states([state_signals(f, s) for f, s in zip(flights, hypothesis.signals, strict=True)])
+    block = block_index(hypothesis, settings)
+    centres = np.concatenate([own.centres(flight.signals.time) for flight in flights])
+    index = hypothesis.flight_index
+    dependence = rank_dependence(residual / floor, index, block, states, settings.shifts, rng)
+    known = _known(flights)
+    rms = _rms(residual, known)
+    effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
+    return Disagreement(
+        checked,
+        rms,
+        np.where(known.any(axis=0), floor, np.nan),
+        _rms(_activity(hypothesis), known),
+        np.where(known, residual, np.nan),
+        centres,
+        index,
+        states,
+        stretches(residual / floor, centres, index),
+        dependence,
+        _worst(residual, rms / floor, dependence, states),
+        not_excited(hypothesis, effects, floor),
+    )
+
+
+def _known(flights: Sequence[WeakFlight]) -> Array:
+    return np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in flights])
+
+
+def _rms(rows: Array, known: Array) -> Array:
+    count = known.sum(axis=0)
+    square = (rows**2 * known).sum(axis=0) / np.maximum(count, 1)
+    return np.asarray(np.sqrt(np.where(count > 0, square, np.nan)))
+
+
+def _activity(hypothesis: System) -> Array:
+    return np.concatenate([flight.averaged(flight.inertial) for flight in hypothesis.flights])
+
+
+def _worst(residual: Array, floors: Array, dependence: Sequence[Dependence], states: dict[str, Array]) -> Worst | None:
+    place = int(np.nanargmax(floors))
+    names = [found.signal for found in dependence if found.channel == CHANNELS[place]][:2]
+    if len(names) < 2:
+        return None
+    first, second = names
+    return Worst(CHANNELS[place], (first, second), heat_map(residual[:, place], states[first], states[second]))

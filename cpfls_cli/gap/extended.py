@@ -1,0 +1,209 @@
+"""A model with effects in it: rigid body or identified model, its numbers refitted, and what it missed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import Columns
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
+from cpfls_cli.gap.audit import Audit
+from cpfls_cli.gap.balance_system import System, is_free, system
+from cpfls_cli.gap.inertial import InertiaModel, rotation_balance
+from cpfls_cli.gap.weak_flight import Candidate, WeakFlight, actuated, columns_of, nuisance
+
+
+class FittedEffect(NamedTuple):
+    """An effect of a model.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    linear : array, shape (coefficient,)
+        Of its columns; empty where everything is in the shape.
+    """
+
+    candidate: Candidate
+    linear: Array
+
+
+@dataclass(frozen=True)
+class ExtendedModel:
+    """A model with effects; without any and with zero parameters it is the base.
+
+    Attributes
+    ----------
+    base : InertiaModel or None
+        None for the rigid body of the vehicle.
+    parameters : array, shape (parameter,)
+        Relative errors of the vehicle's own numbers, in the order of the effect ``parameter_error``.
+    effects : tuple of FittedEffect
+    audit : Audit or None
+        Faults of the sensors, which are taken out of signals first.
+    """
+
+    base: InertiaModel | None
+    parameters: Array
+    effects: tuple[FittedEffect, ...] = ()
+    audit: Audit | None = None
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """Effects with their shapes."""
+        return tuple(effect.candidate for effect in self.effects)
+
+    @property
+    def linear(self) -> Array:
+        """Coefficients in the order of `System.base`."""
+        return np.concatenate([self.parameters, *(e.linear for e in self.effects if is_free(e.candidate))])
+
+    def repaired(self, signals: Signals) -> Signals:
+        """Take the faults of the sensors out.
+
+        Parameters
+        ----------
+        signals : Signals
+
+        Returns
+        -------
+        Signals
+        """
+        return signals if self.audit is None else self.audit.repaired(signals)
+
+    def system(self, flights: Sequence[WeakFlight]) -> System:
+        """Set up the balance of flights under the model's effects.
+
+        Parameters
+        ----------
+        flights : sequence of WeakFlight
+            Made with `base`, of repaired signals.
+
+        Returns
+        -------
+        System
+
+        Raises
+        ------
+        InputError
+            If a flight lacks a signal that an effect needs.
+        """
+        for flight in flights:
+            _require(flight.signals, self.chosen, flight.name)
+        return system(flights, self.chosen)
+
+    def residual(self, flights: Sequence[WeakFlight]) -> Array:
+        """Compute the gap that the model leaves.
+
+        Parameters
+        ----------
+        flights : sequence of WeakFlight
+
+        Returns
+        -------
+        array, shape (window, 6), N m and N
+        """
+        hypothesis = self.system(flights)
+        return np.asarray(hypothesis.residual - hypothesis.base @ self.linear)
+
+    def effect_wrench(self, signals: Signals) -> Array:
+        """Compute what the effects do, sample by sample.
+
+        Momentum parts are differentiated by a cubic spline, so noise of the signals shows in them.
+
+        Parameters
+        ----------
+        signals : Signals
+            With the faults of sensors taken out.
+
+        Returns
+        -------
+        array, shape (time, 6), N m and N
+            Body torque and force beyond those of the rotors as logged.
+        """
+        _require(signals, self.chosen, "the flight")
+        moved = actuated(signals, self.chosen)
+        total = moved.wrench - signals.wrench
+        for candidate, linear in self.effects:
+            if candidate.effect.kind == "wrench":
+                own = linear if is_free(candidate) else np.ones(1)
+                total = total + instantaneous(columns_of(candidate, moved), own, signals.time)
+        return np.asarray(total)
+
+    def inertial_torque(self, signals: Signals) -> Array:
+        """Compute the torque that the motion takes, with the inertia refitted.
+
+        Parameters
+        ----------
+        signals : Signals
+            With the faults of sensors taken out.
+
+        Returns
+        -------
+        array, shape (time, 3), N m, body frame
+        """
+        balance = rotation_balance(signals, self.base)
+        torque = balance.direct + CubicSpline(signals.time, balance.momentum)(signals.time, 1)
+        refitted = instantaneous(columns_of(nuisance(), signals), self.parameters, signals.time)
+        return np.asarray(torque - refitted[:, :3])
+
+    def rotor_torque(self, signals: Signals) -> Array:
+        """Compute the body torque that the rotors as logged have to give for the motion.
+
+        Parameters
+        ----------
+        signals : Signals
+            With the faults of sensors taken out.
+
+        Returns
+        -------
+        array, shape (time, 3), N m, body frame
+        """
+        return np.asarray(self.inertial_torque(signals) - self.effect_wrench(signals)[:, :3])
+
+
+def plain(base: InertiaModel | None) -> ExtendedModel:
+    """Make a model without effects.
+
+    Parameters
+    ----------
+    base : InertiaModel or None
+
+    Returns
+    -------
+    ExtendedModel
+    """
+    return ExtendedModel(base, np.zeros(len(nuisance().effect.coefficients)))
+
+
+def instantaneous(columns: Columns, coefficients: Array, time: Array) -> Array:
+    """Evaluate columns sample by sample, ``direct @ c + d/dt (momentum @ c)``.
+
+    Parameters
+    ----------
+    columns : Columns
+        Of shape (time, 6, coefficient).
+    coefficients : array, shape (coefficient,)
+    time : array, shape (time,), s
+
+    Returns
+    -------
+    array, shape (time, 6)
+    """
+    direct = columns.direct @ coefficients
+    if columns.momentum is None:
+        return np.asarray(direct)
+    return np.asarray(direct + CubicSpline(time, columns.momentum @ coefficients)(time, 1))
+
+
+def _require(signals: Signals, chosen: Sequence[Candidate], name: str) -> None:
+    for candidate in chosen:
+        missing = candidate.effect.missing(signals)
+        if missing:
+            lacking = ", ".join(each.replace("_", " ") for each in missing)
+            raise InputError(f"{name}: lacks {lacking}, which the model's effect {candidate.effect.name} needs")
