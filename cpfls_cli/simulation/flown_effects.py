@@ -13,6 +13,9 @@ from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import SettingError
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+MEASURING_POINT = ("reference_x", "reference_y", "reference_z")
+"""Coefficients of parameter_error: the point whose motion is logged, relative to the centre of mass, body frame, m."""
+
 _HIDING_SPEEDS = frozenset({"motor_lag", "command_delay", "battery_sag"})
 
 
@@ -37,6 +40,12 @@ class FlownEffect:
             return np.ones(1)
         physical = np.array([self.values[coefficient.name] for coefficient in self.effect.coefficients])
         return physical if self.effect.linear is None else self.effect.linear(physical)
+
+    @property
+    def acting(self) -> Array:
+        """The same with 0 for what acts on the log alone: the place where motion is measured."""
+        measured = [coefficient.name in MEASURING_POINT for coefficient in self.effect.coefficients]
+        return np.where(measured, 0.0, self.linear) if any(measured) else self.linear
 
     @property
     def shape(self) -> Mapping[str, float]:

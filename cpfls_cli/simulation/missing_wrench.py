@@ -49,7 +49,7 @@ class MissingWrench:
         """
         total = np.zeros(6)
         for one in self.flown:
-            total += _columns(one, signals).direct[0] @ one.linear
+            total += _columns(one, signals).direct[0] @ one.acting
         return total
 
 
@@ -86,7 +86,7 @@ def _momentum(flown: tuple[FlownEffect, ...], signals: Signals) -> Array:
     for one in flown:
         momentum = _columns(one, signals).momentum
         if momentum is not None:
-            total += momentum[0, :3] @ one.linear
+            total += momentum[0, :3] @ one.acting
     return total
 
 

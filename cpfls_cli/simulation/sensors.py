@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.actuation import delayed
 from cpfls_cli.simulation.closed_loop import FlownMotion
-from cpfls_cli.simulation.flown_effects import FlownEffects
+from cpfls_cli.simulation.flown_effects import MEASURING_POINT, FlownEffects
 from cpfls_cli.simulation.noise import noisy
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.simulation.settings import SimulationSettings
@@ -59,15 +61,28 @@ def _motion(motion: FlownMotion, effects: FlownEffects) -> dict[str, Array]:
     attitude, body_rate = motion.state[:, ATTITUDE], motion.state[:, BODY_RATE]
     rate = rotations.attitude_rate(attitude, body_rate)
     turning = rotations.multiply(rotations.euler_rate_matrix_derivative(attitude, rate), rate)
+    position, velocity, acceleration = _translation(motion, effects)
     return {
         "attitude": attitude,
         "attitude_rate": rate,
         "attitude_acceleration": rotations.attitude_rate(attitude, motion.change[:, BODY_RATE] - turning),
-        "position": motion.state[:, POSITION],
-        "velocity": motion.state[:, VELOCITY],
-        "acceleration": motion.change[:, VELOCITY],
+        "position": position,
+        "velocity": velocity,
+        "acceleration": acceleration,
         "body_rate": gyro(body_rate, effects),
     }
+
+
+def _translation(motion: FlownMotion, effects: FlownEffects) -> Iterator[Array]:
+    """Log position, velocity and acceleration of a point of the body, ``v + omega x r`` and so on."""
+    wrong = effects.values("parameter_error") or {}
+    point = np.array([wrong.get(name, 0.0) for name in MEASURING_POINT])
+    body_rate, turning = motion.state[:, BODY_RATE], motion.change[:, BODY_RATE]
+    moving = np.cross(body_rate, point)
+    beside = (np.tile(point, (len(body_rate), 1)), moving, np.cross(turning, point) + np.cross(body_rate, moving))
+    rotation = rotations.rotation_matrix(motion.state[:, ATTITUDE])
+    centre = (motion.state[:, POSITION], motion.state[:, VELOCITY], motion.change[:, VELOCITY])
+    return (known + rotations.multiply(rotation, more) for known, more in zip(centre, beside, strict=True))
 
 
 def gyro(body_rate: Array, effects: FlownEffects) -> Array:

@@ -18,36 +18,17 @@ from cpfls_cli.vehicle import RotorSettings, VehicleSettings
 HUBS = (((0.3, 0.0, 0.05), 1), ((0.0, -0.3, 0.05), -1), ((-0.3, 0.0, 0.05), 1), ((0.0, 0.3, 0.05), -1))
 VEHICLE = VehicleSettings(rotors=tuple(RotorSettings(position_m=hub, spin=spin, radius_m=0.2) for hub, spin in HUBS))
 PERIOD = 0.01
-TYPICAL = {
-    "linear_damping": [0.12, 0.12, 0.06],
-    "quadratic_damping": [0.05, 0.05, 0.02],
-    "rotor_plane_damping": [1e-4],
-    "rotor_drag": [1.3e-3],
-    "flapping_moment": [6e-5],
-    "rolling_moment": [2e-4],
-    "inflow": [2e-3],
-    "translational_lift": [0.05],
-    "parasitic_drag": [0.05, 0.04, 0.03, 0.004, 0.01, -0.006],
-    "ground_effect": [4.0],
-    "vertical_descent": [-0.4, 0.2, 0.1, -0.1],
-    "wind": [1.3e-3, 3.0, -2.0],
-    "rotor_gyroscopic": [1e-3],
-    "rotor_acceleration": [5e-4],
-    "motor_lag": [0.04],
-    "command_delay": [0.025],
-    "battery_sag": [2.0],
-    "com_offset": [0.01, -0.008],
-    "products_of_inertia": [0.03, -0.02, 0.02],
-    "rotor_mismatch": [0.05, -0.04, 0.02],
-    "torque_bias": [0.2, -0.1, 0.05],
-    "payload": [0.05, 0.5, 1.0, 0.2],
-    "euler_axis_torque": [],
-    "gyro_bias": [0.02, -0.01, 0.03],
-    "gyro_scale": [0.02, -0.01, 0.03],
-    "imu_misalignment": [0.02, -0.01, 0.03],
-    "channel_delay": [0.025],
-    "parameter_error": {"inertia_x": 0.05, "inertia_y": -0.05, "inertia_z": 0.1, "thrust_scale": -0.03},
-}
+
+
+def typical(name):
+    """A twentieth of what is possible, to one side and the other in turn; of shapes, what lies in the middle."""
+    values = {}
+    for place, entry in enumerate(CATALOGUE[name].coefficients):
+        low, high = entry.bounds(VEHICLE)
+        values[entry.name] = 0.05 * (low if place % 2 and low < 0 else high)
+    return values | {shape.name: shape.grid[len(shape.grid) // 2] for shape in CATALOGUE[name].shapes}
+
+
 SEEN_BY_BALANCE = [name for name, effect in CATALOGUE.items() if effect.columns is not None]
 
 
@@ -122,13 +103,9 @@ def test_path_is_followed_and_no_rotor_is_clipped(plain):
     assert plain.violations == ()
 
 
-def test_typical_values_cover_the_catalogue():
-    assert set(TYPICAL) == set(CATALOGUE)
-
-
 @pytest.mark.parametrize("name", SEEN_BY_BALANCE)
 def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
-    flight = flown(effects={name: TYPICAL[name]})
+    flight = flown(effects={name: typical(name)})
     (one,) = flight.effects.flown
     signals = signals_of(flight)
     weak, left = balance(signals)
@@ -137,7 +114,7 @@ def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
         expected = left - weak.averaged(weak.residual(corrected))
     else:
         expected = weak.averaged(one.effect.columns(signals, one.shape)) @ one.linear
-    assert rms(expected)[:3].max() > 1e-3
+    assert rms(expected).max() > 2e-3
     # The log shows what is late only at its samples, with a straight line between them.
     between = 20 if one.effect.kind == "actuator" else 1
     np.testing.assert_array_less(rms(left - expected), between * np.array([2e-5] * 3 + [2e-4] * 3))
@@ -170,8 +147,8 @@ def test_momentum_of_every_effect_is_linear_in_rates_and_rotor_speeds():
     ],
 )
 def test_faulty_gyro_reads_what_the_catalogue_says_and_the_flight_is_the_same(name, reading, plain):
-    faulty = flown(effects={name: TYPICAL[name]})
-    expected = reading(plain.signals["body_rate"], np.array(TYPICAL[name]))
+    faulty = flown(effects={name: typical(name)})
+    expected = reading(plain.signals["body_rate"], np.array(list(typical(name).values())))
     np.testing.assert_allclose(faulty.signals["body_rate"], expected, atol=1e-12)
     np.testing.assert_array_equal(faulty.signals["attitude"], plain.signals["attitude"])
 
@@ -205,7 +182,7 @@ def test_rotors_lag_behind_the_command(plain):
 
 @pytest.mark.parametrize("name", ["motor_lag", "command_delay", "battery_sag"])
 def test_actuator_effects_hide_the_rotor_speed(name):
-    logged = flown(0.5, effects={name: TYPICAL[name]}).signals
+    logged = flown(0.5, effects={name: typical(name)}).signals
     assert "rotor_speed" not in logged
     assert ("voltage" in logged) == (name == "battery_sag")
 
@@ -217,7 +194,7 @@ def test_battery_empties_by_the_share_that_was_asked_for():
 
 def test_effects_add_up():
     names = ("com_offset", "rotor_drag", "products_of_inertia", "rotor_acceleration")
-    flight = flown(effects={name: TYPICAL[name] for name in names})
+    flight = flown(effects={name: typical(name) for name in names})
     signals = signals_of(flight)
     weak, left = balance(signals)
     expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in flight.effects.flown)
