@@ -154,14 +154,15 @@ def _held_rotation(signals: Signals, starts: IntArray, rate: Array, horizon: int
 
 
 def _compared(signals: Signals, starts: IntArray, runs: Iterable[tuple[Array, Array | None]]) -> ReplayError:
-    rates, attitudes = [], []
+    rates: list[Array] = []
+    attitudes: list[Array] = []
     for step, (rate, rotation) in enumerate(runs, start=1):
         at = starts + step
         rates.append(_rms(rate - signals.body_rate[at]))
         if rotation is not None:
             away = signals.rotation[at].swapaxes(1, 2) @ rotation
             attitudes.append(_rms(Rotation.from_matrix(away).as_rotvec()))
-    horizon_s = signals.period * np.arange(1, len(rates) + 1)
+    horizon_s: Array = signals.period * np.arange(1, len(rates) + 1, dtype=float)
     return ReplayError(horizon_s, np.array(rates), np.array(attitudes) if attitudes else None, len(starts))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.rate_equation import ReplayModel, free_runs
 from cpfls_cli.gap.replay import start_rate, start_samples
@@ -63,17 +63,22 @@ def worst_stretch(
     samples = max(1, round(run_s / signals.period))
     starts = start_samples(signals, samples, samples - 1)
     measured = signals.body_rate[starts[:, None] + np.arange(samples)]
-    simulated = [_runs(signals, model, starts, samples) for model in (before, after)]
-    square = ((simulated[0] - measured) ** 2).sum(axis=1)
+    simulated, exchanged = (_runs(signals, model, starts, samples) for model in (before, after))
+    square = ((simulated - measured) ** 2).sum(axis=1)
     joined = min(len(starts), max(1, round(length_s / run_s)))
     first = int(np.convolve(square.sum(axis=1), np.ones(joined), mode="valid").argmax())
     runs = slice(first, first + joined)
-    time = signals.time[starts[runs, None] + np.arange(samples)].ravel()
-    rates = [values[runs].reshape(-1, 3) for values in (measured, *simulated)]
-    return WorstStretch(time, *rates, signals.time[starts[runs]], int(square[runs].sum(axis=0).argmax()))
+    return WorstStretch(
+        time=signals.time[starts[runs, None] + np.arange(samples)].ravel(),
+        measured=measured[runs].reshape(-1, 3),
+        before=simulated[runs].reshape(-1, 3),
+        after=exchanged[runs].reshape(-1, 3),
+        restarts=signals.time[starts[runs]],
+        axis=int(square[runs].sum(axis=0).argmax()),
+    )
 
 
-def _runs(signals: Signals, model: ReplayModel, starts: Array, samples: int) -> Array:
+def _runs(signals: Signals, model: ReplayModel, starts: IntArray, samples: int) -> Array:
     """Simulate every run, its start included, shape (run, sample, 3)."""
     rate = start_rate(signals)[starts]
     steps = [step for step, _ in free_runs(model, signals, starts, rate, samples - 1)]
