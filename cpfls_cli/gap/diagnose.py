@@ -32,6 +32,9 @@ from cpfls_cli.gap.windows import Windows, windows
 _FEWEST_WINDOWS = 16
 _EXCITED_FLOORS = 3.0
 
+_SAME_RATE = 1e-3
+"""Relative difference of sampling periods that clocks of one logger have, and that no floor shows."""
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -148,7 +151,7 @@ def common_windows(recordings: Sequence[Recording], settings: GapSettings) -> Wi
     period = recordings[0].signals.period
     for recording in recordings:
         other = recording.signals.period
-        if abs(other - period) > 1e-6 * period + 1e-9:
+        if abs(other - period) > _SAME_RATE * period:
             raise InputError(
                 f"{recording.name}: sampled at {1 / other:.6g} Hz, {recordings[0].name} at {1 / period:.6g} Hz; set "
                 "import.rate_hz to one rate for all flights"

@@ -32,7 +32,8 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
     -------
     tuple of NotExcited
     """
-    names = {candidate.effect.name for candidate in hypothesis.chosen}
+    # The vehicle's own numbers are free in every fit, so beyond themselves they never show.
+    names = {candidate.effect.name for candidate in hypothesis.free} | {c.effect.name for c in hypothesis.chosen}
     found = ((effect.name, _reason(hypothesis, effect, floor)) for effect in effects if effect.name not in names)
     return tuple(NotExcited(name, reason) for name, reason in found if reason)
 
