@@ -175,9 +175,10 @@ EFFECTS = (
     text("shape/name", "shape", "what the effect depends on nonlinearly"),
     number("shape/value", ("shape",), "value of the shape", "SI"),
     text("parameter/name", "parameter", "numbers of the vehicle, refitted with the effects"),
-    number("parameter/value", ("parameter",), "relative error: true over that of the model, less 1"),
-    gappy("parameter/low", ("parameter",), "lower end of the 95 % interval"),
-    gappy("parameter/high", ("parameter",), "upper end of the 95 % interval"),
+    text("parameter/unit", "parameter", "1 for a relative error: true over that of the model, less 1"),
+    number("parameter/value", ("parameter",), "estimate", "SI"),
+    gappy("parameter/low", ("parameter",), "lower end of the 95 % interval", "SI"),
+    gappy("parameter/high", ("parameter",), "upper end of the 95 % interval", "SI"),
 )
 """Effects with all their numbers, enough to evaluate them."""
 

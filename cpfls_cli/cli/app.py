@@ -33,6 +33,17 @@ LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help="Flight log, .c
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`.")]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
+FlightsArgument = Annotated[
+    list[Path], typer.Argument(metavar="FLIGHT...", help="Flights, or logs (.csv, .csv.gz) that the config describes.")
+]
+ModelOption = Annotated[
+    Path | None,
+    typer.Option("--model", metavar="MODEL", help="Made by `cpfls identify`; without, the vehicle of the config."),
+]
+HeldOutOption = Annotated[
+    list[Path] | None,
+    typer.Option("--held-out", metavar="FLIGHT", help="Judge on this flight, learn nothing of it; may be repeated."),
+]
 
 
 def _version(asked: bool) -> None:
@@ -186,6 +197,21 @@ def report(config: ConfigArgument, artifacts: ArtifactsArgument, output: OutputO
         return stage.run(job, artifacts)
 
     _run("report", config, output, common, call)
+
+
+@app.command()
+@with_common
+def compare(
+    config: ConfigArgument, flights: FlightsArgument, output: OutputOption, model: ModelOption = None, *, common: Common
+) -> None:
+    """Find where a model and flights disagree."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import compare as stage
+
+        return stage.run(job, flights, model)
+
+    _run("compare", config, output, common, call)
 
 
 @app.command()

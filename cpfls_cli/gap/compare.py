@@ -132,7 +132,7 @@ def compare(
         checked,
         rms,
         np.where(known.any(axis=0), floor, np.nan),
-        _rms(_activity(hypothesis), known),
+        _activity(hypothesis, known),
         np.where(known, residual, np.nan),
         centres,
         index,
@@ -154,8 +154,12 @@ def _rms(rows: Array, known: Array) -> Array:
     return np.asarray(np.sqrt(np.where(count > 0, square, np.nan)))
 
 
-def _activity(hypothesis: System) -> Array:
-    return np.concatenate([flight.averaged(flight.inertial) for flight in hypothesis.flights])
+def _activity(hypothesis: System, known: Array) -> Array:
+    """Take the larger of what the motion takes and what the rotors give: one of them can be small."""
+    pairs = list(zip(hypothesis.flights, hypothesis.signals, strict=True))
+    taken = np.concatenate([flight.averaged(flight.inertial) for flight, _ in pairs])
+    given = np.concatenate([flight.windows.average(signals.wrench) for flight, signals in pairs])
+    return np.maximum(_rms(taken, known), _rms(given, known))
 
 
 def _worst(residual: Array, floors: Array, dependence: Sequence[Dependence], states: dict[str, Array]) -> Worst | None:

@@ -45,14 +45,36 @@ def run(job: Job, log: Path) -> Outcome:
         If a key of the section `import` does not suit the log; the message names both.
     """
     started = begin(job, {"log": log})
-    columns = read_csv(log, _wanted(job.study.import_))
-    with _naming(log), settings_of("import", job.study):
-        flight = _with_hints(_import(columns, job.study))
+    flight = _with_hints(imported(log, job.study))
     # An import is quick, and only the whole of it shows that every key suits the log.
     if started.dry_run is not None:
         return started.dry_run
-    finish(job, FLIGHT, {**_signals(flight), **_quality(flight), **_delay(flight)}, started.inputs)
+    finish(job, FLIGHT, {**flight_signals(flight), **_quality(flight), **_delay(flight)}, started.inputs)
     return _outcome(flight, job.study)
+
+
+def imported(log: Path, study: Study) -> ImportedFlight:
+    """Import a log in memory.
+
+    Parameters
+    ----------
+    log : Path
+    study : Study
+
+    Returns
+    -------
+    ImportedFlight
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read or lacks columns that the config names.
+    ConfigError
+        If a key of the section `import` does not suit the log.
+    """
+    columns = read_csv(log, _wanted(study.import_))
+    with _naming(log), settings_of("import", study):
+        return _import(columns, study)
 
 
 @contextmanager
@@ -83,7 +105,17 @@ def _wanted(settings: ImportSettings) -> set[str]:
     return {settings.time_column} | {column for signal in settings.signals.values() for column in signal.columns}
 
 
-def _signals(flight: ImportedFlight) -> dict[str, Array]:
+def flight_signals(flight: ImportedFlight) -> dict[str, Array]:
+    """Arrange the signals of an import as datasets of a flight.
+
+    Parameters
+    ----------
+    flight : ImportedFlight
+
+    Returns
+    -------
+    dict of str to array
+    """
     names = [spec.path for spec in FLIGHT.datasets if "/" not in spec.path]
     return {name: values for name in names if (values := getattr(flight, name)) is not None}
 
@@ -125,7 +157,7 @@ def _outcome(flight: ImportedFlight, study: Study) -> Outcome:
         "saturated": dict(report.saturated),
         "delay_s": report.delay_s,
         "delay_r2": None if estimate is None else [float(value) for value in estimate.r2],
-        "signals": [name for name in _signals(flight) if name != "time"],
+        "signals": [name for name in flight_signals(flight) if name != "time"],
     }
     lines = [f"{report.samples} samples at {report.rate_hz:.4g} Hz from {report.samples_read} rows"]
     lines += [f"{what} ({count})" for what, count in found_and_done(report).items()]

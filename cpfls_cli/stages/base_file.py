@@ -1,0 +1,95 @@
+"""The model that flights are compared with: the vehicle of the config, an identified model, or one with effects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.artifacts.records import Artifact, Header
+from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.study import Study
+from cpfls_cli.identification.model import Model
+from cpfls_cli.stages.model_file import read_model
+from cpfls_cli.stages.same_vehicle import require_same_vehicle
+from cpfls_cli.stages.sources import read_good
+
+_COPIED = ("weights", "coefficients", "rigid_body", "input_range", "visited")
+
+
+def model_base(path: Path, study: Study) -> Artifact:
+    """Read an identified model as the base of a comparison.
+
+    Parameters
+    ----------
+    path : Path
+    study : Study
+
+    Returns
+    -------
+    Artifact
+
+    Raises
+    ------
+    InputError
+        If it was identified with another vehicle.
+    """
+    artifact = read_good(path, MODEL)
+    source = f"{path}: /config"
+    require_same_vehicle(path, validate(parse_config(artifact.header.config, source), source).vehicle, study.vehicle)
+    return artifact
+
+
+def base_data(model: Artifact | None) -> dict[str, Any]:
+    """Arrange a base as datasets.
+
+    Parameters
+    ----------
+    model : Artifact or None
+        None for the rigid body of the vehicle.
+
+    Returns
+    -------
+    dict of str to array
+    """
+    if model is None:
+        return {"base/kind": np.array("rigid-body")}
+    copied = {f"base/{name}": model.data[f"model/{name}"] for name in _COPIED}
+    return {"base/kind": np.array("model"), "base/config": np.array(model.header.config), **copied}
+
+
+def base_artifact(artifact: Artifact) -> Artifact | None:
+    """Take the identified model out of an artifact that was made with one.
+
+    Parameters
+    ----------
+    artifact : Artifact
+
+    Returns
+    -------
+    Artifact or None
+        With what prediction needs; None for the rigid body of the vehicle.
+    """
+    if artifact.text("base/kind") == "rigid-body":
+        return None
+    header = Header(artifact.header.version, artifact.header.seed, artifact.text("base/config"))
+    return Artifact(MODEL, header, {f"model/{name}": artifact.data[f"base/{name}"] for name in _COPIED})
+
+
+def base_model(model: Artifact | None, path: Path) -> Model | None:
+    """Rebuild the base.
+
+    Parameters
+    ----------
+    model : Artifact or None
+    path : Path
+        For messages.
+
+    Returns
+    -------
+    Model or None
+        None for the rigid body of the vehicle.
+    """
+    return None if model is None else read_model(model, path)

@@ -1,0 +1,126 @@
+"""Stage `compare`: where a model and flights disagree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+
+from cpfls_cli.artifacts.gap_formats import DISAGREEMENT
+from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.config.study import Study
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.errors import ConfigError
+from cpfls_cli.gap.compare import Disagreement, compare
+from cpfls_cli.gap.extended import plain
+from cpfls_cli.stages.base_file import base_data, base_model, model_base
+from cpfls_cli.stages.disagreement_file import disagreement_data
+from cpfls_cli.stages.disagreement_words import disagreement_lines, disagreement_summary
+from cpfls_cli.stages.flights_file import flights_data
+from cpfls_cli.stages.job import Job, Outcome, Progress, begin, finish
+from cpfls_cli.stages.recordings import Flights, read_flights
+from cpfls_cli.stages.study import generator
+
+
+def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
+    """Compare a model with flights and write where they disagree.
+
+    Parameters
+    ----------
+    job : Job
+    flights : sequence of Path
+        Artifacts, or logs that the config describes.
+    model : Path or None
+        An identified model; None for the rigid body of the vehicle.
+
+    Returns
+    -------
+    Outcome
+    """
+    started = begin(job, flight_roles("flight", flights) | ({} if model is None else {"model": model}))
+    check_ignored(job.study)
+    given = read_flights(flights, job.study)
+    base = None if model is None else model_base(model, job.study)
+    if started.dry_run is not None:
+        return started.dry_run
+    found = compared(job.study, given, base, model, progress_of(job.progress))
+    data = {
+        **disagreement_data(found, given),
+        **base_data(base),
+        **flights_data(given.recordings, ["given"] * len(flights)),
+    }
+    finish(job, DISAGREEMENT, data, started.inputs)
+    return Outcome(disagreement_summary(found, given), tuple(disagreement_lines(found, given)), given.warnings)
+
+
+def compared(
+    study: Study, given: Flights, base: Artifact | None, path: Path | None, progress: Callable[[float, str], None]
+) -> Disagreement:
+    """Compare a model with flights.
+
+    Parameters
+    ----------
+    study : Study
+    given : Flights
+    base : Artifact or None
+        The identified model.
+    path : Path or None
+        Of the identified model, for messages.
+    progress : callable
+
+    Returns
+    -------
+    Disagreement
+    """
+    model = plain(base_model(base, path or Path()))
+    return compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
+
+
+def flight_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
+    """Give flights the roles of numbered inputs.
+
+    Parameters
+    ----------
+    role : str
+    flights : sequence of Path
+
+    Returns
+    -------
+    dict of str to Path
+    """
+    return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}
+
+
+def check_ignored(study: Study) -> None:
+    """Refuse names in `gap.ignore` that no effect has.
+
+    Parameters
+    ----------
+    study : Study
+
+    Raises
+    ------
+    ConfigError
+    """
+    for name in study.gap.ignore:
+        if name not in CATALOGUE:
+            near = get_close_matches(name, CATALOGUE, n=1, cutoff=0.4)
+            hint = f"did you mean {near[0]}?" if near else "`cpfls effects` lists all"
+            raise ConfigError(f"gap.ignore = {name}: no such effect ({hint})")
+
+
+def progress_of(progress: Progress, start: float = 0.0, end: float = 1.0) -> Callable[[float, str], None]:
+    """Show a part of the work on the progress of a job.
+
+    Parameters
+    ----------
+    progress : Progress
+    start, end : float
+        Shares of the whole.
+
+    Returns
+    -------
+    callable
+        Takes the share of the part that is done and a note.
+    """
+    return lambda done, note: progress(start + (end - start) * done, 1, note)

@@ -1,0 +1,132 @@
+"""A disagreement for people and for machines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.gap.compare import Disagreement
+from cpfls_cli.gap.weak_flight import CHANNELS
+from cpfls_cli.stages.audit_file import audit_lines, audit_summary
+from cpfls_cli.stages.recordings import Flights
+
+_STRETCHES = 3
+_SIGNALS = 3
+_SIGNIFICANT = 0.05
+UNITS = ("N m",) * 3 + ("N",) * 3
+"""Unit of each channel."""
+
+
+def disagreement_lines(found: Disagreement, given: Flights) -> list[str]:
+    """Say where a model and flights disagree.
+
+    Parameters
+    ----------
+    found : Disagreement
+    given : Flights
+
+    Returns
+    -------
+    list of str
+    """
+    return [
+        *(_channel_line(found, place) for place in range(len(CHANNELS)) if np.isfinite(found.rms[place])),
+        *_stretch_lines(found, given),
+        *_signal_lines(found),
+        *unseen_lines((each.name, each.reason) for each in found.not_excited),
+        *audit_lines(found.audit),
+    ]
+
+
+def disagreement_summary(found: Disagreement, given: Flights) -> dict[str, Any]:
+    """Describe a disagreement for machines.
+
+    Parameters
+    ----------
+    found : Disagreement
+    given : Flights
+
+    Returns
+    -------
+    dict
+    """
+    names = [recording.name for recording in given.recordings]
+    return {
+        "flights": names,
+        "gap": {
+            **gap_summary(found.rms, found.floors),
+            "share": [float(share) for share in found.rms / found.activity],
+        },
+        "stretches": [{**stretch._asdict(), "flight": names[stretch.flight]} for stretch in found.stretches],
+        "dependence": [one._asdict() for one in found.dependence],
+        "heat_map": None
+        if found.worst is None
+        else {"channel": found.worst.channel, "signals": list(found.worst.signals)},
+        "not_excited": [vars(each) for each in found.not_excited],
+        "audit": audit_summary(found.audit),
+        "warnings": list(given.warnings),
+    }
+
+
+def gap_summary(value: np.ndarray, floors: np.ndarray) -> dict[str, Any]:
+    """Describe the gap of each channel for machines.
+
+    Parameters
+    ----------
+    value : array, shape (6,), N m and N
+    floors : array, shape (6,)
+
+    Returns
+    -------
+    dict
+        Lists over x, y, z; not finite where unknown.
+    """
+    return {
+        "torque_n_m": [float(v) for v in value[:3]],
+        "floors": [float(v) for v in floors[:3]],
+        "force_n": [float(v) for v in value[3:]],
+        "force_floors": [float(v) for v in floors[3:]],
+    }
+
+
+def unseen_lines(unseen: Iterator[tuple[str, str]]) -> Iterator[str]:
+    """Say which effects could be there unseen, those of one reason together.
+
+    Parameters
+    ----------
+    unseen : iterator of (str, str)
+        Names and reasons.
+
+    Yields
+    ------
+    str
+    """
+    reasons: dict[str, list[str]] = {}
+    for name, reason in unseen:
+        reasons.setdefault(reason, []).append(name)
+    for reason, names in reasons.items():
+        yield f"cannot be seen: {', '.join(names)}: {reason}"
+
+
+def _channel_line(found: Disagreement, place: int) -> str:
+    floors, share = found.floors[place], found.rms[place] / found.activity[place]
+    size = f"{found.rms[place]:.3g} {UNITS[place]}, {floors:.2g} times the noise floor"
+    part = f", {share:.1%} of what moves it" if np.isfinite(share) else ""
+    return f"{CHANNELS[place]}: gap {size}{part}{'' if floors > 1.5 else ': nothing above noise'}"
+
+
+def _stretch_lines(found: Disagreement, given: Flights) -> Iterator[str]:
+    for stretch in found.stretches[:_STRETCHES]:
+        name = given.recordings[stretch.flight].name
+        size = f"{stretch.rms_floors:.2g} floors"
+        yield f"largest in {name} from {stretch.start_s:.1f} s to {stretch.end_s:.1f} s: {stretch.channel}, {size}"
+
+
+def _signal_lines(found: Disagreement) -> Iterator[str]:
+    for place, channel in enumerate(CHANNELS):
+        own = [d for d in found.dependence if d.channel == channel and d.p_value < _SIGNIFICANT and d.r2 > 0]
+        if own and found.floors[place] > 1:
+            best = ", ".join(f"{d.signal} ({d.r2:.0%})" for d in own[:_SIGNALS])
+            yield f"{channel} follows {best}"

@@ -1,0 +1,35 @@
+"""Flights and models of one vehicle: what differs is said."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettings) -> None:
+    """Refuse a file that was made with another vehicle than that of the config.
+
+    Parameters
+    ----------
+    path : Path
+    own : VehicleSettings
+        Of the file.
+    wanted : VehicleSettings
+        Of the config.
+
+    Raises
+    ------
+    InputError
+        Naming the keys that differ.
+    """
+    different = [f.name for f in fields(own) if getattr(own, f.name) != getattr(wanted, f.name)]
+    if different:
+        first = different[0]
+        values = "" if first == "rotors" else f" ({getattr(own, first)} there, {getattr(wanted, first)} in the config)"
+        raise InputError(
+            f"{path}: was made with another vehicle: vehicle.{', vehicle.'.join(different)} differs{values}; use the "
+            "config of that vehicle, or make the file again"
+        )
