@@ -6,11 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.signals import Signals
 
-# A gyroscope at its limit stays there for several samples, and more than one visit may be chance of rounding.
+# A gyroscope at its limit stays there for several samples, and far longer than at the level just before it; the peak
+# of a slow signal that is rounded stays too, but longer at the level before.
 _CLIPPED_SAMPLES = 5
+_CLIPPED_TO_NEXT = 3
 # Rounding to this step adds as much noise as a poor gyroscope has.
 _COARSE_STEP_RAD_S = 0.02
 _AXES = ("x", "y", "z")
@@ -62,14 +64,20 @@ def _gyro(body_rate: Array) -> Iterator[str]:
     for axis, column in zip(_AXES, body_rate.T, strict=True):
         if np.ptp(column) == 0:
             continue
-        stuck = max(_longest_run(column == column.max()), _longest_run(column == column.min()))
-        if stuck >= _CLIPPED_SAMPLES:
+        if _clipped(column) or _clipped(-column):
             yield f"The gyroscope about {axis} is clipped at {np.abs(column).max():.3g} rad/s."
         step = float(np.diff(np.unique(column)).min())
         if step > _COARSE_STEP_RAD_S:
             yield f"The gyroscope about {axis} is rounded to steps of {step:.3g} rad/s."
 
 
-def _longest_run(mask: Array) -> int:
+def _clipped(column: Array) -> bool:
+    before, last = np.unique(column)[-2:]
+    highest = column == last
+    crowded = highest.sum() > _CLIPPED_TO_NEXT * (column == before).sum()
+    return bool(crowded and _longest_run(highest) >= _CLIPPED_SAMPLES)
+
+
+def _longest_run(mask: BoolArray) -> int:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     return int(np.max(edges[1::2] - edges[::2]))

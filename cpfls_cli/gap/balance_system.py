@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.weak_flight import Candidate, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.gap.weak_flight import Candidate, WeakFlight, actuated, nuisance
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class System:
 
     def _evaluate(self, candidate: Candidate) -> Array:
         rows = [
-            None if candidate.effect.missing(signals) else flight.averaged(columns_of(candidate, signals))
+            None if candidate.effect.missing(signals) else flight.rows(candidate, signals)
             for flight, signals in zip(self.flights, self.signals, strict=True)
         ]
         width = max((there.shape[2] for there in rows if there is not None), default=0)

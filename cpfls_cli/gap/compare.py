@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from cpfls_cli.gap.dependence import Dependence, rank_dependence
 from cpfls_cli.gap.diagnose import Recording, common_windows
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.heat_map import HeatMap, heat_map
+from cpfls_cli.gap.replayed import Replayed, replayed
 from cpfls_cli.gap.results import NotExcited
 from cpfls_cli.gap.search import best_floor, block_index
 from cpfls_cli.gap.settings import GapSettings
@@ -60,6 +61,8 @@ class Disagreement:
     worst : Worst or None
         None where no two signals tell anything.
     not_excited : tuple of NotExcited
+    replayed, held : Replayed
+        Errors by horizon of the model, and of rates that stay what they are.
     """
 
     audit: Audit
@@ -74,6 +77,8 @@ class Disagreement:
     dependence: tuple[Dependence, ...]
     worst: Worst | None
     not_excited: tuple[NotExcited, ...]
+    replayed: Replayed
+    held: Replayed
 
     @property
     def floors(self) -> Array:
@@ -141,6 +146,8 @@ def compare(
         dependence,
         _worst(residual, rms / floor, dependence, states),
         not_excited(hypothesis, effects, floor),
+        replayed([recording.signals for recording in recordings], replace(model, audit=checked), settings.horizon),
+        replayed([recording.signals for recording in recordings], None, settings.horizon),
     )
 
 

@@ -16,7 +16,13 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.audit import Audit
 from cpfls_cli.gap.balance_system import System, is_free, system
 from cpfls_cli.gap.inertial import InertiaModel, rotation_balance
+from cpfls_cli.gap.rate_equation import ReplayModel
 from cpfls_cli.gap.weak_flight import Candidate, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.regressor.regressor import InertiaValues
+from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
+
+_COUPLING = (3, 4, 5)
+"""Places of what a wrong scale of the rotor torque leaves between the rates; no inertia holds it."""
 
 
 class FittedEffect(NamedTuple):
@@ -135,6 +141,55 @@ class ExtendedModel:
                 total = total + instantaneous(columns_of(candidate, moved), own, signals.time)
         return np.asarray(total)
 
+    def correction(self, signals: Signals) -> Array:
+        """Compute what the refit adds to the inertia of the base.
+
+        Parameters
+        ----------
+        signals : Signals
+            Of the vehicle.
+
+        Returns
+        -------
+        array, shape (3, 3), kg m^2
+        """
+        return np.diag(self.parameters[:3] * np.array(signals.vehicle.inertia_kg_m2[:3]))
+
+    def inertia(self, signals: Signals) -> Array | InertiaModel:
+        """Give the refitted inertia.
+
+        Parameters
+        ----------
+        signals : Signals
+            Of the vehicle.
+
+        Returns
+        -------
+        array, shape (3, 3), kg m^2, or InertiaModel
+            A tensor for a rigid body.
+        """
+        correction = self.correction(signals)
+        if self.base is None:
+            return inertia_tensor(signals.vehicle) + correction
+        return _Corrected(self.base, correction)
+
+    def replay_model(self, signals: Signals) -> ReplayModel:
+        """Give what drives a replay: rotors and effects along the measured motion, and the refitted inertia.
+
+        Parameters
+        ----------
+        signals : Signals
+            With the faults of sensors taken out.
+
+        Returns
+        -------
+        ReplayModel
+        """
+        coupling = np.where(np.isin(np.arange(len(self.parameters)), _COUPLING), self.parameters, 0.0)
+        left = instantaneous(columns_of(nuisance(), signals), coupling, signals.time)
+        torque = signals.wrench[:, :3] + self.effect_wrench(signals)[:, :3] + left[:, :3]
+        return ReplayModel(torque, self.inertia(signals))
+
     def inertial_torque(self, signals: Signals) -> Array:
         """Compute the torque that the motion takes, with the inertia refitted.
 
@@ -165,6 +220,21 @@ class ExtendedModel:
         array, shape (time, 3), N m, body frame
         """
         return np.asarray(self.inertial_torque(signals) - self.effect_wrench(signals)[:, :3])
+
+
+@dataclass(frozen=True)
+class _Corrected:
+    """An inertia model with what its moments of inertia lack."""
+
+    base: InertiaModel
+    correction: Array
+
+    def inertia(self, attitude: Array) -> InertiaValues:
+        values = self.base.inertia(attitude)
+        return InertiaValues(
+            values.value + inertia_matrix(attitude, self.correction),
+            values.gradient + inertia_matrix_gradient(attitude, self.correction),
+        )
 
 
 def plain(base: InertiaModel | None) -> ExtendedModel:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +45,8 @@ class WeakFlight:
         Momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
     known : array of bool, shape (6,)
         Channels that the flight has.
+    seen : dict
+        Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
     """
 
     name: str
@@ -52,6 +54,7 @@ class WeakFlight:
     windows: Windows
     inertial: Columns
     known: BoolArray
+    seen: dict[tuple[str, tuple[float, ...]], Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return self.windows.count(len(self.signals))
@@ -70,6 +73,27 @@ class WeakFlight:
             Of shape (time, 6), N m and N.
         """
         return Columns((self.inertial.direct - signals.wrench) * self.known, self.inertial.momentum)
+
+    def rows(self, candidate: Candidate, signals: Signals) -> Array:
+        """Average the columns of a candidate over the windows.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            Of an effect with columns.
+        signals : Signals
+            As they are, or with actuator effects applied.
+
+        Returns
+        -------
+        array, shape (window, 6, coefficient)
+        """
+        if signals is not self.signals:
+            return self.averaged(columns_of(candidate, signals))
+        key = (candidate.effect.name, tuple(candidate.shape.values()))
+        if key not in self.seen:
+            self.seen[key] = self.averaged(columns_of(candidate, signals))
+        return self.seen[key]
 
     def averaged(self, columns: Columns) -> Array:
         """Average columns, or a residual, over the windows.

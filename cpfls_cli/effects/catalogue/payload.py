@@ -5,19 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy import signal
+from scipy.interpolate import CubicSpline
+from scipy.signal import savgol_filter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, stack, wrench
+from cpfls_cli.effects.pendulum import integrate
 from cpfls_cli.effects.signals import Signals
+
+_STEP_S = 0.04
+_SMOOTHING_S = 0.1
+_LARGEST_START = 0.5
+_LARGEST_ACROSS = 0.97
 
 
 def swing(signals: Signals, length: float, damping: float) -> Array:
-    """Compute the horizontal swing of a load, ``e'' + c e' + (g / L) e = -v' / L``.
+    """Swing a load on a cable under a moving hook.
 
-    Solved as the filter ``-(s / L) / (s^2 + c s + g / L)`` of the velocity, which is taken as linear between samples,
-    so that nothing is differentiated. The cable starts at rest.
+    ``n'' = -(a + g z)_across / L - |n'|^2 n - c n'`` for the direction n of the cable, with the part of the
+    acceleration across it; integrated by the classical Runge-Kutta method. Large swings are slower than small ones,
+    so no filter will do. The cable starts at rest.
 
     Parameters
     ----------
@@ -30,42 +38,101 @@ def swing(signals: Signals, length: float, damping: float) -> Array:
 
     Returns
     -------
-    array, shape (time, 2)
-        Horizontal distance from the vehicle over the length of the cable, world frame; for small swings.
+    array, shape (time, 6)
+        Direction of the cable from the hook, world frame, and its rate in 1/s.
+
+    References
+    ----------
+    Equation of the spherical pendulum with a moving pivot.
     """
+    stride = max(1, round(_STEP_S / signals.period))
+    felt = _felt_acceleration(signals)
+    nodes = felt[::stride].tolist()
+    middles = (0.5 * (felt[:-stride:stride] + felt[stride::stride])).tolist()
+    states = integrate(nodes, middles, stride * signals.period, length, damping)
+    at = signals.time[::stride]
+    return np.asarray(CubicSpline(at, states)(np.minimum(signals.time, at[-1])))
+
+
+def _felt_acceleration(signals: Signals) -> Array:
+    """Add gravity to the acceleration of the vehicle, shape (time, 3), world frame."""
     assert signals.velocity is not None, "declared among the needs"
-    gravity = signals.vehicle.gravity_m_s2
-    transfer = (np.array([-1 / length, 0.0]), np.array([1.0, damping, gravity / length]))
-    numerator, a, _ = signal.cont2discrete(transfer, signals.period, method="foh")
-    b = numerator.ravel()
-    velocity = signals.velocity[:, :2]
-    start = signal.lfilter_zi(b, a)[:, None] * velocity[0]
-    return np.asarray(signal.lfilter(b, a, velocity, axis=0, zi=start)[0])
+    moving = signals.acceleration
+    if moving is None:
+        moving = savgol_filter(
+            signals.velocity, max(5, 2 * round(0.1 / signals.period) + 1), 2, 1, signals.period, axis=0
+        )
+    return np.asarray(moving + [0.0, 0.0, signals.vehicle.gravity_m_s2])
+
+
+def settled_swing(signals: Signals, length: float, damping: float) -> Array:
+    """Add to the driven swing the one that a flight starts with, as its force balance shows it.
+
+    The horizontal pull on the vehicle is ``m_p g`` times the whole swing. Where forces are known, least squares find
+    ``m_p`` and the two free swings of each direction; else the cable starts at rest.
+
+    Parameters
+    ----------
+    signals : Signals
+        With velocity.
+    length : float, m
+    damping : float, 1/s
+
+    Returns
+    -------
+    array, shape (time, 2)
+    """
+    driven = swing(signals, length, damping)[:, :2]
+    if signals.acceleration is None or signals.thrust is None or signals.attitude is None:
+        return driven
+    mass = signals.vehicle.mass_kg
+    pull = mass * signals.acceleration[:, :2] - signals.thrust[:, None] * signals.rotation[:, :2, 2]
+    free = _free_swing(signals, length, damping)
+    nothing = np.zeros_like(free)
+    columns = np.concatenate(
+        [
+            np.column_stack([driven[:, 0], free, nothing, np.ones(len(free)), nothing[:, 0]]),
+            np.column_stack([driven[:, 1], nothing, free, nothing[:, 0], np.ones(len(free))]),
+        ]
+    )
+    found = np.linalg.lstsq(columns, pull.T.reshape(-1), rcond=None)[0]
+    start = found[1:5] / found[0] if found[0] > 0 else np.zeros(4)
+    if np.abs(start).max() > _LARGEST_START:
+        return driven
+    return driven + np.column_stack([free @ start[:2], free @ start[2:]])
+
+
+def _free_swing(signals: Signals, length: float, damping: float) -> Array:
+    time = signals.time - signals.time[0]
+    natural = np.sqrt(signals.vehicle.gravity_m_s2 / length)
+    turn = np.sqrt(max(natural**2 - damping**2 / 4, 1e-6)) * time
+    return np.asarray(np.exp(-0.5 * damping * time)[:, None] * np.column_stack([np.cos(turn), np.sin(turn)]))
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    swung = swing(signals, shape["length_m"], shape["damping_1_s"])
-    cable = np.column_stack([swung, -np.ones(len(swung))])
-    cable /= np.linalg.norm(cable, axis=1, keepdims=True)
-    pull = np.einsum("tji,tj->ti", signals.rotation, cable * _gravity_felt(signals)[:, None])
-    below = np.array([0.0, 0.0, -1.0])
-    return Columns(stack(wrench(np.cross(below, pull)), wrench(force=pull)))
-
-
-def _gravity_felt(signals: Signals) -> Array:
-    gravity = np.full(len(signals), signals.vehicle.gravity_m_s2)
-    # A climbing vehicle pulls harder on its cable; without accelerations the cable carries the weight alone.
-    return gravity if signals.acceleration is None else gravity + signals.acceleration[:, 2]
+    length = shape["length_m"]
+    swung = settled_swing(signals, length, shape["damping_1_s"])
+    across = np.minimum((swung**2).sum(axis=1), _LARGEST_ACROSS)
+    cable = np.column_stack([swung, -np.sqrt(1 - across)])
+    rate = np.gradient(swung, signals.time, axis=0)
+    tension = length * (rate**2).sum(axis=1) - (_felt_acceleration(signals) * cable).sum(axis=1)
+    pull = np.einsum("tji,tj->ti", signals.rotation, cable * tension[:, None])
+    levers = (wrench(np.cross(hook, pull)) for hook in -np.eye(3)[::-1])
+    return Columns(stack(*levers, wrench(force=pull)))
 
 
 EFFECT = Effect(
     name="payload",
     title="load on a cable",
     kind="wrench",
-    formula="M = m_p r_a (-z) x R^T t,  F = m_p R^T t,  t = (g + a_z) (e_x, e_y, -1)/|.|,  e'' + c e' + g/L e = -a/L",
+    formula="M = m_p r_a x R^T t,  F = m_p R^T t,  t = (g + a_z) (e_x, e_y, -1)/|.|,  e'' + c e' + g/L e = -a/L",
     sentence="A load on a cable swings under the vehicle and pulls it to and fro after each change of speed.",
     coefficients=(
-        Coefficient("mass_times_attachment", "kg m", 0.0, 1.0, "mass times depth of the hook", scales.arm_mass),
+        Coefficient("mass_times_depth", "kg m", 0.0, 1.0, "mass times depth of the hook", scales.arm_mass),
+        Coefficient(
+            "mass_times_right", "kg m", -0.3, 0.3, "mass times offset of the hook to the right", scales.arm_mass
+        ),
+        Coefficient("mass_times_behind", "kg m", -0.3, 0.3, "mass times offset of the hook behind", scales.arm_mass),
         Coefficient("mass", "kg", 0.0, 1.0, "mass of the load; only the force balance shows it", scales.mass),
     ),
     needs=frozenset({"velocity"}),
