@@ -129,6 +129,14 @@ def test_constant_clipped_and_rounded_channels_are_named(turning):
     assert "The channel voltage never changes" in told
 
 
+def test_a_slow_rounded_gyroscope_is_not_called_clipped():
+    for seed in range(20):
+        still = flight(
+            np.random.default_rng(seed), Faults(), LEVELS["low"], coloured=True, amplitude=(0.004, 0.004, 0.004)
+        )
+        assert audit([still], WINDOWS).warnings == ()
+
+
 @pytest.mark.parametrize(("commanded", "whom"), [(True, "commands"), (False, "measured rotors")])
 def test_the_motion_follows_the_torque(turning, commanded, whom):
     clean = flight(np.random.default_rng(3), Faults(), duration=20.0)
