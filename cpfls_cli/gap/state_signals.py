@@ -13,6 +13,8 @@ from cpfls_cli.gap.weak_flight import WeakFlight
 ANGLES = ("roll", "yaw")
 """Signals that come back after a full turn."""
 
+_ACTUATION = ("rotor torque", "rotor speed", "thrust")
+
 
 def state_signals(flight: WeakFlight, signals: Signals) -> dict[str, Array]:
     """Average everything the flight has of motion and actuation over its windows.
@@ -51,6 +53,23 @@ def joined_states(states: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
         name: np.concatenate([state.get(name, np.full(len(state["time"]), np.nan)) for state in states])
         for name in names
     }
+
+
+def without_actuation(state: Mapping[str, Array]) -> dict[str, Array]:
+    """Leave out what the rotors do.
+
+    The controller answers every disturbance with the rotors, and their noise is noise of the residual, so that a
+    residual nearly always follows their torque, whatever causes it. Causes are looked for among the other signals.
+
+    Parameters
+    ----------
+    state : mapping of str to array, shape (window,)
+
+    Returns
+    -------
+    dict of str to array, shape (window,)
+    """
+    return {name: values for name, values in state.items() if not name.startswith(_ACTUATION)}
 
 
 def _instantaneous(signals: Signals) -> Iterator[tuple[str, Array]]:
