@@ -39,6 +39,7 @@ def disagreement_data(found: Disagreement, given: Flights) -> dict[str, Any]:
         **_stretches(found),
         **table("dependence", [d._asdict() for d in found.dependence], ("channel", "signal"), ("r2", "p_value")),
         **({} if found.worst is None else _heat_map(found.worst)),
+        **_replay(found),
         **table("not_excited", [vars(each) for each in found.not_excited], ("name", "reason"), ()),
         **audit_data(found.audit),
         "warning": texts(given.warnings),
@@ -51,6 +52,17 @@ def _stretches(found: Disagreement) -> dict[str, Any]:
         for s in found.stretches
     ]
     return table("stretch", rows, ("channel",), ("flight", "start", "end", "floors"))
+
+
+def _replay(found: Disagreement) -> dict[str, Any]:
+    return {
+        "replay/horizon": np.arange(1, len(found.held.horizon_s) + 1),
+        "replay/horizon_s": found.held.horizon_s,
+        "replay/rate_model": found.replayed.rate,
+        "replay/rate_held": found.held.rate,
+        "replay/attitude_model": found.replayed.attitude,
+        "replay/attitude_held": found.held.attitude,
+    }
 
 
 def _heat_map(worst: Worst) -> dict[str, Any]:

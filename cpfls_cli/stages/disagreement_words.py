@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.gap.compare import Disagreement
+from cpfls_cli.gap.replayed import Replayed
 from cpfls_cli.gap.weak_flight import CHANNELS
 from cpfls_cli.stages.audit_file import audit_lines, audit_summary
 from cpfls_cli.stages.recordings import Flights
@@ -35,6 +36,7 @@ def disagreement_lines(found: Disagreement, given: Flights) -> list[str]:
         *(_channel_line(found, place) for place in range(len(CHANNELS)) if np.isfinite(found.rms[place])),
         *_stretch_lines(found, given),
         *_signal_lines(found),
+        replay_line("simulated from the measured rotors", found.replayed, found.held),
         *unseen_lines((each.name, each.reason) for each in found.not_excited),
         *audit_lines(found.audit),
     ]
@@ -64,6 +66,7 @@ def disagreement_summary(found: Disagreement, given: Flights) -> dict[str, Any]:
         "heat_map": None
         if found.worst is None
         else {"channel": found.worst.channel, "signals": list(found.worst.signals)},
+        "replay": replay_summary(found.held, model=found.replayed, held=found.held),
         "not_excited": [vars(each) for each in found.not_excited],
         "audit": audit_summary(found.audit),
         "warnings": list(given.warnings),
@@ -91,6 +94,25 @@ def gap_summary(value: np.ndarray, floors: np.ndarray) -> dict[str, Any]:
     }
 
 
+def replay_summary(clock: Replayed, **models: Replayed) -> dict[str, Any]:
+    """Describe replays for machines.
+
+    Parameters
+    ----------
+    clock : Replayed
+        Gives the horizons.
+    **models : Replayed
+        By name.
+
+    Returns
+    -------
+    dict
+    """
+    rates = {f"rate_{name}_rad_s": model.rate.tolist() for name, model in models.items()}
+    attitudes = {f"attitude_{name}_rad": model.attitude.tolist() for name, model in models.items()}
+    return {"horizon_s": clock.horizon_s.tolist(), **rates, **attitudes}
+
+
 def unseen_lines(unseen: Iterator[tuple[str, str]]) -> Iterator[str]:
     """Say which effects could be there unseen, those of one reason together.
 
@@ -108,6 +130,23 @@ def unseen_lines(unseen: Iterator[tuple[str, str]]) -> Iterator[str]:
         reasons.setdefault(reason, []).append(name)
     for reason, names in reasons.items():
         yield f"cannot be seen: {', '.join(names)}: {reason}"
+
+
+def replay_line(what: str, model: Replayed, held: Replayed) -> str:
+    """Say how far a simulation is off at its longest horizon.
+
+    Parameters
+    ----------
+    what : str
+    model, held : Replayed
+
+    Returns
+    -------
+    str
+    """
+    rate, still = (" ".join(f"{value:.2g}" for value in each.rate[-1]) for each in (model, held))
+    after = f"after {model.horizon_s[-1]:.2g} s the rates are off by {rate} rad/s (x y z)"
+    return f"{what}: {after}; if they stayed what they were, by {still}"
 
 
 def _channel_line(found: Disagreement, place: int) -> str:
