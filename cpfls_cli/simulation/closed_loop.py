@@ -15,7 +15,7 @@ from cpfls_cli.simulation.autopilot import Autopilot
 from cpfls_cli.simulation.clock import between, clock_of
 from cpfls_cli.simulation.flown_effects import FlownEffects
 from cpfls_cli.simulation.loop import Step, loop
-from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, STATES, VELOCITY
+from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, CABLE, POSITION, STATES, VELOCITY
 from cpfls_cli.simulation.reference import reference
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -30,7 +30,7 @@ class FlownMotion:
 
     Attributes
     ----------
-    state, change : array, shape (time, 16)
+    state, change : array, shape (time, 18)
         State of the plant and its derivative.
     told, followed, speed : array, shape (time, rotor), rad/s
         Command, command after the lag, and rotor speed.
@@ -103,6 +103,7 @@ def _start(planned: Mapping[str, Array]) -> Array:
     state = np.zeros(STATES)
     state[POSITION], state[VELOCITY] = planned["position"][0], planned["velocity"][0]
     state[ATTITUDE] = planned["attitude"][0]
+    state[CABLE] = 0.0, 0.0, -1.0
     state[BODY_RATE] = rotations.body_rate(planned["attitude"][:1], planned["attitude_rate"][:1])[0]
     return state
 

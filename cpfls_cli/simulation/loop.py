@@ -15,7 +15,7 @@ from cpfls_cli.simulation.battery import Battery
 from cpfls_cli.simulation.flown_effects import FlownEffects
 from cpfls_cli.simulation.missing_wrench import missing_wrench
 from cpfls_cli.simulation.mixer import Mixer, mixer
-from cpfls_cli.simulation.payload import Payload
+from cpfls_cli.simulation.payload import payload
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY, Plant, instant
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.rigid_body import inertia_tensor
@@ -28,7 +28,7 @@ class Step:
 
     Attributes
     ----------
-    change : array, shape (16,)
+    change : array, shape (18,)
         Derivative of the state, in the middle of the step.
     rotors : Rotors
         In the middle of the step.
@@ -53,8 +53,8 @@ class Loop:
     mixer : Mixer
     actuators : Actuators
     plant : Plant
-    state : array, shape (16,)
-    change : array, shape (16,)
+    state : array, shape (18,)
+    change : array, shape (18,)
         Derivative of the state in the step before.
     """
 
@@ -103,7 +103,7 @@ def loop(
     settings : ClosedLoopSettings
     effects : FlownEffects
     autopilot : Autopilot
-    state : array, shape (16,)
+    state : array, shape (18,)
     step, duration : float, s
 
     Returns
@@ -113,7 +113,9 @@ def loop(
     mix = mixer(vehicle)
     speed = mix.command(_wrench(autopilot, 0, state))
     missing = missing_wrench(effects, instant(vehicle, state, speed))
-    plant = Plant(vehicle, inertia_tensor(vehicle), missing, _payload(effects, vehicle))
+    load = effects.values("payload")
+    hung = None if load is None else payload(load, vehicle.gravity_m_s2)
+    plant = Plant(vehicle, inertia_tensor(vehicle), missing, hung)
     change = plant.derivative(state, Rotors(speed, speed, speed, np.zeros_like(speed), 1.0))
     lag, delay, sag = (effects.values(name) or {} for name in ("motor_lag", "command_delay", "battery_sag"))
     actuators = Actuators(
@@ -130,14 +132,6 @@ def loop(
 def _wrench(autopilot: Autopilot, number: int, state: Array) -> Array:
     rotation = rotations.rotation_matrix(state[None, ATTITUDE])[0]
     return autopilot.wrench(number, state[POSITION], state[VELOCITY], rotation, state[BODY_RATE])
-
-
-def _payload(effects: FlownEffects, vehicle: VehicleSettings) -> Payload | None:
-    values = effects.values("payload")
-    if values is None:
-        return None
-    lever, length = values["mass_times_attachment"], values["length_m"]
-    return Payload(values["mass"], lever, length, values["damping_1_s"], vehicle.gravity_m_s2)
 
 
 def _battery(vehicle: VehicleSettings, settings: ClosedLoopSettings, duration: float) -> Battery:

@@ -1,97 +1,129 @@
-"""A load on a cable as a pendulum that the motion of the vehicle drives."""
+"""A load on a cable: a spherical pendulum that drives the vehicle which drives it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 
+# Where the coefficients of the catalogue have the hook.
+_HOOK = MappingProxyType(
+    {
+        "mass_times_depth": (0.0, 0.0, -1.0),
+        "mass_times_right": (0.0, -1.0, 0.0),
+        "mass_times_behind": (-1.0, 0.0, 0.0),
+    }
+)
 
-@dataclass(frozen=True)
-class Payload:
-    """A small swing, ``e'' + c e' + (g/L) e = -a/L``, of a cable that carries ``m_p (g + a_z)``.
+
+class Carrier(NamedTuple):
+    """The vehicle that carries the load.
 
     Attributes
     ----------
     mass : float, kg
-    mass_times_attachment : float, kg m
-        Mass times depth of the hook below the centre of mass.
+    inertia : array, shape (3, 3), kg m^2, body frame
+    rotation : array, shape (3, 3)
+        Body to world.
+    body_rate : array, shape (3,), rad/s, body frame
+    """
+
+    mass: float
+    inertia: Array
+    rotation: Array
+    body_rate: Array
+
+
+class Pull(NamedTuple):
+    """What a load does to its carrier.
+
+    Attributes
+    ----------
+    acceleration : array, shape (3,), m/s^2, world frame
+    turning : array, shape (3,), rad/s^2, body frame
+    swing : array, shape (3,), 1/s^2, world frame
+        Second derivative of the direction of the cable.
+    """
+
+    acceleration: Array
+    turning: Array
+    swing: Array
+
+
+@dataclass(frozen=True)
+class Payload:
+    """Direction n of the cable, ``n'' = -(a + g z)_across / L - |n'|^2 n - c n'``, and its pull ``m_p t n``.
+
+    With a the acceleration of the hook and the tension per mass ``t = L |n'|^2 - (a + g z) . n``.
+
+    Attributes
+    ----------
+    mass : float, kg
+    mass_times_hook : array, shape (3,), kg m, body frame
+        Lever of the pull, times the mass.
+    depth : float, m
+        How far below the centre of mass the hook moves.
     length : float, m
+        L.
     damping : float, 1/s
+        c.
     gravity : float, m/s^2
     """
 
     mass: float
-    mass_times_attachment: float
+    mass_times_hook: Array
+    depth: float
     length: float
     damping: float
     gravity: float
 
-    def cable(self, swing: Array) -> Array:
-        """Point along the cable.
+    def pull(self, carrier: Carrier, acceleration: Array, turning: Array, cable: Array, rate: Array) -> Pull:
+        """Pull at a carrier whose acceleration depends on the pull; both are linear in the tension.
 
         Parameters
         ----------
-        swing : array, shape (2,)
-            Horizontal distance from the vehicle over the length, world frame.
+        carrier : Carrier
+        acceleration, turning : array, shape (3,), m/s^2 in the world, rad/s^2 in the body
+            What the carrier would do without the load.
+        cable, rate : array, shape (3,), 1 and 1/s, world frame
+            Direction from the hook to the load, and its derivative.
 
         Returns
         -------
-        array, shape (3,), world frame
-            Of length 1.
+        Pull
         """
-        line = np.array([*swing, -1.0])
-        return np.asarray(line / np.sqrt(line @ line))
+        hook = np.array([0.0, 0.0, -self.depth])
+        pulled = self.mass / carrier.mass * cable
+        turned = np.linalg.solve(carrier.inertia, np.cross(self.mass_times_hook, carrier.rotation.T @ cable))
+        bent = np.cross(turning, hook) + np.cross(carrier.body_rate, np.cross(carrier.body_rate, hook))
+        felt = acceleration + carrier.rotation @ bent
+        felt[2] += self.gravity
+        response = pulled + carrier.rotation @ np.cross(turned, hook)
+        tension = (self.length * rate @ rate - felt @ cable) / (1 + response @ cable)
+        felt = felt + tension * response
+        across = felt - (felt @ cable) * cable
+        swing = -across / self.length - (rate @ rate) * cable - self.damping * rate
+        return Pull(tension * pulled, tension * turned, swing)
 
-    def acceleration(self, free: Array, cable: Array, vehicle_mass: float) -> Array:
-        """Accelerate the vehicle under a load whose pull depends on that acceleration.
 
-        Parameters
-        ----------
-        free : array, shape (3,), m/s^2, world frame
-            Acceleration without the load.
-        cable : array, shape (3,)
-        vehicle_mass : float, kg
+def payload(values: Mapping[str, float], gravity: float) -> Payload:
+    """Hang a load under a vehicle.
 
-        Returns
-        -------
-        array, shape (3,), m/s^2, world frame
-        """
-        share = self.mass / vehicle_mass
-        felt = (self.gravity + free[2]) / (1 - share * cable[2])
-        return np.asarray(free + share * felt * cable)
+    Parameters
+    ----------
+    values : mapping of str to float
+        Of the effect payload.
+    gravity : float, m/s^2
 
-    def torque(self, acceleration: Array, cable: Array, rotation: Array) -> Array:
-        """Compute the torque of the hook.
-
-        Parameters
-        ----------
-        acceleration : array, shape (3,), m/s^2, world frame
-        cable : array, shape (3,)
-        rotation : array, shape (3, 3)
-            Body to world.
-
-        Returns
-        -------
-        array, shape (3,), N m, body frame
-        """
-        x, y, _ = self.mass_times_attachment * (self.gravity + acceleration[2]) * (rotation.T @ cable)
-        # The hook is below the centre of mass: -z x pull.
-        return np.array([y, -x, 0.0])
-
-    def swing_acceleration(self, swing: Array, rate: Array, acceleration: Array) -> Array:
-        """Swing on.
-
-        Parameters
-        ----------
-        swing, rate : array, shape (2,)
-        acceleration : array, shape (3,), m/s^2, world frame
-            Of the vehicle.
-
-        Returns
-        -------
-        array, shape (2,), 1/s^2
-        """
-        return np.asarray(-self.damping * rate - (self.gravity * swing + acceleration[:2]) / self.length)
+    Returns
+    -------
+    Payload
+    """
+    lever = sum((value * np.array(_HOOK[name]) for name, value in values.items() if name in _HOOK), np.zeros(3))
+    depth = values.get("depth_m", 0.0)
+    return Payload(values["mass"], lever, depth, values["length_m"], values["damping_1_s"], gravity)

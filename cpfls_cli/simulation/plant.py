@@ -11,13 +11,14 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.simulation.actuators import Rotors
 from cpfls_cli.simulation.missing_wrench import MissingWrench
-from cpfls_cli.simulation.payload import Payload
+from cpfls_cli.simulation.payload import Carrier, Payload
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 POSITION, VELOCITY, ATTITUDE, BODY_RATE = (slice(3 * n, 3 * n + 3) for n in range(4))
-SWING, SWING_RATE = slice(12, 14), slice(14, 16)
-STATES = 16
-"""Places in the state: position and velocity in the world, attitude as roll, pitch and yaw, body rate, swing."""
+CABLE, CABLE_RATE = slice(12, 15), slice(15, 18)
+STATES = 18
+"""Places in the state: position and velocity in the world, attitude as roll, pitch and yaw, body rate;
+direction of the cable of a load in the world, and its rate."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +44,12 @@ class Plant:
 
         Parameters
         ----------
-        state : array, shape (16,)
+        state : array, shape (18,)
         rotors : Rotors
 
         Returns
         -------
-        array, shape (16,)
+        array, shape (18,)
         """
         body_rate = state[BODY_RATE]
         signals = instant(self.vehicle, state, rotors.speed)
@@ -57,16 +58,18 @@ class Plant:
         torque = torque + self.missing.rotor_coupling @ rotors.acceleration
         acceleration = signals.rotation[0] @ wrench[3:] / self.vehicle.mass_kg
         acceleration[2] -= self.vehicle.gravity_m_s2
+        inertia = self.inertia + self.missing.added_inertia
+        turning = np.linalg.solve(inertia, torque)
         change = np.zeros(STATES)
         if self.payload is not None:
-            cable = self.payload.cable(state[SWING])
-            acceleration = self.payload.acceleration(acceleration, cable, self.vehicle.mass_kg)
-            torque = torque + self.payload.torque(acceleration, cable, signals.rotation[0])
-            change[SWING] = state[SWING_RATE]
-            change[SWING_RATE] = self.payload.swing_acceleration(state[SWING], state[SWING_RATE], acceleration)
+            cable, rate = state[CABLE] / np.linalg.norm(state[CABLE]), state[CABLE_RATE]
+            carrier = Carrier(self.vehicle.mass_kg, inertia, signals.rotation[0], body_rate)
+            pull = self.payload.pull(carrier, acceleration, turning, cable, rate)
+            acceleration, turning = acceleration + pull.acceleration, turning + pull.turning
+            change[CABLE], change[CABLE_RATE] = rate, pull.swing
         change[POSITION], change[VELOCITY] = state[VELOCITY], acceleration
         change[ATTITUDE] = rotations.attitude_rate(state[None, ATTITUDE], body_rate[None])[0]
-        change[BODY_RATE] = np.linalg.solve(self.inertia + self.missing.added_inertia, torque)
+        change[BODY_RATE] = turning
         return change
 
 
@@ -76,7 +79,7 @@ def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signa
     Parameters
     ----------
     vehicle : VehicleSettings
-    state : array, shape (16,)
+    state : array, shape (18,)
     rotor_speed : array, shape (rotor,), rad/s
 
     Returns

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli import rotations
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.simulation import ClosedLoopSettings, SimulationSettings, flown_effects
 from cpfls_cli.simulation.autopilot import upright
@@ -14,10 +15,13 @@ VEHICLE = VehicleSettings()
 
 
 def test_values_are_taken_in_the_order_of_the_catalogue_or_by_name():
-    by_order = flown_effects({"payload": [0.05, 0.5, 1.0, 0.2]}, VEHICLE)
-    names = {"damping_1_s": 0.2, "mass": 0.5, "mass_times_attachment": 0.05, "length_m": 1.0}
-    assert by_order.values("payload") == flown_effects({"payload": names}, VEHICLE).values("payload") == names
-    assert by_order.flown[0].shape == {"length_m": 1.0, "damping_1_s": 0.2}
+    payload = CATALOGUE["payload"]
+    values = {entry.name: 0.2 + 0.01 * place for place, entry in enumerate(payload.coefficients)}
+    shapes = {shape.name: shape.grid[1] for shape in payload.shapes}
+    by_order = flown_effects({"payload": [*values.values(), *shapes.values()]}, VEHICLE)
+    by_name = flown_effects({"payload": {**dict(reversed(values.items())), **shapes}}, VEHICLE)
+    assert by_order.values("payload") == by_name.values("payload") == {**values, **shapes}
+    assert by_order.flown[0].shape == shapes
     assert by_order.values("wind") is None
 
 
