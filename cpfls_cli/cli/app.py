@@ -36,6 +36,7 @@ ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", 
 FlightsArgument = Annotated[
     list[Path], typer.Argument(metavar="FLIGHT...", help="Flights, or logs (.csv, .csv.gz) that the config describes.")
 ]
+DisagreementArgument = Annotated[Path, typer.Argument(metavar="DISAGREEMENT", help="Made by `cpfls compare`.")]
 ModelOption = Annotated[
     Path | None,
     typer.Option("--model", metavar="MODEL", help="Made by `cpfls identify`; without, the vehicle of the config."),
@@ -212,6 +213,26 @@ def compare(
         return stage.run(job, flights, model)
 
     _run("compare", config, output, common, call)
+
+
+@app.command()
+@with_common
+def diagnose(
+    config: ConfigArgument,
+    disagreement: DisagreementArgument,
+    output: OutputOption,
+    held_out: HeldOutOption = None,
+    *,
+    common: Common,
+) -> None:
+    """Name the physical effect that a model misses."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import diagnose as stage
+
+        return stage.run(job, disagreement, held_out or [])
+
+    _run("diagnose", config, output, common, call)
 
 
 @app.command()

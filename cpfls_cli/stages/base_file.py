@@ -9,11 +9,10 @@ import numpy as np
 
 from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.artifacts.records import Artifact, Header
-from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.identification.model import Model
 from cpfls_cli.stages.model_file import read_model
-from cpfls_cli.stages.same_vehicle import require_same_vehicle
+from cpfls_cli.stages.same_vehicle import require_vehicle_of
 from cpfls_cli.stages.sources import read_good
 
 _COPIED = ("weights", "coefficients", "rigid_body", "input_range", "visited")
@@ -37,8 +36,7 @@ def model_base(path: Path, study: Study) -> Artifact:
         If it was identified with another vehicle.
     """
     artifact = read_good(path, MODEL)
-    source = f"{path}: /config"
-    require_same_vehicle(path, validate(parse_config(artifact.header.config, source), source).vehicle, study.vehicle)
+    require_vehicle_of(path, artifact, study)
     return artifact
 
 

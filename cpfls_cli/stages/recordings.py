@@ -158,7 +158,7 @@ def _with_voltage(
 ) -> tuple[list[Recording], tuple[str, ...]]:
     """Take a voltage in V as a share of the largest of all flights."""
     full = [_largest_volts(r.signals, s) for r, s in zip(recordings, sources, strict=True)]
-    if max(full) == 0:
+    if not any(full):
         return list(recordings), ()
     scaled = [_share(r, max(full)) if volts else r for r, volts in zip(recordings, full, strict=True)]
     return scaled, (f"voltage: the largest of these flights, {max(full):.3g} V, is taken for that of a full battery",)

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import fields
 from pathlib import Path
 
+from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -33,3 +36,21 @@ def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettin
             f"{path}: was made with another vehicle: vehicle.{', vehicle.'.join(different)} differs{values}; use the "
             "config of that vehicle, or make the file again"
         )
+
+
+def require_vehicle_of(path: Path, artifact: Artifact, study: Study) -> None:
+    """Refuse an artifact that was made with another vehicle than that of the config.
+
+    Parameters
+    ----------
+    path : Path
+    artifact : Artifact
+    study : Study
+
+    Raises
+    ------
+    InputError
+    """
+    source = f"{path}: /config"
+    own = validate(parse_config(artifact.header.config, source), source)
+    require_same_vehicle(path, own.vehicle, study.vehicle)

@@ -1,0 +1,173 @@
+"""What shows that a gap shrank, on flights that the fit did not see: replays, whiteness, and the worst stretches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.diagnose import Diagnosed, Recording, common_windows
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
+from cpfls_cli.gap.held_out import HeldOut
+from cpfls_cli.gap.inertial import InertiaModel
+from cpfls_cli.gap.replayed import Replayed, replayed
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.stretches import stretches
+from cpfls_cli.gap.weak_flight import CHANNELS, weak_flight
+from cpfls_cli.gap.whiteness import Whiteness, whiteness
+from cpfls_cli.gap.windows import Windows
+from cpfls_cli.gap.worst_stretch import WorstStretch, worst_stretch
+
+_SHORTEST_S = 4.0
+_PER_WINDOW = 16
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Torque or force over the stretch in which model and flight disagreed most.
+
+    Attributes
+    ----------
+    flight : int
+        Number of the held-out flight.
+    channel : str
+    time : array, shape (moment,), s
+    measured : array, shape (moment,), N m or N
+        What the measured motion takes.
+    before, after : array, shape (moment,), N m or N
+        Simulated by the model as given and with effects.
+    """
+
+    flight: int
+    channel: str
+    time: Array
+    measured: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How a model with effects does on held-out flights, beside the model as given.
+
+    Attributes
+    ----------
+    centres : array, shape (window,), s
+    flight_index : array of int, shape (window,)
+    before, after, held : Replayed
+        Of the model as given, with effects, and of rates that stay what they are.
+    white_before, white_after : Whiteness
+    lag_s : float
+        Between windows without common samples.
+    picture : Picture
+    run_flight : int
+        Number of the flight of `run`.
+    run : WorstStretch
+        Free runs over the stretch in which the model as given was worst.
+    """
+
+    centres: Array
+    flight_index: IntArray
+    before: Replayed
+    after: Replayed
+    held: Replayed
+    white_before: Whiteness
+    white_after: Whiteness
+    lag_s: float
+    picture: Picture
+    run_flight: int
+    run: WorstStretch
+
+
+def model_of(diagnosed: Diagnosed, base: InertiaModel | None) -> ExtendedModel:
+    """Give the model that a diagnosis arrives at.
+
+    Parameters
+    ----------
+    diagnosed : Diagnosed
+    base : InertiaModel or None
+
+    Returns
+    -------
+    ExtendedModel
+    """
+    found, chosen = diagnosed.found, diagnosed.hypothesis.chosen
+    effects = tuple(FittedEffect(*pair) for pair in zip(chosen, found.of_effect, strict=True))
+    own = len(found.linear) - sum(len(linear) for linear in found.of_effect)
+    return ExtendedModel(base, found.linear[:own], effects, diagnosed.audit)
+
+
+def evidence(held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, settings: GapSettings) -> Evidence:
+    """Gather what shows that the gap shrank.
+
+    Parameters
+    ----------
+    held : sequence of Recording
+        Held-out flights.
+    unseen : HeldOut
+        Their residuals.
+    model : ExtendedModel
+    settings : GapSettings
+
+    Returns
+    -------
+    Evidence
+    """
+    own = common_windows(held, settings)
+    signals = [recording.signals for recording in held]
+    centres = [own.centres(each.time) for each in signals]
+    index = np.repeat(np.arange(len(held)), [len(each) for each in centres])
+    given = plain(model.base)
+    stride = -(-len(own.weight) // own.hop)
+    runs = [_run(each, given, model) for each in signals]
+    worst = int(np.argmax([_size(run) for run in runs]))
+    return Evidence(
+        np.concatenate(centres),
+        index,
+        replayed(signals, given, settings.horizon),
+        replayed(signals, model, settings.horizon),
+        replayed(signals, None, settings.horizon),
+        whiteness(unseen.before * unseen.known, index, stride),
+        whiteness(unseen.after * unseen.known, index, stride),
+        stride * own.hop * own.period,
+        _picture(held, unseen, np.concatenate(centres), index, own, model, settings),
+        worst,
+        runs[worst],
+    )
+
+
+def _run(signals: Signals, given: ExtendedModel, model: ExtendedModel) -> WorstStretch:
+    repaired = model.repaired(signals)
+    return worst_stretch(repaired, given.replay_model(repaired), model.replay_model(repaired))
+
+
+def _size(run: WorstStretch) -> float:
+    return float(np.mean((run.before - run.measured) ** 2))
+
+
+def _picture(
+    held: Sequence[Recording],
+    unseen: HeldOut,
+    centres: Array,
+    index: IntArray,
+    own: Windows,
+    model: ExtendedModel,
+    settings: GapSettings,
+) -> Picture:
+    in_floors = unseen.before * unseen.known / unseen.floor
+    found = stretches(in_floors, centres, index, level=0.0, most=1)[0]
+    place = CHANNELS.index(found.channel)
+    dense = replace(own, hop=max(1, len(own.weight) // _PER_WINDOW))
+    recording = held[found.flight]
+    raw = weak_flight(recording.name, recording.signals, dense, model.base, settings.force)
+    repaired = weak_flight(recording.name, model.repaired(recording.signals), dense, model.base, settings.force)
+    time = dense.centres(recording.signals.time)
+    middle, half = 0.5 * (found.start_s + found.end_s), 0.5 * max(_SHORTEST_S, found.end_s - found.start_s)
+    shown = np.abs(time - middle) <= half
+    measured = repaired.averaged(repaired.inertial)[shown, place]
+    logged = dense.average(raw.signals.wrench)[shown, place]
+    after = measured - model.residual([repaired])[shown, place]
+    return Picture(found.flight, found.channel, time[shown], measured, logged, after)

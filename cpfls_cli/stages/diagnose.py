@@ -1,0 +1,118 @@
+"""Stage `diagnose`: which physical effect a model misses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT
+from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.config.study import Study
+from cpfls_cli.gap.diagnose import Diagnosed, diagnose
+from cpfls_cli.gap.evidence import Evidence, evidence, model_of
+from cpfls_cli.gap.extended import ExtendedModel
+from cpfls_cli.stages.base_file import base_artifact, base_data, base_model
+from cpfls_cli.stages.compare import check_ignored, flight_roles, progress_of
+from cpfls_cli.stages.diagnosis_file import diagnosis_data
+from cpfls_cli.stages.diagnosis_words import diagnosis_lines, diagnosis_summary
+from cpfls_cli.stages.flights_file import flights_data, flights_of
+from cpfls_cli.stages.job import Job, Outcome, begin, finish
+from cpfls_cli.stages.recordings import read_flights
+from cpfls_cli.stages.same_vehicle import require_vehicle_of
+from cpfls_cli.stages.sources import read_good
+from cpfls_cli.stages.split import Split, split_flights
+from cpfls_cli.stages.study import generator
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A diagnosis with all that shows it.
+
+    Attributes
+    ----------
+    found : Diagnosed
+    shown : Evidence
+    model : ExtendedModel
+    split : Split
+    """
+
+    found: Diagnosed
+    shown: Evidence
+    model: ExtendedModel
+    split: Split
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Datasets, with the flights."""
+        flights = (*self.split.training, *self.split.held_out)
+        roles = ["training"] * len(self.split.training) + ["held-out"] * len(self.split.held_out)
+        own = diagnosis_data(self.found, self.shown, self.model, self.split)
+        return {**own, **flights_data(flights, roles)}
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The answer for people."""
+        return tuple(diagnosis_lines(self.found, self.shown, self.split.sentence))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The answer for machines."""
+        return diagnosis_summary(self.found, self.shown, self.split.sentence)
+
+
+def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
+    """Name what a model misses and write it.
+
+    Parameters
+    ----------
+    job : Job
+    disagreement : Path
+        Holds the flights and the model.
+    held_out : sequence of Path
+        Flights to judge on.
+
+    Returns
+    -------
+    Outcome
+    """
+    started = begin(job, {"disagreement": disagreement} | flight_roles("held-out", held_out))
+    check_ignored(job.study)
+    source = read_good(disagreement, DISAGREEMENT)
+    require_vehicle_of(disagreement, source, job.study)
+    held = read_flights(held_out, job.study)
+    split = split_flights(flights_of(source, job.study), held.recordings, job.study.gap)
+    base = base_artifact(source)
+    if started.dry_run is not None:
+        return started.dry_run
+    answer = answered(job.study, split, base, disagreement, progress_of(job.progress))
+    finish(job, DIAGNOSIS, {**answer.data, **base_data(base)}, started.inputs)
+    warnings = (*source.texts("warning"), *held.warnings)
+    return Outcome(answer.summary, answer.lines, (*warnings, *answer.found.audit.warnings))
+
+
+def answered(
+    study: Study, split: Split, base: Artifact | None, path: Path, progress: Callable[[float, str], None]
+) -> Answer:
+    """Diagnose flights.
+
+    Parameters
+    ----------
+    study : Study
+    split : Split
+    base : Artifact or None
+        The identified model; None for the rigid body of the vehicle.
+    path : Path
+        For messages.
+    progress : callable
+
+    Returns
+    -------
+    Answer
+    """
+    model = base_model(base, path)
+    rng = generator(study, "diagnose")
+    found = diagnose(split.training, split.held_out, study.gap, rng, model=model, progress=progress)
+    extended = model_of(found, model)
+    return Answer(found, evidence(split.held_out, found.held_out, extended, study.gap), extended, split)
