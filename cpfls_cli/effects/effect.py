@@ -64,12 +64,20 @@ class Shape:
     grid : tuple of float
         Ascending; values that a search starts from. The first and the last bound it.
     meaning : str
+    first : float or None
+        Where a search stays until the effect is chosen; None: it tries the whole grid.
     """
 
     name: str
     unit: str
     grid: tuple[float, ...]
     meaning: str
+    first: float | None = None
+
+    @property
+    def tried(self) -> tuple[float, ...]:
+        """Values that a search tries."""
+        return self.grid if self.first is None else (self.first,)
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from cpfls_cli.gap.search import Step, block_index, forward, look
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.unseen import not_excited
 from cpfls_cli.gap.vehicle_numbers import parameter_error
-from cpfls_cli.gap.verdict import verdict_of
+from cpfls_cli.gap.verdict import matters, verdict_of
 from cpfls_cli.gap.weak_flight import WeakFlight, weak_flight
 from cpfls_cli.gap.windows import Windows, windows
 
@@ -119,12 +119,12 @@ def diagnose(
     hypothesis = system(weak, chosen)
     block = block_index(hypothesis, settings)
     found = _estimated(hypothesis, steps[-1].floor, block)
-    unseen = _unseen(held, own, model, settings, checked, hypothesis, found)
+    left = leftover(hypothesis, found.linear, steps[-1].floor, block, settings, rng)
+    unseen = _unseen(held, own, model, settings, checked, hypothesis, found, left.scatter)
     progress(0.75, "rivals")
     gap = steps[0].above_floor
     judged = [judge_effect(weak, chosen, place, found, gap, effects, settings, rng) for place in range(len(chosen))]
-    progress(0.9, "what is left")
-    left = leftover(hypothesis, found.linear, steps[-1].floor, block, settings, rng)
+    progress(0.9, "sensor faults")
     faults = [_fault(finding, training, weak, own, model, settings) for finding in checked.named]
     torque_alone = _torque_alone(training, own, model, settings, checked, effects)
     diagnosis = _concluded(judged, faults, found, unseen, left, steps, hypothesis, settings, torque_alone, checked)
@@ -206,6 +206,7 @@ def _unseen(
     checked: Audit,
     hypothesis: System,
     found: Estimates,
+    scatter: float,
 ) -> HeldOut:
     plain = system(hypothesis.flights)
     weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
@@ -215,6 +216,7 @@ def _unseen(
         hypothesis,
         found.linear,
         fit(plain, weight),
+        scatter,
     )
 
 
@@ -268,7 +270,9 @@ def _concluded(
     effects += [numbers] if numbers is not None else []
     share = unseen.share() if named else 1.0
     rivals = tuple(rival for each in judged for rival in each.alternatives)
-    verdict = verdict_of(effects, rivals, left.unexplained, share, _excited(hypothesis, steps[-1].floor), settings)
+    gap = unseen.size(unseen.before).floors
+    known = [each for each in left.unexplained if matters(each, gap)] if effects else left.unexplained
+    verdict = verdict_of(effects, rivals, known, share, _excited(hypothesis, steps[-1].floor), settings)
     refused = verdict is Verdict.UNEXPLAINED
     return Diagnosis(
         verdict,

@@ -12,6 +12,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance_system import System, system
 from cpfls_cli.gap.floor import floors
 from cpfls_cli.gap.results import GapSize
+from cpfls_cli.gap.scatter import scatter_variance
 from cpfls_cli.gap.weak_flight import WeakFlight
 
 _MARGIN = 1.15
@@ -32,6 +33,8 @@ class HeldOut:
         Of the model with effects.
     floor : array, shape (6,)
     known : array of bool, shape (window, 6)
+    noise : array, shape (window, 6)
+        Floor of each window with the scatter that belongs to the effects.
     """
 
     before: Array
@@ -39,6 +42,7 @@ class HeldOut:
     after: Array
     floor: Array
     known: Array
+    noise: Array
 
     def size(self, residual: Array) -> GapSize:
         """Measure a residual.
@@ -54,11 +58,12 @@ class HeldOut:
         count = self.known.sum(axis=0)
         square = (residual**2 * self.known).sum(axis=0)
         value = np.sqrt(np.where(count > 0, square / np.maximum(count, 1), np.nan))
-        return GapSize(value, value / self.floor)
+        in_floors = ((residual / self.noise) ** 2 * self.known).sum(axis=0)
+        return GapSize(value, np.sqrt(np.where(count > 0, in_floors / np.maximum(count, 1), np.nan)))
 
     def share(self) -> float:
         """Give the share of the gap above the floor that the effects take off."""
-        return share_removed(self.parameters / self.floor, self.after / self.floor, self.known)
+        return share_removed(self.parameters / self.noise, self.after / self.noise, self.known)
 
 
 def share_removed(before: Array, after: Array, known: Array) -> float:
@@ -86,6 +91,7 @@ def held_out(
     fitted: System,
     linear: Array,
     parameters: Array,
+    scatter: float,
 ) -> HeldOut:
     """Apply a fitted hypothesis to flights that it has not seen.
 
@@ -98,6 +104,8 @@ def held_out(
     linear : array, shape (column,)
     parameters : array, shape (parameter,)
         The vehicle's own numbers where nothing else is fitted.
+    scatter : float
+        Mean square of the relative scatter of the effects, from the training flights.
 
     Returns
     -------
@@ -112,10 +120,12 @@ def held_out(
     if full.base.shape[2] != len(linear):
         raise InputError("the held-out flights lack a signal that a named effect needs; hold out others")
     known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in repaired])
+    floor = floors(full, linear)
     return HeldOut(
         raw.residual,
         plain.residual - plain.base @ parameters,
         full.residual - full.base @ linear,
-        floors(full, linear),
+        floor,
         known,
+        np.sqrt(floor**2 + scatter * scatter_variance(full)),
     )

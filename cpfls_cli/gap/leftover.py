@@ -13,8 +13,9 @@ from cpfls_cli.gap.dependence import Dependence, rank_dependence
 from cpfls_cli.gap.floor import left_over
 from cpfls_cli.gap.narrow_band import NarrowBand, narrow_band
 from cpfls_cli.gap.results import Unexplained
+from cpfls_cli.gap.scatter import scatter_size, scatter_variance
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.gap.state_signals import joined_states, state_signals
+from cpfls_cli.gap.state_signals import joined_states, state_signals, without_actuation
 from cpfls_cli.gap.weak_flight import CHANNELS
 
 _LARGE = 1.5
@@ -38,12 +39,15 @@ class Leftover:
     floors : array, shape (6,)
         Root mean square of each channel, in floors; 0 where unknown.
     dependence : tuple of Dependence
+    scatter : float
+        Mean square of the relative scatter of the effects over a window.
     unexplained : tuple of Unexplained
         Channels with a gap.
     """
 
     floors: Array
     dependence: tuple[Dependence, ...]
+    scatter: float
     unexplained: tuple[Unexplained, ...]
 
 
@@ -71,17 +75,22 @@ def leftover(
     -------
     Leftover
     """
-    in_floors = (hypothesis.residual - hypothesis.base @ linear) / floor
+    left = hypothesis.residual - hypothesis.base @ linear
+    variance = scatter_variance(hypothesis)
+    scatter = scatter_size(variance, left, floor)
+    in_floors = left / np.sqrt(floor**2 + scatter * variance)
     sizes = np.sqrt(np.mean(in_floors**2, axis=0))
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
-    dependence = rank_dependence(in_floors, hypothesis.flight_index, block, states, settings.shifts, rng)
+    dependence = rank_dependence(
+        in_floors, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
+    )
     band = _band(hypothesis, linear, settings, rng)
     unexplained = [
         _unexplained(channel, float(size), dependence, band, settings)
         for channel, size in zip(CHANNELS, sizes, strict=True)
         if size > _SMALL
     ]
-    return Leftover(sizes, dependence, tuple(found for found in unexplained if found is not None))
+    return Leftover(sizes, dependence, scatter, tuple(found for found in unexplained if found is not None))
 
 
 def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:

@@ -76,7 +76,7 @@ def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
     return [
         Candidate(effect, dict(zip((shape.name for shape in effect.shapes), values, strict=True)))
         for effect in effects
-        for values in product(*(shape.grid for shape in effect.shapes))
+        for values in product(*(shape.tried for shape in effect.shapes))
     ]
 
 

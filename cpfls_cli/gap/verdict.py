@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from cpfls_cli.arrays import Array
 from cpfls_cli.gap.results import Alternative, NamedEffect, Unexplained, Verdict
 from cpfls_cli.gap.settings import GapSettings
+
+_SECOND_CAUSE = 0.03
+"""Share of the gap, in squared floors, from which on what is left is a cause of its own."""
 
 _MAIN = 0.1
 """Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
@@ -26,6 +32,7 @@ def verdict_of(
     effects : sequence of NamedEffect
     alternatives : sequence of Alternative
     unexplained : sequence of Unexplained
+        Where effects were found: of those, the ones that matter.
     share : float
         Of the gap above the floor that the effects take off flights not seen.
     excited : bool
@@ -46,3 +53,21 @@ def verdict_of(
         return Verdict.PARTIAL
     main = {effect.name for effect in effects if effect.share >= _MAIN}
     return Verdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else Verdict.NAMED
+
+
+def matters(left: Unexplained, before: Array) -> bool:
+    """Tell whether what is left beside named effects shows a second cause that is not small.
+
+    Parameters
+    ----------
+    left : Unexplained
+    before : array, shape (6,), floors
+        The gap of each channel without effects.
+
+    Returns
+    -------
+    bool
+    """
+    follows = left.signal is not None or left.frequency_hz is not None
+    largest = float(np.nanmax(before**2, initial=1.0))
+    return follows and left.share * left.floors**2 > _SECOND_CAUSE * largest

@@ -20,7 +20,7 @@ _LARGEST_START = 0.5
 _LARGEST_ACROSS = 0.97
 
 
-def swing(signals: Signals, length: float, damping: float) -> Array:
+def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
     """Swing a load on a cable under a moving hook.
 
     ``n'' = -(a + g z)_across / L - |n'|^2 n - c n'`` for the direction n of the cable, with the part of the
@@ -35,6 +35,8 @@ def swing(signals: Signals, length: float, damping: float) -> Array:
         L.
     damping : float, 1/s
         c.
+    depth : float, m
+        Of the hook below the centre of mass, with which it swings to and fro itself.
 
     Returns
     -------
@@ -46,7 +48,7 @@ def swing(signals: Signals, length: float, damping: float) -> Array:
     Equation of the spherical pendulum with a moving pivot.
     """
     stride = max(1, round(_STEP_S / signals.period))
-    felt = _felt_acceleration(signals)
+    felt = _felt_acceleration(signals, depth)
     nodes = felt[::stride].tolist()
     middles = (0.5 * (felt[:-stride:stride] + felt[stride::stride])).tolist()
     states = integrate(nodes, middles, stride * signals.period, length, damping)
@@ -54,18 +56,24 @@ def swing(signals: Signals, length: float, damping: float) -> Array:
     return np.asarray(CubicSpline(at, states)(np.minimum(signals.time, at[-1])))
 
 
-def _felt_acceleration(signals: Signals) -> Array:
-    """Add gravity to the acceleration of the vehicle, shape (time, 3), world frame."""
+def _felt_acceleration(signals: Signals, depth: float) -> Array:
+    """Add gravity to the acceleration of the hook, shape (time, 3), world frame."""
     assert signals.velocity is not None, "declared among the needs"
-    moving = signals.acceleration
-    if moving is None:
-        moving = savgol_filter(
-            signals.velocity, max(5, 2 * round(0.1 / signals.period) + 1), 2, 1, signals.period, axis=0
-        )
-    return np.asarray(moving + [0.0, 0.0, signals.vehicle.gravity_m_s2])
+    turning = np.cross(signals.body_rate, [0.0, 0.0, -depth])
+    hook = np.einsum("tij,tj->ti", signals.rotation, turning)
+    if signals.acceleration is None:
+        felt = _smooth_derivative(signals, signals.velocity + hook)
+    else:
+        felt = signals.acceleration + _smooth_derivative(signals, hook)
+    return np.asarray(felt + np.array([0.0, 0.0, signals.vehicle.gravity_m_s2]))
 
 
-def settled_swing(signals: Signals, length: float, damping: float) -> Array:
+def _smooth_derivative(signals: Signals, values: Array) -> Array:
+    samples = max(5, 2 * round(_SMOOTHING_S / signals.period) + 1)
+    return np.asarray(savgol_filter(values, samples, 2, 1, signals.period, axis=0))
+
+
+def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
     """Add to the driven swing the one that a flight starts with, as its force balance shows it.
 
     The horizontal pull on the vehicle is ``m_p g`` times the whole swing. Where forces are known, least squares find
@@ -77,12 +85,14 @@ def settled_swing(signals: Signals, length: float, damping: float) -> Array:
         With velocity.
     length : float, m
     damping : float, 1/s
+    depth : float, m
+        Of the hook.
 
     Returns
     -------
     array, shape (time, 2)
     """
-    driven = swing(signals, length, damping)[:, :2]
+    driven = swing(signals, length, damping, depth)[:, :2]
     if signals.acceleration is None or signals.thrust is None or signals.attitude is None:
         return driven
     mass = signals.vehicle.mass_kg
@@ -99,7 +109,7 @@ def settled_swing(signals: Signals, length: float, damping: float) -> Array:
     start = found[1:5] / found[0] if found[0] > 0 else np.zeros(4)
     if np.abs(start).max() > _LARGEST_START:
         return driven
-    return driven + np.column_stack([free @ start[:2], free @ start[2:]])
+    return np.asarray(driven + np.column_stack([free @ start[:2], free @ start[2:]]))
 
 
 def _free_swing(signals: Signals, length: float, damping: float) -> Array:
@@ -111,11 +121,11 @@ def _free_swing(signals: Signals, length: float, damping: float) -> Array:
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     length = shape["length_m"]
-    swung = settled_swing(signals, length, shape["damping_1_s"])
+    swung = settled_swing(signals, length, shape["damping_1_s"], shape["depth_m"])
     across = np.minimum((swung**2).sum(axis=1), _LARGEST_ACROSS)
     cable = np.column_stack([swung, -np.sqrt(1 - across)])
     rate = np.gradient(swung, signals.time, axis=0)
-    tension = length * (rate**2).sum(axis=1) - (_felt_acceleration(signals) * cable).sum(axis=1)
+    tension = length * (rate**2).sum(axis=1) - (_felt_acceleration(signals, shape["depth_m"]) * cable).sum(axis=1)
     pull = np.einsum("tji,tj->ti", signals.rotation, cable * tension[:, None])
     levers = (wrench(np.cross(hook, pull)) for hook in -np.eye(3)[::-1])
     return Columns(stack(*levers, wrench(force=pull)))
@@ -148,5 +158,6 @@ EFFECT = Effect(
     shapes=(
         Shape("length_m", "m", (0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0), "length of the cable"),
         Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing"),
+        Shape("depth_m", "m", (0.0, 0.1, 0.3), "depth of the hook below the centre of mass", first=0.0),
     ),
 )

@@ -1,0 +1,150 @@
+"""Extension: named effects become part of a model, everything refitted together, and judged on unseen flights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.gap.audit import Audit
+from cpfls_cli.gap.balance_system import System, system
+from cpfls_cli.gap.diagnose import Recording, common_windows
+from cpfls_cli.gap.estimate import Estimates, estimates
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
+from cpfls_cli.gap.held_out import HeldOut, held_out
+from cpfls_cli.gap.inertial import InertiaModel
+from cpfls_cli.gap.refine import fit, refined
+from cpfls_cli.gap.results import NamedEffect
+from cpfls_cli.gap.scatter import scatter_size, scatter_variance
+from cpfls_cli.gap.search import best_floor, block_index
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.weak_flight import CHANNELS, WeakFlight, weak_flight
+from cpfls_cli.gap.windows import Windows
+
+_TOUCHED = 0.2
+"""Root mean square in floors by which effects and refit move a channel, from which on it has to get better."""
+
+
+@dataclass(frozen=True)
+class Extension:
+    """A model with effects and how it does.
+
+    Attributes
+    ----------
+    model : ExtendedModel
+    effects : tuple of NamedEffect
+        With refitted numbers.
+    found : Estimates
+    unseen : HeldOut
+    """
+
+    model: ExtendedModel
+    effects: tuple[NamedEffect, ...]
+    found: Estimates
+    unseen: HeldOut
+
+
+def extend(
+    training: Sequence[Recording],
+    held: Sequence[Recording],
+    effects: Sequence[NamedEffect],
+    audit: Audit,
+    settings: GapSettings,
+    base: InertiaModel | None,
+) -> Extension:
+    """Refit a model together with effects.
+
+    Parameters
+    ----------
+    training, held : sequence of Recording
+    effects : sequence of NamedEffect
+        To become part of the model; shapes start from theirs.
+    audit : Audit
+        Faults of the sensors that are repaired.
+    settings : GapSettings
+    base : InertiaModel or None
+        None for the rigid body of the vehicle.
+
+    Returns
+    -------
+    Extension
+
+    Raises
+    ------
+    ComputationError
+        If the gap on the held-out flights does not shrink in the channels that change.
+    """
+    own = common_windows([*training, *held], settings)
+    flights = [_weak(r, own, base, settings, audit) for r in training]
+    chosen = [effect.candidate for effect in effects if effect.candidate is not None]
+    hypothesis = refined(flights, chosen, best_floor(system(flights, chosen)))
+    found = _estimated(hypothesis, settings)
+    unseen = _judged(held, own, base, settings, audit, hypothesis, found)
+    _require_smaller(unseen)
+    fitted = tuple(FittedEffect(*pair) for pair in zip(hypothesis.chosen, found.of_effect, strict=True))
+    width = len(found.linear) - sum(len(linear) for linear in found.of_effect)
+    model = ExtendedModel(base, found.linear[:width], fitted, audit)
+    return Extension(model, tuple(_renewed(effects, hypothesis, found)), found, unseen)
+
+
+def _weak(
+    recording: Recording, own: Windows, base: InertiaModel | None, settings: GapSettings, audit: Audit | None
+) -> WeakFlight:
+    signals = recording.signals if audit is None else audit.repaired(recording.signals)
+    return weak_flight(recording.name, signals, own, base, settings.force)
+
+
+def _estimated(hypothesis: System, settings: GapSettings) -> Estimates:
+    floor = best_floor(hypothesis)
+    left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+    weight = np.maximum(floor, np.sqrt(np.mean(left**2, axis=0)))
+    return estimates(hypothesis, weight, block_index(hypothesis, settings))
+
+
+def _judged(
+    held: Sequence[Recording],
+    own: Windows,
+    base: InertiaModel | None,
+    settings: GapSettings,
+    audit: Audit,
+    hypothesis: System,
+    found: Estimates,
+) -> HeldOut:
+    plain = system(hypothesis.flights)
+    left = hypothesis.residual - hypothesis.base @ found.linear
+    return held_out(
+        [_weak(r, own, base, settings, None) for r in held],
+        [_weak(r, own, base, settings, audit) for r in held],
+        hypothesis,
+        found.linear,
+        fit(plain, best_floor(plain)),
+        scatter_size(scatter_variance(hypothesis), left, best_floor(hypothesis)),
+    )
+
+
+def _require_smaller(unseen: HeldOut) -> None:
+    before, after = unseen.size(unseen.before).floors, unseen.size(unseen.after).floors
+    moved = unseen.size(unseen.before - unseen.after).floors > _TOUCHED
+    if not moved.any():
+        raise ComputationError("not extended: what is named changes no channel of the held-out flights by its noise")
+    if (after[moved] ** 2).sum() >= (before[moved] ** 2).sum():
+        raise ComputationError(
+            f"not extended: the gap on the held-out flights does not shrink: {_grown(before, after, moved)}"
+        )
+
+
+def _renewed(effects: Sequence[NamedEffect], hypothesis: System, found: Estimates) -> list[NamedEffect]:
+    fitted = {
+        candidate.effect.name: (candidate, linear, numbers)
+        for candidate, linear, numbers in zip(hypothesis.chosen, found.of_effect, found.effects, strict=True)
+    }
+    renewed = []
+    for effect in effects:
+        if effect.candidate is None:
+            renewed.append(effect)
+            continue
+        candidate, linear, numbers = fitted[effect.name]
+        renewed.append(replace(effect, candidate=candidate, linear=linear, coefficients=numbers))
+    return renewed
