@@ -37,6 +37,10 @@ FlightsArgument = Annotated[
     list[Path], typer.Argument(metavar="FLIGHT...", help="Flights, or logs (.csv, .csv.gz) that the config describes.")
 ]
 DisagreementArgument = Annotated[Path, typer.Argument(metavar="DISAGREEMENT", help="Made by `cpfls compare`.")]
+DiagnosisArgument = Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="Made by `cpfls diagnose`.")]
+FolderOption = Annotated[
+    Path, typer.Option("--output", "-o", metavar="FOLDER", help="Folder to fill.", show_default=False)
+]
 ModelOption = Annotated[
     Path | None,
     typer.Option("--model", metavar="MODEL", help="Made by `cpfls identify`; without, the vehicle of the config."),
@@ -233,6 +237,47 @@ def diagnose(
         return stage.run(job, disagreement, held_out or [])
 
     _run("diagnose", config, output, common, call)
+
+
+@app.command()
+@with_common
+def extend(
+    config: ConfigArgument,
+    diagnosis: DiagnosisArgument,
+    output: OutputOption,
+    model: ModelOption = None,
+    *,
+    common: Common,
+) -> None:
+    """Put the named effects into the model, and show that the gap shrinks."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import extend as stage
+
+        return stage.run(job, diagnosis, model)
+
+    _run("extend", config, output, common, call)
+
+
+@app.command()
+@with_common
+def gap(
+    config: ConfigArgument,
+    flights: FlightsArgument,
+    output: FolderOption,
+    held_out: HeldOutOption = None,
+    model: ModelOption = None,
+    *,
+    common: Common,
+) -> None:
+    """Compare, diagnose and extend in one go, with a report."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import gap as stage
+
+        return stage.run(job, flights, held_out or [], model)
+
+    _run("gap", config, output, common, call)
 
 
 @app.command()

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
 from cpfls_cli.cli.options import Common
 from cpfls_cli.errors import CpflsError, InputError
+from cpfls_cli.stages.plain_json import plain
 
 if TYPE_CHECKING:
     from cpfls_cli.stages.job import Outcome
@@ -60,7 +60,7 @@ def tell(outcome: Outcome, common: Common) -> None:
     common : Common
     """
     if common.as_json:
-        print(json.dumps(_plain(outcome.summary), allow_nan=False), flush=True)
+        print(json.dumps(plain(outcome.summary), allow_nan=False), flush=True)
     elif not common.quiet:
         print("\n".join(outcome.lines), flush=True)
     if not common.quiet:
@@ -130,14 +130,3 @@ def _mute_output() -> None:
 def _complain(text: str, kind: str = "error") -> None:
     for line in text.splitlines() or [""]:
         print(f"cpfls: {kind}: {line}", file=sys.stderr)
-
-
-def _plain(value: Any) -> Any:
-    """Replace what JSON has no word for: numbers that are not finite become null."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value.item() if hasattr(value, "item") else value

@@ -166,7 +166,9 @@ def _activity(hypothesis: System, known: Array) -> Array:
     pairs = list(zip(hypothesis.flights, hypothesis.signals, strict=True))
     taken = np.concatenate([flight.averaged(flight.inertial) for flight, _ in pairs])
     given = np.concatenate([flight.windows.average(signals.wrench) for flight, signals in pairs])
-    return np.maximum(_rms(taken, known), _rms(given, known))
+    size = np.maximum(_rms(taken, known), _rms(given, known))
+    # Sideways, too, a vehicle is moved by its thrust.
+    return np.concatenate([size[:3], np.full(3, np.sqrt((size[3:] ** 2).sum()))])
 
 
 def _worst(residual: Array, floors: Array, dependence: Sequence[Dependence], states: dict[str, Array]) -> Worst | None:

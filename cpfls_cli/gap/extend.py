@@ -130,9 +130,8 @@ def _require_smaller(unseen: HeldOut) -> None:
     if not moved.any():
         raise ComputationError("not extended: what is named changes no channel of the held-out flights by its noise")
     if (after[moved] ** 2).sum() >= (before[moved] ** 2).sum():
-        raise ComputationError(
-            f"not extended: the gap on the held-out flights does not shrink: {_grown(before, after, moved)}"
-        )
+        grown = ", ".join(f"{CHANNELS[c]} {before[c]:.3g} -> {after[c]:.3g} floors" for c in np.flatnonzero(moved))
+        raise ComputationError(f"not extended: the gap on the held-out flights does not shrink: {grown}")
 
 
 def _renewed(effects: Sequence[NamedEffect], hypothesis: System, found: Estimates) -> list[NamedEffect]:

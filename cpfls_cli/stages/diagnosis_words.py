@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.gap.diagnose import Diagnosed
 from cpfls_cli.gap.evidence import Evidence
-from cpfls_cli.gap.results import Diagnosis, Estimate, NamedEffect, Unexplained, Verdict
+from cpfls_cli.gap.results import Diagnosis, Estimate, GapSize, NamedEffect, Unexplained, Verdict
 from cpfls_cli.gap.weak_flight import CHANNELS
 from cpfls_cli.stages.audit_file import audit_lines, audit_summary
 from cpfls_cli.stages.disagreement_words import UNITS, gap_summary, replay_line, replay_summary, unseen_lines
@@ -43,7 +43,7 @@ def diagnosis_lines(found: Diagnosed, shown: Evidence, split: str) -> list[str]:
         *(_rival_line(rival.name, rival.instead_of, rival.separated_by) for rival in diagnosis.alternatives),
         *(_unexplained_line(left) for left in diagnosis.unexplained),
         *_levels(diagnosis),
-        *gap_lines(diagnosis),
+        *gap_lines(diagnosis.before, diagnosis.after),
         replay_line("held out, simulated before", shown.before, shown.held),
         replay_line("held out, simulated after", shown.after, shown.held),
         f"flights: {split}",
@@ -123,30 +123,39 @@ def headline(diagnosis: Diagnosis) -> Iterator[str]:
     """
     yield f"{diagnosis.verdict}: {_VERDICTS[diagnosis.verdict]}"
     for effect in diagnosis.effects:
-        yield _effect_line(effect)
+        yield effect_line(effect)
     for effect in diagnosis.closest:
-        yield f"closest, but not it: {_effect_line(effect)}"
+        yield f"closest, but not it: {effect_line(effect)}"
 
 
-def gap_lines(diagnosis: Diagnosis) -> Iterator[str]:
+def gap_lines(before: GapSize, after: GapSize) -> Iterator[str]:
     """Say how the gap of each channel shrinks on held-out flights.
 
     Parameters
     ----------
-    diagnosis : Diagnosis
+    before, after : GapSize
 
     Yields
     ------
     str
     """
-    before, after = diagnosis.before, diagnosis.after
     for place, channel in enumerate(CHANNELS):
         if np.isfinite(before.value[place]):
             size = f"{before.value[place]:.3g} -> {after.value[place]:.3g} {UNITS[place]}"
             yield f"held out, {channel}: gap {size}, {before.floors[place]:.2g} -> {after.floors[place]:.2g} floors"
 
 
-def _effect_line(effect: NamedEffect) -> str:
+def effect_line(effect: NamedEffect) -> str:
+    """Say an effect in one sentence with its numbers.
+
+    Parameters
+    ----------
+    effect : NamedEffect
+
+    Returns
+    -------
+    str
+    """
     numbers = "; ".join(_coefficient(c) for c in effect.coefficients)
     chance = "p < 1e-6" if effect.p_value < 1e-6 else f"p = {effect.p_value:.2g}"
     return f"{effect.name}: {effect.sentence} {numbers} ({chance}, {effect.share:.0%} of the gap)"

@@ -33,13 +33,28 @@ def disagreement_lines(found: Disagreement, given: Flights) -> list[str]:
     list of str
     """
     return [
-        *(_channel_line(found, place) for place in range(len(CHANNELS)) if np.isfinite(found.rms[place])),
-        *_stretch_lines(found, given),
-        *_signal_lines(found),
+        *where_lines(found, given),
         replay_line("simulated from the measured rotors", found.replayed, found.held),
         *unseen_lines((each.name, each.reason) for each in found.not_excited),
         *audit_lines(found.audit),
     ]
+
+
+def where_lines(found: Disagreement, given: Flights) -> Iterator[str]:
+    """Say on which axis, when and with which signal a model and flights disagree.
+
+    Parameters
+    ----------
+    found : Disagreement
+    given : Flights
+
+    Yields
+    ------
+    str
+    """
+    yield from (_channel_line(found, place) for place in range(len(CHANNELS)) if np.isfinite(found.rms[place]))
+    yield from _stretch_lines(found, given)
+    yield from _signal_lines(found)
 
 
 def disagreement_summary(found: Disagreement, given: Flights) -> dict[str, Any]:
