@@ -13,6 +13,8 @@ from cpfls_cli.effects.signals import Signals
 # of a slow signal that is rounded stays too, but longer at the level before.
 _CLIPPED_SAMPLES = 5
 _CLIPPED_TO_NEXT = 3
+# No gyroscope of a multirotor has its limit lower; a common smallest range is 125 deg/s.
+_LOWEST_LIMIT_RAD_S = 1.0
 # Rounding to this step adds as much noise as a poor gyroscope has.
 _COARSE_STEP_RAD_S = 0.02
 _AXES = ("x", "y", "z")
@@ -75,7 +77,7 @@ def _clipped(column: Array) -> bool:
     before, last = np.unique(column)[-2:]
     highest = column == last
     crowded = highest.sum() > _CLIPPED_TO_NEXT * (column == before).sum()
-    return bool(crowded and _longest_run(highest) >= _CLIPPED_SAMPLES)
+    return bool(crowded and last >= _LOWEST_LIMIT_RAD_S and _longest_run(highest) >= _CLIPPED_SAMPLES)
 
 
 def _longest_run(mask: BoolArray) -> int:

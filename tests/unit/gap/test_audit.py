@@ -121,10 +121,10 @@ def test_the_accelerometer_is_compared_with_the_velocity(turning):
 
 def test_constant_clipped_and_rounded_channels_are_named(turning):
     rate = turning.body_rate.copy()
-    rate[:, 0] = np.clip(rate[:, 0], -0.5, 0.5)
+    rate[:, 0] = np.clip(rate[:, 0], -1.0, 1.0)
     rate[:, 1] = np.round(rate[:, 1] / 0.05) * 0.05
     told = " ".join(audit([replace(turning, body_rate=rate, voltage=np.ones(len(turning)))], WINDOWS).warnings)
-    assert "about x is clipped at 0.5 rad/s" in told
+    assert "about x is clipped at 1 rad/s" in told
     assert "about y is rounded to steps of 0.05 rad/s" in told
     assert "The channel voltage never changes" in told
 
