@@ -22,7 +22,7 @@ from cpfls_cli.stages.disagreement_file import disagreement_data
 from cpfls_cli.stages.disagreement_words import disagreement_summary, where_lines
 from cpfls_cli.stages.extend import Grown, extended
 from cpfls_cli.stages.flights_file import flights_data
-from cpfls_cli.stages.job import Job, Outcome, finish, input_file
+from cpfls_cli.stages.job import Job, Outcome, finish, input_file, take_inputs
 from cpfls_cli.stages.output_folder import check_folder, filled_folder
 from cpfls_cli.stages.plain_json import plain
 from cpfls_cli.stages.recordings import Flights, read_flights
@@ -92,17 +92,15 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
 
 
 def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path | None) -> _Given:
+    roles = flight_roles("flight", flights) | flight_roles("held-out", held_out)
+    inputs = take_inputs(job, roles | ({} if model is None else {"model": model}))
     check_folder(job.output, job.force)
     check_ignored(job.study)
-    roles = flight_roles("flight", flights) | flight_roles("held-out", held_out)
-    for path in roles.values():
-        job.reads(path)
     # All flights are read together, so that one battery is full in all of them.
     read = read_flights([*flights, *held_out], job.study)
     given, held = read.recordings[: len(flights)], read.recordings[len(flights) :]
     split = split_flights(given, held, job.study.gap)
     base = None if model is None else model_base(model, job.study)
-    inputs = {role: input_file(path) for role, path in (roles | ({} if model is None else {"model": model})).items()}
     return _Given(Flights(given, read.warnings), split, base, model or Path(), inputs)
 
 

@@ -104,13 +104,35 @@ def begin(job: Job, inputs: Mapping[str, Path]) -> Started:
     InputError
         If an input is missing, the output exists or cannot be written, or is one of the inputs.
     """
-    for path in inputs.values():
-        _check_input(path, job.output)
-        job.reads(path)
+    files = take_inputs(job, inputs)
     check_output(job.output, job.force)
     line = f"{job.output}: would be written; the config and all inputs are good"
     dry_run = Outcome({"dry_run": True, "output": str(job.output)}, (line,)) if job.dry_run else None
-    return Started({role: input_file(path) for role, path in inputs.items()}, dry_run)
+    return Started(files, dry_run)
+
+
+def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
+    """Check inputs, and take note of what they hold.
+
+    Parameters
+    ----------
+    job : Job
+    inputs : mapping of str to Path
+        By role.
+
+    Returns
+    -------
+    dict of str to InputFile
+
+    Raises
+    ------
+    InputError
+        If one is missing, no file, or the output.
+    """
+    for path in inputs.values():
+        _check_input(path, job.output)
+        job.reads(path)
+    return {role: input_file(path) for role, path in inputs.items()}
 
 
 def _check_input(path: Path, output: Path) -> None:

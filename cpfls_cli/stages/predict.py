@@ -14,8 +14,11 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import score
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.physics import not_positive_definite
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.stages.extended_file import is_extended
 from cpfls_cli.stages.job import Job, Outcome, begin, finish
 from cpfls_cli.stages.model_file import read_model
+from cpfls_cli.stages.predict_extended import extended_prediction
 from cpfls_cli.stages.sources import read_good, read_with
 from cpfls_cli.stages.training import MOTION, flight_motion
 
@@ -34,13 +37,19 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     Outcome
     """
     started = begin(job, {"model": model, "flight": flight})
+    if is_extended(model):
+        data = extended_prediction(model, flight, job.study)
+        if started.dry_run is not None:
+            return started.dry_run
+        finish(job, PREDICTION, data, started.inputs)
+        return _outcome(data)
     identified = read_model(read_good(model, MODEL), model)
     source = read_with(flight, FLIGHT, "time", *MOTION)
     if started.dry_run is not None:
         return started.dry_run
     data = _predict(identified, source)
     finish(job, PREDICTION, data, started.inputs)
-    return _outcome(source, data)
+    return _outcome(data)
 
 
 def _predict(model: Model, flight: Artifact) -> dict[str, Any]:
@@ -60,7 +69,7 @@ def _predict(model: Model, flight: Artifact) -> dict[str, Any]:
     return data
 
 
-def _outcome(flight: Artifact, data: dict[str, Any]) -> Outcome:
+def _outcome(data: dict[str, Any]) -> Outcome:
     samples, outside = len(data["time"]), int(np.sum(data["outside"]))
     indefinite = int(np.sum(not_positive_definite(data["inertia"])))
     summary: dict[str, Any] = {"samples": samples, "mse": None, "relative_error": None, "outside": outside}
@@ -72,7 +81,10 @@ def _outcome(flight: Artifact, data: dict[str, Any]) -> Outcome:
     if indefinite:
         warnings.append(f"D(q) is not positive definite at {indefinite} of {samples} samples: no body moves like that")
     if "error" in data:
-        measured = TorqueData(data["time"], flight_motion(flight), data["measured_torque"])
+        # A score looks at attitude and torque only.
+        attitude = data["attitude"]
+        motion = Motion(attitude, np.zeros_like(attitude), np.zeros_like(attitude))
+        measured = TorqueData(data["time"], motion, data["measured_torque"])
         judged = score(measured, data["torque"])
         summary |= {"mse": float(np.mean(judged.mse)), "relative_error": judged.worst_relative_error}
         summary |= {"r2": judged.r2.tolist(), "r2_body": judged.r2_body.tolist()}

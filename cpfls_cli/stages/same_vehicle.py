@@ -33,8 +33,8 @@ def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettin
         first = different[0]
         values = "" if first == "rotors" else f" ({getattr(own, first)} there, {getattr(wanted, first)} in the config)"
         raise InputError(
-            f"{path}: was made with another vehicle: vehicle.{', vehicle.'.join(different)} differs{values}; use the "
-            "config of that vehicle, or make the file again"
+            f"{path}: was made with another vehicle; not the same: vehicle.{', vehicle.'.join(different)}{values}; use "
+            "the config of that vehicle, or make the file again"
         )
 
 
