@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import wilcoxon
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.gap.balance_system import System
@@ -15,6 +16,8 @@ from cpfls_cli.gap.weak_flight import Candidate
 _SPANS = 0.999
 _CLOSE = 0.01
 _ERRORS = 2.0
+_CHANCE = 0.02
+_NEAR = 0.6
 
 
 def unbeaten(own: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
@@ -36,7 +39,7 @@ def unbeaten(own: Scored, ranking: Sequence[Scored], above_floor: float) -> list
         other
         for other in ranking
         if other.candidate.effect.name != own.candidate.effect.name
-        and other.gain > 0.5 * own.gain
+        and other.gain > _NEAR * own.gain
         and not _beats(own, other, above_floor)
     ]
 
@@ -122,8 +125,11 @@ def _outside(columns: Array, values: Array) -> Array:
 
 def _beats(own: Scored, other: Scored, above_floor: float) -> bool:
     margin = other.block_error - own.block_error
-    spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin))) if len(margin) > 1 else np.inf
-    return bool(margin.sum() > _ERRORS * spread and margin.sum() > _CLOSE * above_floor)
+    if margin.sum() <= _CLOSE * above_floor or len(margin) < 2:
+        return False
+    spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin)))
+    # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
+    return bool(margin.sum() > _ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
 
 
 def _numbers(scored: Scored) -> int:

@@ -126,7 +126,7 @@ def diagnose(
     judged = [judge_effect(weak, chosen, place, found, gap, effects, settings, rng) for place in range(len(chosen))]
     progress(0.9, "sensor faults")
     faults = [_fault(finding, training, weak, own, model, settings) for finding in checked.named]
-    torque_alone = _torque_alone(training, own, model, settings, checked, effects)
+    torque_alone = _torque_alone(weak, settings, effects)
     diagnosis = _concluded(judged, faults, found, unseen, left, steps, hypothesis, settings, torque_alone, checked)
     return Diagnosed(diagnosis, checked, hypothesis, found, left, unseen)
 
@@ -236,18 +236,12 @@ def _fault(finding, training, weak, own, model, settings) -> NamedEffect:  # typ
 
 
 def _torque_alone(
-    training: Sequence[Recording],
-    own: Windows,
-    model: InertiaModel | None,
-    settings: GapSettings,
-    checked: Audit,
-    effects: Sequence[Effect],
+    weak: Sequence[WeakFlight], settings: GapSettings, effects: Sequence[Effect]
 ) -> tuple[tuple[str, float], ...]:
     """Tell what the torques alone would name first, where the force balance was used too."""
-    weak = [weak_flight(r.name, checked.repaired(r.signals), own, model, False) for r in training]
-    if not settings.force or not any(r.signals.has_force for r in training):
+    if not any(flight.known[3:].any() for flight in weak):
         return ()
-    step = look(weak, (), effects, settings, None)
+    step = look([flight.without_force() for flight in weak], (), effects, settings, None)
     best = [scored for scored in step.ranking[:3] if np.isfinite(scored.gain) and scored.gain > 0]
     return tuple((s.candidate.effect.name, float(min(1.0, s.gain / step.above_floor))) for s in best)
 
@@ -276,8 +270,8 @@ def _concluded(
     refused = verdict is Verdict.UNEXPLAINED
     return Diagnosis(
         verdict,
-        tuple(effect for effect in effects if not refused or effect.candidate is None),
-        tuple(effects) if refused else (),
+        tuple(faults if refused else effects),
+        tuple(named) if refused else (),
         rivals,
         left.unexplained,
         not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], steps[-1].floor),

@@ -15,7 +15,7 @@ from cpfls_cli.gap.results import GapSize
 from cpfls_cli.gap.scatter import scatter_variance
 from cpfls_cli.gap.weak_flight import WeakFlight
 
-_MARGIN = 1.15
+_MARGIN = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
 
 

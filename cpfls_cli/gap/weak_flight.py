@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -94,6 +94,17 @@ class WeakFlight:
         if key not in self.seen:
             self.seen[key] = self.averaged(columns_of(candidate, signals))
         return self.seen[key]
+
+    def without_force(self) -> WeakFlight:
+        """Leave the force balance out.
+
+        Returns
+        -------
+        WeakFlight
+        """
+        known = self.known & (np.arange(6) < 3)
+        seen = {key: rows * known[:, None] for key, rows in self.seen.items()}
+        return replace(self, known=known, seen=seen)
 
     def averaged(self, columns: Columns) -> Array:
         """Average columns, or a residual, over the windows.

@@ -157,7 +157,7 @@ EFFECT = Effect(
     columns=_columns,
     shapes=(
         Shape("length_m", "m", (0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0), "length of the cable"),
-        Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing"),
+        Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing", first=0.2),
         Shape("depth_m", "m", (0.0, 0.1, 0.3), "depth of the hook below the centre of mass", first=0.0),
     ),
 )
