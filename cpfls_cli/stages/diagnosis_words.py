@@ -181,7 +181,8 @@ def _unexplained_line(left: Unexplained) -> str:
 
 def _levels(diagnosis: Diagnosis) -> Iterator[str]:
     """Explain why torque alone and torque with force give two names, where they do."""
-    named = {effect.name for effect in diagnosis.effects}
+    # Faults of sensors and wrong numbers of the vehicle are told on other grounds.
+    named = {effect.name for effect in diagnosis.effects if effect.candidate is not None}
     if not named or not diagnosis.torque_alone or diagnosis.torque_alone[0][0] in named:
         return
     name, share = diagnosis.torque_alone[0]

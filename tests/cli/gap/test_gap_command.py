@@ -1,0 +1,160 @@
+"""The whole workflow on flights whose only secret is a centre of mass that is off, and on flights without any."""
+
+import json
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+OFFSET = (0.008, -0.005)
+FILES = {"disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json"}
+
+
+@pytest.fixture(scope="module")
+def found(cpfls, gap_config, shifted, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("found") / "gap"
+    result = cpfls("gap", gap_config, *shifted, "-o", folder, "--json")
+    assert result.exit_code == 0, result.stderr
+    return SimpleNamespace(folder=folder, summary=json.loads(result.stdout))
+
+
+@pytest.fixture(scope="module")
+def none(cpfls, gap_config, exact, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("none") / "gap"
+    result = cpfls("gap", gap_config, *exact, "-o", folder, "--json")
+    assert result.exit_code == 0, result.stderr
+    return SimpleNamespace(folder=folder, summary=json.loads(result.stdout))
+
+
+def test_offset_is_named_with_its_size(found):
+    assert found.summary["verdict"] == "NAMED"
+    assert [effect["name"] for effect in found.summary["effects"]] == ["com_offset"]
+    coefficients = found.summary["effects"][0]["coefficients"]
+    for name, true in zip(("c_x", "c_y"), OFFSET, strict=True):
+        assert coefficients[name]["value"] == pytest.approx(true, rel=0.02)
+        assert coefficients[name]["low"] < coefficients[name]["value"] < coefficients[name]["high"]
+        assert coefficients[name]["unit"] == "m"
+    assert found.summary["effects"][0]["p_value"] < 0.01
+
+
+def test_unseen_gap_shrinks_to_the_noise_where_the_offset_acts(found):
+    before, after = found.summary["gap_before"], found.summary["gap_after"]
+    # Thrust of 59 N times the offset.
+    assert before["torque_n_m"][:2] == pytest.approx([0.3, 0.48], rel=0.05)
+    assert all(b > 10 * a for b, a in zip(before["torque_n_m"][:2], after["torque_n_m"][:2], strict=True))
+    assert max(after["floors"]) < 1.5
+    assert before["force_n"] == after["force_n"] == [None] * 3
+
+
+def test_json_has_every_promised_key(found):
+    promised = {"verdict", "effects", "alternatives", "unexplained", "not_excited", "gap_before", "gap_after", "audit"}
+    assert promised <= set(found.summary)
+    assert {"parameters", "split", "extended", "disagreement"} <= set(found.summary)
+    assert set(found.summary["effects"][0]) == {
+        "name", "coefficients", "p_value", "share", "selection_frequency", "sentence",
+    }  # fmt: skip
+    assert json.loads((found.folder / "gap.json").read_text()) == found.summary
+    assert {"findings", "warnings"} <= set(found.summary["audit"])
+
+
+def test_effects_without_their_signals_are_listed(found):
+    unseen = {each["name"]: each["reason"] for each in found.summary["not_excited"]}
+    assert "velocity" in unseen["rotor_drag"]
+    assert "voltage" in unseen["battery_sag"]
+
+
+def test_folder_holds_good_artifacts(cpfls, found):
+    assert {path.name for path in found.folder.iterdir()} == FILES
+    for name in ("disagreement", "diagnosis", "extended"):
+        assert cpfls("check", found.folder / f"{name}.h5").exit_code == 0
+
+
+def test_last_third_of_the_flights_is_held_out(found):
+    assert found.summary["split"].endswith(": flight_3.csv")
+    with h5py.File(found.folder / "diagnosis.h5") as file:
+        assert [role.decode() for role in file["flight/role"]] == ["training", "training", "held-out"]
+
+
+def test_same_seed_same_bytes(cpfls, gap_config, shifted, found, tmp_path):
+    assert cpfls("gap", gap_config, *shifted, "-o", tmp_path / "again", "-q").exit_code == 0
+    for name in FILES:
+        assert (tmp_path / "again" / name).read_bytes() == (found.folder / name).read_bytes(), name
+
+
+def test_one_command_says_what_three_say(cpfls, gap_config, shifted, found, tmp_path):
+    names = [tmp_path / f"{name}.h5" for name in ("disagreement", "diagnosis", "extended")]
+    assert cpfls("compare", gap_config, *shifted, "-o", names[0]).exit_code == 0
+    said = cpfls("diagnose", gap_config, names[0], "-o", names[1], "--json")
+    assert cpfls("extend", gap_config, names[1], "-o", names[2]).exit_code == 0
+    summary = json.loads(said.stdout)
+    assert summary == {key: found.summary[key] for key in summary}
+    for path in names:
+        assert path.read_bytes() == (found.folder / path.name).read_bytes()
+
+
+def test_held_out_by_name(cpfls, gap_config, shifted, tmp_path):
+    words = ("gap", gap_config, *shifted[:1], "--held-out", shifted[1], "-o", tmp_path / "x", "--json")
+    summary = json.loads(cpfls(*words).stdout)
+    assert summary["split"] == "held out as asked: flight_2.csv"
+    assert summary["disagreement"]["flights"] == ["flight_1.csv"]
+    assert [effect["name"] for effect in summary["effects"]] == ["com_offset"]
+
+
+def test_one_flight_is_split_in_time(cpfls, gap_config, shifted, tmp_path):
+    summary = json.loads(cpfls("gap", gap_config, shifted[0], "-o", tmp_path / "x", "--json").stdout)
+    assert summary["split"].endswith("flight_1.csv (last third)")
+    with h5py.File(tmp_path / "x" / "diagnosis.h5") as file:
+        assert file["flight/first"][()].tolist() == [0, 1600]
+        assert file["signals/time"][1600] == pytest.approx(16.0)
+
+
+def test_people_read_the_verdict_first(cpfls, gap_config, shifted, tmp_path):
+    lines = cpfls("gap", gap_config, *shifted, "-o", tmp_path / "x").stdout.splitlines()
+    assert lines[0].startswith("NAMED: ")
+    assert lines[1].startswith("com_offset: The centre of mass is not where the model has it")
+    assert any(line.startswith("held out, torque y: gap 0.4") for line in lines)
+    assert any(line.startswith("torque y follows thrust") for line in lines)
+    assert lines[-1].endswith("extended.h5: the model with com_offset")
+
+
+def test_nothing_hidden_nothing_named(none):
+    assert none.summary["verdict"] == "NO_GAP"
+    assert none.summary["effects"] == []
+    assert none.summary["extended"]["written"] is False
+    assert "NO_GAP" in none.summary["extended"]["reason"]
+    assert {path.name for path in none.folder.iterdir()} == FILES - {"extended.h5"}
+    assert max(none.summary["gap_before"]["floors"]) < 1.5
+
+
+def test_extend_refuses_what_names_nothing(refuse, gap_config, none, tmp_path):
+    (message,) = refuse("extend", gap_config, none.folder / "diagnosis.h5", "-o", tmp_path / "x.h5", code=1)
+    assert message == "not extended: the diagnosis is NO_GAP and names no effect that could be added"
+
+
+def test_a_later_run_leaves_no_file_of_an_earlier_one(cpfls, gap_config, shifted, exact, tmp_path):
+    assert cpfls("gap", gap_config, *shifted, "-o", tmp_path / "x", "-q").exit_code == 0
+    (tmp_path / "x" / "notes.txt").write_text("mine")
+    assert cpfls("gap", gap_config, *exact, "-o", tmp_path / "x", "-q", "--force").exit_code == 0
+    assert {path.name for path in (tmp_path / "x").iterdir()} == (FILES - {"extended.h5"}) | {"notes.txt"}
+
+
+def test_extended_model_holds_the_effect_and_the_inertia(found):
+    with h5py.File(found.folder / "extended.h5") as file:
+        assert file["effect/name"][()].tolist() == [b"com_offset"]
+        assert file["linear/value"][()] == pytest.approx(OFFSET, rel=0.02)
+        assert file["inertia"][()] == pytest.approx([0.6, 0.6, 1.2, 0, 0, 0], rel=0.01, abs=1e-12)
+
+
+def test_replay_of_measured_rotors_gets_better(found):
+    replay = found.summary["replay"]
+    before, after, held = (np.array(replay[f"rate_{name}_rad_s"]) for name in ("before", "after", "held"))
+    assert before.shape == after.shape == (50, 3)
+    assert (after[-1, :2] < 0.1 * before[-1, :2]).all()
+    assert (after[-1] < held[-1]).all()
+
+
+def test_dry_run_writes_nothing(cpfls, gap_config, shifted, tmp_path):
+    result = cpfls("gap", gap_config, *shifted, "-o", tmp_path / "x", "--dry-run")
+    assert result.exit_code == 0
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,116 @@
+"""What the gap workflow refuses, and what it says then."""
+
+import numpy as np
+import pytest
+
+
+def column(path, *names):
+    """Copy a log without some of its columns."""
+    header = path.read_text().splitlines()[0].split(",")
+    data = np.loadtxt(path, delimiter=",", skiprows=1)
+    kept = [place for place, name in enumerate(header) if name not in names]
+    return data[:, kept], ",".join(header[place] for place in kept)
+
+
+def write(path, data, header):
+    np.savetxt(path, data, delimiter=",", header=header, comments="", fmt="%.9g")
+    return path
+
+
+def test_missing_flight(refuse, gap_config, tmp_path):
+    (message,) = refuse("gap", gap_config, tmp_path / "none.csv", "-o", tmp_path / "x")
+    assert message == f"{tmp_path / 'none.csv'}: no such file"
+
+
+def test_folder_that_is_not_empty(refuse, gap_config, shifted, tmp_path):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("mine")
+    (message,) = refuse("gap", gap_config, *shifted, "-o", tmp_path / "full")
+    assert message.endswith("exists already and is not empty; --force replaces what is in it")
+
+
+def test_output_that_is_a_file(refuse, gap_config, shifted, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    (message,) = refuse("gap", gap_config, *shifted, "-o", tmp_path / "file", "--force")
+    assert message.endswith("is a file; -o names a folder")
+
+
+def test_unknown_effect_to_ignore(refuse, gap_config, shifted, tmp_path):
+    (message,) = refuse("gap", gap_config, *shifted, "-o", tmp_path / "x", "--set", "gap.ignore=[com_ofset]")
+    assert message == "gap.ignore = com_ofset: no such effect (did you mean com_offset?)"
+
+
+def test_flight_too_short_to_split(refuse, gap_config, shifted, tmp_path):
+    data, header = column(shifted[0])
+    short = write(tmp_path / "short.csv", data[:900], header)
+    (message,) = refuse("gap", gap_config, short, "-o", tmp_path / "x")
+    assert message.startswith("short.csv: one flight is too short to hold a third of it out")
+    assert "--held-out" in message
+    assert "gap.window_s = 0.4" in message
+
+
+def test_flights_of_different_rates(refuse, gap_config, shifted, tmp_path):
+    data, header = column(shifted[0])
+    slow = write(tmp_path / "slow.csv", data[::2], header)
+    (message,) = refuse("gap", gap_config, shifted[1], slow, "-o", tmp_path / "x")
+    assert message.startswith("slow.csv: sampled at 50 Hz, flight_2.csv at 100 Hz")
+    assert "import.rate_hz" in message
+
+
+def test_log_without_actuation(refuse, gap_config, shifted, tmp_path):
+    data, header = column(shifted[0], "om1", "om2", "om3", "om4")
+    still = write(tmp_path / "still.csv", data, header)
+    (message,) = refuse("compare", gap_config, still, "-o", tmp_path / "x.h5")
+    assert "has no rotor_speed, rotor_command or body_torque" in message
+
+
+@pytest.fixture(scope="module")
+def other_config(gap_config, tmp_path_factory):
+    path = tmp_path_factory.mktemp("other") / "study.yaml"
+    path.write_text(gap_config.read_text().replace("mass_kg: 6.0", "mass_kg: 7.0"))
+    return path
+
+
+def test_flight_of_another_vehicle(cpfls, refuse, gap_config, other_config, shifted, tmp_path):
+    flight = tmp_path / "flight.h5"
+    assert cpfls("import", other_config, shifted[0], "-o", flight).exit_code == 0
+    (message,) = refuse("compare", gap_config, flight, "-o", tmp_path / "x.h5")
+    assert "was made with another vehicle; not the same: vehicle.mass_kg (7.0 there, 6.0 in the config)" in message
+
+
+def test_disagreement_of_another_vehicle(cpfls, refuse, gap_config, other_config, shifted, tmp_path):
+    source = tmp_path / "disagreement.h5"
+    assert cpfls("compare", other_config, *shifted[:2], "-o", source).exit_code == 0
+    (message,) = refuse("diagnose", gap_config, source, "-o", tmp_path / "x.h5")
+    assert "vehicle.mass_kg" in message
+
+
+def test_model_of_another_vehicle(refuse, pipeline, gap_config, shifted, tmp_path):
+    words = (
+        "gap",
+        gap_config,
+        *shifted,
+        "--model",
+        pipeline.model,
+        "-o",
+        tmp_path / "x",
+        "--set",
+        "vehicle.mass_kg=5.5",
+    )
+    (message,) = refuse(*words)
+    assert f"{pipeline.model}: was made with another vehicle" in message
+
+
+def test_artifact_of_another_stage(refuse, pipeline, gap_config, tmp_path):
+    (message,) = refuse("diagnose", gap_config, pipeline.flight, "-o", tmp_path / "x.h5")
+    assert "is a cpfls/flight; this command needs a cpfls/disagreement (made by `cpfls compare" in message
+
+
+def test_commands_stand_in_where_speeds_are_missing(cpfls, gap_config, shifted, tmp_path):
+    data, header = column(shifted[0])
+    commanded = write(tmp_path / "commanded.csv", data, header.replace("om", "cmd"))
+    words = "import.signals.rotor_command={columns: [cmd1, cmd2, cmd3, cmd4], unit: rad/s}"
+    result = cpfls("compare", gap_config, commanded, "-o", tmp_path / "x.h5", "--set", words)
+    assert result.exit_code == 0, result.stderr
+    assert "cannot be seen: channel_delay: the flights lack" in result.stdout
+    assert "motor_lag" not in result.stdout
