@@ -53,7 +53,8 @@ def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -
     middles = (0.5 * (felt[:-stride:stride] + felt[stride::stride])).tolist()
     states = integrate(nodes, middles, stride * signals.period, length, damping)
     at = signals.time[::stride]
-    return np.asarray(CubicSpline(at, states)(np.minimum(signals.time, at[-1])))
+    # The samples beyond the last step are less than a step away.
+    return np.asarray(CubicSpline(at, states)(signals.time))
 
 
 def _felt_acceleration(signals: Signals, depth: float) -> Array:
@@ -124,7 +125,7 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     swung = settled_swing(signals, length, shape["damping_1_s"], shape["depth_m"])
     across = np.minimum((swung**2).sum(axis=1), _LARGEST_ACROSS)
     cable = np.column_stack([swung, -np.sqrt(1 - across)])
-    rate = np.gradient(swung, signals.time, axis=0)
+    rate = np.gradient(cable, signals.time, axis=0)
     tension = length * (rate**2).sum(axis=1) - (_felt_acceleration(signals, shape["depth_m"]) * cable).sum(axis=1)
     pull = np.einsum("tji,tj->ti", signals.rotation, cable * tension[:, None])
     levers = (wrench(np.cross(hook, pull)) for hook in -np.eye(3)[::-1])
