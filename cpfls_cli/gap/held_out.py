@@ -117,7 +117,7 @@ def held_out(
         If they lack a signal that the effects need.
     """
     raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
-    if full.base.shape[2] != len(linear):
+    if not all(full.can(candidate) for candidate in (*full.free, *full.chosen)):
         raise InputError("the held-out flights lack a signal that a named effect needs; hold out others")
     known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in repaired])
     floor = floors(full, linear)

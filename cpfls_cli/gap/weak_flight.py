@@ -186,12 +186,14 @@ def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
     ----------
     signals : Signals
     chosen : iterable of Candidate
+        Those that need a signal which the flight lacks leave it as it is: measured speeds, say, do not lag.
 
     Returns
     -------
     Signals
     """
     for candidate in chosen:
-        if candidate.effect.apply is not None and candidate.effect.kind == "actuator":
-            signals = candidate.effect.apply(signals, candidate.shape)
+        effect = candidate.effect
+        if effect.apply is not None and effect.kind == "actuator" and not effect.missing(signals):
+            signals = effect.apply(signals, candidate.shape)
     return signals
