@@ -57,9 +57,16 @@ def test_battery_takes_the_same_share_of_thrust_and_torque(columns, commanded):
 def test_only_measured_rotors_can_be_late_and_only_commands_can_lag(flight, commanded):
     assert CATALOGUE["channel_delay"].missing(commanded) == ("measured_rotor_speed",)
     assert not CATALOGUE["channel_delay"].missing(flight)
-    for name in ("motor_lag", "command_delay", "battery_sag"):
+    for name in ("motor_lag", "command_delay"):
         assert CATALOGUE[name].missing(flight) == ("command",)
         assert not CATALOGUE[name].missing(commanded)
+
+
+def test_sag_is_looked_for_in_any_rotor_speeds_with_a_voltage(flight, commanded):
+    sag = CATALOGUE["battery_sag"]
+    assert not sag.missing(flight)
+    assert not sag.missing(commanded)
+    assert sag.missing(replace(flight, voltage=None)) == ("voltage",)
 
 
 def test_what_is_applied_before_other_columns_is_what_its_column_says(columns, flight, commanded):

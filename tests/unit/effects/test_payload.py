@@ -1,40 +1,167 @@
-"""The load on a cable against an integrator and against forces in balance."""
+"""The load on a cable against Lagrange's equations in angles, and against forces in balance."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
-from cpfls_cli.effects.catalogue.payload import swing
+from cpfls_cli import rotations
+from cpfls_cli.effects.catalogue.payload import settled_swing, swing
+from cpfls_cli.effects.pendulum import integrate
+from cpfls_cli.effects.signals import Signals
+
+GRAVITY = np.array([0.0, 0.0, 9.81])
 
 
-def test_swing_is_the_solution_of_the_driven_pendulum(flight):
-    length, damping = 1.5, 0.2
-    acceleration = np.diff(flight.velocity[:, 0]) / 0.005
+def direction(angles):
+    """Cable from an elevation about the world's x and a turn about it: regular where the cable hangs."""
+    a, b = angles
+    return np.array([np.sin(a), np.cos(a) * np.sin(b), -np.cos(a) * np.cos(b)])
 
+
+def lagrange(felt, length, damping):
     def rate(t, state):
-        push = acceleration[min(int(t / 0.005), len(acceleration) - 1)]
-        return [state[1], -push / length - damping * state[1] - 9.81 / length * state[0]]
+        a, b, da, db = state
+        along_a = np.array([np.cos(a), -np.sin(a) * np.sin(b), np.sin(a) * np.cos(b)])
+        along_b = np.array([0.0, np.cos(a) * np.cos(b), np.cos(a) * np.sin(b)])
+        dda = -np.sin(a) * np.cos(a) * db**2 - felt(t) @ along_a / length - damping * da
+        ddb = 2 * np.tan(a) * da * db - felt(t) @ along_b / (length * np.cos(a) ** 2) - damping * db
+        return [da, db, dda, ddb]
 
-    span = (0.0, flight.time[-1])
-    solved = solve_ivp(rate, span, [0.0, 0.0], t_eval=flight.time, max_step=0.005, rtol=1e-8, atol=1e-10)
-    np.testing.assert_allclose(swing(flight, length, damping)[:, 0], solved.y[0], atol=2e-4)
-    assert np.abs(solved.y[0]).max() > 0.3
+    return rate
+
+
+def hanging(felt, time, length, damping, start=(0.0, 0.0, 0.0, 0.0)):
+    solved = solve_ivp(lagrange(felt, length, damping), time[[0, -1]], start, t_eval=time, rtol=1e-9, atol=1e-10)
+    return direction(solved.y[:2]).T
+
+
+TIME = np.arange(0.0, 8.0, 0.01)
+
+
+def push(t):
+    """Acceleration of the hook plus gravity: large enough for swings of half a radian in both directions."""
+    t = np.asarray(t)
+    return np.stack([2.5 * np.sin(2.1 * t), 2.0 * np.sin(1.4 * t + 1.0), 9.81 + 1.5 * np.sin(3.0 * t)], axis=-1)
+
+
+def test_integration_agrees_with_lagrange_in_large_swings():
+    step, length, damping = 0.02, 1.5, 0.1
+    at = np.arange(0.0, 8.0, step)
+    found = integrate(push(at).tolist(), push(at[:-1] + step / 2).tolist(), step, length, damping)
+    expected = hanging(push, at, length, damping)
+    np.testing.assert_allclose(found[:, :3], expected, atol=1e-5)
+    np.testing.assert_allclose(found[:, 3:], CubicSpline(at, expected)(at, 1), atol=5e-3)
+    assert np.abs(expected[:, :2]).max(axis=0).min() > 0.4
+
+
+def test_an_undamped_load_under_a_still_hook_keeps_its_energy():
+    step, length, steps = 0.02, 1.0, 600
+    pulse = [[6.0, -4.0, 9.81]] * 20 + [GRAVITY.tolist()] * (steps - 20)
+    found = integrate(pulse, pulse[:-1], step, length, 0.0)[25:]
+    energy = 0.5 * length * (found[:, 3:] ** 2).sum(axis=1) + 9.81 * found[:, 2]
+    np.testing.assert_allclose(energy, energy[0], rtol=2e-5)
+    np.testing.assert_allclose((found[:, :3] ** 2).sum(axis=1), 1.0, atol=1e-12)
+    assert np.abs((found[:, :3] * found[:, 3:]).sum(axis=1)).max() < 1e-12
+
+
+def tumbling(vehicle):
+    """A flight of which position, attitude, rates and the way of any of its points are known by formula."""
+    position = np.column_stack([0.6 * np.sin(2.0 * TIME), 0.5 * np.sin(1.3 * TIME + 1), 0.2 * np.cos(2.5 * TIME)])
+    attitude = np.column_stack([0.3 * np.sin(2.2 * TIME), 0.25 * np.sin(1.7 * TIME + 2), 0.5 * np.sin(0.6 * TIME)])
+    move, turn = CubicSpline(TIME, position), CubicSpline(TIME, attitude)
+    return Signals(
+        time=TIME,
+        vehicle=vehicle,
+        attitude=attitude,
+        body_rate=rotations.body_rate(attitude, turn(TIME, 1)),
+        position=position,
+        velocity=move(TIME, 1),
+        acceleration=move(TIME, 2),
+    )
+
+
+def hook_way(signals, depth):
+    rotation = Rotation.from_euler("ZYX", signals.attitude[:, ::-1])
+    return CubicSpline(TIME, signals.position + rotation.apply([0.0, 0.0, -depth]))
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.2])
+@pytest.mark.parametrize("accelerometer", [True, False])
+def test_swing_under_a_hook_that_tumbles_with_the_vehicle(flight, depth, accelerometer):
+    signals = tumbling(flight.vehicle)
+    signals = signals if accelerometer else replace(signals, acceleration=None)
+    way = hook_way(signals, depth)
+    expected = hanging(lambda t: way(t, 2) + GRAVITY, TIME, 1.5, 0.2)
+    found = swing(signals, 1.5, 0.2, depth)
+    np.testing.assert_allclose(found[:, :3], expected, atol=0.01)
+    assert np.abs(expected[:, :2]).max() > 0.3
+
+
+def test_force_is_what_the_load_needs_besides_its_weight(columns, flight):
+    """Newton's law of the load itself, which the cable alone accelerates."""
+    length, depth = 1.5, 0.1
+    signals = tumbling(flight.vehicle)
+    way = hook_way(signals, depth)
+    load = CubicSpline(TIME, way(TIME) + length * hanging(lambda t: way(t, 2) + GRAVITY, TIME, length, 0.0))
+    rotation = Rotation.from_euler("ZYX", signals.attitude[:, ::-1])
+    pull = rotation.inv().apply(-(load(TIME, 2) + GRAVITY))
+    found = columns("payload", signals, length_m=length, damping_1_s=0.0, depth_m=depth).direct
+    inside = slice(30, -30)
+    np.testing.assert_allclose(found[inside, 3:, 3], pull[inside], atol=0.15)
+    hooks = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
+    for column, hook in enumerate(hooks):
+        np.testing.assert_allclose(found[inside, :3, column], np.cross(hook, pull)[inside], atol=0.15)
+        assert not found[:, 3:, column].any()
+
+
+def test_a_load_that_swings_from_the_start_shows_in_the_balance_of_forces(flight):
+    """Thrust and attitude such that vehicle and load obey Newton's law; the load starts off the vertical."""
+    length, damping, load, mass = 1.5, 0.1, 0.6, flight.vehicle.mass_kg
+    signals = tumbling(flight.vehicle)
+    way = CubicSpline(TIME, 0.5 * signals.position)
+    cable = hanging(lambda t: way(t, 2) + GRAVITY, TIME, length, damping, (0.12, -0.15, 0.3, 0.2))
+    felt = way(TIME, 2) + GRAVITY
+    rate = CubicSpline(TIME, cable)(TIME, 1)
+    tension = length * (rate**2).sum(axis=1) - (felt * cable).sum(axis=1)
+    thrust = mass * felt - load * tension[:, None] * cable
+    size = np.linalg.norm(thrust, axis=1)
+    roll, pitch = -np.arcsin(thrust[:, 1] / size), np.arctan2(thrust[:, 0], thrust[:, 2])
+    level = replace(
+        signals,
+        attitude=np.column_stack([roll, pitch, np.zeros_like(roll)]),
+        velocity=way(TIME, 1),
+        acceleration=way(TIME, 2),
+        stated_thrust=size,
+    )
+    found = settled_swing(level, length, damping)
+    at_rest = swing(level, length, damping)[:, :2]
+    error = lambda guess: np.sqrt(np.mean((guess - cable[:, :2]) ** 2))  # noqa: E731
+    assert error(at_rest) > 0.09
+    assert error(found) < 0.02
+
+
+LEVEL = {"length_m": 1.0, "damping_1_s": 0.2, "depth_m": 0.0}
 
 
 def test_cable_pulls_along_gravity_where_the_velocity_is_constant(columns, flight, with_velocity):
     level = replace(with_velocity(flight, [5.0, -2.0, 0.0]), attitude=np.zeros_like(flight.attitude))
-    found = columns("payload", level, length_m=1.0, damping_1_s=0.2).direct
-    np.testing.assert_allclose(found @ [0.06, 0.6], [[0, 0, 0, 0, 0, -0.6 * 9.81]] * len(level), atol=1e-8)
+    found = columns("payload", level, **LEVEL).direct
+    expected = [-0.01 * 9.81, 0.02 * 9.81, 0, 0, 0, -0.6 * 9.81]
+    # Hook behind and to the left: its load raises the nose and drops the left side.
+    np.testing.assert_allclose(found @ [0.06, -0.01, -0.02, 0.6], [expected] * len(level), atol=1e-8)
 
 
 def test_cable_rights_a_tilted_vehicle(columns, flight, with_velocity):
     tilted = replace(with_velocity(flight, [0.0, 0.0, 0.0]), attitude=np.full_like(flight.attitude, [0.2, 0.0, 0.0]))
-    torque = columns("payload", tilted, length_m=1.0, damping_1_s=0.2).direct[:, :3, 0]
+    torque = columns("payload", tilted, **LEVEL).direct[:, :3, 0]
     np.testing.assert_allclose(torque, [[-9.81 * np.sin(0.2), 0.0, 0.0]] * len(tilted), atol=1e-9)
 
 
 def test_climbing_harder_pulls_harder(columns, flight, with_velocity):
     rising = replace(with_velocity(flight, [0.0, 0.0, 0.0]), acceleration=np.tile([0.0, 0.0, 2.0], (len(flight), 1)))
-    force = columns("payload", rising, length_m=1.0, damping_1_s=0.2).direct[:, 3:, 1]
+    force = columns("payload", replace(rising, rotor_speed=None), **LEVEL).direct[:, 3:, 3]
     np.testing.assert_allclose(np.linalg.norm(force, axis=1), 11.81)

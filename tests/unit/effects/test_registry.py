@@ -37,7 +37,13 @@ USUAL = {
     ("rotor_mismatch", "difference_1"): ((-0.15, 0.15), (-0.1, 0.1)),
     ("torque_bias", "M_z"): ((-0.5, 0.5), None),
     ("payload", "mass"): ((0.2, 1.5), (0.002, 0.01)),
-    ("payload", "mass_times_attachment"): ((0.01, 0.3), (2e-5, 2e-4)),
+    ("payload", "mass_times_depth"): ((0.01, 0.3), (2e-5, 2e-4)),
+    ("payload", "depth_m"): ((0.05, 0.2), (0.0, 0.02)),
+    ("rotor_plane_damping", "k_F"): ((1.6e-4, 8e-4), (3e-8, 1.5e-7)),
+    ("rotor_mismatch", "lift_imbalance"): ((-0.1, 0.1), (-0.1, 0.1)),
+    ("parameter_error", "inertia_x"): ((-0.5, 1.0), (-0.5, 1.0)),
+    ("parameter_error", "reference_z"): ((-0.15, 0.15), (-0.02, 0.02)),
+    ("vertical_descent", "f_2"): ((-0.2, 0.7), (-0.2, 0.7)),
     ("payload", "length_m"): ((0.5, 4.0), None),
     ("gyro_bias", "b_x"): ((-0.1, 0.1), (-0.1, 0.1)),
     ("gyro_scale", "e_x"): ((-0.05, 0.05), (-0.05, 0.05)),
@@ -120,3 +126,10 @@ def test_wind_and_drag_are_two_sides_of_one_number():
     physical = np.array([1.3e-3, 3.0, -2.0])
     np.testing.assert_allclose(entry.physical(entry.linear(physical)), physical)
     assert np.isnan(entry.physical(np.array([0.0, 1e-3, 1e-3]))[1:]).all()
+
+
+def test_a_shape_with_a_first_value_is_tried_there_only():
+    shapes = {shape.name: shape for shape in CATALOGUE["payload"].shapes}
+    assert shapes["depth_m"].tried == (0.0,)
+    assert shapes["length_m"].tried == shapes["length_m"].grid
+    assert all(shape.first in (None, *shape.grid) for entry in CATALOGUE.values() for shape in entry.shapes)

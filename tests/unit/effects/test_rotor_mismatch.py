@@ -36,8 +36,18 @@ def circle(number):
 def test_columns_are_what_other_factors_do(columns, flight):
     true = with_gains(flight.vehicle, [0.05, -0.03, -0.05, 0.03], [-0.1, 0.1, -0.1, 0.1])
     change = body_wrench(true, flight.rotor_speed).body_torque - flight.torque
-    found = columns("rotor_mismatch", flight).direct @ [0.1, -0.06, 0.1]
+    found = columns("rotor_mismatch", flight).direct @ [0.1, -0.06, 0.1, 0.0]
     np.testing.assert_allclose(found[:, :3], change, atol=1e-12)
+    np.testing.assert_allclose(found[:, 5], body_wrench(true, flight.rotor_speed).thrust - flight.thrust, atol=1e-9)
+
+
+def test_what_one_spin_lifts_more_shows_in_force_only(columns, flight):
+    """In torque it is a wrong Ixx and a wrong Iyy of opposite signs, which the inertia columns hold already."""
+    true = body_wrench(with_gains(flight.vehicle, [0.05, -0.05, 0.05, -0.05]), flight.rotor_speed)
+    found = columns("rotor_mismatch", flight).direct[..., 3] * 0.05
+    np.testing.assert_allclose(found[:, 5], true.thrust - flight.thrust, atol=1e-9)
+    assert not found[:, :5].any()
+    np.testing.assert_allclose(true.body_torque - flight.torque, flight.torque * [-0.05, 0.05, 0.0], atol=1e-12)
 
 
 def test_pairs_face_each_other_and_spin_alike(vehicle):

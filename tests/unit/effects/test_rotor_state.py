@@ -4,6 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import interp1d
 
 from cpfls_cli.effects.catalogue.vertical_descent import (
     descent_ratio,
@@ -62,18 +65,52 @@ def test_states_have_names(ratio, state):
 
 
 def test_a_climb_changes_nothing_and_forward_speed_ends_the_effect(columns, flight):
-    assert not columns("vertical_descent", sinking(flight, -5.0)).direct.any()
-    here = columns("vertical_descent", sinking(flight, 7.0)).direct
-    moving = columns("vertical_descent", sinking(flight, 7.0, sideways=14.0)).direct
-    assert np.abs(moving).max() < 0.02 * np.abs(here).max()
+    assert not columns("vertical_descent", sinking(flight, -5.0), sideways=1.0).direct.any()
+    here = columns("vertical_descent", sinking(flight, 7.0), sideways=1.0).direct
+    induced = induced_velocity(flight).mean()
+    moving = columns("vertical_descent", sinking(flight, 7.0, 0.7 * induced), sideways=0.7).direct
+    np.testing.assert_allclose(moving, here / np.e, atol=1e-12)
+    gone = columns("vertical_descent", sinking(flight, 7.0, 2.1 * induced), sideways=0.7).direct
+    assert np.abs(gone).max() < 2e-4 * np.abs(here).max()
 
 
-def test_basis_spans_the_powers_and_is_far_from_alike():
-    ratio = np.linspace(0.0, 2.5, 101)
-    basis, powers = thrust_basis(ratio), ratio[:, None] ** np.arange(1, 5)
-    exact = basis @ np.linalg.lstsq(basis, powers, rcond=None)[0]
-    np.testing.assert_allclose(exact, powers, atol=1e-10)
-    assert np.linalg.cond(basis) < 0.1 * np.linalg.cond(powers / np.linalg.norm(powers, axis=0))
+def test_thrust_follows_a_table_of_any_curve_between_its_knots(columns, flight):
+    """What six coefficients say is what an interpolator makes of the curve at the knots, rotor by rotor."""
+    knots, curve = [0.0, 0.5, 1.0, 1.25, 1.6, 2.0, 2.5], [0.0, 0.02, -0.1, -0.2, -0.1, 0.3, 0.6]
+    fast = replace(flight, velocity=flight.velocity * [0.2, 0.2, 3.0] - [0.0, 0.0, 3.0])
+    sideways = np.linalg.norm(fast.hub_velocity[..., :2], axis=2) / induced_velocity(fast)
+    share = interp1d(knots, curve)(np.clip(-fast.hub_velocity[..., 2] / induced_velocity(fast), 0.0, 2.5))
+    thrust = fast.rotor_thrust * share * np.exp(-(sideways**2))
+    found = columns("vertical_descent", fast, sideways=1.0).direct @ curve[1:]
+    np.testing.assert_allclose(found[:, 5], thrust.sum(axis=1), atol=1e-10)
+    np.testing.assert_allclose(found[:, 0], thrust @ fast.hubs[:, 1], atol=1e-10)
+    np.testing.assert_allclose(found[:, 1], -thrust @ fast.hubs[:, 0], atol=1e-10)
+
+
+@given(st.floats(0.0, 2.5))
+def test_hats_are_a_partition_of_unity_beyond_the_first_knot(ratio):
+    basis = thrust_basis(np.array(ratio))
+    assert basis.sum() == pytest.approx(min(1.0, ratio / 0.5))
+    assert (basis >= 0).all()
+    assert np.count_nonzero(basis) <= 2
+
+
+def test_scatter_is_the_variance_of_thrusts_that_shake_by_themselves(flight):
+    size, draws = 0.07, 20000
+    for k, speed in ((0, 7.0), (300, 9.0)):
+        falling = sinking(flight, speed)
+        found = CATALOGUE["vertical_descent"].scatter(falling, {"sideways": 1.0})[k]
+        shaking = size * np.random.default_rng(k).standard_normal((draws, 4)) * falling.rotor_thrust[k]
+        force = np.zeros((draws, 4, 3))
+        force[..., 2] = shaking
+        torque = np.cross(falling.hubs, force).sum(axis=1)
+        np.testing.assert_allclose(size**2 * found[:3], torque.var(axis=0), rtol=0.05)
+        np.testing.assert_allclose(size**2 * found[3:], force.sum(axis=1).var(axis=0), rtol=0.05)
+
+
+@pytest.mark.parametrize("speed", [-3.0, 2.0, 14.0])
+def test_rotors_do_not_shake_outside_the_vortex_ring(flight, speed):
+    assert not CATALOGUE["vertical_descent"].scatter(sinking(flight, speed), {"sideways": 1.0}).any()
 
 
 def test_bounds_hold_the_curves_of_the_sources(vehicle):

@@ -28,7 +28,6 @@ ROTORS = {
 BODIES = {
     "linear_damping": lambda at: [-at.rate[j] * np.eye(3)[j] for j in range(3)],
     "quadratic_damping": lambda at: [-abs(at.rate[j]) * at.rate[j] * np.eye(3)[j] for j in range(3)],
-    "rotor_plane_damping": lambda at: [-sum(at.w) * in_plane(at.rate)],
     "rotor_gyroscopic": lambda at: [-np.cross(at.rate, sum(at.s * at.w) * Z)],
     "torque_bias": lambda _: list(np.eye(3)),
 }
@@ -67,6 +66,19 @@ def test_what_acts_on_the_body(columns, flight, name):
         torque = np.array(BODIES[name](at)).T
         np.testing.assert_allclose(found[k, :3], torque, atol=1e-12)
     assert not found[:, 3:].any()
+
+
+def test_discs_that_lag_brake_the_body_and_lean_the_thrust(columns, flight):
+    """Thrust at hub i turns by -(p, q) about x and y against the body; its roll and pitch lever is in k_w."""
+    found = columns("rotor_plane_damping", flight).direct
+    for k in (0, 211, 599):
+        rate, total = flight.body_rate[k], np.zeros(6)
+        for rotor, w in zip(flight.vehicle.rotors, flight.rotor_speed[k], strict=True):
+            force = w * np.cross(-in_plane(rate), Z)
+            total += np.concatenate([np.cross(rotor.position_m, force) * Z, force])
+        np.testing.assert_allclose(found[k, :, 1], total, atol=1e-9)
+        damping = -flight.rotor_speed[k].sum() * in_plane(rate)
+        np.testing.assert_allclose(found[k, :, 0], [*damping, 0.0, 0.0, 0.0], atol=1e-9)
 
 
 def test_wind_is_rotor_drag_through_moving_air(columns, flight, with_velocity):
