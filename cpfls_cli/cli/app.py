@@ -43,7 +43,11 @@ FolderOption = Annotated[
 ]
 ModelOption = Annotated[
     Path | None,
-    typer.Option("--model", metavar="MODEL", help="Made by `cpfls identify`; without, the vehicle of the config."),
+    typer.Option(
+        "--model",
+        metavar="MODEL",
+        help="Made by `cpfls identify` (`compare` takes one of `extend` too); without, the vehicle of the config.",
+    ),
 ]
 HeldOutOption = Annotated[
     list[Path] | None,

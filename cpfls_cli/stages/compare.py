@@ -6,19 +6,21 @@ from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
-from cpfls_cli.artifacts.gap_formats import DISAGREEMENT
+from cpfls_cli.artifacts.gap_formats import DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.gap.compare import Disagreement, compare
-from cpfls_cli.gap.extended import plain
-from cpfls_cli.stages.base_file import base_data, base_model, model_base
+from cpfls_cli.gap.extended import ExtendedModel, plain
+from cpfls_cli.stages.base_file import base_artifact, base_data, base_model, model_base
 from cpfls_cli.stages.disagreement_file import disagreement_data
 from cpfls_cli.stages.disagreement_words import disagreement_lines, disagreement_summary
+from cpfls_cli.stages.extended_file import is_extended, read_extended
 from cpfls_cli.stages.flights_file import flights_data
 from cpfls_cli.stages.job import Job, Outcome, Progress, begin, finish
 from cpfls_cli.stages.recordings import Flights, read_flights
+from cpfls_cli.stages.sources import read_good
 from cpfls_cli.stages.study import generator
 
 
@@ -31,7 +33,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     flights : sequence of Path
         Artifacts, or logs that the config describes.
     model : Path or None
-        An identified model; None for the rigid body of the vehicle.
+        An identified model, or one with effects; None for the rigid body of the vehicle.
 
     Returns
     -------
@@ -40,10 +42,10 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     started = begin(job, flight_roles("flight", flights) | ({} if model is None else {"model": model}))
     check_ignored(job.study)
     given = read_flights(flights, job.study)
-    base = None if model is None else model_base(model, job.study)
+    own, base = _model(model, job.study)
     if started.dry_run is not None:
         return started.dry_run
-    found = compared(job.study, given, base, model, progress_of(job.progress))
+    found = compared(job.study, given, own, progress_of(job.progress))
     data = {
         **disagreement_data(found, given),
         **base_data(base),
@@ -53,8 +55,16 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     return Outcome(disagreement_summary(found, given), tuple(disagreement_lines(found, given)), given.warnings)
 
 
+def _model(path: Path | None, study: Study) -> tuple[ExtendedModel, Artifact | None]:
+    """Read a model, with or without effects, and the identified model under it."""
+    if path is not None and is_extended(path):
+        return read_extended(path, study), base_artifact(read_good(path, EXTENDED))
+    base = None if path is None else model_base(path, study)
+    return plain(base_model(base, path or Path())), base
+
+
 def compared(
-    study: Study, given: Flights, base: Artifact | None, path: Path | None, progress: Callable[[float, str], None]
+    study: Study, given: Flights, model: ExtendedModel, progress: Callable[[float, str], None]
 ) -> Disagreement:
     """Compare a model with flights.
 
@@ -62,17 +72,13 @@ def compared(
     ----------
     study : Study
     given : Flights
-    base : Artifact or None
-        The identified model.
-    path : Path or None
-        Of the identified model, for messages.
+    model : ExtendedModel
     progress : callable
 
     Returns
     -------
     Disagreement
     """
-    model = plain(base_model(base, path or Path()))
     return compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
 
 

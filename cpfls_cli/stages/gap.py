@@ -14,8 +14,9 @@ from cpfls_cli.artifacts.records import Artifact, InputFile
 from cpfls_cli.artifacts.spec import ArtifactSpec
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.compare import Disagreement
+from cpfls_cli.gap.extended import plain as without_effects
 from cpfls_cli.stages import report
-from cpfls_cli.stages.base_file import base_data, model_base
+from cpfls_cli.stages.base_file import base_data, base_model, model_base
 from cpfls_cli.stages.compare import check_ignored, compared, flight_roles, progress_of
 from cpfls_cli.stages.diagnose import Answer, answered
 from cpfls_cli.stages.disagreement_file import disagreement_data
@@ -106,7 +107,8 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
 
 def _find(job: Job, given: _Given) -> _Found:
     study, base = job.study, given.base
-    disagreement = compared(study, given.flights, base, given.path, progress_of(job.progress, 0.0, 0.15))
+    model = without_effects(base_model(base, given.path))
+    disagreement = compared(study, given.flights, model, progress_of(job.progress, 0.0, 0.15))
     answer = answered(study, given.split, base, given.path, progress_of(job.progress, 0.15, 0.85))
     job.progress(0.85, 1, "extend")
     try:

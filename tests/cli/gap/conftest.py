@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 INERTIA = np.array([0.6, 0.6, 1.2])
 ARM, THRUST, DRAG = 0.3, 121.5e-6, 2.7e-6
@@ -64,6 +65,15 @@ def flight_table(seed, offset=(0.0, 0.0), duration=24.0, rate_hz=100.0):
     return np.column_stack([time, noisy, np.sqrt(squared)])
 
 
+def attitude_of(rate, step=0.01):
+    """Integrate body rates to roll, pitch and yaw, from level."""
+    turns, angles = Rotation.identity(), np.zeros_like(rate)
+    for place in range(1, len(rate)):
+        turns = turns * Rotation.from_rotvec(0.5 * step * (rate[place - 1] + rate[place]))
+        angles[place] = turns.as_euler("ZYX")[::-1]
+    return np.unwrap(angles, axis=0)
+
+
 def save(path, table, header=HEADER):
     np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
     return path
@@ -88,3 +98,17 @@ def exact(tmp_path_factory):
     """Two flights of the vehicle as it is."""
     folder = tmp_path_factory.mktemp("exact")
     return [save(folder / f"flight_{n}.csv", flight_table(n)) for n in (1, 2)]
+
+
+@pytest.fixture(scope="session")
+def with_attitude(tmp_path_factory):
+    """Two flights with the centre of mass off and a measured attitude."""
+    folder = tmp_path_factory.mktemp("with-attitude")
+    paths = []
+    for number in (4, 5):
+        table = flight_table(number, OFFSET)
+        rate, _, _ = motion(table[:, 0], np.random.default_rng(number))
+        noise = np.random.default_rng(number).normal(0, 0.002, (len(table), 3))
+        logged = np.column_stack([table, attitude_of(rate) + noise])
+        paths.append(save(folder / f"flight_{number}.csv", logged, HEADER + ",phi,theta,psi"))
+    return paths

@@ -1,0 +1,216 @@
+"""Comparison and models with effects, against torques that are written down here."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.gap.compare import compare
+from cpfls_cli.gap.diagnose import Recording
+from cpfls_cli.gap.evidence import evidence
+from cpfls_cli.gap.extend import extend
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
+from cpfls_cli.gap.results import NamedEffect
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.weak_flight import Candidate
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+VEHICLE = VehicleSettings()
+INERTIA = np.array([0.6, 0.6, 1.2])
+SETTINGS = GapSettings(shifts=39)
+NOISE = 0.002
+
+
+def flight(seed, extra=None, seconds=24.0):
+    """Rates of sums of sines; the stated torque is what they take, less `extra`, which the model does not know."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, seconds, 0.01)
+    rate, slope = np.zeros((2, len(time), 3))
+    for axis in range(3):
+        for frequency in rng.uniform(0.2, 1.2, 4):
+            turn, phase = 2 * np.pi * frequency, rng.uniform(0, 6)
+            rate[:, axis] += 0.3 * np.sin(turn * time + phase)
+            slope[:, axis] += 0.3 * turn * np.cos(turn * time + phase)
+    torque = INERTIA * slope + np.cross(rate, INERTIA * rate)
+    missing = np.zeros_like(torque) if extra is None else extra(time, rate)
+    noisy = rate + rng.normal(0, NOISE, rate.shape)
+    signals = Signals(time=time, body_rate=noisy, vehicle=VEHICLE, stated_torque=torque - missing)
+    return Recording(f"flight {seed}", signals)
+
+
+def bias(time, _rate):
+    return np.tile([0.0, 0.1, 0.0], (len(time), 1))
+
+
+def damping(_time, rate):
+    return -0.12 * rate
+
+
+def compared(recordings, model=None):
+    return compare(recordings, model or plain(None), SETTINGS, np.random.default_rng(0))
+
+
+def with_effect(name, *linear, shape=None):
+    effect = FittedEffect(Candidate(CATALOGUE[name], shape or {}), np.array(linear))
+    return replace(plain(None), effects=(effect,))
+
+
+def test_gap_is_the_missing_torque():
+    found = compared([flight(1, bias), flight(2, bias)])
+    assert found.rms[1] == pytest.approx(0.1, rel=0.02)
+    assert (found.rms[[0, 2]] < 0.03).all()
+    assert found.floors[1] > 5
+    assert np.isnan(found.rms[3:]).all()
+    assert np.isnan(found.residual[:, 3:]).all()
+
+
+def test_no_gap_is_about_one_floor():
+    found = compared([flight(1), flight(2)])
+    assert (found.floors[:3] < 1.4).all()
+    assert (found.floors[:3] > 0.7).all()
+    assert all(d.p_value > 0.02 or d.r2 < 0.2 for d in found.dependence)
+
+
+def test_gap_follows_the_signal_that_makes_it():
+    found = compared([flight(1, damping), flight(2, damping)])
+    best = {channel: next(d for d in found.dependence if d.channel == channel) for channel in ("torque x", "torque y")}
+    assert [best[channel].signal for channel in best] == ["body rate x", "body rate y"]
+    assert all(d.r2 > 0.9 and d.p_value < 0.05 for d in best.values())
+    assert found.worst is not None
+    assert found.worst.signals[0].endswith(found.worst.channel[-1])
+
+
+def test_stretch_is_where_the_gap_is():
+    def burst(time, _rate):
+        return np.column_stack([np.where((time > 10) & (time < 13), 0.2, 0.0), 0 * time, 0 * time])
+
+    first = compared([flight(1), flight(2, burst)]).stretches[0]
+    assert (first.flight, first.channel) == (1, "torque x")
+    assert first.start_s == pytest.approx(10, abs=0.6)
+    assert first.end_s == pytest.approx(13, abs=0.6)
+
+
+def test_effects_without_signals_are_listed():
+    unseen = {each.name: each.reason for each in compared([flight(1)]).not_excited}
+    assert "velocity" in unseen["rotor_drag"]
+    assert "parameter_error" not in unseen
+
+
+def test_model_with_the_effect_leaves_the_noise():
+    recordings = [flight(1, damping), flight(2, damping)]
+    found = compared(recordings, with_effect("linear_damping", 0.12, 0.12, 0.12))
+    assert (found.floors[:3] < 1.4).all()
+    assert (found.replayed.rate[-1] < 0.3 * compared(recordings).replayed.rate[-1]).all()
+
+
+def test_effect_wrench_is_the_torque_by_hand():
+    signals = flight(3).signals
+    torque = with_effect("linear_damping", 0.1, 0.2, 0.3).effect_wrench(signals)
+    assert torque[:, :3] == pytest.approx(-signals.body_rate * [0.1, 0.2, 0.3])
+    assert not torque[:, 3:].any()
+
+
+def test_momentum_of_an_effect_is_differentiated():
+    signals = flight(3).signals
+    time = signals.time
+    speed = 350 + 20 * np.sin(2 * np.pi * 0.7 * time)[:, None] * [1.0, -1.0, 1.0, -1.0]
+    turning = replace(signals, rotor_speed=speed, stated_torque=None)
+    found = with_effect("rotor_acceleration", 5e-4).effect_wrench(turning)
+    slope = 20 * 2 * np.pi * 0.7 * np.cos(2 * np.pi * 0.7 * time)
+    # Spins are + - + -, so all four rotors add up.
+    assert found[5:-5, 2] == pytest.approx(-5e-4 * 4 * slope[5:-5], abs=1e-5)
+
+
+def test_required_rotor_torque_is_that_of_the_motion_less_the_effect():
+    recording = flight(4, damping)
+    model = with_effect("linear_damping", 0.12, 0.12, 0.12)
+    exact = replace(recording.signals, body_rate=_exact_rate(4))
+    inside = slice(10, -10)
+    assert model.rotor_torque(exact)[inside] == pytest.approx(exact.stated_torque[inside], abs=2e-4)
+
+
+def test_refitted_inertia_changes_the_inertial_torque_in_proportion():
+    signals = replace(flight(5).signals, body_rate=np.zeros((2400, 3)))
+    spun = replace(signals, body_rate=np.column_stack([0.4 * np.sin(2 * signals.time), *[0 * signals.time] * 2]))
+    base = plain(None)
+    heavier = replace(base, parameters=np.where(np.arange(len(base.parameters)) == 0, 0.1, 0.0))
+    assert heavier.inertial_torque(spun)[:, 0] == pytest.approx(1.1 * base.inertial_torque(spun)[:, 0])
+    assert heavier.inertia(spun) == pytest.approx(np.diag([0.66, 0.6, 1.2]))
+
+
+def test_a_missing_signal_is_named():
+    model = with_effect("rotor_drag", 1e-3, 5e-5)
+    with pytest.raises(InputError, match=r"lacks .*velocity.*, which the model's effect rotor_drag needs"):
+        model.effect_wrench(flight(1).signals)
+
+
+def named(name):
+    return NamedEffect(name, Candidate(CATALOGUE[name], {}), np.zeros(0), (), 0.001, 1.0, 1.0, "")
+
+
+def extension(names, extra):
+    found = compared([flight(1, extra)])
+    training, held = [flight(1, extra), flight(2, extra)], [flight(3, extra)]
+    return extend(training, held, [named(name) for name in names], found.audit, SETTINGS, None), held
+
+
+def test_extension_refits_and_shrinks_the_unseen_gap():
+    found, held = extension(["linear_damping"], damping)
+    values = {c.name: c for c in found.effects[0].coefficients}
+    assert len(values) == 3
+    for estimate in values.values():
+        assert estimate.low < 0.12 < estimate.high or estimate.value == pytest.approx(0.12, rel=0.02)
+    before, after = (found.unseen.size(each).floors[:3] for each in (found.unseen.before, found.unseen.after))
+    assert (before > 3).all()
+    assert (after < 1.4).all()
+    shown = evidence(held, found.unseen, found.model, SETTINGS)
+    assert shown.picture.flight == 0
+    error = {name: np.ptp(getattr(shown.picture, name) - shown.picture.measured) for name in ("before", "after")}
+    assert error["after"] < 0.3 * error["before"]
+    assert (shown.white_after.p_value[:3] > shown.white_before.p_value[:3]).all()
+
+
+def test_extension_that_does_not_help_is_refused():
+    with pytest.raises(ComputationError, match="not extended"):
+        extension(["linear_damping"], None)
+
+
+def test_turned_gyroscope_is_repaired_before_anything_is_compared():
+    """An attitude tells the audit that the gyroscope has a constant error, which no torque gets."""
+
+    def seen(seed):
+        signals = flight(seed).signals
+        exact = _exact_rate(seed)
+        turns = Rotation.identity()
+        angles = np.zeros((len(signals), 3))
+        for place in range(1, len(signals)):
+            turns = turns * Rotation.from_rotvec(0.005 * (exact[place - 1] + exact[place]))
+            angles[place] = turns.as_euler("ZYX")[::-1]
+        noisy = np.unwrap(angles, axis=0) + np.random.default_rng(seed).normal(0, 0.002, angles.shape)
+        biased = signals.body_rate + np.array([0.0, 0.02, 0.0])
+        return Recording("biased", replace(signals, attitude=noisy, body_rate=biased))
+
+    found = compared([seen(6), seen(7)])
+    assert [finding.name for finding in found.audit.named] == ["gyro_bias"]
+    assert (found.floors[:3] < 1.5).all()
+
+
+def _exact_rate(seed):
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 24.0, 0.01)
+    rate = np.zeros((len(time), 3))
+    for axis in range(3):
+        for frequency in rng.uniform(0.2, 1.2, 4):
+            rate[:, axis] += 0.3 * np.sin(2 * np.pi * frequency * time + rng.uniform(0, 6))
+    return rate
+
+
+def test_plain_model_has_no_effects():
+    model = plain(None)
+    assert isinstance(model, ExtendedModel)
+    assert not model.chosen
+    assert not model.effect_wrench(flight(1).signals).any()
