@@ -28,6 +28,8 @@ class Coefficient:
     meaning : str
     scale : callable or None
         Natural size on a vehicle, in `unit`; None for 1.
+    secondary : bool
+        Whether it comes in only once the effect is chosen, because another effect would do as well for it alone.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Coefficient:
     high: float
     meaning: str
     scale: Callable[[VehicleSettings], float] | None = None
+    secondary: bool = False
 
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the coefficient on a vehicle.

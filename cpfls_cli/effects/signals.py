@@ -119,6 +119,20 @@ class Signals:
         return wrench
 
     @cached_property
+    def force(self) -> Array:
+        """Force on the vehicle without weight, shape (time, 3), N, body frame.
+
+        Thrust along z; across it what is measured, or 0 where nothing is.
+        """
+        force = np.zeros((len(self), 3))
+        if self.specific_force is not None:
+            force = self.vehicle.mass_kg * self.specific_force
+        elif self.attitude is not None and self.acceleration is not None:
+            force = self.vehicle.mass_kg * np.einsum("tji,tj->ti", self.rotation, self.acceleration)
+            force += self.vehicle.mass_kg * self.vehicle.gravity_m_s2 * self.rotation[:, 2]
+        return np.column_stack([force[:, :2], self.wrench[:, 5]])
+
+    @cached_property
     def speed(self) -> Array:
         """Rotor speeds, shape (time, rotor), rad/s."""
         assert self.rotor_speed is not None, "an effect that needs rotor speeds declares so"

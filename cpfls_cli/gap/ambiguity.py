@@ -10,11 +10,12 @@ from scipy.stats import wilcoxon
 from cpfls_cli.arrays import Array
 from cpfls_cli.gap.balance_system import System
 from cpfls_cli.gap.results import Alternative
-from cpfls_cli.gap.scoring import Scored
-from cpfls_cli.gap.weak_flight import Candidate
+from cpfls_cli.gap.scoring import Scored, primary
+from cpfls_cli.gap.weak_flight import CHANNELS, Candidate
 
 _SPANS = 0.999
 _CLOSE = 0.01
+_VISIBLE = 0.25
 _ERRORS = 2.0
 _CHANCE = 0.02
 _NEAR = 0.6
@@ -109,8 +110,8 @@ def spans(general: Candidate, special: Scored, hypothesis: System, floor: Array)
     -------
     bool
     """
-    explained = hypothesis.columns(special.candidate) @ special.coefficients / floor
-    columns = np.concatenate([hypothesis.base, hypothesis.columns(general)], axis=2) / floor[:, None]
+    explained = primary(special.candidate, hypothesis.columns(special.candidate)) @ special.coefficients / floor
+    columns = np.concatenate([hypothesis.base, primary(general, hypothesis.columns(general))], axis=2) / floor[:, None]
     base = (hypothesis.base / floor[:, None]).reshape(-1, hypothesis.base.shape[2])
     new = _outside(base, explained.reshape(-1))
     left = _outside(columns.reshape(-1, columns.shape[2]), explained.reshape(-1))
@@ -125,7 +126,9 @@ def _outside(columns: Array, values: Array) -> Array:
 
 def _beats(own: Scored, other: Scored, above_floor: float) -> bool:
     margin = other.block_error - own.block_error
-    if margin.sum() <= _CLOSE * above_floor or len(margin) < 2:
+    # Close is what leaves next to nothing of a large gap, or next to nothing beside what the chosen one leaves itself.
+    close = min(_CLOSE * above_floor, _VISIBLE * own.block_error.sum() / len(CHANNELS))
+    if margin.sum() <= close or len(margin) < 2:
         return False
     spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin)))
     # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.

@@ -64,6 +64,12 @@ class System:
         """Columns that are free: the vehicle's parameters, then the chosen effects; shape (window, 6, column)."""
         return np.concatenate([self.columns(candidate) for candidate in self.free], axis=2)
 
+    @cached_property
+    def rotor_wrench(self) -> Array:
+        """Torque and force of the rotors, averaged over the windows; shape (window, 6)."""
+        pairs = zip(self.flights, self.signals, strict=True)
+        return np.concatenate([flight.windows.average(signals.wrench) * flight.known for flight, signals in pairs])
+
     @property
     def free(self) -> tuple[Candidate, ...]:
         """Candidates with columns in `base`, in their order."""

@@ -34,13 +34,14 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
         False where one lies beyond another bound.
     """
     keep = np.ones(len(linear), dtype=bool)
+    listed = [each for each in effect.coefficients if len(linear) == len(effect.coefficients) or not each.secondary]
     if effect.physical is not None:
         ends = np.array([effect.physical(linear + way * _ERRORS * error) for way in (-1, 1)])
         physical = effect.physical(linear)
-        low, high = np.array([c.bounds(vehicle) for c in effect.coefficients])[: len(physical)].T
+        low, high = np.array([each.bounds(vehicle) for each in listed])[: len(physical)].T
         unsure = np.isnan(ends).any(axis=0) | np.isnan(physical)
         return keep, bool(np.all(unsure | ((ends.max(axis=0) >= low) & (ends.min(axis=0) <= high))))
-    low, high = np.array([c.bounds(vehicle) for c in effect.coefficients]).T
+    low, high = np.array([each.bounds(vehicle) for each in listed]).T
     at_zero = ((linear < low) & (low == 0)) | ((linear > high) & (high == 0))
     beyond = (linear + _ERRORS * error < low) | (linear - _ERRORS * error > high)
     return ~at_zero, bool(not np.any(beyond & ~at_zero))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,24 +19,39 @@ class Folds:
 
     Attributes
     ----------
-    gram : array, shape (block, column, column)
-    moment : array, shape (block, column, draw)
+    grams : array, shape (block, channel, column, column)
+    moments : array, shape (block, channel, column, draw)
         Columns times right side; several right sides are draws.
-    square : array, shape (block, draw)
-        Sum of squares of the right side.
+    squares : array, shape (block, channel, draw)
+        Sums of squares of the right side.
     rows : int
         Rows of all blocks.
     """
 
-    gram: Array
-    moment: Array
-    square: Array
+    grams: Array
+    moments: Array
+    squares: Array
     rows: int
+
+    @cached_property
+    def gram(self) -> Array:
+        """Over all channels, shape (block, column, column)."""
+        return np.asarray(self.grams.sum(axis=1))
+
+    @cached_property
+    def moment(self) -> Array:
+        """Over all channels, shape (block, column, draw)."""
+        return np.asarray(self.moments.sum(axis=1))
+
+    @cached_property
+    def square(self) -> Array:
+        """Over all channels, shape (block, draw)."""
+        return np.asarray(self.squares.sum(axis=1))
 
     @property
     def blocks(self) -> int:
         """Number of blocks."""
-        return len(self.gram)
+        return len(self.grams)
 
     def solve(self, columns: IntArray) -> tuple[Array, Array]:
         """Fit a subset of columns without each block, and judge it on that block.
@@ -92,20 +108,26 @@ class Folds:
         )
         return np.asarray(self.square - explained)
 
-    def subtracted(self, column: int) -> Folds:
-        """Subtract a column with coefficient 1 from the right side.
+    def subtracted(self, column: int, kept: IntArray, weight: Array) -> Folds:
+        """Subtract a column with coefficient 1 from the right side, and weigh the channels.
 
         Parameters
         ----------
         column : int
+        kept : array of int
+            Columns that the result has.
+        weight : array, shape (channel,)
+            On the rows.
 
         Returns
         -------
         Folds
         """
-        inner = self.gram[:, :, column]
-        square = self.square - 2 * self.moment[:, column] + self.gram[:, column, column, None]
-        return Folds(self.gram, self.moment - inner[..., None], square, self.rows)
+        inner = self.grams[:, :, kept, column, None]
+        square = self.squares - 2 * self.moments[:, :, column] + self.grams[:, :, column, column, None]
+        power = weight[:, None] ** 2
+        grams = power[..., None] * self.grams[:, :, kept[:, None], kept]
+        return Folds(grams, power[..., None] * (self.moments[:, :, kept] - inner), power * square, self.rows)
 
 
 def folds(columns: Array, right: Array, block: IntArray) -> Folds:
@@ -124,14 +146,12 @@ def folds(columns: Array, right: Array, block: IntArray) -> Folds:
     Folds
     """
     draws = right.reshape(*right.shape[:2], -1)
-    parts = [
-        (columns[block == b].reshape(-1, columns.shape[2]), draws[block == b].reshape(-1, draws.shape[2]))
-        for b in range(int(block.max()) + 1)
-    ]
+    own = [block == b for b in range(int(block.max()) + 1)]
+    parts = [(columns[rows].swapaxes(0, 1), draws[rows].swapaxes(0, 1)) for rows in own]
     return Folds(
-        np.array([x.T @ x for x, _ in parts]),
-        np.array([x.T @ y for x, y in parts]),
-        np.array([(y**2).sum(axis=0) for _, y in parts]),
+        np.array([x.swapaxes(1, 2) @ x for x, _ in parts]),
+        np.array([x.swapaxes(1, 2) @ y for x, y in parts]),
+        np.array([(y**2).sum(axis=1) for _, y in parts]),
         columns.shape[0] * columns.shape[1],
     )
 

@@ -62,8 +62,11 @@ class HeldOut:
         return GapSize(value, np.sqrt(np.where(count > 0, in_floors / np.maximum(count, 1), np.nan)))
 
     def share(self) -> float:
-        """Give the share of the gap above the floor that the effects take off."""
-        return share_removed(self.parameters / self.noise, self.after / self.noise, self.known)
+        """Give the share of the gap above the floor that the effects take off, of torque or force whichever is less."""
+        before, after = self.parameters / self.noise, self.after / self.noise
+        kinds = [slice(0, 3), slice(3, 6)]
+        gaps = [kind for kind in kinds if _above(before[:, kind], self.known[:, kind]) > 0]
+        return min((share_removed(before[:, k], after[:, k], self.known[:, k]) for k in gaps), default=1.0)
 
 
 def share_removed(before: Array, after: Array, known: Array) -> float:
@@ -71,18 +74,22 @@ def share_removed(before: Array, after: Array, known: Array) -> float:
 
     Parameters
     ----------
-    before, after : array, shape (window, 6), floors
-    known : array of bool, shape (window, 6)
+    before, after : array, shape (window, channel), floors
+    known : array of bool, shape (window, channel)
 
     Returns
     -------
     float
         0 where nothing is gained.
     """
-    rows = known.sum(axis=0)
     gone = float(((before**2 - after**2) * known).sum())
-    left = float(np.maximum((after**2 * known).sum(axis=0) - _MARGIN * rows, 0.0).sum())
+    left = _above(after, known)
     return max(0.0, gone / (gone + left)) if gone > 0 else 0.0
+
+
+def _above(residual: Array, known: Array) -> float:
+    """Sum what channels have above the floor, in squared floors."""
+    return float(np.maximum((residual**2 * known).sum(axis=0) - _MARGIN * known.sum(axis=0), 0.0).sum())
 
 
 def held_out(

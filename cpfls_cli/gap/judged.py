@@ -36,7 +36,7 @@ def judge_effect(
     chosen: Sequence[Candidate],
     place: int,
     found: Estimates,
-    gap: float,
+    share: float,
     effects: Sequence[Effect],
     settings: GapSettings,
     rng: np.random.Generator,
@@ -50,8 +50,8 @@ def judge_effect(
     place : int
         Of the effect among them.
     found : Estimates
-    gap : float
-        Sum of squares above the floor without any effect, in squared floors.
+    share : float
+        Of what all effects explain.
     effects : sequence of Effect
     settings : GapSettings
     rng : numpy.random.Generator
@@ -70,7 +70,7 @@ def judge_effect(
         found.of_effect[place],
         found.effects[place],
         step.p_value(own.gain),
-        float(np.clip(own.gain / gap, 0.0, 1.0)) if np.isfinite(own.gain) and gap > 0 else 0.0,
+        share,
         _frequency(own, step),
         candidate.effect.sentence,
     )

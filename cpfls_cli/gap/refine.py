@@ -10,6 +10,7 @@ from scipy.optimize import least_squares, minimize_scalar
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Shape
 from cpfls_cli.gap.balance_system import System, system
+from cpfls_cli.gap.told_torque import compensation
 from cpfls_cli.gap.weak_flight import Candidate, WeakFlight
 
 _EVALUATIONS = 14
@@ -33,11 +34,12 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     System
     """
     best = list(chosen)
+    told = system(flights).rotor_wrench
     shapes = [(place, shape) for place, candidate in enumerate(best) for shape in candidate.effect.shapes]
     for place, shape in shapes:
         if place == len(best) - 1:
-            best[place] = _improved(flights, best, place, shape, floor)
-    return system(flights, _together(flights, best, shapes, floor) if len(shapes) > 1 else best)
+            best[place] = _improved(flights, best, place, shape, floor, told)
+    return system(flights, _together(flights, best, shapes, floor, told) if len(shapes) > 1 else best)
 
 
 def fit(hypothesis: System, floor: Array) -> Array:
@@ -59,23 +61,31 @@ def fit(hypothesis: System, floor: Array) -> Array:
     return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale)
 
 
-def left(hypothesis: System, floor: Array) -> Array:
-    """Compute what a hypothesis leaves after its fit, in floors.
+def left(hypothesis: System, floor: Array, told: Array) -> Array:
+    """Compute what a hypothesis leaves after its fit, in floors, as if its rotors gave as much torque as told.
 
     Parameters
     ----------
     hypothesis : System
     floor : array, shape (6,)
+    told : array, shape (window, 6), N m and N
+        Wrench of the rotors without effects on the actuation.
 
     Returns
     -------
     array, shape (window, 6)
     """
-    return np.asarray((hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)) / floor)
+    weight = compensation(told, hypothesis.rotor_wrench) / floor
+    return np.asarray((hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)) * weight)
 
 
 def _improved(
-    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], place: int, shape: Shape, floor: Array
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    place: int,
+    shape: Shape,
+    floor: Array,
+    told: Array,
 ) -> Candidate:
     candidate = chosen[place]
 
@@ -84,7 +94,7 @@ def _improved(
 
     def error(value: float) -> float:
         hypothesis = system(flights, [*chosen[:place], moved(value), *chosen[place + 1 :]])
-        return float((left(hypothesis, floor) ** 2).sum())
+        return float((left(hypothesis, floor, told) ** 2).sum())
 
     bracket = _bracket(shape.grid, candidate.shape[shape.name])
     found = minimize_scalar(
@@ -100,7 +110,11 @@ def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
 
 
 def _together(
-    flights: Sequence[WeakFlight], chosen: list[Candidate], shapes: list[tuple[int, Shape]], floor: Array
+    flights: Sequence[WeakFlight],
+    chosen: list[Candidate],
+    shapes: list[tuple[int, Shape]],
+    floor: Array,
+    told: Array,
 ) -> list[Candidate]:
     low = np.array([shape.grid[0] for _, shape in shapes])
     high = np.array([shape.grid[-1] for _, shape in shapes])
@@ -113,7 +127,7 @@ def _together(
         return there
 
     def error(values: Array) -> Array:
-        return left(system(flights, moved(values)), floor).reshape(-1)
+        return left(system(flights, moved(values)), floor, told).reshape(-1)
 
     found = least_squares(
         error,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from cpfls_cli.gap.bounds import within_bounds
 from cpfls_cli.gap.folds import Folds, folds
 from cpfls_cli.gap.refine import fit
 from cpfls_cli.gap.shape_columns import shape_columns
+from cpfls_cli.gap.told_torque import compensation
 from cpfls_cli.gap.weak_flight import Candidate
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -45,6 +47,22 @@ class Scored:
     coefficients: Array
 
 
+class Place(NamedTuple):
+    """Where a candidate stands in a layout.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    columns : array of int
+    weight : array, shape (6,)
+        On the residuals of the channels where the candidate acts on the actuation.
+    """
+
+    candidate: Candidate
+    columns: IntArray
+    weight: Array
+
+
 @dataclass(frozen=True)
 class Layout:
     """Base columns and candidates side by side.
@@ -54,12 +72,12 @@ class Layout:
     matrix : array, shape (window, 6, column)
         Weighted.
     base : array of int
-    candidates : tuple of (Candidate, array of int)
+    candidates : tuple of Place
     """
 
     matrix: Array
     base: IntArray
-    candidates: tuple[tuple[Candidate, IntArray], ...]
+    candidates: tuple[Place, ...]
 
 
 def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
@@ -98,15 +116,31 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
     """
     moving = shape_columns(hypothesis, fit(hypothesis, floor))
     parts: list[Array] = [hypothesis.base, moving]
-    places: list[tuple[Candidate, IntArray]] = []
+    places: list[Place] = []
     first = hypothesis.base.shape[2] + moving.shape[2]
     base = np.arange(first)
     for candidate in candidates:
-        columns = hypothesis.columns(candidate)
+        columns = primary(candidate, hypothesis.columns(candidate))
         parts.append(columns)
-        places.append((candidate, np.arange(first, first + columns.shape[2])))
+        places.append(Place(candidate, np.arange(first, first + columns.shape[2]), _weight(hypothesis, candidate)))
         first += columns.shape[2]
     return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(places))
+
+
+def primary(candidate: Candidate, columns: Array) -> Array:
+    """Leave out the columns that come in only once an effect is chosen.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    columns : array, shape (window, 6, coefficient)
+
+    Returns
+    -------
+    array, shape (window, 6, coefficient)
+    """
+    secondary = np.array([coefficient.secondary for coefficient in candidate.effect.coefficients], dtype=bool)
+    return columns[..., ~secondary] if secondary.any() and len(secondary) == columns.shape[2] else columns
 
 
 def score(arranged: Layout, normal: Folds, hypothesis: System) -> list[Scored]:
@@ -147,8 +181,8 @@ def chance(arranged: Layout, normal: Folds) -> Array:
     """
     _, before = normal.solve(arranged.base)
     best = np.full(before.shape[1], -np.inf)
-    for candidate, columns in arranged.candidates:
-        best = np.maximum(best, (before - _error(candidate, columns, arranged.base, normal)).sum(axis=0))
+    for place in arranged.candidates:
+        best = np.maximum(best, (before - _error(place, place.columns, arranged.base, normal)).sum(axis=0))
     return best
 
 
@@ -170,20 +204,25 @@ def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArr
     return folds(arranged.matrix, weighted, block)
 
 
-def _error(candidate: Candidate, columns: IntArray, base: IntArray, normal: Folds) -> Array:
-    if candidate.effect.unit_coefficient:
-        return normal.subtracted(int(columns[0])).solve(base)[1]
+def _weight(hypothesis: System, candidate: Candidate) -> Array:
+    if candidate.effect.kind != "actuator":
+        return np.ones(6)
+    told = hypothesis.rotor_wrench
+    return compensation(told, told + hypothesis.columns(candidate)[..., 0])
+
+
+def _error(place: Place, columns: IntArray, base: IntArray, normal: Folds) -> Array:
+    if place.candidate.effect.unit_coefficient:
+        return normal.subtracted(int(columns[0]), base, place.weight).solve(np.arange(len(base)))[1]
     return normal.solve(np.concatenate([base, columns]))[1]
 
 
-def _scored(
-    place: tuple[Candidate, IntArray], base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings
-) -> Scored:
-    candidate, columns = place
+def _scored(place: Place, base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings) -> Scored:
+    candidate, columns, _ = place
     if len(columns) == 0:
         return Scored(candidate, columns, REFUSED, before, np.zeros(0))
     if candidate.effect.unit_coefficient:
-        error = _error(candidate, columns, base, normal)[:, 0]
+        error = _error(place, columns, base, normal)[:, 0]
         return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
     for _ in range(len(columns)):
@@ -197,5 +236,5 @@ def _scored(
             break
         kept &= keep
     used = columns[kept]
-    error = _error(candidate, used, base, normal)[:, 0]
+    error = _error(place, used, base, normal)[:, 0]
     return Scored(candidate, used, float((before - error).sum()), error, fitted)

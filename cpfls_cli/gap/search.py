@@ -32,7 +32,7 @@ from cpfls_cli.gap.weak_flight import Candidate, WeakFlight
 _LEAST_SHARE = 0.05
 """Share of the remaining gap above the floor that an effect has to explain."""
 
-_LEAST_IN_FLOORS = 0.2
+_LEAST_IN_FLOORS = 0.3
 """Root mean square that an effect has to explain of one channel, in floors."""
 
 

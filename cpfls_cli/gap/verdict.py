@@ -69,5 +69,6 @@ def matters(left: Unexplained, before: Array) -> bool:
     bool
     """
     follows = left.signal is not None or left.frequency_hz is not None
-    largest = float(np.nanmax(before**2, initial=1.0))
+    kind = slice(0, 3) if left.axis.startswith("torque") else slice(3, 6)
+    largest = float(np.nanmax(before[kind] ** 2, initial=1.0))
     return follows and left.share * left.floors**2 > _SECOND_CAUSE * largest

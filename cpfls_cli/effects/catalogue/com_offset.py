@@ -13,8 +13,7 @@ from cpfls_cli.effects.signals import Signals
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     direct = np.zeros((len(signals), 6, 2))
-    direct[:, 1, 0] = signals.wrench[:, 5]
-    direct[:, 0, 1] = -signals.wrench[:, 5]
+    direct[:, :3] = -np.cross(np.eye(3)[None, :2], signals.force[:, None]).swapaxes(1, 2)
     return Columns(direct)
 
 
@@ -22,7 +21,7 @@ EFFECT = Effect(
     name="com_offset",
     title="offset of the centre of mass",
     kind="wrench",
-    formula="M = -c x T z = (-c_y T, c_x T, 0)",
+    formula="M = -c x F,  F the thrust and, where it is measured, the force across it",
     sentence="The centre of mass is not where the model has it, so that thrust tilts the vehicle.",
     coefficients=(
         Coefficient("c_x", "m", -0.4, 0.4, "true centre of mass, forward of that of the model", scales.arm),

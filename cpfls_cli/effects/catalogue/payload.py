@@ -141,9 +141,11 @@ EFFECT = Effect(
     coefficients=(
         Coefficient("mass_times_depth", "kg m", 0.0, 1.0, "mass times depth of the hook", scales.arm_mass),
         Coefficient(
-            "mass_times_right", "kg m", -0.3, 0.3, "mass times offset of the hook to the right", scales.arm_mass
+            "mass_times_right", "kg m", -0.3, 0.3, "mass times offset of the hook to the right", scales.arm_mass, True
         ),
-        Coefficient("mass_times_behind", "kg m", -0.3, 0.3, "mass times offset of the hook behind", scales.arm_mass),
+        Coefficient(
+            "mass_times_behind", "kg m", -0.3, 0.3, "mass times offset of the hook behind", scales.arm_mass, True
+        ),
         Coefficient("mass", "kg", 0.0, 1.0, "mass of the load; only the force balance shows it", scales.mass),
     ),
     needs=frozenset({"velocity"}),
