@@ -11,6 +11,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
 from cpfls_cli.gap.audit import Audit, audit
 from cpfls_cli.gap.balance_system import System, system
 from cpfls_cli.gap.contributions import shares
@@ -27,7 +28,7 @@ from cpfls_cli.gap.unseen import not_excited
 from cpfls_cli.gap.vehicle_numbers import parameter_error
 from cpfls_cli.gap.verdict import matters, verdict_of
 from cpfls_cli.gap.weak_flight import WeakFlight, weak_flight
-from cpfls_cli.gap.windows import Windows
+from cpfls_cli.gap.windows import Windows, windows
 
 _FEWEST_WINDOWS = 16
 _EXCITED_FLOORS = 3.0
@@ -126,6 +127,64 @@ def diagnose(
     judged = [
         judge_effect(weak, chosen, place, found, float(own_shares[place]), effects, settings, rng)
         for place in range(len(chosen))
+    ]
+    progress(0.9, "sensor faults")
+    faults = [_fault(finding, training, weak, own, model, settings) for finding in checked.named]
+    torque_alone = _torque_alone(weak, settings, effects)
+    diagnosis = _concluded(judged, faults, found, unseen, left, steps, hypothesis, settings, torque_alone, checked)
+    return Diagnosed(diagnosis, checked, hypothesis, found, left, unseen)
+
+
+def common_windows(recordings: Sequence[Recording], settings: GapSettings) -> Windows:
+    """Make the windows that all flights share.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    settings : GapSettings
+
+    Returns
+    -------
+    Windows
+
+    Raises
+    ------
+    InputError
+        If a flight is too short or has another sampling period than the first.
+    """
+    period = recordings[0].signals.period
+    for recording in recordings:
+        other = recording.signals.period
+        if abs(other - period) > _SAME_RATE * period:
+            raise InputError(
+                f"{recording.name}: sampled at {1 / other:.6g} Hz, {recordings[0].name} at {1 / period:.6g} Hz; set "
+                "import.rate_hz to one rate for all flights"
+            )
+    own = windows(period, settings.window_s, settings.overlap)
+    for recording in recordings:
+        if own.count(len(recording.signals)) < _FEWEST_WINDOWS:
+            raise InputError(
+                f"{recording.name}: {len(recording.signals) * period:.3g} s are too short; "
+                f"{_FEWEST_WINDOWS} windows of gap.window_s = {settings.window_s:g} s are needed"
+            )
+    return own
+
+
+def considered(settings: GapSettings) -> list[Effect]:
+    """List the effects that the search tries.
+
+    Parameters
+    ----------
+    settings : GapSettings
+
+    Returns
+    -------
+    list of Effect
+    """
+    return [
+        effect
+        for name, effect in CATALOGUE.items()
+        if effect.columns is not None and effect.kind != "parameter" and name not in settings.ignore
     ]
 
 
