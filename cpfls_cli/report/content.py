@@ -65,6 +65,8 @@ class Table:
     rows : sequence of sequence of (str or Cell)
     words : frozenset of int
         Columns that hold words and are aligned left; all others hold numbers.
+    sentences : frozenset of int
+        Columns of words that are long and broken into lines.
     """
 
     name: str
@@ -72,6 +74,7 @@ class Table:
     header: Sequence[str]
     rows: Sequence[Sequence[str | Cell]]
     words: frozenset[int] = frozenset({0})
+    sentences: frozenset[int] = frozenset()
     kind: ClassVar[str] = "table"
 
     @property
@@ -142,7 +145,27 @@ class Heading:
     kind: ClassVar[str] = "heading"
 
 
-Block = Text | Facts | Table | Plot | Listing | Folded | Heading
+@dataclass(frozen=True)
+class Box:
+    """What a reader must see first.
+
+    Attributes
+    ----------
+    label : str
+        One word, such as the name of a verdict.
+    title : str
+    sentences : sequence of str
+    tone : {"plain", "note", "good", "warning"}
+    """
+
+    label: str
+    title: str
+    sentences: Sequence[str]
+    tone: Tone = "note"
+    kind: ClassVar[str] = "box"
+
+
+Block = Box | Text | Facts | Table | Plot | Listing | Folded | Heading
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION, SELECTION, TRAJECTORY
+from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.spec import ArtifactSpec
+from cpfls_cli.report.gap_words import titles_of
 from cpfls_cli.report.source import Sources
 
 _LACKS: tuple[tuple[ArtifactSpec, str, str], ...] = (
@@ -20,6 +24,11 @@ _LACKS: tuple[tuple[ArtifactSpec, str, str], ...] = (
         "Figure 7 and the inertia matrix along a flight",
         "cpfls predict CONFIG model.h5 flight.h5 -o prediction.h5",
     ),
+)
+_GAP_LACKS: tuple[tuple[ArtifactSpec, str, str], ...] = (
+    (DISAGREEMENT, "where and when model and flights disagree", "cpfls compare CONFIG FLIGHT... -o disagreement.h5"),
+    (DIAGNOSIS, "what the model misses", "cpfls diagnose CONFIG disagreement.h5 -o diagnosis.h5"),
+    (EXTENDED, "the model with the effects in it", "cpfls extend CONFIG diagnosis.h5 -o extended.h5"),
 )
 
 
@@ -38,9 +47,19 @@ def missing(sources: Sources) -> dict[str, str]:
     given = {source.artifact.spec.format for source in sources.all}
     return {
         _word(spec): f"Not shown, because no {_word(spec)} was given: {shows}; made by: {command}."
-        for spec, shows, command in _LACKS
+        for spec, shows, command in _wanted(sources)
         if spec.format not in given
     }
+
+
+def _wanted(sources: Sources) -> Iterator[tuple[ArtifactSpec, str, str]]:
+    """List what a report of these artifacts could show: nobody who looks for a gap wants a training path."""
+    if not sources.only_gap:
+        yield from _LACKS
+    if sources.gap:
+        yield from _GAP_LACKS[:2]
+        if any(len(titles_of(diagnosis)) for diagnosis in sources.diagnoses):
+            yield _GAP_LACKS[2]
 
 
 def _word(spec: ArtifactSpec) -> str:

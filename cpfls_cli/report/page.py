@@ -10,6 +10,9 @@ from markupsafe import Markup
 
 from cpfls_cli.report.content import Section
 from cpfls_cli.report.missing import missing
+from cpfls_cli.report.sections.diagnosis import diagnosis_section
+from cpfls_cli.report.sections.disagreement import disagreement_section
+from cpfls_cli.report.sections.extension import extension_section
 from cpfls_cli.report.sections.flight import flight_section
 from cpfls_cli.report.sections.identification import identification_section
 from cpfls_cli.report.sections.partitions import partitions_section
@@ -19,12 +22,19 @@ from cpfls_cli.report.sections.provenance import provenance_section
 from cpfls_cli.report.sections.reduction import reduction_section
 from cpfls_cli.report.sections.rules import rules_section
 from cpfls_cli.report.sections.search import search_section
+from cpfls_cli.report.sections.sensors import sensors_section
 from cpfls_cli.report.sections.summary import summary_section
+from cpfls_cli.report.sections.unseen import unseen_section
 from cpfls_cli.report.sections.vehicle import vehicle_section
 from cpfls_cli.report.source import Sources
 
 _SECTIONS = (
     summary_section,
+    diagnosis_section,
+    extension_section,
+    disagreement_section,
+    sensors_section,
+    unseen_section,
     vehicle_section,
     path_section,
     flight_section,
@@ -93,4 +103,4 @@ def _render(sections: Sequence[Section], sources: Sources, version: str) -> str:
     # Figures are made here and hold only escaped text; everything else on the page is escaped by the template.
     environment.filters["figure"] = Markup
     template = environment.get_template("page.html")
-    return template.render(title=sources.settings.title, sections=sections, version=version, sources=sources.all)
+    return template.render(title=sources.title, sections=sections, version=version, sources=sources.all)

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION, SELECTION, TRAJECTORY
+from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.spec import ArtifactSpec
 from cpfls_cli.report.settings import ReportSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 HASH_SHOWN = 12
+GAP_TITLE = "Where simulation and flight disagree"
+"""Heading of a page about nothing else, unless the config gives one."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,37 @@ class Sources:
     def predictions(self) -> list[Source]:
         """Predictions of models along flights."""
         return self._of(PREDICTION)
+
+    @property
+    def disagreements(self) -> list[Source]:
+        """Where models and flights disagree."""
+        return self._of(DISAGREEMENT)
+
+    @property
+    def diagnoses(self) -> list[Source]:
+        """What models miss."""
+        return self._of(DIAGNOSIS)
+
+    @property
+    def extensions(self) -> list[Source]:
+        """Models with the effects that they missed."""
+        return self._of(EXTENDED)
+
+    @property
+    def gap(self) -> list[Source]:
+        """Everything that the gap workflow wrote, answers before their grounds."""
+        return [*self.diagnoses, *self.extensions, *self.disagreements]
+
+    @property
+    def only_gap(self) -> bool:
+        """Whether nothing else was given than what the gap workflow writes."""
+        return len(self.gap) == len(self.all)
+
+    @property
+    def title(self) -> str:
+        """Heading of the page."""
+        usual = self.settings.title == ReportSettings().title
+        return GAP_TITLE if usual and self.only_gap else self.settings.title
 
     def by_hash(self, sha256: str | None) -> Source | None:
         """Look up an artifact by its hash."""

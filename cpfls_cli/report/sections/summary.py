@@ -8,6 +8,7 @@ from cpfls_cli.report.content import Block, Cell, Facts, Heading, Section, Table
 from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, Judged, judged
 from cpfls_cli.report.missing import missing
 from cpfls_cli.report.numbers import ROUNDING, count, percent, plain, r_squared
+from cpfls_cli.report.sections.gap_summary import gap_blocks
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.report.verdict import fuzzy_part_off, verdict
 
@@ -26,9 +27,10 @@ def summary_section(sources: Sources) -> Section:
     Section
     """
     blocks: list[Block] = [Text(note, "note") for note in sources.settings.notes]
+    blocks += gap_blocks(sources)
     for number, model in enumerate(sources.models, start=1):
         blocks += _model(model, sources, number)
-    if not sources.models:
+    if not sources.models and not sources.only_gap:
         blocks.append(Text("No model was given, so there is nothing to judge yet.", "note"))
     for flight in sources.flights:
         blocks += _flight_warnings(flight)

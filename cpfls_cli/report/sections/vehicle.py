@@ -53,7 +53,7 @@ def _rows(sources: Sources) -> list[tuple[str, str, str]]:
     names += [f"{name}, kg m²" for name in INERTIA_PARAMETERS[: len(vehicle.inertia_kg_m2)]]
     printed = [*_PAPER, *["0"] * (len(values) - len(_PAPER))]
     rows = list(zip(names, values, printed, strict=True))
-    return [*rows, ("flight time T, s", _durations(sources), _PAPER_DURATION)]
+    return rows if sources.only_gap else [*rows, ("flight time T, s", _durations(sources), _PAPER_DURATION)]
 
 
 def _rotors(vehicle: VehicleSettings) -> list[str]:
