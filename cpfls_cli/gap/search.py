@@ -211,10 +211,13 @@ def exchanged(
             kept = others
             continue
         best = step.ranking[0]
-        if best.candidate.effect.name != candidate.effect.name and own not in unbeaten(
+        worse = best.candidate.effect.name != candidate.effect.name and own not in unbeaten(
             best, step.ranking, step.above_floor
-        ):
-            kept = list(refined(flights, [*others, best.candidate], step.floor).chosen)
+        )
+        # Beside other effects its own shape may be another one: a delay that is dropped leaves its time to a lag.
+        better = best.candidate if worse else own.candidate
+        if better is not candidate:
+            kept = list(refined(flights, [*others, better], step.floor).chosen)
     return tuple(kept)
 
 
