@@ -25,6 +25,7 @@ _LACKS: tuple[tuple[ArtifactSpec, str, str], ...] = (
         "cpfls predict CONFIG model.h5 flight.h5 -o prediction.h5",
     ),
 )
+_SHOWN = {"extended": "extended model"}
 _GAP_LACKS: tuple[tuple[ArtifactSpec, str, str], ...] = (
     (DISAGREEMENT, "where and when model and flights disagree", "cpfls compare CONFIG FLIGHT... -o disagreement.h5"),
     (DIAGNOSIS, "what the model misses", "cpfls diagnose CONFIG disagreement.h5 -o diagnosis.h5"),
@@ -46,7 +47,9 @@ def missing(sources: Sources) -> dict[str, str]:
     """
     given = {source.artifact.spec.format for source in sources.all}
     return {
-        _word(spec): f"Not shown, because no {_word(spec)} was given: {shows}; made by: {command}."
+        _word(
+            spec
+        ): f"Not shown, because no {_SHOWN.get(_word(spec), _word(spec))} was given: {shows}; made by: {command}."
         for spec, shows, command in _wanted(sources)
         if spec.format not in given
     }

@@ -14,12 +14,12 @@ from cpfls_cli.report.canvas import BASELINE, GREY, plain_ticks, style_of
 MEASURED: dict[str, Any] = {"color": "black", "linestyle": "-", "linewidth": 2.6}
 """Wide, so that a thin line on top of it leaves an edge."""
 
-BEFORE: dict[str, Any] = {**BASELINE, "linewidth": 1.4}
-AFTER: dict[str, Any] = {"color": style_of(1)["color"], "linestyle": "-", "linewidth": 1.2}
+BEFORE: dict[str, Any] = {**BASELINE, "linewidth": 1.4, "zorder": 3}
+AFTER: dict[str, Any] = {"color": style_of(1)["color"], "linestyle": "-", "linewidth": 1.2, "zorder": 2.5}
 HELD: dict[str, Any] = {"color": GREY, "linestyle": (0, (1, 1.6)), "linewidth": 1.2}
 
 _MARKS = 12
-_ROOM = 12.0
+_ROOM = 3.0
 _AXES = 3
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -35,27 +36,33 @@ def free_runs_figure(name: str, diagnosis: Source, after: str) -> Plot:
     time, restart = artifact.array("run/time"), artifact.array("run/restart")
     curves = {key: artifact.array(f"run/{key}") for key in ("measured", "before", "after")}
     runs = np.split(np.arange(len(time)), np.searchsorted(time, restart[1:] - 1e-9))
+    worst = int(artifact.number("run/axis"))
     left: list[str] = []
 
     def draw(figure: Figure) -> None:
-        panels = stacked(figure, len(AXES))
-        for index, (axes, axis) in enumerate(zip(panels, AXES, strict=True)):
+        panels = stacked(figure, len(AXES) + 1)
+        for axes, start in product(panels, restart):
+            axes.axvline(start, color=GREY, linewidth=1.2, linestyle=(0, (1, 1.5)), zorder=0.5)
+        for index, (axes, axis) in enumerate(zip(panels, AXES, strict=False)):
             own = {key: values[:, index] for key, values in curves.items()}
             _draw_axis(axes, time, own, runs)
-            for start in restart:
-                axes.axvline(start, color=GREY, linewidth=1.2, linestyle=(0, (1, 1.5)), zorder=0.5)
             axes.set_title(f"body rate about {axis}")
             axes.set_ylabel("rad/s")
             if keep_in_view(axes, (own["measured"], own["after"]), own["before"]):
                 left.append(axis)
+        errors = {key: curves[key][:, worst] - curves["measured"][:, worst] for key in ("before", "after")}
+        _draw_axis(panels[-1], time, errors, runs)
+        panels[-1].axhline(0.0, color="black", linewidth=0.8)
+        panels[-1].set_title(f"simulated less measured about {AXES[worst]}")
+        panels[-1].set_ylabel("rad/s")
         legend_over(figure, panels[0])
         panels[-1].set_xlabel("time, s")
 
-    drawn = plot(name, "", "Body rates about three axes, measured and simulated before and after, over time", 5.2, draw)
+    drawn = plot(name, "", "Body rates about three axes, measured and simulated before and after, over time", 6.4, draw)
     astray = f" About {' and '.join(left)} the model as given leaves the picture." if left else ""
     caption = (
         f"{artifact.text('run/flight')}, where the model as given went astray most (about "
-        f"{AXES[int(artifact.number('run/axis'))]}). At each dotted line the simulation starts from the measured "
+        f"{AXES[worst]}). At each dotted line the simulation starts from the measured "
         f"rates and then runs freely on the rotor speeds of the flight. Before: the model as given; after: "
         f"{after}.{astray}"
     )

@@ -67,8 +67,9 @@ def replay_figure(name: str, source: Source, where: str) -> Plot:
                 values = scale * artifact.array(f"replay/{quantity}_{key}")
                 for axes, column in zip(panels, values.T, strict=True):
                     axes.plot(horizon, column, label=_LABELS[key], **styles[key])
-                    axes.set_ylim(bottom=0.0)
-                    plain_ticks(axes.yaxis)
+            for axes in panels:
+                axes.set_ylim(bottom=0.0)
+                plain_ticks(axes.yaxis)
             panels[0].set_ylabel(label)
         for axes, axis in zip(grid[0], AXES, strict=True):
             axes.set_title(f"error about {axis}")

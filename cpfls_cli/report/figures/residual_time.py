@@ -14,6 +14,7 @@ from cpfls_cli.report.source import Source
 
 STRETCHES = 5
 _SHADE = "#f3d9b8"
+_LABEL = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 
 
 def residual_time_figure(name: str, disagreement: Source) -> Plot:
@@ -89,6 +90,5 @@ def _mark_stretches(axes: Axes, disagreement: Source, channel: str, offset: Arra
             continue
         first = start + offset[int(flight)]
         axes.axvspan(first, first + end - start, color=_SHADE, zorder=0)
-        axes.text(
-            first + (end - start) / 2, 0.98, str(rank), transform=axes.get_xaxis_transform(), ha="center", va="top"
-        )
+        middle, above = first + (end - start) / 2, axes.get_xaxis_transform()
+        axes.text(middle, 0.97, str(rank), transform=above, ha="center", va="top", fontsize=8.5, zorder=5, bbox=_LABEL)
