@@ -91,7 +91,7 @@ def test_a_model_needs_the_attitude_and_a_body_does_not():
     ids=["velocity", "acceleration", "accelerometer first"],
 )
 def test_force_is_what_an_accelerometer_feels_times_the_mass(known):
-    felt = Rotation.from_euler("ZYX", ATTITUDE[:, ::-1]).inv().apply(ACCELERATION + [0.0, 0.0, 9.81])
+    felt = Rotation.from_euler("ZYX", ATTITUDE[:, ::-1]).inv().apply(ACCELERATION + np.array([0.0, 0.0, 9.81]))
     given = {name: felt if isinstance(value, str) else value for name, value in known.items()}
     found = averaged(translation_balance(replace(FLIGHT, **given)))
     np.testing.assert_allclose(found, 6.0 * THROUGH.average(felt), atol=2e-5)

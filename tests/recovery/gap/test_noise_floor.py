@@ -1,0 +1,87 @@
+"""The estimated floor against the scatter of windows that see the same noise without any motion."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from cpfls_cli.effects.effect import Columns
+from cpfls_cli.gap.noise_floor import modulated, noise_floor
+from cpfls_cli.gap.windows import windows
+
+PERIOD, SAMPLES = 0.01, 6000
+THROUGH = windows(PERIOD, 0.4, 0.5)
+TIME = PERIOD * np.arange(SAMPLES)
+GYRO, ROTOR, RHO = 0.01, 0.4, 0.7
+
+
+def coloured(rho, seed, samples=SAMPLES):
+    """Noise of variance 1 that is correlated by rho from sample to sample."""
+    white = np.random.default_rng(seed).standard_normal((samples + 200, 6))
+    return np.sqrt(1 - rho**2) * lfilter([1.0], [1.0, -rho], white, axis=0)[200:]
+
+
+def noise(kind, seed, samples=SAMPLES):
+    gyro = GYRO * coloured(RHO if "gyro AR" in kind else 0.0, seed, samples)
+    rotor = ROTOR * coloured(RHO if "rotor AR" in kind else 0.0, seed + 1000, samples)
+    return Columns(rotor * ("rotor" in kind), gyro * ("gyro" in kind))
+
+
+@cache
+def scatter(kind):
+    long = noise(kind, 99, 20 * SAMPLES)
+    return (THROUGH.average(long.direct) + THROUGH.derivative(long.momentum)).std(axis=0)
+
+
+def add(left, right):
+    return Columns(left.direct + right.direct, left.momentum + right.momentum)
+
+
+def slow_motion():
+    """What a model leaves of a missing effect: larger than the noise of a window, and slower than windows."""
+    turn = 2 * np.pi * np.linspace(0.3, 0.6, 6)
+    return Columns(0.3 * np.sin(TIME[:, None] * turn), np.zeros((SAMPLES, 6)))
+
+
+def bursts():
+    """A tenth of the flight with fast shaking ten times as large as the noise."""
+    shaking = np.sin(2 * np.pi * 17.0 * TIME) * (np.sin(2 * np.pi * TIME / 20.0) > 0.951)
+    return Columns(np.tile(10 * ROTOR * shaking[:, None], 6), np.zeros((SAMPLES, 6)))
+
+
+KINDS = ["gyro", "rotor", "gyro rotor", "gyro AR", "rotor AR", "gyro AR rotor"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("motion", [None, slow_motion, bursts], ids=["still", "slow motion", "bursts"])
+def test_floor_is_the_scatter_of_windows(kind, motion):
+    ratio = []
+    for seed in range(3):
+        given = noise(kind, seed) if motion is None else add(noise(kind, seed), motion())
+        ratio.extend(noise_floor(given, THROUGH) / scatter(kind))
+    # What slow noise has below the lowest frequency that is looked at cannot be sure: rather too much than too little.
+    assert np.median(ratio) == pytest.approx(1, abs=0.3)
+    assert np.mean(np.abs(np.array(ratio) - 1) < 0.3) > (0.5 if "AR" in kind else 0.75)
+    assert min(ratio) > 0.7
+    assert max(ratio) < (2.5 if "AR" in kind else 1.6)
+
+
+def test_floor_of_short_flights_is_right_in_the_mean():
+    found = [noise_floor(noise("gyro rotor", seed, 500), THROUGH) for seed in range(10)]
+    np.testing.assert_allclose(np.sqrt(np.mean(np.square(found))), scatter("gyro rotor").mean(), rtol=0.2)
+
+
+def test_floor_scales_with_the_noise_and_nothing_has_no_floor():
+    given = noise("gyro rotor", 5)
+    tripled = Columns(3 * given.direct, 3 * given.momentum)
+    np.testing.assert_allclose(noise_floor(tripled, THROUGH), 3 * noise_floor(given, THROUGH))
+    assert not noise_floor(Columns(np.zeros((900, 6))), THROUGH).any()
+
+
+def test_shifted_windows_hear_one_frequency_and_keep_integration_by_parts():
+    tone = np.exp(2j * np.pi * 12.0 * TIME)
+    heard = modulated(THROUGH, 12.0)
+    np.testing.assert_allclose(np.abs(heard.average(tone)), 1.0)
+    assert np.abs(modulated(THROUGH, 20.0).average(tone)).max() < 0.01
+    np.testing.assert_allclose(heard.derivative(tone), 2j * np.pi * 12.0 * heard.average(tone), rtol=2e-3)
