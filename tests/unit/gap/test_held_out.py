@@ -1,0 +1,81 @@
+"""The gap of flights that no fit has seen: its size, the share that is gone, and flights that cannot tell."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.gap.balance_system import system
+from cpfls_cli.gap.held_out import held_out, share_removed
+from cpfls_cli.gap.refine import fit
+from tests.unit.gap.synthetic_flights import candidate, fly, weak
+
+KNOWN = np.tile([True, True, True, False, False, False], (1000, 1))
+
+
+def noise(*sizes):
+    return np.random.default_rng(0).standard_normal((1000, 6)) * np.array([*sizes, 1e3, 1e3, 1e3])
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "share"),
+    [
+        ((10, 10, 10), (1, 1, 1), 1.0),
+        ((10, 10, 10), (5, 5, 5), 75 / (75 + 25 - 1.25)),
+        ((10, 10, 10), (10, 10, 10), 0.0),
+        ((5, 5, 5), (10, 10, 10), 0.0),
+        ((10, 1, 1), (1, 1, 1), 1.0),
+        ((10, 1, 1), (1, 4, 1), (99 - 15) / (99 - 15 + 16 - 1.25)),
+    ],
+    ids=["all", "three quarters", "nothing", "worse", "one axis", "moved to another axis"],
+)
+def test_share_is_of_what_stands_above_the_floor(before, after, share):
+    assert share_removed(noise(*before), noise(*after), KNOWN) == pytest.approx(share, abs=0.02)
+
+
+def training(chosen, seeds=(1, 2), **given):
+    truth = [(candidate("com_offset"), [0.01, -0.008])]
+    fitted = system([weak(fly(seed, truth, **given)) for seed in seeds], chosen)
+    floor = np.ones(6)
+    return fitted, fit(fitted, floor), fit(system(fitted.flights), floor)
+
+
+def unseen(chosen, seed=3, gyro=0.005):
+    flight = weak(fly(seed, [(candidate("com_offset"), [0.01, -0.008])], gyro=gyro, rotor=1.0))
+    fitted, linear, parameters = training(chosen, gyro=gyro, rotor=1.0)
+    return held_out([flight], [flight], fitted, linear, parameters, 0.0)
+
+
+def test_an_effect_that_is_there_closes_the_gap_of_a_flight_not_seen():
+    found = unseen([candidate("com_offset")])
+    assert found.share() > 0.97
+    before, after = found.size(found.before), found.size(found.after)
+    assert (before.floors[:2] > 4).all()
+    assert (after.floors[:3] < 1.35).all()
+    np.testing.assert_allclose(before.value[:2], [0.008 * 6 * 9.81, 0.01 * 6 * 9.81], rtol=0.2)
+    assert np.isnan(before.value[3:]).all()
+    assert np.isnan(after.floors[3:]).all()
+
+
+def test_an_effect_that_is_not_there_does_not():
+    assert unseen([candidate("linear_damping")]).share() < 0.1
+
+
+def test_size_is_the_root_mean_square():
+    found = unseen([candidate("com_offset")])
+    np.testing.assert_allclose(found.size(found.after).value[:3], np.sqrt(np.mean(found.after[:, :3] ** 2, axis=0)))
+    np.testing.assert_allclose(found.size(found.after).floors[:3] * found.floor[:3], found.size(found.after).value[:3])
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [candidate("rotor_drag"), candidate("ground_effect", G=1.0), candidate("battery_sag", exponent=1.0)],
+    ids=lambda chosen: chosen.effect.kind + " " + chosen.effect.name,
+)
+def test_flights_without_the_signals_of_an_effect_are_refused(chosen):
+    seen = replace(fly(1), voltage=np.ones(2400))
+    blind = weak(replace(fly(2), velocity=None, position=None))
+    fitted = system([weak(seen)], [chosen])
+    with pytest.raises(InputError, match="lack a signal that a named effect needs"):
+        held_out([blind], [blind], fitted, np.zeros(fitted.base.shape[2]), np.zeros(10), 0.0)

@@ -1,0 +1,56 @@
+"""Effects that could be there unseen: without their signals, or without their motion."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.balance_system import system
+from cpfls_cli.gap.unseen import not_excited
+from tests.unit.gap.synthetic_flights import candidate, fly, weak
+
+FLOOR = np.full(6, 0.05)
+
+
+def reasons(signals, chosen=(), floor=FLOOR):
+    found = not_excited(system([weak(each) for each in signals], chosen), list(CATALOGUE.values()), floor)
+    return {each.name: each.reason for each in found}
+
+
+def test_a_rich_flight_hides_little_and_says_which_signals_it_lacks():
+    found = reasons([fly(1, speed=5.0)])
+    assert found["battery_sag"] == "the flights lack voltage"
+    assert found["motor_lag"] == "the flights lack command"
+    for seen in ("com_offset", "rotor_drag", "linear_damping", "rotor_mismatch", "products_of_inertia", "wind"):
+        assert seen not in found
+
+
+def test_high_above_the_ground_its_effect_cannot_show():
+    high, low = fly(1), replace(fly(1), ground_height_m=29.5)
+    assert "heights" in reasons([high])["ground_effect"]
+    assert "ground_effect" not in reasons([low])
+
+
+def test_a_signal_of_one_flight_is_enough():
+    blind = replace(fly(2), velocity=None)
+    assert "the flights lack velocity" in reasons([blind])["rotor_drag"]
+    assert "rotor_drag" not in reasons([blind, fly(1, speed=5.0)])
+
+
+def test_hover_shows_a_bias_but_not_the_motion_that_is_missing():
+    still = fly(1, tilt=1e-4, yaw=1e-4, speed=1e-3)
+    found = reasons([still])
+    for hidden in ("linear_damping", "quadratic_damping", "products_of_inertia", "rotor_drag", "rotor_gyroscopic"):
+        assert found[hidden].startswith("it would not show; ")
+    assert "torque_bias" not in found
+
+
+def test_what_is_chosen_or_the_vehicle_itself_is_not_unseen():
+    found = reasons([fly(1, tilt=1e-4, yaw=1e-4, speed=1e-3)], [candidate("linear_damping")])
+    assert "linear_damping" not in found
+    assert "parameter_error" not in found
+
+
+def test_more_noise_hides_more():
+    quiet, loud = reasons([fly(1)], floor=0.1 * FLOOR), reasons([fly(1)], floor=100 * FLOOR)
+    assert set(quiet) < set(loud)

@@ -1,0 +1,63 @@
+"""The table of verdicts, and which leftovers are causes of their own."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.gap.results import Alternative, NamedEffect, Unexplained, Verdict
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.verdict import matters, verdict_of
+
+RIVAL = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")
+LEFT = Unexplained("torque y", 4.0, "yaw rate", 0.8, None, "neither")
+
+
+def effect(name="com_offset", share=0.9):
+    return NamedEffect(name, None, np.zeros(0), (), 0.001, share, 1.0, "")
+
+
+BIG, SMALL = effect(), effect("com_offset", 0.05)
+
+CASES = {
+    "nothing moved": ([], [], [], 1.0, False, Verdict.NOT_EXCITED),
+    "nothing wrong": ([], [], [], 1.0, True, Verdict.NO_GAP),
+    "a gap without a name": ([], [], [LEFT], 1.0, True, Verdict.UNEXPLAINED),
+    "a gap without a name in a still flight": ([], [], [LEFT], 1.0, False, Verdict.UNEXPLAINED),
+    "all": ([BIG], [], [], 0.95, True, Verdict.NAMED),
+    "exactly enough": ([BIG], [], [], 0.9, True, Verdict.NAMED),
+    "not all": ([BIG], [], [], 0.89, True, Verdict.PARTIAL),
+    "exactly partly": ([BIG], [], [], 0.5, True, Verdict.PARTIAL),
+    "too little": ([BIG], [], [], 0.49, True, Verdict.UNEXPLAINED),
+    "a second cause": ([BIG], [], [LEFT], 0.97, True, Verdict.PARTIAL),
+    "a rival": ([BIG], [RIVAL], [], 0.95, True, Verdict.AMBIGUOUS),
+    "a rival of a small part": ([effect("rotor_drag"), SMALL], [RIVAL], [], 0.95, True, Verdict.NAMED),
+    "a rival, but not all": ([BIG], [RIVAL], [], 0.7, True, Verdict.PARTIAL),
+}
+
+
+@pytest.mark.parametrize(("effects", "rivals", "left", "share", "excited", "expected"), CASES.values(), ids=CASES)
+def test_verdicts(effects, rivals, left, share, excited, expected):
+    assert verdict_of(effects, rivals, left, share, excited, GapSettings()) is expected
+
+
+def test_shares_of_the_settings_decide():
+    strict = GapSettings(named_share=0.99, partial_share=0.97)
+    assert verdict_of([BIG], [], [], 0.98, True, strict) is Verdict.PARTIAL
+    assert verdict_of([BIG], [], [], 0.96, True, strict) is Verdict.UNEXPLAINED
+
+
+GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("left", "expected"),
+    [
+        (LEFT, True),
+        (Unexplained("torque y", 3.0, "yaw rate", 0.8, None, "neither"), False),
+        (Unexplained("torque y", 4.0, None, 0.0, None, "neither"), False),
+        (Unexplained("torque y", 4.0, None, 0.8, 0.9, "feeds"), True),
+        (Unexplained("torque y", 4.0, "yaw rate", 0.5, None, "neither"), False),
+    ],
+    ids=["3.2 % of the gap", "1.8 % of the gap", "follows nothing", "narrow band", "half of it follows"],
+)
+def test_what_is_left_matters_where_it_follows_something_and_is_not_small(left, expected):
+    assert matters(left, GAP) is expected
