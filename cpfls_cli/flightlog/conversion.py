@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.frames import (
@@ -38,6 +40,9 @@ def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) ->
     """
     in_body = _as_body_vectors(signals, settings)
     converted = {name: signals[name] for name in _ROTOR_SIGNALS if name in signals}
+    if "rotor_command" in signals and settings.rotor_command_is == "thrust":
+        # Thrust goes with the square of the speed; a share below 0 is none.
+        converted["rotor_command"] = np.sqrt(np.maximum(signals["rotor_command"], 0.0))
     converted |= {name: signals[name][:, 0] for name in _SCALAR_SIGNALS if name in signals}
     converted |= {name: body_to_flu(in_body[name], settings.body_frame) for name in _BODY_SIGNALS if name in in_body}
     world = [name for name in _WORLD_SIGNALS if name in signals and not _is_specific_force(name, settings)]

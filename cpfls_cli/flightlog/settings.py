@@ -30,6 +30,10 @@ class ImportSettings(Settings):
         Literal["world", "body-specific-force"],
         Doc("acceleration in the world, or what an accelerometer senses; the latter is kept as specific_force too"),
     ] = "world"
+    rotor_command_is: Annotated[
+        Literal["speed", "thrust"],
+        Doc("what a rotor_command of unit 1 is a share of; of thrust, its root is kept, which is the share of speed"),
+    ] = "speed"
     torque_source: Annotated[
         Literal["column", "rotor-speed", "rotor-command"] | None,
         Doc(
@@ -73,6 +77,7 @@ class ImportSettings(Settings):
         if self.signals:
             _check_attitude(self)
             _check_torque(self)
+            _check_command(self)
 
 
 def _check_attitude(settings: ImportSettings) -> None:
@@ -99,3 +104,9 @@ def _check_torque(settings: ImportSettings) -> None:
         raise SettingError("torque_source", f"{settings.torque_source!r} needs the signal {missing}")
     if {"torque", "body_torque"} <= names:
         raise SettingError("signals", "torque and body_torque are both given; keep one")
+
+
+def _check_command(settings: ImportSettings) -> None:
+    command = settings.signals.get("rotor_command")
+    if settings.rotor_command_is == "thrust" and (command is None or command.unit != "1"):
+        raise SettingError("rotor_command_is", "'thrust' needs the signal rotor_command in unit 1")

@@ -25,6 +25,10 @@ def test_every_key_of_the_section_has_a_default():
         ("signals", {"signals": {"torque": TORQUE, "body_torque": TORQUE, "attitude": ATTITUDE}}),
         ("torque_source", {"signals": {"attitude": ATTITUDE}}),
         ("torque_source", {"signals": {"rotor_speed": ROTORS}, "torque_source": "rotor-command"}),
+        (
+            "rotor_command_is",
+            {"signals": {"rotor_command": ROTORS}, "torque_source": None, "rotor_command_is": "thrust"},
+        ),
     ],
 )
 def test_a_contradiction_between_keys_is_refused_at_its_key(key, settings):
