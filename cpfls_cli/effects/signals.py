@@ -72,6 +72,8 @@ class Signals:
         """Names of what effects can ask for and this flight has."""
         radius = all(rotor.radius_m is not None for rotor in self.vehicle.rotors)
         found = {
+            # A log without gyroscope and attitude is taken as at rest: it holds the balance and no motion.
+            "body_rate": bool(self.body_rate.any()),
             "attitude": self.attitude is not None,
             "velocity": self.velocity is not None and self.attitude is not None,
             "height": self.position is not None and self.attitude is not None,

@@ -45,7 +45,7 @@ def _constant(flights: Sequence[Signals]) -> Iterator[str]:
 def _columns(signals: Signals) -> Mapping[str, Array]:
     numbered = tuple(str(i + 1) for i in range(len(signals.vehicle.rotors)))
     groups: tuple[tuple[str, tuple[str, ...], Array | None], ...] = (
-        ("gyroscope", _AXES, signals.body_rate),
+        ("gyroscope", _AXES, signals.body_rate if "body_rate" in signals.available else None),
         ("attitude", _ANGLES, signals.attitude),
         ("velocity", _AXES, signals.velocity),
         ("position", _AXES, signals.position),

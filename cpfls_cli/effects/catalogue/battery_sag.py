@@ -26,7 +26,7 @@ EFFECT = Effect(
     formula="T_i = k w_i,commanded^2 (V/V_0)^n, drag torque alike;  M = M_rot(T) - M_rot(commanded)",
     sentence="As the battery empties, the same command gives less thrust.",
     coefficients=(),
-    needs=frozenset({"voltage", "rotor_speed"}),
+    needs=frozenset({"body_rate", "rotor_speed", "voltage"}),
     excitation="a flight from a full to an empty battery",
     rivals={
         "parameter_error": "compare the start with the end of a flight: a wrong parameter stays",

@@ -24,7 +24,7 @@ EFFECT = Effect(
     formula="w(t) = w_commanded(t - d);  M = M_rot(w) - M_rot(w_commanded)",
     sentence="The command takes time to reach the motors.",
     coefficients=(),
-    needs=frozenset({"command", "torque"}),
+    needs=frozenset({"body_rate", "command", "torque"}),
     excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
     rivals={
         "motor_lag": "sweep the torque up to 3 Hz and above: lag also weakens it, a delay does not",

@@ -24,7 +24,7 @@ EFFECT = Effect(
     formula="tau w_i' + w_i = w_i,commanded;  M = M_rot(w) - M_rot(w_commanded)",
     sentence="The motors need time to reach the speed that they are told.",
     coefficients=(),
-    needs=frozenset({"command", "torque"}),
+    needs=frozenset({"body_rate", "command", "torque"}),
     excitation="roll and pitch torque sweeps from 0.5 to 3 Hz",
     rivals={
         "command_delay": "sweep the torque up to 3 Hz and above: lag also weakens it, a delay does not",

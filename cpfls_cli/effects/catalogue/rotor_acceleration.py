@@ -26,7 +26,7 @@ EFFECT = Effect(
     coefficients=(
         Coefficient("J_r", "kg m^2", 0.0, 0.01, "inertia of one rotor about its axis", scales.moment_of_inertia(0)),
     ),
-    needs=frozenset({"rotor_speed"}),
+    needs=frozenset({"body_rate", "rotor_speed"}),
     excitation="yaw steps, and a yaw sweep from 0.3 to 2 Hz, with rotor speeds logged at 100 Hz or more",
     rivals={
         "parameter_error": "compare slow with fast yaw: a wrong Izz acts in both",
