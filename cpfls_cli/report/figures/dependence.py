@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.report.canvas import plain_ticks, plot
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.gap_words import channel_unit, channel_words, signal_words
@@ -76,12 +79,9 @@ def heat_map_figure(name: str, disagreement: Source) -> Plot:
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
-        axes.set_facecolor("#f2f2f2")
+        axes.set_facecolor("white")
         mesh = axes.pcolormesh(*edges, np.ma.masked_invalid(mean), cmap="PuOr", norm=BoundaryNorm(limits, 256))
-        negative = np.ma.masked_where(~(mean < 0), mean)
-        hatched = axes.pcolor(*edges, negative, hatch="////", edgecolor="#6b6b6b", linewidth=0.0)
-        hatched.set_array(None)
-        hatched.set_facecolor("none")
+        axes.add_collection(_hatched(edges[0], edges[1], mean < 0))
         bar = figure.colorbar(mesh, ax=axes, ticks=limits)
         bar.ax.set_yticklabels([plain(float(limit), smallest=1e-4) for limit in limits])
         bar.set_label(f"mean gap, {channel_unit(channel)}")
@@ -96,6 +96,15 @@ def heat_map_figure(name: str, disagreement: Source) -> Plot:
         "that explain it best. Hatched cells are negative; the flights never were where nothing is drawn."
     )
     return plot(name, caption, f"Mean gap over {signals[0]} and {signals[1]}", 3.9, draw)
+
+
+def _hatched(first: Array, second: Array, marked: BoolArray) -> PatchCollection:
+    """Hatch cells, so that a sign is seen without colour."""
+    cells = [
+        Rectangle((first[column], second[row]), first[column + 1] - first[column], second[row + 1] - second[row])
+        for row, column in np.argwhere(marked)
+    ]
+    return PatchCollection(cells, facecolor="none", edgecolor="#6b6b6b", linewidth=0.0, hatch="////")
 
 
 def _draw_channel(axes: Axes, disagreement: Source, channel: str) -> None:
