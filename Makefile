@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce quick hexarotor crazyflie test lint bench clean FORCE
+.PHONY: help reproduce quick hexarotor crazyflie test lint bench blind-study clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -20,6 +20,7 @@ help:
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
 	@echo "  make lint        formatting, lint, types, import contracts"
 	@echo "  make bench       benchmarks, as Markdown tables"
+	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
 	@echo "  make clean       remove what studies produced"
 
 reproduce: data/paper/report.html
@@ -138,6 +139,13 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python benchmarks/reduction.py
 	$(MAKE) data/paper/selection.h5
 	$(BIN)/python benchmarks/judging.py configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
+
+# Stopped and started again it goes on where it was. SIZE takes more options: `python -m tests.gap.study --help`.
+SEED := 2027
+DRAWS := 6
+NONE := 200
+blind-study: $(INSTALLED_DEV)
+	$(BIN)/python -m tests.gap.study run --out data/blind --seed $(SEED) --draws $(DRAWS) --none $(NONE) $(SIZE)
 
 clean:
 	rm -rf data/paper data/quick data/hexarotor data/crazyflie

@@ -1,0 +1,54 @@
+"""Judge the gap workflow blindly: ``python -m tests.gap.study run --seed 777 --draws 2 --out data/blind``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from tests.gap.study.fly import fly
+from tests.gap.study.run import judge_all, run
+from tests.gap.study.score import scored
+from tests.gap.study.sets import GROUPS, LEVELS, Size, sets
+from tests.gap.study.tables import tables
+
+
+def main():
+    """Fly, judge or score a study, or all of it."""
+    told = _arguments()
+    size = Size(told.seed, told.draws, told.levels, told.kinds, told.groups, told.none, told.limit)
+    if told.command == "fly":
+        for own in sets(size):
+            fly([own], told.out)
+    if told.command == "judge":
+        judge_all(told.out, told.processes)
+    if told.command == "run":
+        run(sets(size), told.out, told.processes, lambda each: each.level in told.baselines, told.keep)
+    if told.command in ("run", "score"):
+        text = tables(scored(told.out))
+        (told.out / "tables.md").write_text(text, encoding="utf-8")
+        print(text)
+
+
+def _arguments():
+    parser = argparse.ArgumentParser(prog="tests.gap.study", description=__doc__)
+    parser.add_argument("command", choices=("fly", "judge", "score", "run"))
+    parser.add_argument("--out", type=Path, default=Path("data/blind"), help="folder of the study")
+    parser.add_argument("--seed", type=int, default=777)
+    parser.add_argument("--draws", type=int, default=2, help="draws of each effect")
+    parser.add_argument("--levels", type=_list, default=LEVELS, help="noise: low,mid,high")
+    parser.add_argument("--kinds", type=_list, default=("white", "coloured"), help="noise: white,coloured")
+    parser.add_argument("--groups", type=_list, default=GROUPS, help=",".join(GROUPS))
+    parser.add_argument("--none", type=int, help="number of sets that hide nothing, over all vehicles and noises")
+    parser.add_argument("--limit", type=int, help="a random part of that many cases")
+    parser.add_argument("--baselines", type=_list, default=("mid",), help="noise levels that simpler ways judge, too")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--keep", action="store_true", help="keep the logs, 4 MB for each set")
+    return parser.parse_args()
+
+
+def _list(text):
+    return tuple(part for part in text.split(",") if part)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""Flights as a user would have them: logs and a config in one folder, the key in another."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import yaml
+
+from tests.gap.blind.generator import DURATION, simulate_many, write, write_key
+
+_COLUMNS_OF = Path(__file__).parents[3] / "configs" / "gap" / "sixkg.yaml"
+
+
+def fly(group, folder, duration=DURATION):
+    """Fly cases, write the logs of each set to ``flights/NAME`` and what is hidden to ``keys/NAME``.
+
+    Parameters
+    ----------
+    group : list of list of Set
+        One list for each case.
+    folder : Path
+    duration : float, s
+
+    Returns
+    -------
+    list of Path
+        Folders with logs.
+    """
+    written = []
+    seed = group[0][0].seed
+    for flights, own in zip(simulate_many([own[0].case for own in group], seed, duration), group, strict=True):
+        for each in own:
+            logs = Path(folder) / "flights" / each.name
+            write(flights, logs, each.level, each.kind, each.generator())
+            (logs / "study.yaml").write_text(config(logs / "vehicle.json"), encoding="utf-8")
+            _write_key(flights, each, Path(folder) / "keys" / each.name)
+            written.append(logs)
+    return written
+
+
+def config(vehicle_file):
+    """Describe a vehicle and the columns of its logs as a config.
+
+    Parameters
+    ----------
+    vehicle_file : Path
+
+    Returns
+    -------
+    str
+        YAML; everything else is left at its default.
+    """
+    told = json.loads(vehicle_file.read_text(encoding="utf-8"))
+    factors = {
+        "thrust_factor_n_s2": told["thrust_factor"],
+        "drag_factor_n_m_s2": told["torque_factor"],
+        "radius_m": told["rotor_radius"],
+    }
+    hover = (told["mass"] * told["gravity"] / (4 * told["thrust_factor"])) ** 0.5
+    vehicle = {
+        "gravity_m_s2": told["gravity"],
+        "mass_kg": told["mass"],
+        "inertia_kg_m2": told["inertia"],
+        "rotor_speed_max_rad_s": round(3 * hover),
+        "rotors": [
+            {"position_m": place, "spin": spin, **factors}
+            for place, spin in zip(told["rotors"], told["spin"], strict=True)
+        ],
+    }
+    columns = yaml.safe_load(_COLUMNS_OF.read_text(encoding="utf-8"))["import"]
+    # PyYAML writes 1e-05, which a YAML parser of another make reads as text.
+    return json.dumps({"seed": 1, "vehicle": vehicle, "import": columns}, indent=1)
+
+
+def _write_key(flights, each, folder):
+    path = write_key(flights, folder)
+    key = json.loads(path.read_text(encoding="ascii"))
+    key |= {"set": each.name, "level": each.level, "kind": each.kind}
+    path.write_text(json.dumps(key, indent=1) + "\n", encoding="ascii")

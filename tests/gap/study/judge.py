@@ -1,0 +1,65 @@
+"""One folder of flights judged as `cpfls gap` judges it; the key is never opened."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from cpfls_cli.config.load import load_study
+from cpfls_cli.errors import CpflsError
+from cpfls_cli.gap.diagnose import diagnose
+from cpfls_cli.stages.plain_json import plain
+from cpfls_cli.stages.recordings import read_flights
+from cpfls_cli.stages.study import generator
+from tests.gap.study.baselines import baselines
+
+
+def judge(folder, compared=False):
+    """Diagnose the flights of a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``study.yaml``, ``train_*.csv`` and ``held_out_*.csv``.
+    compared : bool
+        Tell what simpler procedures would name, too.
+
+    Returns
+    -------
+    dict
+        Plain data.
+    """
+    folder = Path(folder)
+    started = time.monotonic()
+    try:
+        told = _judged(folder, compared)
+    except CpflsError as error:
+        told = {"verdict": "ERROR", "error": str(error), "effects": []}
+    return {"set": folder.name, **plain(told), "seconds": round(time.monotonic() - started, 2)}
+
+
+def _judged(folder, compared):
+    study = load_study(folder / "study.yaml")
+    logs = [sorted(folder.glob(f"{role}_*.csv")) for role in ("train", "held_out")]
+    read = read_flights([*logs[0], *logs[1]], study).recordings
+    training, held = read[: len(logs[0])], read[len(logs[0]) :]
+    found = diagnose(training, held, study.gap, generator(study, "diagnose")).diagnosis
+    simpler = {"baselines": baselines(training, study.gap)} if compared else {}
+    return {
+        "verdict": str(found.verdict),
+        "effects": [_effect(effect) for effect in found.effects],
+        "closest": [_effect(effect) for effect in found.closest],
+        "alternatives": [vars(rival) for rival in found.alternatives],
+        "unexplained": [vars(left) for left in found.unexplained],
+        "share": found.share,
+        "gap_before": {"value": found.before.value.tolist(), "floors": found.before.floors.tolist()},
+        "gap_after": {"value": found.after.value.tolist(), "floors": found.after.floors.tolist()},
+        "floor": found.floor.tolist(),
+        **simpler,
+    }
+
+
+def _effect(effect):
+    numbers = {c.name: {"value": c.value, "low": c.low, "high": c.high, "unit": c.unit} for c in effect.coefficients}
+    told = {"name": effect.name, "coefficients": numbers, "p_value": effect.p_value, "share": effect.share}
+    return told | {"selection_frequency": effect.selection_frequency}

@@ -1,0 +1,99 @@
+"""A whole study: fly, judge, forget the logs; what is done already is not done again."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+
+from tests.gap.study.fly import fly
+from tests.gap.study.judge import judge
+
+_CASES_AT_ONCE = 24
+
+
+class Progress:
+    """A line on stderr with the time left."""
+
+    def __init__(self, done, total):
+        self.first, self.done, self.total, self.started = done, done, total, time.monotonic()
+
+    def step(self):
+        """Take note of one more set."""
+        self.done += 1
+        spent = time.monotonic() - self.started
+        left = spent / (self.done - self.first) * (self.total - self.done)
+        end = "\n" if self.done == self.total or not sys.stderr.isatty() else ""
+        if sys.stderr.isatty() or self.done % 20 == 0 or self.done == self.total:
+            print(f"\r{self.done} of {self.total} sets, {_clock(left)} left ", end=end, file=sys.stderr, flush=True)
+
+
+def run(groups, folder, processes, compared=lambda _: False, keep=False):
+    """Fly and judge a study.
+
+    Parameters
+    ----------
+    groups : list of list of Set
+        One list for each case.
+    folder : Path
+        Holds ``results.jsonl``, ``keys`` and, where they are kept, ``flights``.
+    processes : int
+    compared : callable
+        Takes a Set and tells whether simpler procedures judge it, too.
+    keep : bool
+        Keep the logs.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    done = judged(folder)
+    progress = Progress(sum(each.name in done for own in groups for each in own), sum(map(len, groups)))
+    left = [own for own in ([each for each in own if each.name not in done] for own in groups) if own]
+    with_others = {each.name for own in left for each in own if compared(each)}
+    parts = [left[start : start + _CASES_AT_ONCE] for start in range(0, len(left), _CASES_AT_ONCE)]
+    # Several threads in each of several processes would be in each other's way.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    with ProcessPoolExecutor(processes) as pool, (folder / "results.jsonl").open("a", encoding="utf-8") as results:
+        coming = [pool.submit(fly, part, folder) for part in parts[:1]]
+        for place in range(len(parts)):
+            logs = coming.pop().result()
+            # The next flights are flown while these are judged.
+            coming = [pool.submit(fly, part, folder) for part in parts[place + 1 : place + 2]]
+            asked = {pool.submit(judge, path, path.name in with_others): path for path in logs}
+            for future in as_completed(asked):
+                print(json.dumps(future.result()), file=results, flush=True)
+                progress.step()
+                if not keep:
+                    shutil.rmtree(asked[future])
+
+
+def judge_all(folder, processes):
+    """Judge all flights of a folder that are not judged yet."""
+    folder = Path(folder)
+    done = judged(folder)
+    logs = [path for path in sorted((folder / "flights").iterdir()) if path.name not in done]
+    progress = Progress(len(done), len(done) + len(logs))
+    with ProcessPoolExecutor(processes) as pool, (folder / "results.jsonl").open("a", encoding="utf-8") as results:
+        for future in as_completed([pool.submit(judge, path) for path in logs]):
+            print(json.dumps(future.result()), file=results, flush=True)
+            progress.step()
+
+
+def judged(folder):
+    """List the sets that have a result; half a line, of a run that was stopped, is taken off."""
+    path = folder / "results.jsonl"
+    if not path.exists():
+        return set()
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    if whole != text:
+        path.write_text(whole, encoding="utf-8")
+    return {json.loads(line)["set"] for line in whole.splitlines()}
+
+
+def _clock(seconds):
+    minutes = round(seconds / 60)
+    return f"{minutes // 60} h {minutes % 60:02d} min"

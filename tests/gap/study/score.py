@@ -1,0 +1,194 @@
+"""What the judge said beside what was hidden."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tests.gap.study.truth import ROUGH, coefficients
+
+VISIBLE = 0.7
+"""Hidden torque in floors, on its largest axis, below which nobody can see it."""
+
+RIGHT = "right"
+EXTRA = "right and more"
+PARTIAL = "right, called partial"
+SOME = "some"
+RIVAL = "among the rivals"
+WRONG = "wrong"
+REFUSED = "refused"
+MISSED = "missed"
+UNSEEN = "not visible"
+ERROR = "error"
+OUTCOMES = (RIGHT, EXTRA, PARTIAL, SOME, RIVAL, WRONG, REFUSED, MISSED, UNSEEN, ERROR)
+
+NOT_COLUMNS = frozenset({"gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay", "parameter_error"})
+"""Effects that are not found by a search among columns."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A judged set: the key, what was said of it, and how the two compare."""
+
+    key: dict
+    said: dict
+    outcome: str
+
+    @property
+    def truth(self):
+        """Names that a perfect judge would give."""
+        return frozenset(self.key["truth"])
+
+    @property
+    def names(self):
+        """Names that were given, those that explain most first."""
+        return tuple(effect["name"] for effect in self.said["effects"])
+
+    @property
+    def verdict(self):
+        """The word for it all."""
+        return self.said["verdict"]
+
+    @property
+    def false_names(self):
+        """Names of what is not hidden; a form close to one of the catalogue allows the nearest."""
+        return set(self.names) - self.truth - set(self.key["hidden"]) - set(self.key["nearest"])
+
+    @property
+    def visible(self):
+        """Hidden torque in floors, on the axis where it is largest."""
+        return visible(self.key, self.said)
+
+    def floors(self, when):
+        """Give the held-out torque gap in floors, on the axis where it was largest before."""
+        before = np.array(self.said["gap_before"]["floors"][:3], dtype=float)
+        if np.isnan(before).all():
+            return float("nan")
+        return float(np.array(self.said[f"gap_{when}"]["floors"], dtype=float)[np.nanargmax(before)])
+
+
+@dataclass(frozen=True)
+class Number:
+    """A coefficient of a rightly named effect beside the hidden one."""
+
+    effect: str
+    name: str
+    level: str
+    kind: str
+    true: float
+    value: float
+    scale: float
+    inside: bool
+
+    @property
+    def error(self):
+        """Relative to the largest number of its kind."""
+        return (self.value - self.true) / self.scale
+
+
+def scored(folder):
+    """Join keys and results.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    list of Scored
+    """
+    folder = Path(folder)
+    out = []
+    for line in (folder / "results.jsonl").read_text(encoding="utf-8").splitlines():
+        said = json.loads(line)
+        key = json.loads((folder / "keys" / said["set"] / "key.json").read_text(encoding="ascii"))
+        out.append(Scored(key, said, outcome(key, said)))
+    return sorted(out, key=lambda each: (each.key["case"], each.key["level"], each.key["kind"]))
+
+
+def visible(key, said):
+    """Give the hidden torque of the held-out flights in floors, on its largest axis."""
+    if "floor" not in said:
+        return float("nan")
+    own = [values for name, values in key["residual_rms_n_m"].items() if name.startswith("held_out")]
+    hidden = np.sqrt(np.mean(np.square(own), axis=0))
+    return float(np.nanmax(hidden / np.array(said["floor"][:3], dtype=float)))
+
+
+def outcome(key, said):
+    """Compare the names given with those hidden.
+
+    Wind acts through rotor drag, so a wind includes its drag.
+
+    Parameters
+    ----------
+    key, said : dict
+
+    Returns
+    -------
+    str
+        One of ``OUTCOMES``.
+    """
+    if said["verdict"] == "ERROR":
+        return ERROR
+    truth, names = set(key["truth"]), {effect["name"] for effect in said["effects"]}
+    if not names:
+        return _nothing_named(key, said)
+    if "wind" in truth:
+        names |= {"rotor_drag"} if "wind" in names else set()
+        truth |= {"rotor_drag"}
+    if names == truth:
+        return PARTIAL if said["verdict"] in ("PARTIAL", "UNEXPLAINED") else RIGHT
+    if said["verdict"] == "AMBIGUOUS" and _with_rivals(said, names, truth):
+        return RIVAL
+    if truth and names > truth:
+        return EXTRA
+    return SOME if names & truth else WRONG
+
+
+def _nothing_named(key, said):
+    quiet = said["verdict"] in ("NO_GAP", "NOT_EXCITED")
+    if not key["truth"]:
+        return RIGHT if quiet else REFUSED
+    if not quiet:
+        return REFUSED
+    return MISSED if visible(key, said) >= VISIBLE else UNSEEN
+
+
+def _with_rivals(said, names, truth):
+    """Tell whether a listed rival in the place of a name makes the answer right."""
+    return any(names - {rival["instead_of"]} | {rival["name"]} == truth for rival in said["alternatives"])
+
+
+def numbers(each):
+    """Compare the coefficients of rightly named effects with the hidden ones.
+
+    Parameters
+    ----------
+    each : Scored
+
+    Returns
+    -------
+    list of Number
+    """
+    true = coefficients(each.key)
+    out = []
+    for effect in each.said["effects"]:
+        name = effect["name"]
+        known = {c: (true[name][c], found) for c, found in effect["coefficients"].items() if c in true.get(name, {})}
+        if name not in each.truth:
+            continue
+        for coefficient, (value, found) in known.items():
+            scale = max(abs(other) for other, more in known.values() if more["unit"] == found["unit"])
+            inside = None not in (found["low"], found["high"]) and found["low"] <= value <= found["high"]
+            noise = each.key["level"], each.key["kind"]
+            out.append(Number(name, coefficient, *noise, value, found["value"], max(scale, 1e-12), inside))
+    return out
+
+
+def exact(number):
+    """Tell whether the hidden form is that of the catalogue."""
+    return number.effect not in ROUGH

@@ -1,0 +1,243 @@
+"""What a study found, as Markdown."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable
+
+from tests.gap.study import score
+from tests.gap.study.number_tables import coefficient_table, gap_table, number_totals
+from tests.gap.study.score import OUTCOMES, RIGHT
+from tests.gap.study.text import percent, table
+
+_LIMITED = ("hover", "no_velocity", "no_force")
+_OUTSIDE = ("NAMED", "AMBIGUOUS", "PARTIAL", "UNEXPLAINED", "NO_GAP", "NOT_EXCITED", "ERROR")
+
+
+def tables(judged):
+    """Write all tables of a study.
+
+    Parameters
+    ----------
+    judged : list of Scored
+
+    Returns
+    -------
+    str
+    """
+    parts = (
+        ("Totals against the targets", _totals(judged)),
+        ("Outcomes by group and noise", _outcomes(judged)),
+        ("One effect hidden: what was named", _confusion(_of(judged, "single"))),
+        ("Nothing hidden: false names", _false_names(_of(judged, "none"))),
+        ("Outside the catalogue", _outside(_with_outside(judged))),
+        ("Forms that differ from the catalogue's", _forms(_of(judged, "form"))),
+        ("Pairs and triples within the catalogue", _confusion(_several(judged))),
+        ("One effect over a background of many", _background(_of(judged, "background"))),
+        ("Hover alone, no velocity, no force", _confusion(_of(judged, *_LIMITED))),
+        ("Coefficients and their 95 % intervals", coefficient_table(judged)),
+        ("Held-out torque gap in floors", gap_table(_of(judged, "single"))),
+        ("Simpler procedures on the same columns", _simpler(judged)),
+        ("Every miss", _misses(judged)),
+    )
+    return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts if text) + "\n"
+
+
+def _of(judged, *groups):
+    return [each for each in judged if each.key["group"] in groups]
+
+
+def _with_outside(judged):
+    return [each for each in judged if each.key["outside"]]
+
+
+def _several(judged):
+    return [each for each in _of(judged, "pair", "triple") if not each.key["outside"]]
+
+
+def _totals(judged):
+    single, none, outside = _of(judged, "single"), _of(judged, "none"), _of(judged, "outside")
+    right = [each.outcome == RIGHT for each in single]
+    named = [each.verdict in ("NAMED", "AMBIGUOUS") for each in outside]
+    rows = [
+        ("one effect: exactly right", percent(right), "at least 96 %"),
+        ("one effect: exactly right, white noise", percent(_right(single, "white")), "prototype 95 %"),
+        ("one effect: exactly right, coloured noise", percent(_right(single, "coloured")), "at least 96 %"),
+        ("one effect: wrong name", percent([each.outcome == score.WRONG for each in single]), "0"),
+        ("any group: wrong name", percent([_wrong(each) for each in judged]), "0"),
+        ("nothing hidden: false name", percent([bool(each.names) for each in none]), "at most 1 %"),
+        ("nothing hidden: a gap without a name", percent([each.outcome == score.REFUSED for each in none]), ""),
+        ("outside the catalogue: NAMED or AMBIGUOUS", percent(named), "0"),
+        ("two or three effects: all named", percent([each.outcome == RIGHT for each in _several(judged)]), "96 %"),
+        *number_totals(judged),
+        ("could not be judged", percent([each.outcome == score.ERROR for each in judged]), "0"),
+    ]
+    return table(("", "found", "target"), rows)
+
+
+def _right(judged, kind):
+    return [each.outcome == RIGHT for each in judged if each.key["kind"] == kind]
+
+
+def _wrong(each):
+    """Tell whether a certain verdict rests on nothing but names of what is not there."""
+    certain = each.verdict in ("NAMED", "AMBIGUOUS")
+    rightly = each.outcome == score.RIVAL or set(each.names) - each.false_names
+    return certain and bool(each.names) and not rightly
+
+
+def _outcomes(judged):
+    rows = []
+    for group, own in _grouped(judged, lambda each: (each.key["group"], each.key["level"], each.key["kind"])).items():
+        found = Counter(each.outcome for each in own)
+        rows.append((*group, len(own), *(found[name] or "" for name in OUTCOMES)))
+    return table(("group", "noise", "kind", "sets", *OUTCOMES), rows)
+
+
+def _confusion(judged):
+    """Write what was said of each hidden effect, by noise."""
+    noises = sorted({_noise(each) for each in judged}, key=_rank)
+    rows = []
+    for hidden, own in _grouped(judged, _hidden).items():
+        rows.append((hidden, *(_said([each for each in own if _noise(each) == noise]) for noise in noises)))
+    return table(("hidden", *(" ".join(noise) for noise in noises)), rows)
+
+
+def _hidden(each):
+    group = "" if each.key["group"] in ("single", "none", "pair", "triple") else f"{each.key['group']}: "
+    return group + (" + ".join(each.key["truth"]) or "nothing")
+
+
+def _said(judged):
+    found = Counter(_answer(each) for each in judged)
+    return ", ".join(f"{answer} {count}/{len(judged)}" for answer, count in found.most_common())
+
+
+def _answer(each):
+    names = "+".join(sorted(each.names, key=lambda name: name not in each.truth))
+    if each.outcome == RIGHT and each.truth:
+        return "right" if each.verdict == "NAMED" else "right, with rivals"
+    return f"{each.verdict} {names}".strip()
+
+
+def _false_names(judged):
+    rows = []
+    for group, own in _grouped(judged, lambda each: (each.key["level"], each.key["kind"])).items():
+        rows.append((*group, percent([bool(each.names) for each in own]), _said(own)))
+    return table(("noise", "kind", "false names", "said"), rows)
+
+
+def _outside(judged):
+    rows = []
+    for hidden, own in _grouped(judged, lambda each: " + ".join([*each.key["outside"], *each.key["truth"]])).items():
+        found = Counter(each.verdict for each in own)
+        names = ", ".join(f"{name} {count}" for name, count in _names(own).most_common())
+        rows.append((hidden, *(found[verdict] or "" for verdict in _OUTSIDE), names))
+    return table(("hidden", *_OUTSIDE, "names given"), rows)
+
+
+def _forms(judged):
+    rows = []
+    for (form, nearest), own in _grouped(judged, lambda e: (*e.key["hidden"], *e.key["nearest"][:1])[-2:]).items():
+        with_nearest = [each for each in own if nearest in each.names]
+        alone = [each for each in with_nearest if len(each.names) == 1]
+        other = [each for each in own if each.names and nearest not in each.names]
+        quiet = len(own) - len(with_nearest) - len(other)
+        rows.append(
+            (form, nearest, len(own), len(alone), len(with_nearest) - len(alone), len(other), quiet, _said(own))
+        )
+    return table(("form", "nearest", "sets", "nearest alone", "and more", "another", "no name", "said"), rows)
+
+
+def _background(judged):
+    rows = []
+    for dominant, own in _grouped(judged, lambda each: each.key["dominant"]).items():
+        first = [bool(each.names) and each.names[0] == dominant for each in own]
+        somewhere = [dominant in each.names for each in own]
+        false = [bool(each.false_names) for each in own]
+        rows.append((dominant, percent(first), percent(somewhere), percent(false), _names(own).most_common(3)))
+    return table(("dominant", "named first", "named", "a name of what is not hidden", "names given most"), rows)
+
+
+def _simpler(judged):
+    """Write how simpler procedures do where they were tried; they know neither sensors nor wrong vehicle numbers."""
+    own = [each for each in judged if "baselines" in each.said]
+    ways = {"this": lambda e: set(e.names), "BIC": lambda e: set(e.said["baselines"]["bic"])}
+    ways["F test"] = lambda e: set(e.said["baselines"]["f_test"])
+    rows = []
+    for name, way in ways.items():
+        single = [each for each in _of(own, "single") if not each.truth & score.NOT_COLUMNS]
+        rows.append(
+            (
+                name,
+                percent([way(each) == each.truth for each in single]),
+                percent([way(each) > each.truth for each in single]),
+                percent([bool(way(each)) and not way(each) & each.truth for each in single]),
+                percent([bool(way(each)) for each in _of(own, "none")]),
+                percent([bool(way(each)) and _certain(name, each) for each in _of(own, "outside")]),
+            )
+        )
+    columns = (
+        "way",
+        "exactly right",
+        "right and more",
+        "wrong",
+        "nothing hidden: a name",
+        "outside: certain of a name",
+    )
+    return table(columns, rows)
+
+
+def _certain(way, each):
+    # Simpler procedures have no way to say that their names are not all.
+    return way != "this" or each.verdict in ("NAMED", "AMBIGUOUS")
+
+
+def _misses(judged):
+    rows = []
+    for each in judged:
+        expected = each.key["group"] in ("single", "none", "pair", "triple") and not each.key["outside"]
+        if (expected and each.outcome != RIGHT) or _wrong(each):
+            rows.append(_miss(each))
+    columns = (
+        "set",
+        "case",
+        "noise",
+        "outcome",
+        "verdict",
+        "named (share, p)",
+        "rivals",
+        "hidden, floors",
+        "gap, floors",
+    )
+    return table(columns, rows)
+
+
+def _miss(each):
+    named = ", ".join(f"{e['name']} ({e['share']:.2f}, {e['p_value']:.1g})" for e in each.said["effects"])
+    rivals = ", ".join(sorted({rival["name"] for rival in each.said.get("alternatives", ())}))
+    gap, hidden = "", ""
+    if "gap_before" in each.said:
+        gap, hidden = f"{each.floors('before'):.2f} -> {each.floors('after'):.2f}", f"{each.visible:.2f}"
+    noise = f"{each.key['level']} {each.key['kind']}"
+    told = each.said.get("error", named)
+    return each.key["set"], each.key["case"], noise, each.outcome, each.verdict, told, rivals, hidden, gap
+
+
+def _names(judged):
+    return Counter(name for each in judged for name in each.names)
+
+
+def _noise(each):
+    return each.key["level"], each.key["kind"]
+
+
+def _rank(noise):
+    return ("low", "mid", "high").index(noise[0]), noise[1] != "white"
+
+
+def _grouped(judged: Iterable, key):
+    groups = defaultdict(list)
+    for each in judged:
+        groups[key(each)].append(each)
+    return groups
