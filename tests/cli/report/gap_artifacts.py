@@ -1,0 +1,215 @@
+"""Artifacts of the gap workflow with numbers made up, quick to write and sound by their formats."""
+
+import numpy as np
+
+from cpfls_cli.artifacts import DIAGNOSIS, DISAGREEMENT, EXTENDED, Artifact, Header, InputFile
+
+CHANNELS = np.array([f"{kind} {axis}" for kind in ("torque", "force") for axis in "xyz"])
+WINDOWS, HORIZON, LAGS = 60, 50, 10
+SENTENCE = "The centre of mass is not where the model has it."
+EFFECT = {
+    "name": "com_offset",
+    "kind": "wrench",
+    "named": 1,
+    "p_value": 1e-9,
+    "share": 0.93,
+    "selection_frequency": 1.0,
+    "sentence": SENTENCE,
+}
+
+
+def texts(*values):
+    return np.array(values) if values else np.array([], dtype="U1")
+
+
+def table(group, fields, rows):
+    """Arrange rows as datasets; a field that starts with a quote holds text."""
+    columns = {}
+    for place, field in enumerate(fields):
+        values = [row[place] for row in rows]
+        words = field.startswith("'")
+        columns[f"{group}/{field.lstrip(chr(39))}"] = texts(*values) if words else np.array(values, dtype=float)
+    return columns
+
+
+def audit(findings=()):
+    return {
+        **table("audit", ("'finding", "named", "p_value", "'sentence"), findings),
+        **table(
+            "audit_coefficient",
+            ("'finding", "'name", "'unit", "value", "low", "high", "named"),
+            [(finding[0], "x", "rad/s", 0.01, 0.008, 0.012, finding[1]) for finding in findings],
+        ),
+        "audit/untested": texts("gyro_scale: no attitude", "imu_misalignment: no attitude"),
+        "audit/warning": texts(),
+        "audit/note": texts("The motion follows the rotors by 12 ms."),
+    }
+
+
+def flights(names=("one.csv", "two.csv"), roles=("training", "held-out")):
+    samples = 8
+    return {
+        "flight/name": texts(*names),
+        "flight/role": texts(*roles),
+        "flight/first": np.array([0, 4]),
+        "flight/commanded": np.zeros(2, dtype=int),
+        "signals/time": np.arange(samples) * 0.01,
+        "signals/body_rate": np.zeros((samples, 3)),
+    }
+
+
+def replay(*names):
+    growth = np.arange(1, HORIZON + 1)[:, None] * np.ones(3)
+    data = {"replay/horizon": np.arange(1, HORIZON + 1), "replay/horizon_s": np.arange(1, HORIZON + 1) * 0.01}
+    for place, name in enumerate(names):
+        data |= {f"replay/rate_{name}": growth * 0.001 / (place + 1), f"replay/attitude_{name}": growth * 0.0001}
+    return data
+
+
+def disagreement(force=True, **changed):
+    floors = np.array([12.0, 3.0, 0.8, *([5.0, 4.0, 70.0] if force else [np.nan] * 3)])
+    rng = np.random.default_rng(1)
+    cells = np.outer(np.linspace(-1, 1, 12), np.ones(12)) * 0.01
+    cells[0, :5] = np.nan
+    known = CHANNELS[: 6 if force else 3]
+    pairs = [(channel, "thrust", 0.9, 0.004) for channel in known] + [(channel, "yaw", 0.6, 0.3) for channel in known]
+    data = {
+        "gap/channel": CHANNELS,
+        "gap/rms": floors * 0.01,
+        "gap/floor": np.where(np.isfinite(floors), 0.01, np.nan),
+        "gap/floors": floors,
+        "gap/share": floors / 100,
+        "residual/time": np.tile(np.arange(WINDOWS // 2) * 0.2, 2),
+        "residual/flight": np.repeat([0, 1], WINDOWS // 2),
+        "residual/value": rng.standard_normal((WINDOWS, 6)) * floors * 0.01,
+        "state/name": texts("thrust", "yaw"),
+        "state/value": np.zeros((WINDOWS, 2)),
+        **table(
+            "stretch",
+            ("flight", "start", "end", "'channel", "floors"),
+            [(1, 1.0, 2.0, "torque x", 33.3), (0, 3.0, 4.0, "torque y", 9.9)],
+        ),
+        **table("dependence", ("'channel", "'signal", "r2", "p_value"), pairs),
+        "heat_map/channel": np.array("torque x"),
+        "heat_map/signal": texts("thrust", "yaw"),
+        "heat_map/first_edge": np.linspace(50, 70, 13),
+        "heat_map/second_edge": np.linspace(-3, 3, 13),
+        "heat_map/mean": cells,
+        "heat_map/count": np.ones((12, 12)),
+        **replay("model", "held"),
+        **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
+        **audit(),
+        "warning": texts("one.csv: rotor 2 looks saturated"),
+        "base/kind": np.array("rigid-body"),
+        **flights(roles=("given", "given")),
+    }
+    return Artifact(DISAGREEMENT, Header("0", 1, "seed: 1\n"), data | changed)
+
+
+def effects(*rows):
+    rows = [{**EFFECT, **row} for row in rows]
+    order = ("name", "kind", "named", "p_value", "share", "selection_frequency", "sentence")
+    coefficients = [
+        (row["name"], "c_x", "m", 0.01, 0.009, 0.0111, -0.06, 0.06) for row in rows if row["kind"] != "parameter"
+    ]
+    return {
+        **table(
+            "effect",
+            ("'name", "'kind", "named", "p_value", "share", "selection_frequency", "'sentence"),
+            [[row[key] for key in order] for row in rows],
+        ),
+        **table(
+            "coefficient",
+            ("'effect", "'name", "'unit", "value", "low", "high", "plausible_low", "plausible_high"),
+            coefficients,
+        ),
+        **table("linear", ("'effect", "value"), [("com_offset", 0.01)]),
+        **table("shape", ("'effect", "'name", "value"), []),
+        **table("parameter", ("'name", "'unit", "value", "low", "high"), [("inertia_x", "1", 0.021, 0.01, 0.03)]),
+    }
+
+
+def sizes(force=True):
+    before = np.array([40.0, 3.0, 0.9, *([5.0, 4.0, 70.0] if force else [np.nan] * 3)])
+    after = np.array([1.1, 0.01, 0.9, *([0.9, 0.8, 1.2] if force else [np.nan] * 3)])
+    return {
+        "gap/channel": CHANNELS,
+        "gap/before": before * 0.01234,
+        "gap/after": after * 0.01234,
+        "gap/floor": np.where(np.isfinite(before), 0.01234, np.nan),
+        "gap/before_floors": before,
+        "gap/after_floors": after,
+    }
+
+
+def pictures():
+    time = np.arange(200) * 0.01
+    waves = np.sin(3 * time)[:, None] * np.ones(3)
+    return {
+        "whiteness/lag": np.arange(1, LAGS + 1) * 0.4,
+        "whiteness/before": np.full((LAGS, 6), 0.6),
+        "whiteness/after": np.zeros((LAGS, 6)),
+        "whiteness/p_value_before": np.zeros(6),
+        "whiteness/p_value_after": np.full(6, 0.4),
+        "picture/flight": np.array("two.csv"),
+        "picture/channel": np.array("torque x"),
+        "picture/time": time,
+        "picture/measured": waves[:, 0],
+        "picture/before": waves[:, 0] + 0.2,
+        "picture/after": waves[:, 0],
+        "run/flight": np.array("two.csv"),
+        "run/axis": 1,
+        "run/time": time,
+        "run/restart": np.array([0.0, 1.0]),
+        "run/measured": waves,
+        "run/before": waves + 30 * (time % 1.0)[:, None],
+        "run/after": waves,
+    }
+
+
+def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alone=(), force=True, **changed):
+    data = {
+        "verdict": np.array(verdict),
+        "share": 0.973,
+        "split": np.array("no flight was held out by name"),
+        **effects(*named),
+        **table("alternative", ("'name", "'instead_of", "relative_gain", "'separated_by"), alternatives),
+        **table(
+            "unexplained", ("'axis", "floors", "'signal", "share", "frequency", "'energy"), unexplained
+        ),
+        **table("torque_alone", ("'name", "share"), alone),
+        **sizes(force),
+        **replay("before", "after", "held"),
+        "residual/time": np.arange(WINDOWS) * 0.2,
+        "residual/flight": np.zeros(WINDOWS),
+        "residual/before": np.zeros((WINDOWS, 6)),
+        "residual/parameters": np.zeros((WINDOWS, 6)),
+        "residual/after": np.zeros((WINDOWS, 6)),
+        **pictures(),
+        **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
+        **audit(),
+        "note": texts("A note that readers need."),
+        "base/kind": np.array("rigid-body"),
+        **flights(),
+    }  # fmt: skip
+    return Artifact(DIAGNOSIS, Header("0", 1, "seed: 1\n"), data | changed)
+
+
+def extended(diagnosis_sha256=""):
+    data = {
+        "inertia": np.array([0.61, 0.6, 1.2, 0.0, 0.0, 0.0]),
+        "thrust_scale": 1.0123,
+        **effects({}),
+        **sizes(),
+        **replay("before", "after", "held"),
+        **audit(),
+        "base/kind": np.array("rigid-body"),
+    }
+    source = InputFile("diagnosis.h5", diagnosis_sha256 or "0" * 64, "cpfls/diagnosis")
+    return Artifact(EXTENDED, Header("0", 1, "seed: 1\n", {"diagnosis": source}), data)
+
+
+def without(artifact, *groups):
+    """Leave out optional datasets."""
+    kept = {path: values for path, values in artifact.data.items() if path.split("/")[0] not in groups}
+    return Artifact(artifact.spec, artifact.header, kept)

@@ -1,0 +1,145 @@
+"""The report of the gap workflow, from artifacts with known numbers."""
+
+import json
+import re
+from html import unescape
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from cpfls_cli.artifacts import check_artifact, file_sha256, write_artifact
+from cpfls_cli.cli.app import app
+from tests.cli.report import gap_artifacts as made
+
+FIGURES = [
+    "free-runs-1", "gap-picture-1", "gap-sizes-1", "prediction-error-1", "whiteness-1", "intervals-1",
+    "gap-over-time-1", "dependence-1", "heat-map-1", "replay-1",
+]  # fmt: skip
+
+
+def shown(folder, *artifacts, options=()):
+    """Write artifacts and a report about them; give its summary, its HTML and its text."""
+    config, output = folder / "study.yaml", folder / "report.html"
+    config.write_text("seed: 1\n")
+    paths = [folder / f"{number}-{each.spec.format.split('/')[1]}.h5" for number, each in enumerate(artifacts)]
+    for path, artifact in zip(paths, artifacts, strict=True):
+        assert check_artifact(artifact) == []
+        write_artifact(path, artifact)
+    result = CliRunner().invoke(
+        app, ["report", str(config), *map(str, paths), "-o", str(output), "--json", "--force", *options]
+    )
+    assert result.exit_code == 0, result.output
+    html = output.read_text(encoding="utf-8")
+    body = re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", html, flags=re.DOTALL)
+    text = re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", body)))
+    return SimpleNamespace(summary=json.loads(result.stdout), html=html, text=text, paths=paths)
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("gap")
+    first = shown(folder, made.disagreement(), made.diagnosis(alone=[("torque_bias", 0.9)]))
+    return shown(folder, made.disagreement(), made.diagnosis(alone=[("torque_bias", 0.9)]),
+                 made.extended(file_sha256(first.paths[1])))  # fmt: skip
+
+
+def test_the_answer_comes_first_and_every_figure_once(full):
+    assert full.summary["sections"] == [
+        "summary", "diagnosis", "extension", "disagreement", "sensors", "unseen", "vehicle", "provenance",
+    ]  # fmt: skip
+    assert full.summary["figures"] == FIGURES
+    assert full.summary["missing"] == []
+    first = full.text[: full.text.index("Before and after", full.text.index("What the model misses"))]
+    for words in ("NAMED", "What the model misses is offset of the centre of mass.", made.SENTENCE, "97 % is gone",
+                  "Held out two.csv", "Fitted to one.csv"):  # fmt: skip
+        assert words in first, words
+    assert "Where simulation and flight disagree" in full.text
+    assert "No model was given" not in full.text
+
+
+def test_ids_are_unique_and_figures_are_whole_pictures_of_vectors(full):
+    ids = re.findall(r'\bid="([^"]+)"', full.html)
+    assert len(ids) == len(set(ids))
+    pictures = re.findall(r"<svg.*?</svg>", full.html, re.DOTALL)
+    assert len(pictures) == len(FIGURES)
+    for picture in pictures:
+        root = ElementTree.fromstring(picture)
+        assert root.get("aria-label")
+        assert not [element for element in root.iter() if element.tag.endswith("image")]
+
+
+def test_numbers_of_the_artifacts_stand_in_the_tables(full):
+    for words in ("0.494", "0.0136", "0.0123", "40 1.1", "70 1.2"):
+        assert words in full.text, words
+    assert "0.01000 0.009000 … 0.01110 m −0.0600 … 0.0600" in full.text
+    assert "< 10⁻⁶" in full.text
+    assert "moment of inertia about x 2.10 1.00 … 3.00 %" in full.text
+    assert "1.0123" in full.text
+    assert "two.csv torque about x (roll) 1.0 … 2.0 33.3" in full.text
+    for words in ("rotor 2 looks saturated.", "A note that readers need.", "Fly near the ground.", "12 ms"):
+        assert full.text.count(words) == 1, words
+
+
+def test_two_levels_with_two_names_are_explained(full):
+    told = "From the torques alone it would be constant torque, which explains 90 % of their gap"
+    assert told in full.text
+
+
+def test_the_model_that_runs_away_does_not_flatten_the_picture(full):
+    assert "the model as given leaves the picture" in full.text
+
+
+def test_equal_artifacts_give_equal_pages(tmp_path):
+    given = made.without(made.diagnosis(), "run", "picture", "replay")
+    assert shown(tmp_path, given).html == shown(tmp_path, given).html
+
+
+def test_what_is_lacking_is_left_out_and_said(tmp_path):
+    bare = made.without(made.diagnosis(force=False), "run", "picture", "whiteness", "replay")
+    page = shown(tmp_path, bare)
+    assert page.summary["figures"] == ["gap-sizes-1", "intervals-1"]
+    assert page.summary["missing"] == ["disagreement", "extended"]
+    assert "too short to simulate" in page.text
+    assert "cpfls compare CONFIG FLIGHT" in page.text
+    assert "force along" not in page.text[: page.text.index("Effects and their numbers")]
+
+
+def test_a_disagreement_alone_says_where_and_how_to_go_on(tmp_path):
+    page = shown(tmp_path, made.without(made.disagreement(force=False), "heat_map", "replay"))
+    assert page.summary["figures"] == ["gap-over-time-1", "dependence-1"]
+    assert "The gap is largest in the torque about x (roll): 12.0 noise floors." in page.text
+    assert "It follows thrust most." in page.text
+    assert "cpfls diagnose" in page.text
+
+
+def test_a_disagreement_below_noise_has_nothing_to_follow(tmp_path):
+    quiet = made.disagreement(**{"gap/floors": np.array([0.4, 0.5, 0.6, 0.7, 0.8, 0.9])})
+    page = shown(tmp_path, quiet)
+    assert "Model and flights agree to the noise." in page.text
+    assert "dependence-1" not in page.summary["figures"]
+
+
+def test_an_extended_model_alone_brings_its_figures(tmp_path):
+    page = shown(tmp_path, made.extended())
+    assert page.summary["figures"] == [
+        "extended-gap-sizes-1", "extended-prediction-error-1", "extended-intervals-1",
+    ]  # fmt: skip
+    assert "the model with offset of the centre of mass" in page.text
+    assert "its largest gap is 1.2 noise floors; it was 70" in page.text
+
+
+def test_a_fault_of_a_sensor_stands_under_sensors(tmp_path):
+    finding = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
+    page = shown(tmp_path, made.diagnosis(named=({"name": "gyro_bias", "kind": "sensor"},), **made.audit([finding])))
+    section = page.html[page.html.index('id="sensors"') :]
+    assert "The gyroscope shows 0.01 rad/s at rest. The diagnosis repairs it" in section
+    assert "Not tested for gyro scale and misaligned IMU: no attitude." in page.text
+    assert "held against the repaired sensors" in page.text
+
+
+def test_a_title_of_the_config_wins(tmp_path):
+    page = shown(tmp_path, made.disagreement(), options=("--set", "report.title=My vehicle"))
+    assert "<h1>My vehicle</h1>" in page.html

@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from cpfls_cli.report.gap_verdict import levels, verdict_box
+from cpfls_cli.report.source import Source
+from cpfls_cli.vehicle.settings import VehicleSettings
+from tests.cli.report import gap_artifacts as made
+
+
+def source(artifact):
+    return Source("diagnosis.h5", "0" * 64, artifact, {}, VehicleSettings(), 0)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"verdict": "NO_GAP", "named": ()}, ["Nothing is missing that these flights can show."]),
+        ({"verdict": "NOT_EXCITED", "named": ()}, ["These flights move too little"]),
+        ({"verdict": "PARTIAL"}, ["What the model misses is offset of the centre of mass.", "closest, not all of it"]),
+        (
+            {"verdict": "AMBIGUOUS", "alternatives": [("torque_bias", "com_offset", 0.98, "change the thrust")]},
+            [
+                "These flights cannot tell offset of the centre of mass from constant torque.",
+                "To tell: change the thrust.",
+            ],
+        ),
+        (
+            {
+                "verdict": "UNEXPLAINED",
+                "named": ({"named": 0},),
+                "unexplained": [
+                    ("torque z", 14.2, "yaw", 0.82, 3.21, "feeds"),
+                    ("force x", 2.0, "", 0.0, np.nan, "neither"),
+                ],
+            },
+            [
+                "There is a gap that nothing in the catalogue explains.",
+                "torque about z (yaw), 14 floors; it follows yaw most and it rings at 3.21 Hz (82 % of it); "
+                "it feeds energy into the motion.",
+                "force along x (forward), 2.0 floors; it follows no one signal.",
+                "The closest was offset of the centre of mass, and that is not it",
+            ],
+        ),
+        ({"named": ({"name": "gyro_bias", "kind": "sensor"},)}, ["The sensors are at fault: gyro bias."]),
+        ({"named": ({"name": "parameter_error", "kind": "parameter"},)}, ["A number of the vehicle is wrong"]),
+    ],
+)
+def test_every_verdict_is_said_in_words(given, words):
+    box = verdict_box(source(made.diagnosis(**given)))
+    summary = " ".join([box.label, box.title, *box.sentences])
+    assert box.label == given.get("verdict", "NAMED").replace("_", " ")
+    for each in words:
+        assert each in summary
+    named = [row for row in given.get("named", ({},)) if row.get("named", 1)]
+    misses = "What the model misses" in summary
+    assert misses == (given.get("verdict", "NAMED") in ("NAMED", "PARTIAL") and named[0].get("kind") is None)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"alone": [("torque_bias", 0.9)]}, True),
+        ({"alone": [("com_offset", 0.9)]}, False),
+        ({"alone": [("torque_bias", 0.9)], "force": False}, False),
+        ({"alone": [("torque_bias", 0.9)], "named": ({"name": "gyro_bias", "kind": "sensor"},)}, False),
+        ({}, False),
+    ],
+)
+def test_two_names_are_explained_only_where_the_forces_decided(given, said):
+    assert bool(levels(source(made.diagnosis(**given)))) is said
