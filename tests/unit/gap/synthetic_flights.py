@@ -50,7 +50,7 @@ def effect_wrench(signals, effects):
     return total
 
 
-def motion(rng, seconds=24.0, tilt=0.15, yaw=0.3, speed=3.0):
+def motion(rng, seconds=24.0, tilt=0.15, yaw=0.2, speed=3.0):
     time = PERIOD * np.arange(round(seconds / PERIOD))
     attitude, rate, second = sines(time, [tilt, tilt, yaw], [0.2, 0.2, 0.05], [0.8, 0.8, 0.25], rng)
     velocity = sines(time, [speed, speed, 1.5], 0.1, 0.4, rng)[0]

@@ -1,0 +1,138 @@
+"""The search finds what was put into flights, stops, exchanges a poor choice, and knows what chance can do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import gumbel_r
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.balance_system import system
+from cpfls_cli.gap.refine import refined
+from cpfls_cli.gap.search import Step, acceptable, exchanged, forward, look
+from cpfls_cli.gap.settings import GapSettings
+from tests.unit.gap.synthetic_flights import candidate, fly, weak
+
+SETTINGS = GapSettings(shifts=99)
+TRIED = [
+    CATALOGUE[name]
+    for name in ("com_offset", "torque_bias", "linear_damping", "rotor_mismatch", "products_of_inertia", "rotor_drag")
+]
+
+
+def flights(*effects, seeds=(1, 2), **given):
+    return [weak(fly(seed, effects, gyro=0.005, rotor=1.0, **given)) for seed in seeds]
+
+
+def names(chosen):
+    return [found.effect.name for found in chosen]
+
+
+@pytest.mark.parametrize(
+    ("name", "coefficients"),
+    [
+        ("com_offset", [0.004, -0.003]),
+        ("linear_damping", [0.1, 0.1, 0.05]),
+        ("products_of_inertia", [0.03, 0.0, 0.02]),
+        ("rotor_drag", [1.5e-3]),
+        ("rotor_mismatch", [0.05, -0.03, 0.02, 0.0]),
+    ],
+)
+def test_forward_finds_one_effect_and_stops(name, coefficients):
+    looks = []
+    chosen, steps = forward(
+        flights((candidate(name), coefficients)), TRIED, SETTINGS, np.random.default_rng(0), looks.append
+    )
+    assert names(chosen) == [name]
+    assert looks == [1, 2]
+    assert steps[0].p_value(steps[0].ranking[0].gain) <= 0.01
+    assert not acceptable(steps[-1], SETTINGS)
+    assert steps[-1].above_floor < 0.02 * steps[0].above_floor
+
+
+def test_two_effects_are_both_found():
+    truth = [(candidate("com_offset"), [0.004, 0.0]), (candidate("linear_damping"), [0.1, 0.1, 0.05])]
+    chosen, _ = forward(flights(*truth), TRIED, SETTINGS, np.random.default_rng(0))
+    assert sorted(names(chosen)) == ["com_offset", "linear_damping"]
+
+
+def test_noise_alone_has_no_name():
+    named = 0
+    for seed in range(5):
+        known = flights(seeds=(10 + 2 * seed, 11 + 2 * seed), seconds=16.0, tilt=0.1)
+        named += len(forward(known, TRIED, SETTINGS, np.random.default_rng(seed))[0])
+    assert named == 0
+
+
+def test_as_many_effects_as_the_settings_allow():
+    truth = [(candidate("com_offset"), [0.004, 0.0]), (candidate("linear_damping"), [0.1, 0.1, 0.05])]
+    chosen, steps = forward(flights(*truth), TRIED, replace(SETTINGS, effects_max=1), np.random.default_rng(0))
+    assert (len(chosen), len(steps)) == (1, 2)
+
+
+def test_a_poor_choice_is_replaced_by_what_serves_better():
+    known = flights((candidate("com_offset"), [0.004, -0.003]), (candidate("linear_damping"), [0.1, 0.1, 0.05]))
+    chosen = exchanged(known, [candidate("torque_bias"), candidate("linear_damping")], TRIED, SETTINGS)
+    assert sorted(names(chosen)) == ["com_offset", "linear_damping"]
+
+
+def test_a_needless_effect_is_dropped():
+    known = flights((candidate("com_offset"), [0.004, -0.003]))
+    chosen = exchanged(known, [candidate("torque_bias"), candidate("com_offset")], TRIED, SETTINGS)
+    assert names(chosen) == ["com_offset"]
+
+
+def test_what_is_chosen_is_not_looked_at_again_and_each_effect_is_listed_once():
+    known = flights((candidate("com_offset"), [0.004, -0.003]))
+    step = look(known, [candidate("com_offset")], [*TRIED, CATALOGUE["channel_delay"]], SETTINGS, None)
+    listed = names([scored.candidate for scored in step.ranking])
+    assert sorted(listed) == sorted([*(effect.name for effect in TRIED[1:]), "channel_delay"])
+    gains = [scored.gain for scored in step.ranking]
+    assert gains == sorted(gains, reverse=True)
+
+
+def step_of(chance):
+    return Step(system([]), np.ones(6), (), chance, 1.0, np.zeros(0))
+
+
+def test_p_value_is_the_share_of_shifts_that_do_as_well():
+    step = step_of(np.arange(99.0))
+    assert step.p_value(49.0) == pytest.approx(51 / 100)
+    assert step.p_value(90.0) == pytest.approx(10 / 100)
+    assert step.p_value(-np.inf) == 1.0
+
+
+def test_p_value_beyond_all_shifts_is_the_tail_of_extreme_values():
+    """What one in two thousand draws reaches, from ninety-nine of them."""
+    law = gumbel_r(5.0, 2.0)
+    found = [
+        step_of(law.rvs(99, random_state=np.random.default_rng(seed))).p_value(law.isf(5e-4)) for seed in range(200)
+    ]
+    assert np.median(found) == pytest.approx(5e-4, rel=0.5)
+    assert max(found) <= 0.02
+    rising = [step_of(law.rvs(99, random_state=0)).p_value(gain) for gain in np.linspace(0, 40, 200)]
+    assert (np.diff(rising) <= 0).all()
+
+
+def commanded(seed, lag, delay):
+    """Logs the command of rotors that follow it late: u(t) = w(t + d) + tau w'(t + d), with w by inverse dynamics."""
+    signals = fly(seed, gyro=0.002, seconds=30.0)
+    time, speed = signals.time, signals.speed
+    command = speed + lag * np.gradient(speed, time, axis=0)
+    early = np.column_stack([np.interp(time + delay, time, channel) for channel in command.T])
+    return weak(replace(signals, rotor_speed=early, commanded=True))
+
+
+@pytest.mark.parametrize(("lag", "delay"), [(0.05, 0.02), (0.03, 0.04)])
+def test_lag_and_delay_come_back_together(lag, delay):
+    known = [commanded(seed, lag, delay) for seed in (1, 2)]
+    start = [candidate("motor_lag", time_constant_s=0.065), candidate("command_delay", delay_s=0.012)]
+    shapes = [found.shape for found in refined(known, start, np.ones(6)).chosen]
+    assert shapes[0]["time_constant_s"] == pytest.approx(lag, abs=0.004)
+    assert shapes[1]["delay_s"] == pytest.approx(delay, abs=0.004)
+
+
+def test_one_shape_is_refined_between_the_points_of_its_grid():
+    known = [commanded(1, 0.0445, 0.0)]
+    (found,) = refined(known, [candidate("motor_lag", time_constant_s=0.05)], np.ones(6)).chosen
+    assert found.shape["time_constant_s"] == pytest.approx(0.0445, abs=0.0015)
