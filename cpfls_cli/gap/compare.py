@@ -119,7 +119,10 @@ def compare(
     own = common_windows(recordings, settings)
     progress(0.0, "sensor audit")
     checked = model.audit or audit([recording.signals for recording in recordings], own)
-    flights = [weak_flight(r.name, checked.repaired(r.signals), own, model.base, settings.force) for r in recordings]
+    flights = [
+        weak_flight(r.name, checked.repaired(r.signals), own, model.base, settings.force, settings.axes)
+        for r in recordings
+    ]
     progress(0.3, "noise floor")
     hypothesis = model.system(flights)
     floor = best_floor(hypothesis)

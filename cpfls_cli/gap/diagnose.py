@@ -192,7 +192,7 @@ def _weak(
     recording: Recording, own: Windows, model: InertiaModel | None, settings: GapSettings, checked: Audit | None
 ) -> WeakFlight:
     signals = recording.signals if checked is None else checked.repaired(recording.signals)
-    return weak_flight(recording.name, signals, own, model, settings.force)
+    return weak_flight(recording.name, signals, own, model, settings.force, settings.axes)
 
 
 def _estimated(hypothesis: System, floor: Array, block: IntArray) -> Estimates:

@@ -162,8 +162,10 @@ def _picture(
     place = CHANNELS.index(found.channel)
     dense = replace(own, hop=max(1, len(own.weight) // _PER_WINDOW))
     recording = held[found.flight]
-    raw = weak_flight(recording.name, recording.signals, dense, model.base, settings.force)
-    repaired = weak_flight(recording.name, model.repaired(recording.signals), dense, model.base, settings.force)
+    raw = weak_flight(recording.name, recording.signals, dense, model.base, settings.force, settings.axes)
+    repaired = weak_flight(
+        recording.name, model.repaired(recording.signals), dense, model.base, settings.force, settings.axes
+    )
     time = dense.centres(recording.signals.time)
     middle, half = 0.5 * (found.start_s + found.end_s), 0.5 * max(_SHORTEST_S, found.end_s - found.start_s)
     shown = np.abs(time - middle) <= half

@@ -93,7 +93,7 @@ def _weak(
     recording: Recording, own: Windows, base: InertiaModel | None, settings: GapSettings, audit: Audit | None
 ) -> WeakFlight:
     signals = recording.signals if audit is None else audit.repaired(recording.signals)
-    return weak_flight(recording.name, signals, own, base, settings.force)
+    return weak_flight(recording.name, signals, own, base, settings.force, settings.axes)
 
 
 def _estimated(hypothesis: System, settings: GapSettings) -> Estimates:

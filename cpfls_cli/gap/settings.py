@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le, Lt, MinLen
 from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
@@ -33,6 +33,11 @@ class GapSettings(Settings):
     ground_height_m: Annotated[float, Doc("height of the ground in the world frame of the flights, m")] = 0.0
     ignore: Annotated[tuple[str, ...], Doc("effects that are not considered")] = ()
     force: Annotated[bool, Doc("use the force balance too, where a flight has velocity or acceleration")] = True
+    axes: Annotated[
+        tuple[Literal["x", "y", "z"], ...],
+        MinLen(1),
+        Doc("body axes whose torque is compared; the others are left out"),
+    ] = ("x", "y", "z")
     horizon: Annotated[int, Ge(1), Doc("longest replay of measured rotor speeds, samples")] = 50
 
     def __post_init__(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -14,6 +14,8 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.inertial import Balance, InertiaModel, rotation_balance, translation_balance
 from cpfls_cli.gap.windows import Windows
+
+_AXES = ("x", "y", "z")
 
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
@@ -123,7 +125,14 @@ class WeakFlight:
         return np.asarray(rows * self.known.reshape(-1, *[1] * (rows.ndim - 2)))
 
 
-def weak_flight(name: str, signals: Signals, windows: Windows, model: InertiaModel | None, force: bool) -> WeakFlight:
+def weak_flight(
+    name: str,
+    signals: Signals,
+    windows: Windows,
+    model: InertiaModel | None,
+    force: bool,
+    axes: Sequence[str] = _AXES,
+) -> WeakFlight:
     """Write down the inertial side of a flight.
 
     Parameters
@@ -134,6 +143,8 @@ def weak_flight(name: str, signals: Signals, windows: Windows, model: InertiaMod
     model : InertiaModel or None
     force : bool
         Whether to use the force balance where the flight allows it.
+    axes : sequence of str
+        Body axes of which the torque balance is used.
 
     Returns
     -------
@@ -147,7 +158,7 @@ def weak_flight(name: str, signals: Signals, windows: Windows, model: InertiaMod
         np.concatenate([rotation.direct, translation.direct], axis=1),
         np.concatenate([rotation.momentum, translation.momentum], axis=1),
     )
-    known = np.array([signals.torque is not None] * 3 + [with_force] * 3)
+    known = np.array([signals.torque is not None and axis in axes for axis in _AXES] + [with_force] * 3)
     return WeakFlight(name, signals, windows, inertial, known)
 
 
