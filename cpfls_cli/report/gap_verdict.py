@@ -175,7 +175,9 @@ def _shrunk(diagnosis: Source, verdict: str) -> Iterator[str]:
     worst, left = int(np.nanargmax(before)), int(np.nanargmax(after))
     names = [channel_words(channel) for channel in artifact.texts("gap/channel")]
     if verdict in (Verdict.NO_GAP, Verdict.NOT_EXCITED) or not artifact.array("effect/named").any():
-        yield f"On flights held out, the largest gap is {number(before[worst], 2)} noise floors, in the {names[worst]}."
+        still = f"; with the closest effects {number(after[left], 2)} are left" if artifact.texts("effect/name") else ""
+        size = f"{number(before[worst], 2)} noise floors, in the {names[worst]}"
+        yield f"On flights held out, the largest gap is {size}{still}."
         return
     yield (
         f"On flights held out from the fit, the largest gap shrinks from {number(before[worst], 2)} noise floors, "

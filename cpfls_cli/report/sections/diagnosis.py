@@ -12,7 +12,7 @@ from cpfls_cli.report.figures.intervals import intervals_figure
 from cpfls_cli.report.figures.replay import has_replay, replay_figure
 from cpfls_cli.report.figures.whiteness import whiteness_figure
 from cpfls_cli.report.gap_verdict import levels
-from cpfls_cli.report.gap_words import joined, known_channels, titles_of
+from cpfls_cli.report.gap_words import effect_title, joined, known_channels, titles_of
 from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.sections.gap_tables import coefficients_table, effects_table, parameters_table
 from cpfls_cli.report.source import Source, Sources
@@ -54,7 +54,12 @@ def after_words(source: Source) -> str:
     str
     """
     titles = titles_of(source)
-    return f"with {joined(titles)}" if titles else "with nothing but the vehicle's own numbers refitted"
+    if titles:
+        return f"with {joined(titles)}"
+    closest = [effect_title(name) for name in source.artifact.texts("effect/name")]
+    if closest:
+        return f"with the closest effects, {joined(closest)}, which are not the answer"
+    return "with nothing but the vehicle's own numbers refitted"
 
 
 def _pictures(diagnosis: Source, index: int) -> Iterator[Block]:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.report.gap_verdict import levels, verdict_box
+from cpfls_cli.report.sections.diagnosis import after_words
 from cpfls_cli.report.source import Source
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.cli.report import gap_artifacts as made
@@ -39,6 +40,7 @@ def source(artifact):
                 "it feeds energy into the motion.",
                 "force along x (forward), 2.0 floors; it follows no one signal.",
                 "The closest was offset of the centre of mass, and that is not it",
+                "the largest gap is 70 noise floors, in the force along z (up); with the closest effects 1.2 are left.",
             ],
         ),
         ({"named": ({"name": "gyro_bias", "kind": "sensor"},)}, ["The sensors are at fault: gyro bias."]),
@@ -68,3 +70,15 @@ def test_every_verdict_is_said_in_words(given, words):
 )
 def test_two_names_are_explained_only_where_the_forces_decided(given, said):
     assert bool(levels(source(made.diagnosis(**given)))) is said
+
+
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [
+        (({},), "with offset of the centre of mass"),
+        (({"named": 0},), "with the closest effects, offset of the centre of mass, which are not the answer"),
+        ((), "with nothing but the vehicle's own numbers refitted"),
+    ],
+)
+def test_the_second_model_is_said_to_be_what_it_is(named, words):
+    assert after_words(source(made.diagnosis(named=named))) == words
