@@ -32,7 +32,7 @@ def test_variance_is_there_where_the_vehicle_sinks():
     assert not scatter_variance(system([flight], [candidate("com_offset")])).any()
 
 
-@pytest.mark.parametrize("size", [0.02, 0.1])
+@pytest.mark.parametrize("size", [0.01, 0.1])
 def test_the_size_of_the_scatter_comes_back(size):
     variance = scatter_variance(system([weak(sinking())], [RING]))
     floor = np.full(6, 0.05)
