@@ -175,18 +175,28 @@ def numbers(each):
     list of Number
     """
     true = coefficients(each.key)
-    out = []
-    for effect in each.said["effects"]:
-        name = effect["name"]
-        known = {c: (true[name][c], found) for c, found in effect["coefficients"].items() if c in true.get(name, {})}
-        if name not in each.truth:
-            continue
-        for coefficient, (value, found) in known.items():
-            scale = max(abs(other) for other, more in known.values() if more["unit"] == found["unit"])
-            inside = None not in (found["low"], found["high"]) and found["low"] <= value <= found["high"]
-            noise = each.key["level"], each.key["kind"]
-            out.append(Number(name, coefficient, *noise, value, found["value"], max(scale, 1e-12), inside))
-    return out
+    return [
+        number
+        for effect in each.said["effects"]
+        if effect["name"] in each.truth and effect["name"] in true
+        for number in _compared(each, effect, true[effect["name"]])
+    ]
+
+
+def _compared(each, effect, true):
+    known = [(name, found, _named_alike(name, true)) for name, found in effect["coefficients"].items()]
+    known = [(name, found, value) for name, found, value in known if value is not None]
+    for name, found, value in known:
+        scale = max(abs(other) for _, more, other in known if more["unit"] == found["unit"])
+        inside = None not in (found["low"], found["high"]) and found["low"] <= value <= found["high"]
+        noise = each.key["level"], each.key["kind"]
+        yield Number(effect["name"], name, *noise, value, found["value"], max(scale, 1e-12), inside)
+
+
+def _named_alike(name, true):
+    """Find a coefficient; the audit of the sensors calls b_x and delay_s just x and delay."""
+    alike = [value for own, value in true.items() if name == own or name in (own.split("_")[0], own.split("_")[-1])]
+    return true.get(name, alike[0] if alike else None)
 
 
 def exact(number):

@@ -59,8 +59,10 @@ def _totals(judged):
     single, none, outside = _of(judged, "single"), _of(judged, "none"), _of(judged, "outside")
     right = [each.outcome == RIGHT for each in single]
     named = [each.verdict in ("NAMED", "AMBIGUOUS") for each in outside]
+    seen = [each.outcome == RIGHT for each in single if each.visible >= score.VISIBLE]
     rows = [
         ("one effect: exactly right", percent(right), "at least 96 %"),
+        (f"one effect with a torque of {score.VISIBLE} floors or more: exactly right", percent(seen), "at least 96 %"),
         ("one effect: exactly right, white noise", percent(_right(single, "white")), "prototype 95 %"),
         ("one effect: exactly right, coloured noise", percent(_right(single, "coloured")), "at least 96 %"),
         ("one effect: wrong name", percent([each.outcome == score.WRONG for each in single]), "0"),
@@ -131,8 +133,7 @@ def _outside(judged):
     rows = []
     for hidden, own in _grouped(judged, lambda each: " + ".join([*each.key["outside"], *each.key["truth"]])).items():
         found = Counter(each.verdict for each in own)
-        names = ", ".join(f"{name} {count}" for name, count in _names(own).most_common())
-        rows.append((hidden, *(found[verdict] or "" for verdict in _OUTSIDE), names))
+        rows.append((hidden, *(found[verdict] or "" for verdict in _OUTSIDE), _often(own)))
     return table(("hidden", *_OUTSIDE, "names given"), rows)
 
 
@@ -155,7 +156,7 @@ def _background(judged):
         first = [bool(each.names) and each.names[0] == dominant for each in own]
         somewhere = [dominant in each.names for each in own]
         false = [bool(each.false_names) for each in own]
-        rows.append((dominant, percent(first), percent(somewhere), percent(false), _names(own).most_common(3)))
+        rows.append((dominant, percent(first), percent(somewhere), percent(false), _often(own)))
     return table(("dominant", "named first", "named", "a name of what is not hidden", "names given most"), rows)
 
 
@@ -224,8 +225,9 @@ def _miss(each):
     return each.key["set"], each.key["case"], noise, each.outcome, each.verdict, told, rivals, hidden, gap
 
 
-def _names(judged):
-    return Counter(name for each in judged for name in each.names)
+def _often(judged):
+    names = Counter(name for each in judged for name in each.names)
+    return ", ".join(f"{name} {count}" for name, count in names.most_common(4))
 
 
 def _noise(each):
