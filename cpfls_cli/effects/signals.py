@@ -124,15 +124,15 @@ class Signals:
     def force(self) -> Array:
         """Force on the vehicle without weight, shape (time, 3), N, body frame.
 
-        Thrust along z; across it what is measured, or 0 where nothing is.
+        As measured, or else the thrust of the rotors alone.
         """
-        force = np.zeros((len(self), 3))
+        mass, gravity = self.vehicle.mass_kg, self.vehicle.gravity_m_s2
         if self.specific_force is not None:
-            force = self.vehicle.mass_kg * self.specific_force
-        elif self.attitude is not None and self.acceleration is not None:
-            force = self.vehicle.mass_kg * np.einsum("tji,tj->ti", self.rotation, self.acceleration)
-            force += self.vehicle.mass_kg * self.vehicle.gravity_m_s2 * self.rotation[:, 2]
-        return np.column_stack([force[:, :2], self.wrench[:, 5]])
+            return np.asarray(mass * self.specific_force)
+        if self.attitude is not None and self.acceleration is not None:
+            felt = np.einsum("tji,tj->ti", self.rotation, self.acceleration)
+            return np.asarray(mass * (felt + gravity * self.rotation[:, 2]))
+        return self.wrench[:, 3:]
 
     @cached_property
     def speed(self) -> Array:

@@ -45,3 +45,27 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
     at_zero = ((linear < low) & (low == 0)) | ((linear > high) & (high == 0))
     beyond = (linear + _ERRORS * error < low) | (linear - _ERRORS * error > high)
     return ~at_zero, bool(not np.any(beyond & ~at_zero))
+
+
+def information(effect: Effect, columns: int, vehicle: VehicleSettings) -> Array:
+    """Give what bounds say of linear coefficients before any data.
+
+    A coefficient that only one block of a flight determines would be anything where that block is left out; with its
+    bound as the standard deviation of a normal prior it is small there.
+
+    Parameters
+    ----------
+    effect : Effect
+    columns : int
+        Linear coefficients in use.
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    array, shape (coefficient,)
+        One over the variance; 0 where the physical coefficients are not linear.
+    """
+    listed = [each for each in effect.coefficients if columns == len(effect.coefficients) or not each.secondary]
+    if effect.physical is not None or len(listed) != columns:
+        return np.zeros(columns)
+    return np.array([1.0 / max(abs(bound) for bound in each.bounds(vehicle)) ** 2 for each in listed])

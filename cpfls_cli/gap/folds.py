@@ -26,12 +26,15 @@ class Folds:
         Sums of squares of the right side.
     rows : int
         Rows of all blocks.
+    prior : array, shape (column,)
+        Information that bounds give before any data: one over the square of the largest possible coefficient.
     """
 
     grams: Array
     moments: Array
     squares: Array
     rows: int
+    prior: Array
 
     @cached_property
     def gram(self) -> Array:
@@ -67,7 +70,7 @@ class Folds:
             Sum of squares left on the block that the fit did not see.
         """
         gram, moment = self.gram[:, columns[:, None], columns], self.moment[:, columns]
-        coefficients = _solve(gram.sum(axis=0) - gram, moment.sum(axis=0) - moment)
+        coefficients = _solve(gram.sum(axis=0) - gram + self._known(columns), moment.sum(axis=0) - moment)
         return coefficients, self._left(gram, moment, coefficients)
 
     def fit(self, columns: IntArray) -> tuple[Array, Array]:
@@ -83,7 +86,7 @@ class Folds:
         error : array, shape (block, draw)
         """
         gram, moment = self.gram[:, columns[:, None], columns], self.moment[:, columns]
-        coefficients = _solve(gram.sum(axis=0), moment.sum(axis=0))
+        coefficients = _solve(gram.sum(axis=0) + self._known(columns), moment.sum(axis=0))
         return coefficients, self._left(gram, moment, coefficients[None])
 
     def errors(self, columns: IntArray) -> Array:
@@ -97,10 +100,13 @@ class Folds:
         -------
         array, shape (column,)
         """
-        gram = self.gram[:, columns[:, None], columns].sum(axis=0)
+        gram = self.gram[:, columns[:, None], columns].sum(axis=0) + self._known(columns)
         _, left = self.fit(columns)
         inverse = _solve(gram, np.eye(len(columns)))
         return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse), 0.0) * max(left.sum() / self.rows, 1.0)))
+
+    def _known(self, columns: IntArray) -> Array:
+        return np.diag(self.prior[columns])
 
     def _left(self, gram: Array, moment: Array, coefficients: Array) -> Array:
         explained = np.einsum(
@@ -127,10 +133,12 @@ class Folds:
         square = self.squares - 2 * self.moments[:, :, column] + self.grams[:, :, column, column, None]
         power = weight[:, None] ** 2
         grams = power[..., None] * self.grams[:, :, kept[:, None], kept]
-        return Folds(grams, power[..., None] * (self.moments[:, :, kept] - inner), power * square, self.rows)
+        return Folds(
+            grams, power[..., None] * (self.moments[:, :, kept] - inner), power * square, self.rows, self.prior[kept]
+        )
 
 
-def folds(columns: Array, right: Array, block: IntArray) -> Folds:
+def folds(columns: Array, right: Array, block: IntArray, prior: Array | None = None) -> Folds:
     """Build the normal equations of each block.
 
     Parameters
@@ -140,6 +148,8 @@ def folds(columns: Array, right: Array, block: IntArray) -> Folds:
     right : array, shape (window, channel) or (window, channel, draw)
         Weighted.
     block : array of int, shape (window,)
+    prior : array, shape (column,), or None
+        None for nothing known.
 
     Returns
     -------
@@ -153,6 +163,7 @@ def folds(columns: Array, right: Array, block: IntArray) -> Folds:
         np.array([x.swapaxes(1, 2) @ y for x, y in parts]),
         np.array([(y**2).sum(axis=1) for _, y in parts]),
         columns.shape[0] * columns.shape[1],
+        np.zeros(columns.shape[2]) if prior is None else prior,
     )
 
 

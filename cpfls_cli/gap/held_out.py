@@ -18,6 +18,9 @@ from cpfls_cli.gap.weak_flight import WeakFlight
 _MARGIN = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
 
+_COUNTS = 0.02
+"""Share of the whole gap, in squared floors, that the torque or the force has to have to be judged on its own."""
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -62,10 +65,14 @@ class HeldOut:
         return GapSize(value, np.sqrt(np.where(count > 0, in_floors / np.maximum(count, 1), np.nan)))
 
     def share(self) -> float:
-        """Give the share of the gap above the floor that the effects take off, of torque or force whichever is less."""
+        """Give the share of the gap above the floor that the effects take off.
+
+        Of torque or force whichever is less, where each is a part of the gap that counts.
+        """
         before, after = self.parameters / self.noise, self.after / self.noise
         kinds = [slice(0, 3), slice(3, 6)]
-        gaps = [kind for kind in kinds if _above(before[:, kind], self.known[:, kind]) > 0]
+        sizes = [_above(before[:, kind], self.known[:, kind]) for kind in kinds]
+        gaps = [kind for kind, size in zip(kinds, sizes, strict=True) if size > _COUNTS * sum(sizes)]
         return min((share_removed(before[:, k], after[:, k], self.known[:, k]) for k in gaps), default=1.0)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance_system import System
-from cpfls_cli.gap.bounds import within_bounds
+from cpfls_cli.gap.bounds import information, within_bounds
 from cpfls_cli.gap.folds import Folds, folds
 from cpfls_cli.gap.refine import fit
 from cpfls_cli.gap.shape_columns import shape_columns
@@ -73,11 +73,14 @@ class Layout:
         Weighted.
     base : array of int
     candidates : tuple of Place
+    prior : array, shape (column,)
+        What bounds say of the coefficients of candidates before any data.
     """
 
     matrix: Array
     base: IntArray
     candidates: tuple[Place, ...]
+    prior: Array
 
 
 def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
@@ -124,7 +127,11 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
         parts.append(columns)
         places.append(Place(candidate, np.arange(first, first + columns.shape[2]), _weight(hypothesis, candidate)))
         first += columns.shape[2]
-    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(places))
+    vehicle = hypothesis.flights[0].signals.vehicle
+    prior = np.zeros(first)
+    for place in places:
+        prior[place.columns] = information(place.candidate.effect, len(place.columns), vehicle)
+    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(places), prior)
 
 
 def primary(candidate: Candidate, columns: Array) -> Array:
@@ -201,7 +208,7 @@ def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArr
     Folds
     """
     weighted = right / (floor if right.ndim == 2 else floor[:, None])
-    return folds(arranged.matrix, weighted, block)
+    return folds(arranged.matrix, weighted, block, arranged.prior)
 
 
 def _weight(hypothesis: System, candidate: Candidate) -> Array:

@@ -155,6 +155,7 @@ def forward(
     """
     chosen: tuple[Candidate, ...] = ()
     steps: list[Step] = []
+    tried: set[frozenset[str]] = {frozenset()}
     while True:
         step = look(flights, chosen, effects, settings, rng)
         steps.append(step)
@@ -163,7 +164,14 @@ def forward(
             return chosen, steps
         best = simplest(step.ranking, step.above_floor)
         found = refined(flights, [*chosen, best.candidate], step.floor)
-        chosen = exchanged(flights, found.chosen, effects, settings) if len(found.chosen) > 1 else found.chosen
+        grown = exchanged(flights, found.chosen, effects, settings) if len(found.chosen) > 1 else found.chosen
+        names = frozenset(candidate.effect.name for candidate in grown)
+        # An exchange can undo what was added; a set that was there before would come round again for ever.
+        if names in tried:
+            return chosen, steps
+        tried.add(names)
+        chosen = grown
+        step.hypothesis.cache.clear()
 
 
 def acceptable(step: Step, settings: GapSettings) -> bool:

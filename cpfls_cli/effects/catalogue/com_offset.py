@@ -21,7 +21,7 @@ EFFECT = Effect(
     name="com_offset",
     title="offset of the centre of mass",
     kind="wrench",
-    formula="M = -c x F,  F the thrust and, where it is measured, the force across it",
+    formula="M = -c x F,  F the force without weight, as measured, or else the thrust",
     sentence="The centre of mass is not where the model has it, so that thrust tilts the vehicle.",
     coefficients=(
         Coefficient("c_x", "m", -0.4, 0.4, "true centre of mass, forward of that of the model", scales.arm),
