@@ -15,7 +15,7 @@ from cpfls_cli.gap.balance_system import System
 from cpfls_cli.gap.bounds import information, within_bounds
 from cpfls_cli.gap.folds import Folds, folds
 from cpfls_cli.gap.refine import fit
-from cpfls_cli.gap.shape_columns import shape_columns
+from cpfls_cli.gap.shape_columns import free_shapes, shape_columns
 from cpfls_cli.gap.told_torque import compensation
 from cpfls_cli.gap.weak_flight import Candidate
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -74,7 +74,7 @@ class Layout:
     base : array of int
     candidates : tuple of Place
     prior : array, shape (column,)
-        What bounds say of the coefficients of candidates before any data.
+        What bounds say of the coefficients before any data.
     """
 
     matrix: Array
@@ -127,11 +127,18 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
         parts.append(columns)
         places.append(Place(candidate, np.arange(first, first + columns.shape[2]), _weight(hypothesis, candidate)))
         first += columns.shape[2]
+    widths = [(each, hypothesis.columns(each).shape[2]) for each in hypothesis.free]
+    widths += [(place.candidate, len(place.columns)) for place in places]
     vehicle = hypothesis.flights[0].signals.vehicle
-    prior = np.zeros(first)
-    for place in places:
-        prior[place.columns] = information(place.candidate.effect, len(place.columns), vehicle)
+    known = [information(each.effect, width, vehicle) for each, width in widths]
+    free, offered = known[: len(hypothesis.free)], known[len(hypothesis.free) :]
+    shapes = np.array([1.0 / np.ptp(_grid(each, name)) ** 2 for each, name in free_shapes(hypothesis)])
+    prior = np.concatenate([*free, shapes, *offered])
     return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(places), prior)
+
+
+def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
+    return next(shape.grid for shape in candidate.effect.shapes if shape.name == name)
 
 
 def primary(candidate: Candidate, columns: Array) -> Array:
