@@ -15,19 +15,20 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.audit import Audit, audit
 from cpfls_cli.gap.balance_system import System, system
 from cpfls_cli.gap.contributions import shares
-from cpfls_cli.gap.estimate import Estimates, estimates
+from cpfls_cli.gap.estimate import Estimates, differs_from_zero, estimates
 from cpfls_cli.gap.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.inertial import InertiaModel
 from cpfls_cli.gap.judged import Judged, judge_effect
 from cpfls_cli.gap.leftover import Leftover, leftover
-from cpfls_cli.gap.refine import fit
-from cpfls_cli.gap.results import Diagnosis, Estimate, NamedEffect, Verdict
+from cpfls_cli.gap.refine import fit, refined
+from cpfls_cli.gap.results import Diagnosis, NamedEffect, Verdict
 from cpfls_cli.gap.search import Step, block_index, forward, look
+from cpfls_cli.gap.sensor_numbers import sensor_estimates
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.unseen import not_excited
 from cpfls_cli.gap.vehicle_numbers import parameter_error
 from cpfls_cli.gap.verdict import matters, verdict_of
-from cpfls_cli.gap.weak_flight import WeakFlight, weak_flight
+from cpfls_cli.gap.weak_flight import Candidate, WeakFlight, weak_flight
 from cpfls_cli.gap.windows import Windows, windows
 
 _FEWEST_WINDOWS = 16
@@ -117,9 +118,8 @@ def diagnose(
     effects = considered(settings)
     chosen, steps = forward(weak, effects, settings, rng, lambda n: progress(0.1 + 0.1 * min(n, 5), "search"))
     progress(0.65, "estimates")
-    hypothesis = system(weak, chosen)
-    block = block_index(hypothesis, settings)
-    found = _estimated(hypothesis, steps[-1].floor, block)
+    hypothesis, block, found = _sure(weak, chosen, steps[-1].floor, settings)
+    chosen = hypothesis.chosen
     left = leftover(hypothesis, found.linear, steps[-1].floor, block, settings, rng)
     unseen = _unseen(held, own, model, settings, checked, hypothesis, found, left.scatter)
     progress(0.75, "rivals")
@@ -195,6 +195,21 @@ def _weak(
     return weak_flight(recording.name, signals, own, model, settings.force, settings.axes)
 
 
+def _sure(
+    weak: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings
+) -> tuple[System, IntArray, Estimates]:
+    """Fit the chosen effects, and once more without those that may as well be zero."""
+    hypothesis = system(weak, chosen)
+    block = block_index(hypothesis, settings)
+    found = _estimated(hypothesis, floor, block)
+    pairs = zip(chosen, found.effects, strict=True)
+    kept = [candidate for candidate, numbers in pairs if differs_from_zero(candidate.effect, numbers)]
+    if len(kept) == len(chosen):
+        return hypothesis, block, found
+    hypothesis = refined(weak, kept, floor)
+    return hypothesis, block, _estimated(hypothesis, floor, block)
+
+
 def _estimated(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
     """Fit once with the floors as weights, then with what is left, which is more where something is unexplained."""
     left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
@@ -230,12 +245,7 @@ def _fault(finding, training, weak, own, model, settings) -> NamedEffect:  # typ
     weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
     before, after = ((s.residual - s.base @ fit(s, weight)) / weight for s in (logged, repaired))
     share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
-    bounds = {c.name: c.bounds(training[0].signals.vehicle) for c in CATALOGUE[finding.name].coefficients}
-    coefficients = tuple(
-        Estimate(c.name, c.unit, c.value, c.low, c.high, bounds.get(c.name, (-np.inf, np.inf)))
-        for c in finding.coefficients
-        if c.named
-    )
+    coefficients = sensor_estimates(finding, training[0].signals.vehicle)
     return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import t as student
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance_system import System, is_free
 from cpfls_cli.gap.refine import fit
 from cpfls_cli.gap.results import Estimate
@@ -76,6 +78,26 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
         own_linear.append(linear[own])
         place, shape_place = place + width, shape_place + depth
     return Estimates(linear, tuple(found), parameters, tuple(own_linear))
+
+
+def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
+    """Tell whether any number that gives an effect its size is surely not zero.
+
+    Parameters
+    ----------
+    effect : Effect
+    numbers : sequence of Estimate
+        Physical coefficients, then shapes.
+
+    Returns
+    -------
+    bool
+    """
+    if effect.unit_coefficient and not effect.shapes:
+        return True
+    shapes = {shape.name for shape in effect.shapes}
+    sized = [number for number in numbers if (number.name in shapes) == effect.unit_coefficient]
+    return any(number.low > 0 or number.high < 0 for number in sized)
 
 
 def _of(

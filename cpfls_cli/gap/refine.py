@@ -36,9 +36,10 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     best = list(chosen)
     told = system(flights).rotor_wrench
     shapes = [(place, shape) for place, candidate in enumerate(best) for shape in candidate.effect.shapes]
-    for place, shape in shapes:
-        if place == len(best) - 1:
-            best[place] = _improved(flights, best, place, shape, floor, told)
+    newest = [(place, shape) for place, shape in shapes if place == len(best) - 1]
+    # A second round where there are several: the best length of a cable depends on its damping.
+    for place, shape in newest * min(len(newest), 2):
+        best[place] = _improved(flights, best, place, shape, floor, told)
     return system(flights, _together(flights, best, shapes, floor, told) if len(shapes) > 1 else best)
 
 

@@ -41,7 +41,7 @@ def parameter_error(found: Estimates, effects: Sequence[NamedEffect], share: flo
 
 
 def _told(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
-    if number.name.startswith("coupling"):
+    if not number.name.startswith(("inertia", "thrust")):
         return False
     half = 0.5 * (number.high - number.low)
     sure = abs(number.value) > 1.5 * half and abs(number.value) > _MATTERS

@@ -159,7 +159,7 @@ EFFECT = Effect(
     source="equation of the driven pendulum",
     columns=_columns,
     shapes=(
-        Shape("length_m", "m", (0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0), "length of the cable"),
+        Shape("length_m", "m", (0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.55, 1.9, 2.4, 3.1, 4.0), "length of the cable"),
         Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing", first=0.2),
         Shape("depth_m", "m", (0.0, 0.1, 0.3), "depth of the hook below the centre of mass", first=0.0),
     ),
