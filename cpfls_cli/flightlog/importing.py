@@ -9,6 +9,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.alignment import align_commands
 from cpfls_cli.flightlog.deriving import derive_flight
+from cpfls_cli.flightlog.following import followed
 from cpfls_cli.flightlog.reading import read_signals
 from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
@@ -48,7 +49,7 @@ def import_log(
     ComputationError
         If the pitch comes within a degree of +-90 degrees, or the delay cannot be estimated.
     """
-    signals = read_signals(columns, settings)
+    signals = followed(read_signals(columns, settings), settings.rotor_command_lag_s)
     if settings.torque_source in ("rotor-speed", "rotor-command"):
         if rotor_torque is None:
             raise InputError(f"import.torque_source = {settings.torque_source} needs a vehicle")

@@ -34,6 +34,9 @@ class ImportSettings(Settings):
         Literal["speed", "thrust"],
         Doc("what a rotor_command of unit 1 is a share of; of thrust, its root is kept, which is the share of speed"),
     ] = "speed"
+    rotor_command_lag_s: Annotated[
+        float, Ge(0), Doc("known time constant, s, with which the rotors follow rotor_command; what follows is kept")
+    ] = 0.0
     torque_source: Annotated[
         Literal["column", "rotor-speed", "rotor-command"] | None,
         Doc(
