@@ -16,7 +16,7 @@ from cpfls_cli.gap.audit import Audit, audit
 from cpfls_cli.gap.balance_system import System, system
 from cpfls_cli.gap.contributions import shares
 from cpfls_cli.gap.estimate import Estimates, differs_from_zero, estimates
-from cpfls_cli.gap.held_out import HeldOut, held_out, share_removed
+from cpfls_cli.gap.held_out import HeldOut, held_out
 from cpfls_cli.gap.inertial import InertiaModel
 from cpfls_cli.gap.judged import Judged, judge_effect
 from cpfls_cli.gap.leftover import Leftover, leftover
@@ -274,7 +274,7 @@ def _concluded(
 ) -> Diagnosis:
     named = sorted((each.effect for each in judged), key=lambda effect: -effect.share)
     effects = [*faults, *named]
-    numbers = parameter_error(found, effects, _parameter_share(unseen))
+    numbers = parameter_error(found, effects, unseen.explained_by_parameters(), _pull(hypothesis, steps[-1].floor))
     effects += [numbers] if numbers is not None else []
     share = unseen.share() if named else 1.0
     rivals = tuple(rival for each in judged for rival in each.alternatives)
@@ -299,8 +299,11 @@ def _concluded(
     )
 
 
-def _parameter_share(unseen: HeldOut) -> float:
-    return share_removed(unseen.before / unseen.floor, unseen.parameters / unseen.floor, unseen.known)
+def _pull(hypothesis: System, floor: Array) -> Array:
+    """Bound by how much noise in the motion itself can draw each number of the vehicle towards zero torque."""
+    columns = hypothesis.columns(hypothesis.free[0]) / floor[:, None]
+    information = (columns**2).mean(axis=0).max(axis=0)
+    return np.asarray(1.0 / np.maximum(information, 1e-12))
 
 
 def _excited(hypothesis: System, floor: Array) -> bool:

@@ -18,8 +18,14 @@ from cpfls_cli.gap.weak_flight import WeakFlight
 _MARGIN = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
 
-_COUNTS = 0.02
-"""Share of the whole gap, in squared floors, that the torque or the force has to have to be judged on its own."""
+_COUNTS = 0.05
+"""Share of the whole gap, in squared floors, from which on the lesser of torque and force is judged on its own."""
+
+_CLEAR = 1.5
+"""Root mean square in floors that one of its channels has to have: floors of coloured noise are off by a third."""
+
+_SEEN = 0.3
+"""Root mean square in floors that wrong numbers of the vehicle have to explain of one channel."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +78,25 @@ class HeldOut:
         before, after = self.parameters / self.noise, self.after / self.noise
         kinds = [slice(0, 3), slice(3, 6)]
         sizes = [_above(before[:, kind], self.known[:, kind]) for kind in kinds]
-        gaps = [kind for kind, size in zip(kinds, sizes, strict=True) if size > _COUNTS * sum(sizes)]
-        return min((share_removed(before[:, k], after[:, k], self.known[:, k]) for k in gaps), default=1.0)
+        judged = [
+            kind
+            for kind, size in zip(kinds, sizes, strict=True)
+            if size == max(sizes) or (size > _COUNTS * sum(sizes) and _largest(before[:, kind]) > _CLEAR)
+        ]
+        if not any(sizes):
+            return share_removed(before, after, self.known)
+        return min(share_removed(before[:, k], after[:, k], self.known[:, k]) for k in judged)
+
+    def explained_by_parameters(self) -> float:
+        """Give the share of the gap that refitted numbers of the vehicle take off; 0 where nobody would see it."""
+        before, after = self.before / self.noise, self.parameters / self.noise
+        rows = np.maximum(self.known.sum(axis=0), 1)
+        gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
+        return share_removed(before, after, self.known) if gone.max() > _SEEN**2 else 0.0
+
+
+def _largest(residual: Array) -> float:
+    return float(np.sqrt(np.mean(residual**2, axis=0)).max())
 
 
 def share_removed(before: Array, after: Array, known: Array) -> float:

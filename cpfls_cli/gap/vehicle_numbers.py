@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import norm
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.estimate import Estimates
 from cpfls_cli.gap.results import Estimate, NamedEffect
@@ -16,8 +17,11 @@ _MATTERS = 0.02
 
 _LEAST_SHARE = 0.05
 
+_PULLS = 2.0
+"""Multiple of the pull of noise that an error has to exceed."""
 
-def parameter_error(found: Estimates, effects: Sequence[NamedEffect], share: float) -> NamedEffect | None:
+
+def parameter_error(found: Estimates, effects: Sequence[NamedEffect], share: float, pull: Array) -> NamedEffect | None:
     """Name wrong numbers of the vehicle where they are sure, matter, and nothing named accounts for them.
 
     Parameters
@@ -27,12 +31,15 @@ def parameter_error(found: Estimates, effects: Sequence[NamedEffect], share: flo
         Already named.
     share : float
         Part of the gap of the model as given that refitting its numbers takes off.
+    pull : array, shape (parameter,)
+        Error of each number that noise in the motion can make: a noisy acceleration asks for less inertia.
 
     Returns
     -------
     NamedEffect or None
     """
-    wrong = [number for number in found.parameters if _told(number, effects)]
+    pairs = zip(found.parameters, pull, strict=True)
+    wrong = [number for number, drawn in pairs if abs(number.value) > _PULLS * drawn and _told(number, effects)]
     if not wrong or share < _LEAST_SHARE:
         return None
     p_value = min(2 * float(norm.sf(3.92 * abs(n.value) / (n.high - n.low))) if n.high > n.low else 0.0 for n in wrong)
