@@ -26,6 +26,7 @@ LIGHT, HEAVY = ["add_weight_W1_near_M3__E9_log04"], [f"add_weight_W3_near_M3__E9
 CASES = (
     [(config, "rotorpy", name, RAW) for config in ("rotorpy", "sixkg") for name in ("none", "drag", "com")]
     + [("arpl", "real/arpl_crazyflie_1khz", f"log{name}", ARPL) for name in ("10_35_65s", "15_55_90s", "16_32_49s")]
+    + [("arpl_yaw", "real/arpl_crazyflie_1khz", "log16_32_49s", ARPL)]
     + [("crazypad", "real/crazypad_com", name, CRAZYPAD) for name in NORMAL + LIGHT + HEAVY]
     + [("crazyswarm2", "real/crazyswarm2_lee", name, CRAZYSWARM) for name in ("log119", "log149", "log45")]
 )
@@ -96,8 +97,9 @@ def test_commands_and_thrust_of_a_crazyflie_are_those_of_the_log(imported):
 
 
 def imbalance(found):
-    """Left motors (M3, M4) less right ones, over all."""
-    right, left = found["rotor_command"][:, :2].mean(), found["rotor_command"][:, 2:].mean()
+    """Thrust asked of the left motors (M3, M4) less that of the right ones, over all."""
+    thrust = found["rotor_command"] ** 2
+    right, left = thrust[:, :2].mean(), thrust[:, 2:].mean()
     return (left - right) / (left + right)
 
 

@@ -1,0 +1,72 @@
+"""Real flights: what can be told of them is told, what cannot is not."""
+
+import pytest
+
+ARPL, CRAZYPAD, CRAZYSWARM = (f"real/{name}" for name in ("arpl_crazyflie_1khz", "crazypad_com", "crazyswarm2_lee"))
+
+
+@pytest.fixture(scope="module")
+def heavy(answer_of):
+    held = ["add_weight_W3_near_M3__E9_log02"]
+    return answer_of("crazypad", CRAZYPAD, "add_weight_W3_near_M3__E9_log00", held_out=held)
+
+
+@pytest.fixture(scope="module")
+def light(answer_of):
+    return answer_of("crazypad", CRAZYPAD, "add_weight_W1_near_M3__E9_log04")
+
+
+def names_of(answer):
+    return {effect["name"] for effect in answer["effects"]}
+
+
+def test_motors_lag_their_commands_by_about_72_ms(answer_of, coefficients_of):
+    answer = answer_of("arpl", ARPL, "log15_55_90s")
+    lag = coefficients_of(answer, "motor_lag")["time_constant_s"]
+    assert lag["value"] == pytest.approx(0.072, abs=0.008)
+    assert lag["low"] < 0.072 < lag["high"]
+    before, after = (answer[f"gap_{when}"]["torque_n_m"] for when in ("before", "after"))
+    assert after[0] < 0.3 * before[0]
+    assert after[1] < 0.3 * before[1]
+    # A fifth of the torque stays unexplained, so that nobody may call the whole gap named.
+    assert answer["verdict"] != "NAMED"
+
+
+def test_yaw_at_one_frequency_cannot_tell_the_rotors_reaction_from_damping(answer_of):
+    answer = answer_of("arpl_yaw", ARPL, "log16_32_49s")
+    assert answer["verdict"] not in ("NAMED", "NO_GAP")
+    assert {"rotor_acceleration", "linear_damping"} <= names_of(answer) | {a["name"] for a in answer["alternatives"]}
+
+
+def test_flights_without_weight_have_no_offset(answer_of):
+    normal = [f"normal_flight__E9_log0{number}" for number in range(3)]
+    answer = answer_of("crazypad", CRAZYPAD, *normal[:2], held_out=normal[2:])
+    assert names_of(answer) == set()
+
+
+def test_weights_move_the_centre_of_mass_towards_the_motor_they_hang_at(light, heavy, coefficients_of):
+    """M3 is back left; the heavier weight moves it further."""
+    offsets = [coefficients_of(answer, "com_offset") for answer in (light, heavy)]
+    back = [-found["c_x"]["value"] for found in offsets]
+    left = [found["c_y"]["value"] for found in offsets]
+    assert 0.0003 < back[0] < 0.001 < 0.0025 < back[1] < 0.0035
+    assert 0.0003 < left[0] < 0.001 < 0.0025 < left[1] < 0.0035
+
+
+def test_effects_of_motion_are_out_of_reach_without_rates(heavy):
+    unseen = {entry["name"] for entry in heavy["not_excited"]}
+    assert {"motor_lag", "command_delay", "battery_sag", "rotor_acceleration", "linear_damping"} <= unseen
+
+
+@pytest.mark.xfail(reason="a rival with more numbers counts as a generalisation where it spans a hover")
+def test_level_flight_cannot_tell_an_offset_from_a_constant_torque(heavy):
+    assert heavy["verdict"] == "AMBIGUOUS"
+    assert "torque_bias" in {entry["name"] for entry in heavy["alternatives"]}
+
+
+@pytest.mark.parametrize(("name", "held_out"), [("log149", ()), ("log119", ("log45",))])
+def test_commanded_torque_acts_late_and_something_is_left(answer_of, coefficients_of, name, held_out):
+    answer = answer_of("crazyswarm2", CRAZYSWARM, name, held_out=held_out)
+    assert coefficients_of(answer, "command_delay")["delay_s"]["value"] == pytest.approx(0.07, abs=0.015)
+    assert answer["verdict"] == "PARTIAL"
+    assert answer["unexplained"]
