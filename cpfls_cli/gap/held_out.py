@@ -78,14 +78,13 @@ class HeldOut:
         before, after = self.parameters / self.noise, self.after / self.noise
         kinds = [slice(0, 3), slice(3, 6)]
         sizes = [_above(before[:, kind], self.known[:, kind]) for kind in kinds]
-        judged = [
-            kind
+        clear = [
+            share_removed(before[:, kind], after[:, kind], self.known[:, kind])
             for kind, size in zip(kinds, sizes, strict=True)
-            if size == max(sizes) or (size > _COUNTS * sum(sizes) and _largest(before[:, kind]) > _CLEAR)
+            if size > _COUNTS * sum(sizes) and _largest(before[:, kind]) > _CLEAR
         ]
-        if not any(sizes):
-            return share_removed(before, after, self.known)
-        return min(share_removed(before[:, k], after[:, k], self.known[:, k]) for k in judged)
+        each = [share_removed(before[:, kind], after[:, kind], self.known[:, kind]) for kind in kinds]
+        return min(clear) if clear else max(each)
 
     def explained_by_parameters(self) -> float:
         """Give the share of the gap that refitted numbers of the vehicle take off; 0 where nobody would see it."""

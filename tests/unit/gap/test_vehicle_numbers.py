@@ -24,8 +24,8 @@ def named(name, *coefficients):
 SURE = number("inertia_x", 0.15, 0.02)
 
 
-def told(*numbers, effects=(), share=0.5):
-    effect = parameter_error(found(*numbers), effects, share)
+def told(*numbers, effects=(), share=0.5, pull=0.001):
+    effect = parameter_error(found(*numbers), effects, share, np.full(len(numbers), pull))
     return () if effect is None else tuple(each.name for each in effect.coefficients)
 
 
@@ -51,8 +51,13 @@ def test_a_refit_that_takes_nothing_off_the_gap_tells_nothing():
     assert told(SURE, share=0.04) == ()
 
 
+def test_an_error_that_noise_in_the_motion_can_make_is_not_told():
+    assert told(SURE, pull=0.1) == ()
+    assert told(SURE, pull=0.05) == ("inertia_x",)
+
+
 def test_probability_is_that_of_a_normal_error_of_the_surest_number():
-    effect = parameter_error(found(SURE, number("inertia_y", 0.05, 0.02)), (), 0.5)
+    effect = parameter_error(found(SURE, number("inertia_y", 0.05, 0.02)), (), 0.5, np.zeros(2))
     assert effect.p_value == pytest.approx(2 * norm.sf(1.96 * 0.15 / 0.02))
     assert (effect.name, effect.share) == ("parameter_error", 0.5)
 

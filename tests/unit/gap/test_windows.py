@@ -13,7 +13,7 @@ from cpfls_cli.gap.windows import windows
 TIME = 3.0 + 0.01 * np.arange(500)
 LOCAL = np.array(TIME - 5.5)
 THROUGH = windows(0.01, 0.4, 0.5)
-CUBIC = st.lists(st.floats(-5, 5), min_size=4, max_size=4)
+CUBIC = st.lists(st.floats(-5, 5, allow_subnormal=False), min_size=4, max_size=4)
 
 
 @given(CUBIC)
@@ -21,7 +21,7 @@ def test_integration_by_parts_is_exact_on_cubics(coefficients):
     cubic = Polynomial(coefficients)
     by_parts, direct = THROUGH.derivative(cubic(LOCAL)), THROUGH.average(cubic.deriv()(LOCAL))
     size = np.abs(coefficients).max() * 20
-    np.testing.assert_allclose(by_parts, direct, atol=2e-5 * size)
+    np.testing.assert_allclose(by_parts, direct, atol=2e-5 * size + 1e-300)
 
 
 @given(CUBIC)
