@@ -139,6 +139,8 @@ class Effect:
     apply : callable or None
         For actuator and sensor effects: ``apply(signals, shape) -> Signals`` as they would be without the effect's
         error, so that all other columns can be computed from them.
+    holds : frozenset of str
+        Effects that are special cases of this one; it is no rival of theirs.
     scatter : callable or None
         For effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque and
         force for a unit of relative scatter.
@@ -161,6 +163,7 @@ class Effect:
     linear: Callable[[Array], Array] | None = None
     apply: Callable[[Signals, Mapping[str, float]], Signals] | None = None
     scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
+    holds: frozenset[str] = frozenset()
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that the effect needs and the flight lacks.

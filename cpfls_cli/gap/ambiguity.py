@@ -7,13 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import wilcoxon
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.gap.balance_system import System
 from cpfls_cli.gap.results import Alternative
-from cpfls_cli.gap.scoring import Scored, primary
-from cpfls_cli.gap.weak_flight import CHANNELS, Candidate
+from cpfls_cli.gap.scoring import Scored
+from cpfls_cli.gap.weak_flight import CHANNELS
 
-_SPANS = 0.999
 _CLOSE = 0.01
 _VISIBLE = 0.25
 _ERRORS = 2.0
@@ -63,65 +60,30 @@ def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
     return min([best, *rivals], key=lambda scored: (_numbers(scored), -scored.gain))
 
 
-def alternatives(
-    own: Scored, ranking: Sequence[Scored], hypothesis: System, floor: Array, above_floor: float
-) -> list[Alternative]:
+def alternatives(own: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Alternative]:
     """List what is as good as the chosen effect; an effect that holds it as a special case is none.
 
     Parameters
     ----------
     own : Scored
     ranking : sequence of Scored
-    hypothesis : System
-        Without the chosen effect.
-    floor : array, shape (6,)
     above_floor : float
 
     Returns
     -------
     list of Alternative
     """
-    name = own.candidate.effect.name
+    effect = own.candidate.effect
     return [
         Alternative(
-            other.candidate.effect.name,
-            name,
-            float(other.gain / own.gain),
-            own.candidate.effect.rivals.get(other.candidate.effect.name)
-            or other.candidate.effect.rivals.get(name)
-            or own.candidate.effect.excitation,
+            other.name,
+            effect.name,
+            float(scored.gain / own.gain),
+            effect.rivals.get(other.name) or other.rivals.get(effect.name) or effect.excitation,
         )
-        for other in unbeaten(own, ranking, above_floor)
-        if _numbers(other) <= _numbers(own) or not spans(other.candidate, own, hypothesis, floor)
+        for scored in unbeaten(own, ranking, above_floor)
+        if effect.name not in (other := scored.candidate.effect).holds
     ]
-
-
-def spans(general: Candidate, special: Scored, hypothesis: System, floor: Array) -> bool:
-    """Tell whether one effect can stand for all that another one explains.
-
-    Parameters
-    ----------
-    general : Candidate
-    special : Scored
-    hypothesis : System
-    floor : array, shape (6,)
-
-    Returns
-    -------
-    bool
-    """
-    explained = primary(special.candidate, hypothesis.columns(special.candidate)) @ special.coefficients / floor
-    columns = np.concatenate([hypothesis.base, primary(general, hypothesis.columns(general))], axis=2) / floor[:, None]
-    base = (hypothesis.base / floor[:, None]).reshape(-1, hypothesis.base.shape[2])
-    new = _outside(base, explained.reshape(-1))
-    left = _outside(columns.reshape(-1, columns.shape[2]), explained.reshape(-1))
-    return bool(left @ left <= (1 - _SPANS) * (new @ new))
-
-
-def _outside(columns: Array, values: Array) -> Array:
-    length = np.linalg.norm(columns, axis=0)
-    scaled = columns / np.where(length > 0, length, 1.0)
-    return np.asarray(values - scaled @ np.linalg.lstsq(scaled, values, rcond=1e-9)[0])
 
 
 def _beats(own: Scored, other: Scored, above_floor: float) -> bool:

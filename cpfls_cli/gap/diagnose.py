@@ -27,7 +27,7 @@ from cpfls_cli.gap.sensor_numbers import sensor_estimates
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.unseen import not_excited
 from cpfls_cli.gap.vehicle_numbers import parameter_error
-from cpfls_cli.gap.verdict import matters, verdict_of
+from cpfls_cli.gap.verdict import gap_stays, matters, verdict_of
 from cpfls_cli.gap.weak_flight import Candidate, WeakFlight, weak_flight
 from cpfls_cli.gap.windows import Windows, windows
 
@@ -280,7 +280,8 @@ def _concluded(
     rivals = tuple(rival for each in judged for rival in each.alternatives)
     gap = unseen.size(unseen.before).floors
     known = [each for each in left.unexplained if matters(each, gap)] if effects else left.unexplained
-    verdict = verdict_of(effects, rivals, known, share, _excited(hypothesis, steps[-1].floor), settings)
+    stays = gap_stays(unseen.size(unseen.parameters).floors, unseen.size(unseen.after).floors)
+    verdict = verdict_of(effects, rivals, known, share, stays, _excited(hypothesis, steps[-1].floor), settings)
     refused = verdict is Verdict.UNEXPLAINED
     return Diagnosis(
         verdict,

@@ -74,7 +74,7 @@ def judge_effect(
         _frequency(own, step),
         candidate.effect.sentence,
     )
-    return Judged(effect, tuple(alternatives(own, step.ranking, step.hypothesis, step.floor, step.above_floor)))
+    return Judged(effect, tuple(alternatives(own, step.ranking, step.above_floor)))
 
 
 def _frequency(own: Scored, step: Step) -> float:

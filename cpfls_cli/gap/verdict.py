@@ -13,6 +13,11 @@ from cpfls_cli.gap.settings import GapSettings
 _SECOND_CAUSE = 0.03
 """Share of the gap, in squared floors, from which on what is left is a cause of its own."""
 
+_CLEAR = 1.5
+_PART = 0.05
+_STAYS = 0.7
+"""Root mean square that is left of a clear gap about an axis, as a share, from which on nothing explained it."""
+
 _MAIN = 0.1
 """Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
 
@@ -22,6 +27,7 @@ def verdict_of(
     alternatives: Sequence[Alternative],
     unexplained: Sequence[Unexplained],
     share: float,
+    stays: bool,
     excited: bool,
     settings: GapSettings,
 ) -> Verdict:
@@ -35,6 +41,8 @@ def verdict_of(
         Where effects were found: of those, the ones that matter.
     share : float
         Of the gap above the floor that the effects take off flights not seen.
+    stays : bool
+        Whether an axis keeps a clear gap.
     excited : bool
         Whether anything moved enough to show a gap.
     settings : GapSettings
@@ -49,10 +57,27 @@ def verdict_of(
         return Verdict.NO_GAP if excited else Verdict.NOT_EXCITED
     if share < settings.partial_share:
         return Verdict.UNEXPLAINED
-    if share < settings.named_share or unexplained:
+    if share < settings.named_share or unexplained or stays:
         return Verdict.PARTIAL
     main = {effect.name for effect in effects if effect.share >= _MAIN}
     return Verdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else Verdict.NAMED
+
+
+def gap_stays(before: Array, after: Array) -> bool:
+    """Tell whether the gap about an axis stays that is a part of the whole.
+
+    Parameters
+    ----------
+    before, after : array, shape (6,), floors
+        Of the held-out flights, with the vehicle's own numbers refitted.
+
+    Returns
+    -------
+    bool
+    """
+    own, left = before[:3], after[:3]
+    clear = (own > _CLEAR) & (own**2 > _PART * np.nanmax(own, initial=0.0) ** 2)
+    return bool((clear & (left > _STAYS * own)).any())
 
 
 def matters(left: Unexplained, before: Array) -> bool:

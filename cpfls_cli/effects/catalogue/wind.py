@@ -56,4 +56,5 @@ EFFECT = Effect(
     columns=_columns,
     physical=_physical,
     linear=_linear,
+    holds=frozenset({"rotor_drag"}),
 )

@@ -58,7 +58,6 @@ def test_effects_of_motion_are_out_of_reach_without_rates(heavy):
     assert {"motor_lag", "command_delay", "battery_sag", "rotor_acceleration", "linear_damping"} <= unseen
 
 
-@pytest.mark.xfail(reason="a rival with more numbers counts as a generalisation where it spans a hover")
 def test_level_flight_cannot_tell_an_offset_from_a_constant_torque(heavy):
     assert heavy["verdict"] == "AMBIGUOUS"
     assert "torque_bias" in {entry["name"] for entry in heavy["alternatives"]}

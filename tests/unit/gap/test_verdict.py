@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.gap.results import Alternative, NamedEffect, Unexplained, Verdict
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.gap.verdict import matters, verdict_of
+from cpfls_cli.gap.verdict import gap_stays, matters, verdict_of
 
 RIVAL = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")
 LEFT = Unexplained("torque y", 4.0, "yaw rate", 0.8, None, "neither")
@@ -36,13 +36,13 @@ CASES = {
 
 @pytest.mark.parametrize(("effects", "rivals", "left", "share", "excited", "expected"), CASES.values(), ids=CASES)
 def test_verdicts(effects, rivals, left, share, excited, expected):
-    assert verdict_of(effects, rivals, left, share, excited, GapSettings()) is expected
+    assert verdict_of(effects, rivals, left, share, False, excited, GapSettings()) is expected
 
 
 def test_shares_of_the_settings_decide():
     strict = GapSettings(named_share=0.99, partial_share=0.97)
-    assert verdict_of([BIG], [], [], 0.98, True, strict) is Verdict.PARTIAL
-    assert verdict_of([BIG], [], [], 0.96, True, strict) is Verdict.UNEXPLAINED
+    assert verdict_of([BIG], [], [], 0.98, False, True, strict) is Verdict.PARTIAL
+    assert verdict_of([BIG], [], [], 0.96, False, True, strict) is Verdict.UNEXPLAINED
 
 
 GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
@@ -61,3 +61,22 @@ GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
 )
 def test_what_is_left_matters_where_it_follows_something_and_is_not_small(left, expected):
     assert matters(left, GAP) is expected
+
+
+def test_an_axis_that_keeps_its_gap_is_not_all_explained():
+    assert verdict_of([BIG], [], [], 0.99, True, True, GapSettings()) is Verdict.PARTIAL
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "stays"),
+    [
+        ([20.0, 8.0, 1.0], [1.0, 7.0, 1.0], True),
+        ([20.0, 8.0, 1.0], [1.0, 2.0, 1.0], False),
+        ([20.0, 2.0, 1.0], [1.0, 2.0, 1.0], False),
+        ([1.2, 1.1, 1.0], [1.2, 1.1, 1.0], False),
+    ],
+    ids=["one axis stays", "all shrink", "a small part of the whole", "no clear gap"],
+)
+def test_a_gap_stays_where_an_axis_is_clear_and_counts(before, after, stays):
+    forces = [9.0, 9.0, 9.0]
+    assert gap_stays(np.array(before + forces), np.array(after + forces)) == stays
