@@ -90,6 +90,15 @@ def simulate(
     config: ConfigArgument,
     trajectory: TrajectoryArgument,
     output: OutputOption,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model",
+            metavar="MODEL",
+            help="Fly this model, made by `cpfls extend` or `cpfls identify`, in closed loop; without, the vehicle of "
+            "the config. Effects given come on top.",
+        ),
+    ] = None,
     mode: Annotated[
         str | None,
         typer.Option(
@@ -120,7 +129,7 @@ def simulate(
     def call(job: Job) -> Outcome:
         from cpfls_cli.stages import simulate as stage
 
-        return stage.run(job, trajectory)
+        return stage.run(job, trajectory, model)
 
     _run("simulate", config, output, common, call)
 

@@ -1,6 +1,7 @@
 """Simulation: the exact vehicle along a planned motion, or a flight in closed loop with what its model lacks."""
 
 from cpfls_cli.simulation.flown_effects import FlownEffect, FlownEffects, flown_effects
+from cpfls_cli.simulation.flown_model import FlownModel, flown_model
 from cpfls_cli.simulation.measured import MeasuredFlight, measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.simulation.simulate import SimulatedFlight, simulate
@@ -9,10 +10,12 @@ __all__ = [
     "ClosedLoopSettings",
     "FlownEffect",
     "FlownEffects",
+    "FlownModel",
     "MeasuredFlight",
     "SimulatedFlight",
     "SimulationSettings",
     "flown_effects",
+    "flown_model",
     "measure",
     "simulate",
 ]

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.simulation.autopilot import Autopilot
 from cpfls_cli.simulation.clock import between, clock_of
-from cpfls_cli.simulation.flown_effects import FlownEffects
+from cpfls_cli.simulation.flown_model import FlownModel
 from cpfls_cli.simulation.loop import Step, loop
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, CABLE, POSITION, STATES, VELOCITY
 from cpfls_cli.simulation.reference import reference
@@ -54,7 +54,7 @@ def fly(
     planned: Mapping[str, Array],
     vehicle: VehicleSettings,
     settings: ClosedLoopSettings,
-    effects: FlownEffects,
+    model: FlownModel,
     progress: Callable[[float, int], None],
 ) -> FlownMotion:
     """Integrate a flight.
@@ -68,7 +68,8 @@ def fly(
         (time, 3) each.
     vehicle : VehicleSettings
     settings : ClosedLoopSettings
-    effects : FlownEffects
+    model : FlownModel
+        What is flown.
     progress : callable
         Takes steps done and steps in all.
 
@@ -83,7 +84,7 @@ def fly(
     """
     clock = clock_of(time, settings.integration_rate_hz)
     autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
-    flight = loop(vehicle, settings, effects, autopilot, _start(planned), clock.step, float(time[-1] - time[0]))
+    flight = loop(vehicle, settings, model, autopilot, _start(planned), clock.step, float(time[-1] - time[0]))
     states, steps = [flight.state], []
     # A vehicle that is lost may reach infinity before the next sample, where it is told.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):

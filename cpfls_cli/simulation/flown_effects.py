@@ -62,7 +62,7 @@ class FlownEffects:
     flown : tuple of FlownEffect
     """
 
-    flown: tuple[FlownEffect, ...]
+    flown: tuple[FlownEffect, ...] = ()
 
     def values(self, name: str) -> Mapping[str, float] | None:
         """Give the values of an effect, None where it is not flown.
@@ -105,12 +105,26 @@ def flown_effects(asked: Mapping[str, Sequence[float] | Mapping[str, float]], ve
         If values are missing, too many or physically impossible, or effects do not go together.
     """
     chosen = FlownEffects(tuple(_flown(name, given, vehicle) for name, given in asked.items()))
+    refuse_conflict(chosen)
+    return chosen
+
+
+def refuse_conflict(chosen: FlownEffects) -> None:
+    """Refuse effects that do not go together.
+
+    Parameters
+    ----------
+    chosen : FlownEffects
+
+    Raises
+    ------
+    SettingError
+    """
     if chosen.hides_rotor_speed and chosen.values("channel_delay") is not None:
         raise SettingError(
             _key("channel_delay"),
             "shifts measured rotor speeds, which a flight with motor_lag, command_delay or battery_sag does not log",
         )
-    return chosen
 
 
 def _flown(name: str, given: Sequence[float] | Mapping[str, float], vehicle: VehicleSettings) -> FlownEffect:

@@ -12,12 +12,13 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.simulation.actuators import Actuators, Rotors
 from cpfls_cli.simulation.autopilot import Autopilot
 from cpfls_cli.simulation.battery import Battery
-from cpfls_cli.simulation.flown_effects import FlownEffects
+from cpfls_cli.simulation.flown_model import FlownModel
 from cpfls_cli.simulation.missing_wrench import missing_wrench
 from cpfls_cli.simulation.mixer import Mixer, mixer
 from cpfls_cli.simulation.payload import payload
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY, Plant, instant
 from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.simulation.turning import identified_turning, rigid_turning
 from cpfls_cli.vehicle.rigid_body import inertia_tensor
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -89,7 +90,7 @@ class Loop:
 def loop(
     vehicle: VehicleSettings,
     settings: ClosedLoopSettings,
-    effects: FlownEffects,
+    model: FlownModel,
     autopilot: Autopilot,
     state: Array,
     step: float,
@@ -101,7 +102,8 @@ def loop(
     ----------
     vehicle : VehicleSettings
     settings : ClosedLoopSettings
-    effects : FlownEffects
+    model : FlownModel
+        What is flown.
     autopilot : Autopilot
     state : array, shape (18,)
     step, duration : float, s
@@ -112,10 +114,12 @@ def loop(
     """
     mix = mixer(vehicle)
     speed = mix.command(_wrench(autopilot, 0, state))
+    effects = model.effects
     missing = missing_wrench(effects, instant(vehicle, state, speed))
     load = effects.values("payload")
     hung = None if load is None else payload(load, vehicle.gravity_m_s2)
-    plant = Plant(vehicle, inertia_tensor(vehicle), missing, hung)
+    turning = rigid_turning(inertia_tensor(vehicle)) if model.base is None else identified_turning(model.base)
+    plant = Plant(vehicle, turning, missing, hung)
     change = plant.derivative(state, Rotors(speed, speed, speed, np.zeros_like(speed), 1.0))
     lag, delay, sag = (effects.values(name) or {} for name in ("motor_lag", "command_delay", "battery_sag"))
     actuators = Actuators(

@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.simulation.closed_loop import fly
 from cpfls_cli.simulation.flown_effects import FlownEffects, flown_effects
+from cpfls_cli.simulation.flown_model import FlownModel
 from cpfls_cli.simulation.plant import ATTITUDE, POSITION
 from cpfls_cli.simulation.sensors import logged
 from cpfls_cli.simulation.settings import SimulationSettings
@@ -50,6 +51,7 @@ def measure(
     settings: SimulationSettings,
     rng: np.random.Generator,
     progress: Callable[[float, int], None] = lambda _done, _total: None,
+    model: FlownModel | None = None,
 ) -> MeasuredFlight:
     """Fly a planned motion in closed loop and log it.
 
@@ -67,6 +69,8 @@ def measure(
         Source of the noise.
     progress : callable
         Takes steps done and steps in all.
+    model : FlownModel or None
+        What is flown in place of the vehicle; effects of the settings come on top of its own.
 
     Returns
     -------
@@ -81,14 +85,14 @@ def measure(
     ComputationError
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
-    effects = flown_effects(settings.closed_loop.effects, vehicle)
-    motion = fly(time, planned, vehicle, settings.closed_loop, effects, progress)
-    signals, noise_std = logged(time, motion, vehicle, settings, effects, rng)
+    flown = (model or FlownModel()).with_effects(flown_effects(settings.closed_loop.effects, vehicle))
+    motion = fly(time, planned, vehicle, settings.closed_loop, flown, progress)
+    signals, noise_std = logged(time, motion, vehicle, settings, flown.effects, rng)
     return MeasuredFlight(
         signals,
         noise_std,
         violations(motion.demand, vehicle.rotor_speed_max_rad_s),
-        effects,
+        flown.effects,
         motion.state[:, POSITION] - planned["position"],
         motion.state[:, ATTITUDE] - planned["attitude"],
     )

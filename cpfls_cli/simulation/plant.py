@@ -12,6 +12,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.simulation.actuators import Rotors
 from cpfls_cli.simulation.missing_wrench import MissingWrench
 from cpfls_cli.simulation.payload import Carrier, Payload
+from cpfls_cli.simulation.turning import TurningLaw
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 POSITION, VELOCITY, ATTITUDE, BODY_RATE = (slice(3 * n, 3 * n + 3) for n in range(4))
@@ -28,14 +29,14 @@ class Plant:
     Attributes
     ----------
     vehicle : VehicleSettings
-    inertia : array, shape (3, 3), kg m^2
+    turning : callable
         Of the model.
     missing : MissingWrench
     payload : Payload or None
     """
 
     vehicle: VehicleSettings
-    inertia: Array
+    turning: TurningLaw
     missing: MissingWrench
     payload: Payload | None
 
@@ -54,11 +55,11 @@ class Plant:
         body_rate = state[BODY_RATE]
         signals = instant(self.vehicle, state, rotors.speed)
         wrench = signals.wrench[0] + self.missing.direct(signals)
-        torque = wrench[:3] - np.cross(body_rate, self.inertia @ body_rate)
-        torque = torque + self.missing.rotor_coupling @ rotors.acceleration
+        own = self.turning(state[ATTITUDE], body_rate)
+        torque = wrench[:3] - own.direct + self.missing.rotor_coupling @ rotors.acceleration
         acceleration = signals.rotation[0] @ wrench[3:] / self.vehicle.mass_kg
         acceleration[2] -= self.vehicle.gravity_m_s2
-        inertia = self.inertia + self.missing.added_inertia
+        inertia = own.inertia + self.missing.added_inertia
         turning = np.linalg.solve(inertia, torque)
         change = np.zeros(STATES)
         if self.payload is not None:

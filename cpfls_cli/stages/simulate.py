@@ -6,23 +6,26 @@ from pathlib import Path
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT, TRAJECTORY
-from cpfls_cli.errors import ComputationError
-from cpfls_cli.simulation import flown_effects, measure, simulate
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.simulation import FlownModel, flown_effects, measure, simulate
 from cpfls_cli.stages.flown import closed_loop_outcome, effect_record, exact_outcome, noise_record, violation_sentence
 from cpfls_cli.stages.job import Job, Outcome, Started, begin, finish
+from cpfls_cli.stages.model_in_flight import model_in_flight
 from cpfls_cli.stages.sources import read_with
 from cpfls_cli.stages.study import generator, settings_of
 
 _PLANNED = ("attitude", "attitude_rate", "attitude_acceleration", "position", "velocity", "acceleration")
 
 
-def run(job: Job, trajectory: Path) -> Outcome:
+def run(job: Job, trajectory: Path, model: Path | None = None) -> Outcome:
     """Simulate a flight along a trajectory and write it.
 
     Parameters
     ----------
     job : Job
     trajectory : Path
+    model : Path or None
+        Flown in closed loop in place of the vehicle of the config: one with effects, or an identified one.
 
     Returns
     -------
@@ -31,20 +34,24 @@ def run(job: Job, trajectory: Path) -> Outcome:
     Raises
     ------
     InputError
-        If an effect is unknown or has impossible values.
+        If an effect is unknown or has impossible values, or the model is of another vehicle.
     ComputationError
         If a rotor would have to do what it cannot, unless `simulation.infeasible` is ``report``, or a flight in closed
         loop loses its path.
     """
-    started = begin(job, {"trajectory": trajectory})
+    closed = job.study.simulation.mode == "closed-loop"
+    if model is not None and not closed:
+        raise InputError(f"{model}: models are flown in closed loop only; add --mode closed-loop")
+    started = begin(job, {"trajectory": trajectory} | ({} if model is None else {"model": model}))
     source = read_with(trajectory, TRAJECTORY, "time", *_PLANNED)
+    flown = FlownModel() if model is None else model_in_flight(model, job.study)
     with settings_of("simulation", job.study):
-        flown_effects(job.study.simulation.closed_loop.effects, job.study.vehicle)
+        flown.with_effects(flown_effects(job.study.simulation.closed_loop.effects, job.study.vehicle))
     if started.dry_run is not None:
         return started.dry_run
     planned = {name: source.array(name) for name in _PLANNED}
-    if job.study.simulation.mode == "closed-loop":
-        return _closed_loop(job, started, source.array("time"), planned)
+    if closed:
+        return _closed_loop(job, started, source.array("time"), planned, flown)
     return _inverse(job, started, source.array("time"), planned, trajectory)
 
 
@@ -58,9 +65,9 @@ def _inverse(job: Job, started: Started, time: Array, planned: dict[str, Array],
     return exact_outcome(flight, time, problems)
 
 
-def _closed_loop(job: Job, started: Started, time: Array, planned: dict[str, Array]) -> Outcome:
+def _closed_loop(job: Job, started: Started, time: Array, planned: dict[str, Array], model: FlownModel) -> Outcome:
     rng = generator(job.study, "simulate")
-    flight = measure(time, planned, job.study.vehicle, job.study.simulation, rng, job.progress)
+    flight = measure(time, planned, job.study.vehicle, job.study.simulation, rng, job.progress, model)
     records = {**noise_record(flight.noise_std), **effect_record(flight.effects)}
     finish(job, FLIGHT, {"time": time, **flight.signals, **records}, started.inputs)
     return closed_loop_outcome(flight, time)

@@ -1,0 +1,91 @@
+"""`cpfls simulate --model`: what was extended or identified is flown."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+PATH = {"legs": 1, "displacement_m": 1.0, "period_s": 0.18, "duration_s": 3.0, "yaw_turn_rad": 0.3}
+CLOSED = ("--mode", "closed-loop")
+
+
+@pytest.fixture(scope="module")
+def extended(cpfls, gap_config, shifted, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("extended") / "gap"
+    assert cpfls("gap", gap_config, *shifted, "-o", folder, "-q").exit_code == 0
+    return folder / "extended.h5"
+
+
+@pytest.fixture(scope="module")
+def path(cpfls, gap_config, tmp_path_factory):
+    target = tmp_path_factory.mktemp("path") / "trajectory.h5"
+    result = cpfls("trajectory", gap_config, "--set", f"trajectory={json.dumps(PATH)}", "-o", target)
+    assert result.exit_code == 0, result.stderr
+    return target
+
+
+@pytest.fixture
+def fly(cpfls, gap_config, path, tmp_path):
+    def call(name, *options):
+        target = tmp_path / name
+        result = cpfls("simulate", gap_config, path, *CLOSED, *options, "-o", target, "--json")
+        assert result.exit_code == 0, result.stderr
+        with h5py.File(target) as file:
+            return file["rotor_speed"][()], json.loads(result.stdout)["effects"]
+
+    return call
+
+
+def test_extended_model_flies_as_its_effects_do(fly, extended):
+    plain, _ = fly("plain.h5")
+    model, effects = fly("model.h5", "--model", extended)
+    truth, _ = fly("truth.h5", "--effect", "com_offset=0.008,-0.005")
+    # The rotors in front and behind balance what hangs off centre.
+    assert np.abs(truth - plain).max() > 5
+    assert np.abs(model - truth).max() < 0.05 * np.abs(truth - plain).max()
+    assert effects["com_offset.c_x"] == pytest.approx(0.008, rel=0.02)
+    assert "parameter_error.inertia_x" in effects
+
+
+def test_effects_come_on_top_of_a_model(fly, extended):
+    model, _ = fly("model.h5", "--model", extended)
+    more, effects = fly("more.h5", "--model", extended, "--effect", "torque_bias.M_z=0.1")
+    assert effects["torque_bias.M_z"] == 0.1
+    assert np.abs(more - model).max() > 5
+
+
+def test_an_effect_that_the_model_has_is_refused(refuse, gap_config, path, extended, tmp_path):
+    words = ("--model", extended, "--effect", "com_offset=0.01,0")
+    (line,) = refuse("simulate", gap_config, path, *CLOSED, *words, "-o", tmp_path / "x.h5")
+    assert line.startswith("simulation.closed_loop.effects.com_offset = [0.01, 0.0]: the model has it already: c_x = ")
+
+
+def test_identified_model_is_flown(cpfls, fly, gap_config, path, tmp_path):
+    """A rigid body under a fuzzy part without weight flies as the vehicle whose inertia it found."""
+    flight, model = tmp_path / "flight.h5", tmp_path / "model.h5"
+    assert cpfls("simulate", gap_config, path, "-o", flight).exit_code == 0
+    search = "{base: rigid-body, population: 10, generations: 1, local_search: {enabled: false}}"
+    words = ("--set", f"identification={search}")
+    result = cpfls("identify", gap_config, flight, *words, "-o", model)
+    assert result.exit_code == 0, result.stderr
+    identified, effects = fly("identified.h5", "--model", model)
+    plain, _ = fly("plain.h5")
+    assert effects == {}
+    assert np.abs(identified - plain).max() < 0.01 * plain.mean()
+
+
+def test_a_model_needs_closed_loop(refuse, gap_config, path, extended, tmp_path):
+    (line,) = refuse("simulate", gap_config, path, "--model", extended, "-o", tmp_path / "x.h5")
+    assert line == f"{extended}: models are flown in closed loop only; add --mode closed-loop"
+
+
+def test_a_model_of_another_vehicle_is_refused(refuse, gap_config, path, extended, tmp_path):
+    words = ("--model", extended, "--set", "vehicle.mass_kg=7", "-o", tmp_path / "x.h5")
+    (line,) = refuse("simulate", gap_config, path, *CLOSED, *words)
+    assert f"{extended}: was made with another vehicle; not the same: vehicle.mass_kg" in line
+
+
+def test_a_file_that_is_no_model_is_refused(refuse, gap_config, path, tmp_path):
+    (line,) = refuse("simulate", gap_config, path, *CLOSED, "--model", path, "-o", tmp_path / "x.h5")
+    assert "is a cpfls/trajectory; this command needs a cpfls/model" in line
