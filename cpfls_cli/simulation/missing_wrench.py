@@ -48,8 +48,9 @@ class MissingWrench:
         array, shape (6,), N m and N, body frame
         """
         total = np.zeros(6)
-        for one in self.flown:
-            total += _columns(one, signals).direct[0] @ one.acting
+        for one in sorted(self.flown, key=_takes_all_forces):
+            felt = _with_force(signals, total[3:]) if _takes_all_forces(one) else signals
+            total += _columns(one, felt).direct[0] @ one.acting
         return total
 
 
@@ -88,6 +89,15 @@ def _momentum(flown: tuple[FlownEffect, ...], signals: Signals) -> Array:
         if momentum is not None:
             total += momentum[0, :3] @ one.acting
     return total
+
+
+def _takes_all_forces(one: FlownEffect) -> bool:
+    """Tell whether an effect has a lever for what the other effects pull, as an offset centre of mass has."""
+    return one.effect.name == "com_offset"
+
+
+def _with_force(signals: Signals, force: Array) -> Signals:
+    return replace(signals, specific_force=(signals.wrench[:, 3:] + force) / signals.vehicle.mass_kg)
 
 
 def _columns(one: FlownEffect, signals: Signals) -> Columns:
