@@ -137,6 +137,7 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[bench]"
 	$(BIN)/python benchmarks/evolution_hypervolume.py
 	$(BIN)/python benchmarks/reduction.py
+	$(BIN)/python benchmarks/gap.py
 	$(MAKE) data/paper/selection.h5
 	$(BIN)/python benchmarks/judging.py configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
 

@@ -1,0 +1,95 @@
+"""Time a diagnosis: how it grows with flight time, and what leaving out the heavier parts would save.
+
+python benchmarks/gap.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.diagnose import Recording, diagnose
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from tests.gap.blind.cases import make
+from tests.gap.blind.generator import COLUMNS, simulate_many
+from tests.gap.blind.measure import disturb
+
+EFFECTS = ("com_offset", "rotor_drag")
+
+
+def main() -> None:
+    rng = np.random.default_rng(1)
+    case = make("timing", "pair", "sixkg", EFFECTS, rng)
+    print("| flights | seconds | ratio to the first |\n|---|---|---|")
+    first = None
+    for seconds in (30.0, 60.0, 120.0):
+        recordings = fly(case, seconds, rng)
+        spent = time(recordings, GapSettings())
+        first = first or spent
+        print(f"| 6 of {seconds:.0f} s at 100 Hz, {len(EFFECTS)} effects hidden | {spent:.2f} | {spent / first:.2f} |")
+    recordings = fly(case, 30.0, rng)
+    whole = time(recordings, GapSettings())
+    for what, settings in (
+        ("39 shifts instead of 199", GapSettings(shifts=39)),
+        ("no load on a cable", GapSettings(ignore=("payload",))),
+        ("torque alone", GapSettings(force=False)),
+    ):
+        spent = time(recordings, settings)
+        print(f"| 6 of 30 s, {what} | {spent:.2f} | {spent / whole:.2f} |", flush=True)
+
+
+def time(recordings: list[Recording], settings: GapSettings) -> float:
+    """Time one diagnosis by its own processor time, half of the flights held out."""
+    start = process_time()
+    diagnose(recordings[:3], recordings[3:], settings, np.random.default_rng(1))
+    return process_time() - start
+
+
+def fly(case, seconds: float, rng: np.random.Generator) -> list[Recording]:
+    """Fly a case and log it with middling noise."""
+    flown = simulate_many([case], 1, seconds)[0]
+    logs = (disturb(flight.table, flown.vehicle, "mid", "white", rng) for flight in flown.flights)
+    return [Recording(f"flight {n}", signals(log, vehicle_of(flown.vehicle))) for n, log in enumerate(logs)]
+
+
+def signals(log: np.ndarray, vehicle: VehicleSettings) -> Signals:
+    """Arrange the columns of a log."""
+    columns = dict(zip(COLUMNS, log.T, strict=True))
+    pick = lambda names: np.column_stack([columns[name] for name in names.split()])  # noqa: E731
+    return Signals(
+        time=columns["t"],
+        body_rate=pick("wx wy wz"),
+        vehicle=vehicle,
+        attitude=pick("phi theta psi"),
+        velocity=pick("vx vy vz"),
+        position=pick("x y z"),
+        acceleration=pick("ax ay az"),
+        rotor_speed=pick("om1 om2 om3 om4"),
+        voltage=columns["volt"],
+    )
+
+
+def vehicle_of(craft) -> VehicleSettings:
+    """Describe the craft of the generator as a config does."""
+    rotors = tuple(
+        RotorSettings(
+            position_m=tuple(place),
+            spin=spin,
+            thrust_factor_n_s2=craft.thrust_factor,
+            drag_factor_n_m_s2=craft.torque_factor,
+            radius_m=craft.rotor_radius,
+        )
+        for place, spin in zip(craft.rotors, craft.spin, strict=True)
+    )
+    return VehicleSettings(mass_kg=craft.mass, inertia_kg_m2=craft.inertia, rotors=rotors)
+
+
+if __name__ == "__main__":
+    main()
