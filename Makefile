@@ -11,13 +11,14 @@ export OPENBLAS_NUM_THREADS := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce quick hexarotor crazyflie test lint bench blind-study clean FORCE
+.PHONY: help reproduce quick hexarotor crazyflie gap-example test lint bench blind-study clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
 	@echo "  make quick       the same study with a small search, in a minute"
 	@echo "  make hexarotor   a six-rotor study with a rigid body under the fuzzy part"
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
+	@echo "  make gap-example [HIDDEN=NAME=VALUES]   a flight with a hidden effect, and what the gap workflow makes of it"
 	@echo "  make lint        formatting, lint, types, import contracts"
 	@echo "  make bench       benchmarks, as Markdown tables"
 	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
@@ -124,6 +125,34 @@ $(REAL)/report.html: $(REAL_ARTIFACTS:%=$(REAL)/%.h5) $(REAL)/.part/report.yaml
 
 data/paper/report.html: $(TABLE_4_SIZES:%=data/paper/selection-%.h5)
 
+# Two flights with an effect that the model lacks; the second is held out. HIDDEN takes several, or none.
+HIDDEN := com_offset=0.01,-0.006
+GAP := data/gap-example
+GAP_CONFIG := configs/gap/example.yaml
+GAP_REPORT := $(GAP)/gap/report.html
+gap-example: $(GAP_REPORT)
+	@echo "open $(GAP_REPORT)"
+
+$(GAP)/.hidden: FORCE | $(INSTALLED)
+	@mkdir -p $(@D)
+	@echo "$(HIDDEN)" | cmp --silent - $@ || echo "$(HIDDEN)" > $@
+
+$(GAP)/path-1.h5: $(GAP_CONFIG) | $(GAP)/.hidden
+	$(CPFLS) trajectory $< -o $@ --force
+
+$(GAP)/path-2.h5: $(GAP_CONFIG) | $(GAP)/.hidden
+	$(CPFLS) trajectory $< -o $@ --force --set trajectory.path=straight --set "trajectory.direction=[1.0, -0.6, 0.3]"
+
+$(GAP)/flight-%.h5: $(GAP)/path-%.h5 $(GAP)/.hidden
+	$(CPFLS) simulate $(GAP_CONFIG) $< $(addprefix --effect ,$(HIDDEN)) --seed $* -o $@ --force
+
+$(GAP_REPORT): $(GAP_CONFIG) $(GAP)/flight-1.h5 $(GAP)/flight-2.h5
+	$(CPFLS) gap $< $(GAP)/flight-1.h5 --held-out $(GAP)/flight-2.h5 -o $(@D) --force
+
+# The picture of README.md: the element alone, without its page.
+docs/gap-example.svg: $(GAP_REPORT)
+	sed -n '/<figure id="gap-picture-1">/,/<\/svg>/{/<figure/d;s/.*<svg/<svg/;s/<\/svg>.*/<\/svg>/;p}' $< > $@
+
 test: $(INSTALLED_DEV)
 	$(BIN)/python -m pytest -n 2
 
@@ -149,6 +178,6 @@ blind-study: $(INSTALLED_DEV)
 	$(BIN)/python -m tests.gap.study run --out data/blind --seed $(SEED) --draws $(DRAWS) --none $(NONE) $(SIZE)
 
 clean:
-	rm -rf data/paper data/quick data/hexarotor data/crazyflie
+	rm -rf data/paper data/quick data/hexarotor data/crazyflie data/gap-example
 
 FORCE:
