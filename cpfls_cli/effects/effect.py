@@ -139,6 +139,8 @@ class Effect:
     apply : callable or None
         For actuator and sensor effects: ``apply(signals, shape) -> Signals`` as they would be without the effect's
         error, so that all other columns can be computed from them.
+    told : callable or None
+        ``told(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
     holds : frozenset of str
         Effects that are special cases of this one; it is no rival of theirs.
     scatter : callable or None
@@ -163,6 +165,7 @@ class Effect:
     linear: Callable[[Array], Array] | None = None
     apply: Callable[[Signals, Mapping[str, float]], Signals] | None = None
     scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
+    told: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
     holds: frozenset[str] = frozenset()
 
     def missing(self, signals: Signals) -> tuple[str, ...]:

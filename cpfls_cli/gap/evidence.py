@@ -140,8 +140,9 @@ def evidence(held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, s
 
 
 def _run(signals: Signals, given: ExtendedModel, model: ExtendedModel) -> WorstStretch:
+    # The model as given knows of no fault of the sensors and takes the log as it is, so that a fault shows.
     repaired = model.repaired(signals)
-    return worst_stretch(repaired, given.replay_model(repaired), model.replay_model(repaired))
+    return worst_stretch(repaired, given.replay_model(signals), model.replay_model(repaired), signals)
 
 
 def _size(run: WorstStretch) -> float:

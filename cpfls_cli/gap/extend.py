@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.audit import Audit
 from cpfls_cli.gap.balance_system import System, system
@@ -20,11 +21,18 @@ from cpfls_cli.gap.results import NamedEffect
 from cpfls_cli.gap.scatter import scatter_size, scatter_variance
 from cpfls_cli.gap.search import best_floor, block_index
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.told_effect import told_effect
 from cpfls_cli.gap.weak_flight import CHANNELS, WeakFlight, weak_flight
 from cpfls_cli.gap.windows import Windows
 
 _TOUCHED = 0.2
 """Root mean square in floors by which effects and refit move a channel, from which on it has to get better."""
+
+_CLEAR = 1.5
+"""Root mean square in floors of a gap that is there."""
+
+_WORSE = 1.2
+"""Ratio from which on a gap has grown."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +142,20 @@ def _require_smaller(unseen: HeldOut) -> None:
         raise ComputationError(f"not extended: the gap on the held-out flights does not shrink: {grown}")
 
 
+def worse_axes(before: Array, after: Array) -> list[int]:
+    """List the axes about which a clear gap grows.
+
+    Parameters
+    ----------
+    before, after : array, shape (6,), floors
+
+    Returns
+    -------
+    list of int
+    """
+    return [int(c) for c in np.flatnonzero((before[:3] > _CLEAR) & (after[:3] > _WORSE * before[:3]))]
+
+
 def _renewed(effects: Sequence[NamedEffect], hypothesis: System, found: Estimates) -> list[NamedEffect]:
     fitted = {
         candidate.effect.name: (candidate, linear, numbers)
@@ -145,5 +167,6 @@ def _renewed(effects: Sequence[NamedEffect], hypothesis: System, found: Estimate
             renewed.append(effect)
             continue
         candidate, linear, numbers = fitted[effect.name]
-        renewed.append(replace(effect, candidate=candidate, linear=linear, coefficients=numbers))
+        told = told_effect(candidate.effect, numbers, hypothesis.flights[0].signals.vehicle)
+        renewed.append(replace(effect, candidate=candidate, linear=linear, coefficients=numbers, sentence=told))
     return renewed

@@ -14,6 +14,7 @@ from cpfls_cli.gap.results import Alternative, NamedEffect
 from cpfls_cli.gap.scoring import Scored
 from cpfls_cli.gap.search import Step, look
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.told_effect import told_effect
 from cpfls_cli.gap.weak_flight import Candidate, WeakFlight
 
 
@@ -72,7 +73,7 @@ def judge_effect(
         step.p_value(own.gain),
         share,
         _frequency(own, step),
-        candidate.effect.sentence,
+        told_effect(candidate.effect, found.effects[place], flights[0].signals.vehicle),
     )
     return Judged(effect, tuple(alternatives(own, step.ranking, step.above_floor)))
 

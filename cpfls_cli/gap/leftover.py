@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.gap.balance_system import System
 from cpfls_cli.gap.dependence import Dependence, rank_dependence
+from cpfls_cli.gap.energy import energy_words
 from cpfls_cli.gap.floor import left_over
 from cpfls_cli.gap.narrow_band import NarrowBand, narrow_band
 from cpfls_cli.gap.results import Unexplained
@@ -85,9 +86,12 @@ def leftover(
         in_floors, hypothesis.flight_index, block, without_actuation(states), settings.shifts, rng
     )
     band = _band(hypothesis, linear, settings, rng)
+    rates = np.concatenate([flight.windows.average(flight.signals.body_rate) for flight in hypothesis.flights])
+    # A force turns nothing.
+    energy = [*energy_words(left[:, :3], rates, block), *["neither"] * 3]
     unexplained = [
-        _unexplained(channel, float(size), dependence, band, settings)
-        for channel, size in zip(CHANNELS, sizes, strict=True)
+        _unexplained(channel, float(size), dependence, band, own, settings)
+        for channel, size, own in zip(CHANNELS, sizes, energy, strict=True)
         if size > _SMALL
     ]
     return Leftover(sizes, dependence, scatter, tuple(found for found in unexplained if found is not None))
@@ -108,7 +112,12 @@ def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.rand
 
 
 def _unexplained(
-    channel: str, size: float, dependence: Sequence[Dependence], band: NarrowBand | None, settings: GapSettings
+    channel: str,
+    size: float,
+    dependence: Sequence[Dependence],
+    band: NarrowBand | None,
+    energy: str,
+    settings: GapSettings,
 ) -> Unexplained | None:
     signal = next((d for d in dependence if d.channel == channel), None)
     band = band if band is not None and band.channel == channel else None
@@ -123,5 +132,5 @@ def _unexplained(
         signal.signal if follows and signal else None,
         share,
         band.frequency_hz if rings and band else None,
-        band.energy if band else "neither",
+        band.energy if rings and band else energy,
     )

@@ -36,7 +36,13 @@ class WorstStretch:
 
 
 def worst_stretch(
-    signals: Signals, before: ReplayModel, after: ReplayModel, length_s: float = 2.0, run_s: float = 1.0
+    signals: Signals,
+    before: ReplayModel,
+    after: ReplayModel,
+    logged: Signals | None = None,
+    *,
+    length_s: float = 2.0,
+    run_s: float = 1.0,
 ) -> WorstStretch:
     """Find the stretch in which free runs of the first model are farthest from the flight.
 
@@ -45,7 +51,10 @@ def worst_stretch(
     Parameters
     ----------
     signals : Signals
+        What the models are held against.
     before, after : ReplayModel
+    logged : Signals or None
+        What the first model starts from, where faults of the sensors were taken out of `signals`.
     length_s : float
         Of the stretch, s.
     run_s : float
@@ -63,7 +72,8 @@ def worst_stretch(
     samples = max(1, round(run_s / signals.period))
     starts = start_samples(signals, samples, samples - 1)
     measured = signals.body_rate[starts[:, None] + np.arange(samples)]
-    simulated, exchanged = (_runs(signals, model, starts, samples) for model in (before, after))
+    simulated = _runs(signals if logged is None else logged, before, starts, samples)
+    exchanged = _runs(signals, after, starts, samples)
     square = ((simulated - measured) ** 2).sum(axis=1)
     joined = min(len(starts), max(1, round(length_s / run_s)))
     first = int(np.convolve(square.sum(axis=1), np.ones(joined), mode="valid").argmax())

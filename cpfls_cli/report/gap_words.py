@@ -173,7 +173,7 @@ def whole_percent(share: float) -> str:
     """
     if not math.isfinite(share):
         return number(share)
-    if 0 < share < 0.005:
+    if 0 < abs(share) < 0.005:
         return "< 1 %"
     return "> 99 %" if 0.995 <= share < 1 else f"{100 * share:.0f} %".replace("-", "−")
 

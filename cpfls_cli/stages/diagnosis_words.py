@@ -9,11 +9,17 @@ import numpy as np
 
 from cpfls_cli.gap.diagnose import Diagnosed
 from cpfls_cli.gap.evidence import Evidence
-from cpfls_cli.gap.results import Diagnosis, Estimate, GapSize, NamedEffect, Unexplained, Verdict
+from cpfls_cli.gap.results import Alternative, Diagnosis, Estimate, GapSize, NamedEffect, Unexplained, Verdict
 from cpfls_cli.gap.weak_flight import CHANNELS
+from cpfls_cli.report.gap_words import whole_percent
+from cpfls_cli.report.rounded import with_interval
 from cpfls_cli.stages.audit_file import audit_lines, audit_summary
-from cpfls_cli.stages.disagreement_words import UNITS, gap_summary, replay_line, replay_summary, unseen_lines
+from cpfls_cli.stages.disagreement_words import UNITS, gap_summary, replay_lines, replay_summary, unseen_lines
 
+_ENERGY = {
+    "feeds": "; it feeds energy into the rotation",
+    "drains": "; it drains energy from the rotation",
+}
 _VERDICTS = {
     Verdict.NAMED: "what is missing has a name and explains the gap",
     Verdict.PARTIAL: "what is named is the closest, and does not explain all of the gap",
@@ -40,12 +46,11 @@ def diagnosis_lines(found: Diagnosed, shown: Evidence, split: str) -> list[str]:
     diagnosis = found.diagnosis
     return [
         *headline(diagnosis),
-        *(_rival_line(rival.name, rival.instead_of, rival.separated_by) for rival in diagnosis.alternatives),
         *(_unexplained_line(left) for left in diagnosis.unexplained),
         *_levels(diagnosis),
         *gap_lines(diagnosis.before, diagnosis.after),
-        replay_line("held out, simulated before", shown.before, shown.held),
-        replay_line("held out, simulated after", shown.after, shown.held),
+        *replay_lines("held out, simulated before", shown.before, shown.held),
+        *replay_lines("held out, simulated after", shown.after, shown.held),
         f"flights: {split}",
         *unseen_lines((each.name, each.reason) for each in diagnosis.not_excited),
         *audit_lines(found.audit),
@@ -111,7 +116,7 @@ def effect_summary(effect: NamedEffect) -> dict[str, Any]:
 
 
 def headline(diagnosis: Diagnosis) -> Iterator[str]:
-    """Say the verdict and each effect.
+    """Say the verdict and each effect; before them the flight that would tell, where the verdict hangs on it.
 
     Parameters
     ----------
@@ -122,10 +127,14 @@ def headline(diagnosis: Diagnosis) -> Iterator[str]:
     str
     """
     yield f"{diagnosis.verdict}: {_VERDICTS[diagnosis.verdict]}"
+    rivals = [_rival_line(rival) for rival in diagnosis.alternatives]
+    ambiguous = diagnosis.verdict is Verdict.AMBIGUOUS
+    yield from rivals if ambiguous else []
     for effect in diagnosis.effects:
         yield effect_line(effect)
     for effect in diagnosis.closest:
         yield f"closest, but not it: {effect_line(effect)}"
+    yield from [] if ambiguous else rivals
 
 
 def gap_lines(before: GapSize, after: GapSize) -> Iterator[str]:
@@ -158,24 +167,29 @@ def effect_line(effect: NamedEffect) -> str:
     """
     numbers = "; ".join(_coefficient(c) for c in effect.coefficients)
     chance = "p < 1e-6" if effect.p_value < 1e-6 else f"p = {effect.p_value:.2g}"
-    return f"{effect.name}: {effect.sentence} {numbers} ({chance}, {effect.share:.0%} of the gap)"
+    return f"{effect.name}: {effect.sentence} {numbers} ({chance}, {_share_words(effect.share)} of the gap)"
 
 
 def _coefficient(coefficient: Estimate) -> str:
     unit = "" if coefficient.unit == "1" else f" {coefficient.unit}"
-    interval = f"[{coefficient.low:.4g}, {coefficient.high:.4g}]"
-    return f"{coefficient.name} = {coefficient.value:.4g} {interval}{unit}"
+    value, low, high = with_interval(coefficient.value, coefficient.low, coefficient.high)
+    return f"{coefficient.name} = {value} [{low}, {high}]{unit}"
 
 
-def _rival_line(name: str, instead_of: str, separated_by: str) -> str:
-    return f"could be {name} instead of {instead_of}; to tell: {separated_by}"
+def _share_words(share: float) -> str:
+    """Write a share in whole per cent; what rounding alone would make nothing or all of it is not called so."""
+    return whole_percent(share).replace("> ", "more than ").replace("< ", "less than ")
+
+
+def _rival_line(rival: Alternative) -> str:
+    return f"could be {rival.name} instead of {rival.instead_of}; to tell: {rival.separated_by}"
 
 
 def _unexplained_line(left: Unexplained) -> str:
     signal = f", depends on {left.signal} most" if left.signal else ""
     band = f", rings at {left.frequency_hz:.3g} Hz" if left.frequency_hz is not None else ""
-    told = f" ({left.share:.0%} of it)" if signal or band else ""
-    energy = "" if left.energy == "neither" else f"; it {left.energy} energy"
+    told = f" ({_share_words(left.share)} of it)" if signal or band else ", depends on no one signal"
+    energy = _ENERGY.get(left.energy, "")
     return f"unexplained: {left.axis}, {left.floors:.2g} floors{signal}{band}{told}{energy}"
 
 
@@ -183,12 +197,13 @@ def _levels(diagnosis: Diagnosis) -> Iterator[str]:
     """Explain why torque alone and torque with force give two names, where they do."""
     # Faults of sensors and wrong numbers of the vehicle are told on other grounds.
     named = {effect.name for effect in diagnosis.effects if effect.candidate is not None}
-    if not named or not diagnosis.torque_alone or diagnosis.torque_alone[0][0] in named:
+    forces = np.isfinite(diagnosis.before.value[3:]).any()
+    if not forces or not named or not diagnosis.torque_alone or diagnosis.torque_alone[0][0] in named:
         return
     name, share = diagnosis.torque_alone[0]
     yield (
-        f"torque alone would say {name} ({share:.0%} of the gap): about the axes it looks the same. The forces tell "
-        f"them apart, and with them it is {', '.join(sorted(named))}"
+        f"torque alone would say {name} ({_share_words(share)} of the gap): about the axes it looks the same. "
+        f"The forces tell them apart, and with them it is {', '.join(sorted(named))}"
     )
 
 

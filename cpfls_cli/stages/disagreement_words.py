@@ -10,12 +10,14 @@ import numpy as np
 from cpfls_cli.gap.compare import Disagreement
 from cpfls_cli.gap.replayed import Replayed
 from cpfls_cli.gap.weak_flight import CHANNELS
+from cpfls_cli.report.gap_words import whole_percent
 from cpfls_cli.stages.audit_file import audit_lines, audit_summary
 from cpfls_cli.stages.recordings import Flights
 
 _STRETCHES = 3
 _SIGNALS = 3
 _SIGNIFICANT = 0.05
+_LEAST_SHARE = 1e-3
 UNITS = ("N m",) * 3 + ("N",) * 3
 """Unit of each channel."""
 
@@ -34,7 +36,7 @@ def disagreement_lines(found: Disagreement, given: Flights) -> list[str]:
     """
     return [
         *where_lines(found, given),
-        replay_line("simulated from the measured rotors", found.replayed, found.held),
+        *replay_lines("simulated from the measured rotors", found.replayed, found.held),
         *unseen_lines((each.name, each.reason) for each in found.not_excited),
         *audit_lines(found.audit),
     ]
@@ -147,27 +149,31 @@ def unseen_lines(unseen: Iterator[tuple[str, str]]) -> Iterator[str]:
         yield f"cannot be seen: {', '.join(names)}: {reason}"
 
 
-def replay_line(what: str, model: Replayed, held: Replayed) -> str:
-    """Say how far a simulation is off at its longest horizon.
+def replay_lines(what: str, model: Replayed, held: Replayed) -> Iterator[str]:
+    """Say how far a simulation is off at its longest horizon; nothing of flights without rates.
 
     Parameters
     ----------
     what : str
     model, held : Replayed
 
-    Returns
-    -------
+    Yields
+    ------
     str
     """
+    # Rates that never change are those of a log that has none.
+    if not held.rate.any():
+        return
     rate, still = (" ".join(f"{value:.2g}" for value in each.rate[-1]) for each in (model, held))
     after = f"after {model.horizon_s[-1]:.2g} s the rates are off by {rate} rad/s (x y z)"
-    return f"{what}: {after}; if they stayed what they were, by {still}"
+    yield f"{what}: {after}; if they stayed what they were, by {still}"
 
 
 def _channel_line(found: Disagreement, place: int) -> str:
     floors, share = found.floors[place], found.rms[place] / found.activity[place]
     size = f"{found.rms[place]:.3g} {UNITS[place]}, {floors:.2g} times the noise floor"
-    part = f", {share:.1%} of what moves it" if np.isfinite(share) else ""
+    size_of = f"{share:.1%}" if share >= _LEAST_SHARE else f"less than {_LEAST_SHARE:.1%}"
+    part = f", {size_of} of what moves it" if np.isfinite(share) else ""
     return f"{CHANNELS[place]}: gap {size}{part}{'' if floors > 1.5 else ': nothing above noise'}"
 
 
@@ -182,5 +188,5 @@ def _signal_lines(found: Disagreement) -> Iterator[str]:
     for place, channel in enumerate(CHANNELS):
         own = [d for d in found.dependence if d.channel == channel and d.p_value < _SIGNIFICANT and d.r2 > 0]
         if own and found.floors[place] > 1:
-            best = ", ".join(f"{d.signal} ({d.r2:.0%})" for d in own[:_SIGNALS])
+            best = ", ".join(f"{d.signal} ({whole_percent(d.r2)})" for d in own[:_SIGNALS])
             yield f"{channel} follows {best}"

@@ -15,21 +15,24 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.audit import Audit
 from cpfls_cli.gap.diagnose import Recording
-from cpfls_cli.gap.extend import Extension, extend
+from cpfls_cli.gap.extend import Extension, extend, worse_axes
 from cpfls_cli.gap.extended import plain
 from cpfls_cli.gap.replayed import Replayed, replayed
-from cpfls_cli.gap.results import GapSize, NamedEffect
+from cpfls_cli.gap.results import GapSize, NamedEffect, Verdict
+from cpfls_cli.gap.weak_flight import CHANNELS
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.stages.audit_file import audit_data, audit_of
 from cpfls_cli.stages.base_file import base_artifact, base_data, base_model, model_base
 from cpfls_cli.stages.diagnosis_file import replay_data, shrunk_data
 from cpfls_cli.stages.diagnosis_words import effect_line, effect_summary, gap_lines
-from cpfls_cli.stages.disagreement_words import gap_summary, replay_line
+from cpfls_cli.stages.disagreement_words import gap_summary, replay_lines
 from cpfls_cli.stages.effects_file import effects_data, effects_of
 from cpfls_cli.stages.flights_file import flights_of
 from cpfls_cli.stages.job import Job, Outcome, begin, finish
 from cpfls_cli.stages.same_vehicle import require_vehicle_of
 from cpfls_cli.stages.sources import read_good
+
+_EXTENDS = (Verdict.NAMED, Verdict.PARTIAL, Verdict.AMBIGUOUS)
 
 
 @dataclass(frozen=True)
@@ -75,8 +78,15 @@ class Grown:
         """The extension for people."""
         yield from (effect_line(effect) for effect in self.extension.effects)
         yield from gap_lines(self.before, self.after)
-        yield replay_line("held out, simulated before", self.replay_before, self.held)
-        yield replay_line("held out, simulated after", self.replay_after, self.held)
+        yield from replay_lines("held out, simulated before", self.replay_before, self.held)
+        yield from replay_lines("held out, simulated after", self.replay_after, self.held)
+
+    @property
+    def warnings(self) -> Iterator[str]:
+        """Axes that the extension serves ill, although it serves the whole well."""
+        for place in worse_axes(self.before.floors, self.after.floors):
+            size = f"{self.before.floors[place]:.3g} -> {self.after.floors[place]:.3g} floors"
+            yield f"held out, {CHANNELS[place]}: the gap grows, {size}, although the sum over all channels shrinks"
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -85,6 +95,7 @@ class Grown:
             "effects": [effect_summary(effect) for effect in self.extension.effects],
             "gap_before": gap_summary(self.before.value, self.before.floors),
             "gap_after": gap_summary(self.after.value, self.after.floors),
+            "warnings": list(self.warnings),
         }
 
 
@@ -118,7 +129,7 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
     flights = (flights_of(source, job.study, "training"), flights_of(source, job.study, "held-out"))
     grown = extended(job.study, *flights, effects, audit_of(source), base, model or diagnosis)
     finish(job, EXTENDED, {**grown.data, **base_data(base)}, started.inputs)
-    return Outcome(grown.summary, tuple(grown.lines))
+    return Outcome(grown.summary, tuple(grown.lines), tuple(grown.warnings))
 
 
 def named_effects(diagnosis: Artifact) -> list[NamedEffect]:
@@ -138,10 +149,30 @@ def named_effects(diagnosis: Artifact) -> list[NamedEffect]:
         If it names none.
     """
     effects = effects_of(diagnosis)
-    if not effects or not diagnosis.array("effect/named").all():
-        verdict = diagnosis.text("verdict")
-        raise ComputationError(f"not extended: the diagnosis is {verdict} and names no effect that could be added")
+    verdict = diagnosis.text("verdict")
+    named = bool(diagnosis.array("effect/named").all())
+    require_named(verdict, effects if named else ())
     return effects
+
+
+def require_named(verdict: str, effects: Sequence[NamedEffect]) -> None:
+    """Refuse a diagnosis that names no effect to add.
+
+    Parameters
+    ----------
+    verdict : str
+    effects : sequence of NamedEffect
+        Those that it names.
+
+    Raises
+    ------
+    ComputationError
+    """
+    if verdict not in _EXTENDS or not effects:
+        closest = " (those that it calls closest are not it)" if verdict == Verdict.UNEXPLAINED else ""
+        raise ComputationError(
+            f"not extended: the diagnosis is {verdict} and names no effect that could be added{closest}"
+        )
 
 
 def extended(

@@ -21,7 +21,7 @@ from cpfls_cli.stages.compare import check_ignored, compared, flight_roles, prog
 from cpfls_cli.stages.diagnose import Answer, answered
 from cpfls_cli.stages.disagreement_file import disagreement_data
 from cpfls_cli.stages.disagreement_words import disagreement_summary, where_lines
-from cpfls_cli.stages.extend import Grown, extended
+from cpfls_cli.stages.extend import Grown, extended, require_named
 from cpfls_cli.stages.flights_file import flights_data
 from cpfls_cli.stages.job import Job, Outcome, finish, input_file, take_inputs
 from cpfls_cli.stages.output_folder import check_folder, filled_folder
@@ -89,7 +89,8 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
         report.run(replace(job, output=folder / "report.html", progress=_quiet), written)
     job.progress(1, 1)
     lines = (*found.answer.lines, *where_lines(found.disagreement, given.flights), _last_line(job, found))
-    return Outcome(summary, lines, (*given.flights.warnings, *found.answer.found.audit.warnings))
+    warned = () if found.grown is None else tuple(found.grown.warnings)
+    return Outcome(summary, lines, (*given.flights.warnings, *found.answer.found.audit.warnings, *warned))
 
 
 def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path | None) -> _Given:
@@ -120,8 +121,7 @@ def _find(job: Job, given: _Given) -> _Found:
 
 def _grown(job: Job, given: _Given, answer: Answer) -> Grown:
     diagnosis = answer.found.diagnosis
-    if not diagnosis.effects:
-        raise ComputationError(f"not extended: the diagnosis is {diagnosis.verdict} and names no effect to add")
+    require_named(diagnosis.verdict, diagnosis.effects)
     split = given.split
     audit = answer.found.audit
     return extended(job.study, split.training, split.held_out, diagnosis.effects, audit, given.base, given.path)

@@ -78,6 +78,21 @@ def gains(vehicle: VehicleSettings, differences: Array) -> Array:
     return loss
 
 
+def _told(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
+    """Say which rotor is weak; that its opposite is strong instead looks the same."""
+    differences = np.array([values.get(f"difference_{mode}", 0.0) for mode in (1, 2)])
+    loss = gains(vehicle, differences).tolist()
+    other = {place: pair[1 - pair.index(place)] for pair in opposite_pairs(vehicle) for place in pair}
+    if len(other) != len(loss):
+        weak = loss.index(min(loss))
+        return f"Rotor {weak + 1} pulls least, {-100 * loss[weak]:.2g} % less than modelled." if any(loss) else ""
+    return " ".join(
+        f"Rotor {weak + 1} pulls {-100 * loss[weak]:.2g} % less than modelled, or rotor {other[weak] + 1} as much more."
+        for weak in range(len(loss))
+        if loss[weak] < 0
+    )
+
+
 def _seeds(vehicle: VehicleSettings) -> Array:
     hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
     pairs = opposite_pairs(vehicle)
@@ -129,4 +144,5 @@ EFFECT = Effect(
     },
     source="rotor by rotor thrust factors in quad_race_env (tudelft) and SkyFlow",
     columns=_columns,
+    told=_told,
 )

@@ -10,6 +10,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, thrust_wrench
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 _AIR_DENSITY = 1.225
 _LARGEST_RATIO = 2.5
@@ -106,6 +107,20 @@ def _scatter(signals: Signals, shape: Mapping[str, float]) -> Array:
     return np.asarray(shaken**2 @ per_thrust**2)
 
 
+def _name(knot: float) -> str:
+    return f"f_{knot:g}".replace(".", "_")
+
+
+def _told(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
+    """Name the state in which the thrust changes most."""
+    changes = {knot: values[_name(knot)] for knot in _KNOTS[1:] if _name(knot) in values}
+    if not changes:
+        return ""
+    ratio = max(changes, key=lambda knot: abs(changes[knot]))
+    size = f"{abs(100 * changes[ratio]):.2g} % {'less' if changes[ratio] < 0 else 'more'} thrust"
+    return f"Strongest in the state called {descent_state(ratio)}: {size} at {ratio:g} times the induced velocity."
+
+
 EFFECT = Effect(
     name="vertical_descent",
     title="vertical descent (vortex ring, turbulent wake, windmill brake)",
@@ -113,8 +128,7 @@ EFFECT = Effect(
     formula="dT_i = T_i exp(-(u_xy/(s v_h))^2) f(x_i),  f linear between knots, f(0) = 0,  x_i = max(-u_iz/v_h, 0)",
     sentence="A vehicle that sinks into its own wake loses thrust and shakes; sinking faster, it gains thrust.",
     coefficients=tuple(
-        Coefficient(f"f_{knot:g}".replace(".", "_"), "1", -0.8, 1.5, f"share of thrust gained at x = {knot:g}")
-        for knot in _KNOTS[1:]
+        Coefficient(_name(knot), "1", -0.8, 1.5, f"share of thrust gained at x = {knot:g}") for knot in _KNOTS[1:]
     ),
     needs=frozenset({"velocity", "rotor_speed", "rotor_radius"}),
     excitation="vertical descents in steps up to twice the induced velocity, then the same with forward speed",
@@ -127,4 +141,5 @@ EFFECT = Effect(
     columns=_columns,
     shapes=(Shape("sideways", "1", (0.4, 0.7, 1.0, 1.5), "sideways speed over v_h that blows the effect away"),),
     scatter=_scatter,
+    told=_told,
 )

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.report.canvas import GREY, plain_ticks, plot, stacked
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.figures.before_after import BEFORE, MEASURED, keep_in_view, legend_over, marked
-from cpfls_cli.report.gap_words import AXES, titles_of
+from cpfls_cli.report.gap_words import AXES
 from cpfls_cli.report.source import Source
 
 
@@ -60,8 +60,8 @@ def free_runs_figure(name: str, diagnosis: Source, after: str) -> Plot:
 
     drawn = plot(name, "", "Body rates about three axes, measured and simulated before and after, over time", 6.4, draw)
     astray = f" About {' and '.join(left)} the model as given leaves the picture." if left else ""
-    # What the sensors get wrong would hide what the model does, so both models are given the repaired signals.
-    repaired = " Both are held against the repaired sensors." if titles_of(diagnosis, ("sensor",)) else ""
+    told = " Measured are the rates without the faults of the sensors; before starts from the log as it is."
+    repaired = told if artifact.array("audit/named").any() else ""
     caption = (
         f"{artifact.text('run/flight')}, where the model as given went astray most (about "
         f"{AXES[worst]}). At each dotted line the simulation starts from the measured "

@@ -36,7 +36,10 @@ def has_replay(source: Source) -> bool:
     bool
     """
     data = source.artifact.data
-    return "replay/rate_held" in data and len(source.artifact.array("replay/horizon_s")) > 1
+    if "replay/rate_held" not in data or len(source.artifact.array("replay/horizon_s")) < 2:
+        return False
+    # Rates that never change are those of a log that has none.
+    return bool(source.artifact.array("replay/rate_held").any())
 
 
 def replay_figure(name: str, source: Source, where: str) -> Plot:

@@ -64,10 +64,13 @@ def after_words(source: Source) -> str:
 
 def _pictures(diagnosis: Source, index: int) -> Iterator[Block]:
     data, after = diagnosis.artifact.data, after_words(diagnosis)
-    if "run/time" in data:
+    if "run/time" in data and diagnosis.artifact.array("run/measured").any():
         yield free_runs_figure(f"free-runs-{index}", diagnosis, after)
     else:
-        yield Text("The held-out flights are too short to simulate a stretch of them.", "note")
+        lacking = (
+            "have no body rates to simulate" if "run/time" in data else "are too short to simulate a stretch of them"
+        )
+        yield Text(f"The held-out flights {lacking}.", "note")
     if "picture/time" in data:
         yield gap_picture_figure(f"gap-picture-{index}", diagnosis, after)
 

@@ -18,6 +18,7 @@ from cpfls_cli.report.gap_words import (
     whole_percent,
 )
 from cpfls_cli.report.numbers import UNKNOWN, number
+from cpfls_cli.report.rounded import printed, with_interval
 from cpfls_cli.report.source import Source
 
 _GROWN = 1.05
@@ -112,7 +113,7 @@ def coefficients_table(name: str, source: Source) -> Table:
         first = not rows or effect not in (row[0] for row in rows)
         named = [effect if first else "", _meaning(effect, coefficient)]
         possible = interval(least, largest, 3)
-        rows.append([*named, number(value), interval(low, high), unit_words(unit), possible])
+        rows.append([*named, *measured(value, low, high), unit_words(unit), possible])
     caption = "Coefficients with their 95 % intervals, and the range that is physically possible on this vehicle."
     header = ("Effect", "Coefficient", "Value", "95 % interval", "Unit", "Possible")
     return Table(name, caption, header, rows, frozenset({0, 1, 4}), frozenset({1}))
@@ -139,6 +140,22 @@ def parameters_table(name: str, source: Source) -> Table:
         "Only ratios to the torque of the rotors can be seen."
     )
     return Table(name, caption, ("Number", "Change", "95 % interval", "Unit"), rows, frozenset({0, 3}))
+
+
+def measured(value: float, low: float, high: float) -> list[str]:
+    """Write a value and its interval with the digits that the width of the interval leaves.
+
+    Parameters
+    ----------
+    value, low, high : float
+
+    Returns
+    -------
+    list of str
+        Value, interval; the interval is ``—`` where it is not known.
+    """
+    first, *ends = (printed(text) for text in with_interval(value, low, high))
+    return [first, " … ".join(ends) if np.isfinite([low, high]).any() else UNKNOWN]
 
 
 def interval(low: float, high: float, digits: int = 4) -> str:
@@ -170,6 +187,5 @@ def _parameter(name: str, unit: str, value: float, low: float, high: float) -> I
     kind, _, axis = name.rpartition("_")
     yield f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else name.replace("_", " ")
     scale = 100.0 if unit == "1" else 1.0
-    yield number(scale * value, 3)
-    yield interval(scale * low, scale * high, 3)
+    yield from measured(scale * value, scale * low, scale * high)
     yield "%" if unit == "1" else unit_words(unit)

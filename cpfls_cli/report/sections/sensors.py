@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 from cpfls_cli.report.content import Block, Heading, Section, Table, Text
 from cpfls_cli.report.gap_words import effect_title, joined, probability, sentence, unit_words
-from cpfls_cli.report.numbers import number
-from cpfls_cli.report.sections.gap_tables import interval
+from cpfls_cli.report.sections.gap_tables import measured
 from cpfls_cli.report.source import Source, Sources
 
 
@@ -70,8 +69,7 @@ def _numbers(source: Source, index: int) -> Table:
         [
             effect_title(finding),
             name,
-            number(value),
-            interval(low, high),
+            *measured(value, low, high),
             unit_words(unit),
             probability(chance[finding]),
         ]
