@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.report.numbers import number
 
 _DIGITS = 4
-_SMALLEST, _LARGEST = -3, 6
+_SMALLEST, _LARGEST = -4, 6
 """Powers of ten between which no power is written."""
 
 _FEWEST, _MOST = 2, 12

@@ -22,7 +22,7 @@ from cpfls_cli.stages.job import Job, Outcome, begin, finish
 from cpfls_cli.stages.recordings import read_flights
 from cpfls_cli.stages.same_vehicle import require_vehicle_of
 from cpfls_cli.stages.sources import read_good
-from cpfls_cli.stages.split import Split, split_flights
+from cpfls_cli.stages.split import Split, seen_twice, split_flights
 from cpfls_cli.stages.study import generator
 
 
@@ -89,7 +89,9 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     answer = answered(job.study, split, base, disagreement, progress_of(job.progress))
     finish(job, DIAGNOSIS, {**answer.data, **base_data(base)}, started.inputs)
     warnings = (*source.texts("warning"), *held.warnings)
-    return Outcome(answer.summary, answer.lines, (*warnings, *answer.found.audit.warnings))
+    learned = [file for role, file in source.header.inputs.items() if role.startswith("flight")]
+    twice = seen_twice(learned, [file for role, file in started.inputs.items() if role.startswith("held-out")])
+    return Outcome(answer.summary, answer.lines, (*twice, *warnings, *answer.found.audit.warnings))
 
 
 def answered(

@@ -12,7 +12,7 @@ from cpfls_cli.stages.job import Outcome
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _LABEL = 12
-_WIDTH = 110
+_WIDTH = 80
 
 
 def show(name: str | None) -> Outcome:

@@ -27,7 +27,7 @@ from cpfls_cli.stages.job import Job, Outcome, finish, input_file, take_inputs
 from cpfls_cli.stages.output_folder import check_folder, filled_folder
 from cpfls_cli.stages.plain_json import plain
 from cpfls_cli.stages.recordings import Flights, read_flights
-from cpfls_cli.stages.split import Split, split_flights
+from cpfls_cli.stages.split import Split, seen_twice, split_flights
 
 FILES = ("disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json")
 """What a folder holds in the end; no extended.h5 where the extension was refused."""
@@ -90,7 +90,9 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
     job.progress(1, 1)
     lines = (*found.answer.lines, *where_lines(found.disagreement, given.flights), _last_line(job, found))
     warned = () if found.grown is None else tuple(found.grown.warnings)
-    return Outcome(summary, lines, (*given.flights.warnings, *found.answer.found.audit.warnings, *warned))
+    return Outcome(
+        summary, lines, (*_twice(given), *given.flights.warnings, *found.answer.found.audit.warnings, *warned)
+    )
 
 
 def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path | None) -> _Given:
@@ -104,6 +106,13 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     split = split_flights(given, held, job.study.gap)
     base = None if model is None else model_base(model, job.study)
     return _Given(Flights(given, read.warnings), split, base, model or Path(), inputs)
+
+
+def _twice(given: _Given) -> tuple[str, ...]:
+    learned, held = (
+        [file for role, file in given.inputs.items() if role.startswith(kind)] for kind in ("flight", "held-out")
+    )
+    return seen_twice(learned, held)
 
 
 def _find(job: Job, given: _Given) -> _Found:

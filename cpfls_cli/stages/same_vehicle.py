@@ -32,9 +32,10 @@ def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettin
     if different:
         first = different[0]
         values = "" if first == "rotors" else f" ({getattr(own, first)} there, {getattr(wanted, first)} in the config)"
+        keys = ", ".join([f"vehicle.{first}{values}", *(f"vehicle.{name}" for name in different[1:])])
         raise InputError(
-            f"{path}: was made with another vehicle; not the same: vehicle.{', vehicle.'.join(different)}{values}; use "
-            "the config of that vehicle, or make the file again"
+            f"{path}: was made with another vehicle; not the same: {keys}; use the config of that vehicle, or make the "
+            "file again"
         )
 
 

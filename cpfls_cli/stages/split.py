@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
+from cpfls_cli.artifacts.records import InputFile
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.diagnose import Recording, common_windows
@@ -57,6 +58,31 @@ def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], set
         training, last = tuple(given[:first]), tuple(given[first:])
         return Split(training, last, f"no flight was held out by name, so the last third of them is: {_names(last)}")
     return _thirds(given[0], settings)
+
+
+def seen_twice(given: Iterable[InputFile], held_out: Iterable[InputFile]) -> tuple[str, ...]:
+    """Warn of files that stand for two flights: what is learned and judged on one flight says nothing of another.
+
+    Parameters
+    ----------
+    given, held_out : iterable of InputFile
+
+    Returns
+    -------
+    tuple of str
+    """
+    learned: dict[str, str] = {}
+    said = []
+    for file in given:
+        if file.sha256 in learned:
+            said.append(f"{file.name}: is given twice, also as {learned[file.sha256]}")
+        learned[file.sha256] = file.name
+    said += [
+        f"{file.name}: is learned from and held out at once, so the gap after shows nothing of flights not seen"
+        for file in held_out
+        if file.sha256 in learned
+    ]
+    return tuple(said)
 
 
 def _thirds(flight: Recording, settings: GapSettings) -> Split:

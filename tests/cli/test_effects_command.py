@@ -26,3 +26,8 @@ def test_machines_get_the_same(cpfls):
 
 def test_an_unknown_name_is_refused(refuse):
     assert refuse("effects", "rotor_drug")[0].startswith("rotor_drug: no such effect (did you mean rotor_drag")
+
+
+def test_all_of_it_fits_a_terminal_of_80_columns(cpfls):
+    texts = [cpfls("effects").stdout, *(cpfls("effects", name).stdout for name in CATALOGUE)]
+    assert max(len(line) for text in texts for line in text.splitlines()) <= 80

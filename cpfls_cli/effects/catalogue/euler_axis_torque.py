@@ -17,7 +17,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="euler_axis_torque",
-    title="torque about the Euler axes instead of the body axes",
+    title="torque about Euler instead of body axes",
     kind="wrench",
     formula="M = (W^-T - 1) M_rot",
     sentence="The log gives torques about the axes of the Euler angles, and the model takes them for body axes; they "

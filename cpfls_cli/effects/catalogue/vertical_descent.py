@@ -123,7 +123,7 @@ def _told(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
 
 EFFECT = Effect(
     name="vertical_descent",
-    title="vertical descent (vortex ring, turbulent wake, windmill brake)",
+    title="vertical descent (vortex ring to windmill brake)",
     kind="wrench",
     formula="dT_i = T_i exp(-(u_xy/(s v_h))^2) f(x_i),  f linear between knots, f(0) = 0,  x_i = max(-u_iz/v_h, 0)",
     sentence="A vehicle that sinks into its own wake loses thrust and shakes; sinking faster, it gains thrust.",

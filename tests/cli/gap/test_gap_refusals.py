@@ -114,3 +114,21 @@ def test_commands_stand_in_where_speeds_are_missing(cpfls, gap_config, shifted, 
     assert result.exit_code == 0, result.stderr
     assert "cannot be seen: channel_delay: the flights lack" in result.stdout
     assert "motor_lag" not in result.stdout
+
+
+def test_a_flight_that_is_learned_from_and_held_out(cpfls, gap_config, shifted, tmp_path):
+    words = (gap_config, shifted[0], "--held-out", shifted[0], "-o", tmp_path / "x")
+    result = cpfls("gap", *words)
+    assert result.exit_code == 0, result.stderr
+    assert "flight_1.csv: is learned from and held out at once" in result.stderr
+    # The same through the stages, where the first one has the flights.
+    assert cpfls("compare", *words[:2], shifted[0], "-o", tmp_path / "d.h5").exit_code == 0
+    result = cpfls("diagnose", gap_config, tmp_path / "d.h5", "--held-out", shifted[0], "-o", tmp_path / "n.h5")
+    assert "flight_1.csv: is learned from and held out at once" in result.stderr
+    assert "flight_1.csv: is given twice, also as flight_1.csv" in result.stderr
+
+
+def test_all_numbers_that_differ_are_named_and_the_first_with_both_values(refuse, gap_config, pipeline, tmp_path):
+    words = ("--set", "vehicle.mass_kg=5.5", "--set", "vehicle.rotor_speed_max_rad_s=900")
+    (message,) = refuse("compare", gap_config, pipeline.flight, *words, "-o", tmp_path / "x.h5")
+    assert "vehicle.mass_kg (6.0 there, 5.5 in the config), vehicle." in message
