@@ -1,5 +1,7 @@
 """Simulation from the points of a flight: exact for the model that made it, wrong by as much as the torque is wrong."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -144,3 +146,15 @@ def test_the_worst_stretch_is_where_the_torque_is_wrong():
     assert found.axis == 1
     np.testing.assert_allclose(found.after, found.measured, atol=1e-4)
     assert np.abs(found.before - found.measured)[:, 1].max() > 0.1
+
+
+def test_a_fault_of_the_gyro_shows_in_the_runs_that_start_from_the_log():
+    torque, bias = rigid_torque(), np.array([0.0, 0.0, 0.05])
+    signals = flight(torque)
+    logged = replace(signals, body_rate=signals.body_rate + bias)
+    model = ReplayModel(torque, TENSOR)
+    found = worst_stretch(signals, model, model, logged)
+    np.testing.assert_allclose(found.after, found.measured, atol=1e-4)
+    starts = np.searchsorted(found.time, found.restarts)
+    np.testing.assert_allclose((found.before - found.measured)[starts], np.tile(bias, (len(starts), 1)), atol=1e-4)
+    assert found.axis == 2
