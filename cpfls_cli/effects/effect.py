@@ -141,6 +141,8 @@ class Effect:
         error, so that all other columns can be computed from them.
     told : callable or None
         ``told(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
+    rate_derivative : bool
+        Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
     holds : frozenset of str
         Effects that are special cases of this one; it is no rival of theirs.
     scatter : callable or None
@@ -167,6 +169,7 @@ class Effect:
     scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
     told: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
     holds: frozenset[str] = frozenset()
+    rate_derivative: bool = False
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that the effect needs and the flight lacks.

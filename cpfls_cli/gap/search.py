@@ -164,6 +164,8 @@ def forward(
             return chosen, steps
         best = simplest(step.ranking, step.above_floor)
         found = refined(flights, [*chosen, best.candidate], step.floor)
+        if not quiet_enough(best.gain, step, found):
+            return chosen, steps
         grown = exchanged(flights, found.chosen, effects, settings) if len(found.chosen) > 1 else found.chosen
         names = frozenset(candidate.effect.name for candidate in grown)
         # An exchange can undo what was added; a set that was there before would come round again for ever.
@@ -189,9 +191,40 @@ def acceptable(step: Step, settings: GapSettings) -> bool:
     if not step.ranking or step.ranking[0].gain == REFUSED:
         return False
     best = step.ranking[0]
-    windows = len(step.hypothesis.residual)
-    enough = best.gain >= max(_LEAST_SHARE * step.above_floor, _LEAST_IN_FLOORS**2 * windows)
-    return enough and step.p_value(best.gain) <= settings.significance
+    return best.gain >= _enough(step) and step.p_value(best.gain) <= settings.significance
+
+
+def _enough(step: Step) -> float:
+    """Give what an effect has to explain to be worth a name, in squared floors."""
+    return max(_LEAST_SHARE * step.above_floor, _LEAST_IN_FLOORS**2 * len(step.hypothesis.residual))
+
+
+def quiet_enough(gain: float, step: Step, found: System) -> bool:
+    """Tell whether an effect explains motion, not noise.
+
+    Columns of rates hold the noise of the gyroscope, and so does the inertial torque: where rates about two axes go
+    hand in hand, a fit can turn one against the other and be rid of noise. What an effect takes off the floor is
+    therefore taken off its gain.
+
+    Parameters
+    ----------
+    gain : float
+        What it explains, in squared floors.
+    step : Step
+        The look that chose it.
+    found : System
+        With the effect.
+
+    Returns
+    -------
+    bool
+    """
+    if not found.chosen[-1].effect.rate_derivative:
+        return True
+    after = floors(found, fit(found, step.floor))
+    rows = np.sum([len(flight) * flight.known for flight in found.flights], axis=0)
+    noise = float((rows * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
+    return gain - noise >= _enough(step)
 
 
 def exchanged(

@@ -13,9 +13,13 @@ from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.inertial import Balance, InertiaModel, rotation_balance, translation_balance
+from cpfls_cli.gap.noise_floor import noise_floor
 from cpfls_cli.gap.windows import Windows
 
 _AXES = ("x", "y", "z")
+
+_TURNING = 4.0
+"""Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth."""
 
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
@@ -47,6 +51,8 @@ class WeakFlight:
         Momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
     known : array of bool, shape (6,)
         Channels that the flight has.
+    turns : array, shape (parameter,)
+        1 for numbers of the vehicle that the flight can show, 0 for the inertia about axes that hardly turn.
     seen : dict
         Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
     """
@@ -56,6 +62,7 @@ class WeakFlight:
     windows: Windows
     inertial: Columns
     known: BoolArray
+    turns: Array
     seen: dict[tuple[str, tuple[float, ...]], Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -91,11 +98,15 @@ class WeakFlight:
         array, shape (window, 6, coefficient)
         """
         if signals is not self.signals:
-            return self.averaged(columns_of(candidate, signals))
+            return self._rows(candidate, signals)
         key = (candidate.effect.name, tuple(candidate.shape.values()))
         if key not in self.seen:
-            self.seen[key] = self.averaged(columns_of(candidate, signals))
+            self.seen[key] = self._rows(candidate, signals)
         return self.seen[key]
+
+    def _rows(self, candidate: Candidate, signals: Signals) -> Array:
+        rows = self.averaged(columns_of(candidate, signals))
+        return rows * self.turns if candidate.effect.kind == "parameter" else rows
 
     def without_force(self) -> WeakFlight:
         """Leave the force balance out.
@@ -159,7 +170,22 @@ def weak_flight(
         np.concatenate([rotation.momentum, translation.momentum], axis=1),
     )
     known = np.array([signals.torque is not None and axis in axes for axis in _AXES] + [with_force] * 3)
-    return WeakFlight(name, signals, windows, inertial, known)
+    hardly = WeakFlight(name, signals, windows, inertial, known, np.ones(len(nuisance().effect.coefficients)))
+    return replace(hardly, turns=_turns(hardly))
+
+
+def _turns(flight: WeakFlight) -> Array:
+    """Find what the flight shows of the vehicle's own numbers.
+
+    Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to be rid of the noise
+    of the gyroscope, which is not what anybody asked.
+    """
+    left = flight.residual(flight.signals)
+    floor = noise_floor(left, flight.windows)[:3]
+    moved = flight.averaged(flight.inertial)[:, :3].std(axis=0) > _TURNING * floor
+    names = [coefficient.name for coefficient in nuisance().effect.coefficients]
+    about = {f"{kind}_{axis}": moved[n] for kind in ("inertia", "coupling") for n, axis in enumerate("xyz")}
+    return np.array([float(about.get(name, True)) for name in names])
 
 
 def columns_of(candidate: Candidate, signals: Signals) -> Columns:

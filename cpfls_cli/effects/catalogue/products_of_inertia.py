@@ -26,7 +26,7 @@ EFFECT = Effect(
     formula="M = -(d/dt (dI omega) + omega x dI omega),  dI off the diagonal",
     sentence="The mass is spread askew, so that turning about one axis turns the vehicle about another.",
     coefficients=tuple(
-        Coefficient(name, "kg m^2", -0.5, 0.5, f"entry {name} of the inertia tensor, added", scales.smallest_inertia)
+        Coefficient(name, "kg m^2", -0.25, 0.25, f"entry {name} of the inertia tensor, added", scales.smallest_inertia)
         for name in INERTIA_PARAMETERS[3:]
     ),
     needs=frozenset(),
@@ -38,4 +38,5 @@ EFFECT = Effect(
     },
     source="Newton-Euler equations; RotorPy and PX4 sih.cpp (Ixy, Ixz, Iyz)",
     columns=_columns,
+    rate_derivative=True,
 )
