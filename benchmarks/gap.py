@@ -14,7 +14,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.diagnose import Recording, diagnose
+from cpfls_cli.gap.balance.recording import Recording
+from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.gap.blind.cases import make

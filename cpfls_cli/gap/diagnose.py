@@ -10,46 +10,27 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import InputError
-from cpfls_cli.gap.audit import Audit, audit
-from cpfls_cli.gap.balance_system import System, system
-from cpfls_cli.gap.contributions import shares
-from cpfls_cli.gap.estimate import Estimates, differs_from_zero, estimates
-from cpfls_cli.gap.held_out import HeldOut, held_out
-from cpfls_cli.gap.inertial import InertiaModel
-from cpfls_cli.gap.judged import Judged, judge_effect
-from cpfls_cli.gap.leftover import Leftover, leftover
-from cpfls_cli.gap.refine import fit, refined
-from cpfls_cli.gap.results import Diagnosis, NamedEffect, Verdict
-from cpfls_cli.gap.search import Step, block_index, forward, look
-from cpfls_cli.gap.sensor_numbers import sensor_estimates
+from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.inertial import InertiaModel
+from cpfls_cli.gap.balance.recording import Recording, common_windows
+from cpfls_cli.gap.balance.refine import fit, refined
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, weak_flight
+from cpfls_cli.gap.balance.windows import Windows
+from cpfls_cli.gap.naming.contributions import shares
+from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, estimates
+from cpfls_cli.gap.naming.held_out import HeldOut, held_out
+from cpfls_cli.gap.naming.judged import Judged, judge_effect
+from cpfls_cli.gap.naming.leftover import Leftover, leftover
+from cpfls_cli.gap.naming.results import Diagnosis, NamedEffect, Verdict
+from cpfls_cli.gap.naming.search import Step, block_index, forward, look
+from cpfls_cli.gap.naming.sensor_numbers import sensor_estimates
+from cpfls_cli.gap.naming.unseen import not_excited
+from cpfls_cli.gap.naming.vehicle_numbers import parameter_error
+from cpfls_cli.gap.naming.verdict import gap_stays, matters, verdict_of
+from cpfls_cli.gap.sensors.audit import Audit, audit
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.gap.unseen import not_excited
-from cpfls_cli.gap.vehicle_numbers import parameter_error
-from cpfls_cli.gap.verdict import gap_stays, matters, verdict_of
-from cpfls_cli.gap.weak_flight import Candidate, WeakFlight, weak_flight
-from cpfls_cli.gap.windows import Windows, windows
 
-_FEWEST_WINDOWS = 16
 _EXCITED_FLOORS = 3.0
-
-_SAME_RATE = 1e-3
-"""Relative difference of sampling periods that clocks of one logger have, and that no floor shows."""
-
-
-@dataclass(frozen=True)
-class Recording:
-    """A flight and its name.
-
-    Attributes
-    ----------
-    name : str
-    signals : Signals
-    """
-
-    name: str
-    signals: Signals
 
 
 @dataclass(frozen=True)
@@ -133,41 +114,6 @@ def diagnose(
     torque_alone = _torque_alone(weak, settings, effects)
     diagnosis = _concluded(judged, faults, found, unseen, left, steps, hypothesis, settings, torque_alone, checked)
     return Diagnosed(diagnosis, checked, hypothesis, found, left, unseen)
-
-
-def common_windows(recordings: Sequence[Recording], settings: GapSettings) -> Windows:
-    """Make the windows that all flights share.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    settings : GapSettings
-
-    Returns
-    -------
-    Windows
-
-    Raises
-    ------
-    InputError
-        If a flight is too short or has another sampling period than the first.
-    """
-    period = recordings[0].signals.period
-    for recording in recordings:
-        other = recording.signals.period
-        if abs(other - period) > _SAME_RATE * period:
-            raise InputError(
-                f"{recording.name}: sampled at {1 / other:.6g} Hz, {recordings[0].name} at {1 / period:.6g} Hz; set "
-                "import.rate_hz to one rate for all flights"
-            )
-    own = windows(period, settings.window_s, settings.overlap)
-    for recording in recordings:
-        if own.count(len(recording.signals)) < _FEWEST_WINDOWS:
-            raise InputError(
-                f"{recording.name}: {len(recording.signals) * period:.3g} s are too short; "
-                f"{_FEWEST_WINDOWS} windows of gap.window_s = {settings.window_s:g} s are needed"
-            )
-    return own
 
 
 def considered(settings: GapSettings) -> list[Effect]:

@@ -9,21 +9,21 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.gap.audit import Audit
-from cpfls_cli.gap.balance_system import System, system
-from cpfls_cli.gap.diagnose import Recording, common_windows
-from cpfls_cli.gap.estimate import Estimates, estimates
+from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.inertial import InertiaModel
+from cpfls_cli.gap.balance.recording import Recording, common_windows
+from cpfls_cli.gap.balance.refine import fit, refined
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, weak_flight
+from cpfls_cli.gap.balance.windows import Windows
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
-from cpfls_cli.gap.held_out import HeldOut, held_out
-from cpfls_cli.gap.inertial import InertiaModel
-from cpfls_cli.gap.refine import fit, refined
-from cpfls_cli.gap.results import NamedEffect
-from cpfls_cli.gap.scatter import scatter_size, scatter_variance
-from cpfls_cli.gap.search import best_floor, block_index
+from cpfls_cli.gap.naming.estimate import Estimates, estimates
+from cpfls_cli.gap.naming.held_out import HeldOut, held_out
+from cpfls_cli.gap.naming.results import NamedEffect
+from cpfls_cli.gap.naming.scatter import scatter_size, scatter_variance
+from cpfls_cli.gap.naming.search import best_floor, block_index
+from cpfls_cli.gap.naming.told_effect import told_effect
+from cpfls_cli.gap.sensors.audit import Audit
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.gap.told_effect import told_effect
-from cpfls_cli.gap.weak_flight import CHANNELS, WeakFlight, weak_flight
-from cpfls_cli.gap.windows import Windows
 
 _TOUCHED = 0.2
 """Root mean square in floors by which effects and refit move a channel, from which on it has to get better."""

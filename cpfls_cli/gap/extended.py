@@ -13,11 +13,11 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.audit import Audit
-from cpfls_cli.gap.balance_system import System, is_free, system
-from cpfls_cli.gap.inertial import InertiaModel, rotation_balance
-from cpfls_cli.gap.rate_equation import ReplayModel
-from cpfls_cli.gap.weak_flight import Candidate, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.gap.balance.balance_system import System, is_free, system
+from cpfls_cli.gap.balance.inertial import InertiaModel, rotation_balance
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.gap.replay.rate_equation import ReplayModel
+from cpfls_cli.gap.sensors.audit import Audit
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.replay import ReplayError, held, replay, start_samples
+from cpfls_cli.gap.replay.replay import ReplayError, held, replay, start_samples
 
 _EVERY = 5
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cpfls_cli.gap.results import Verdict
+from cpfls_cli.gap.naming.results import Verdict
 from cpfls_cli.report.content import Box, Tone
 from cpfls_cli.report.gap_words import (
     channel_words,

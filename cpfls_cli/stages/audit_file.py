@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from cpfls_cli.artifacts.records import Artifact
-from cpfls_cli.gap.audit import Audit
-from cpfls_cli.gap.audit_findings import AuditFinding, Coefficient
+from cpfls_cli.gap.sensors.audit import Audit
+from cpfls_cli.gap.sensors.audit_findings import AuditFinding, Coefficient
 from cpfls_cli.stages.tables import rows_of, table, texts
 
 _FINDING = (("finding", "sentence"), ("named", "p_value"))

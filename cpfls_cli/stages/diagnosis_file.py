@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.diagnose import Diagnosed
 from cpfls_cli.gap.evidence import Evidence
 from cpfls_cli.gap.extended import ExtendedModel
+from cpfls_cli.gap.naming.results import Diagnosis, GapSize
 from cpfls_cli.gap.replayed import Replayed
-from cpfls_cli.gap.results import Diagnosis, GapSize
-from cpfls_cli.gap.weak_flight import CHANNELS
 from cpfls_cli.stages.audit_file import audit_data
 from cpfls_cli.stages.effects_file import effects_data
 from cpfls_cli.stages.split import Split

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.diagnose import Diagnosed
 from cpfls_cli.gap.evidence import Evidence
-from cpfls_cli.gap.results import Alternative, Diagnosis, Estimate, GapSize, NamedEffect, Unexplained, Verdict
-from cpfls_cli.gap.weak_flight import CHANNELS
+from cpfls_cli.gap.naming.results import Alternative, Diagnosis, Estimate, GapSize, NamedEffect, Unexplained, Verdict
 from cpfls_cli.report.gap_words import whole_percent
 from cpfls_cli.report.rounded import with_interval
 from cpfls_cli.stages.audit_file import audit_lines, audit_summary

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import Disagreement, Worst
-from cpfls_cli.gap.weak_flight import CHANNELS
 from cpfls_cli.stages.audit_file import audit_data
 from cpfls_cli.stages.recordings import Flights
 from cpfls_cli.stages.tables import table, texts

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import Disagreement
 from cpfls_cli.gap.replayed import Replayed
-from cpfls_cli.gap.weak_flight import CHANNELS
 from cpfls_cli.report.gap_words import whole_percent
 from cpfls_cli.stages.audit_file import audit_lines, audit_summary
 from cpfls_cli.stages.recordings import Flights

@@ -10,10 +10,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.effects.registry import CATALOGUE, effect
+from cpfls_cli.gap.balance.inertial import InertiaModel
+from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
-from cpfls_cli.gap.inertial import InertiaModel
-from cpfls_cli.gap.results import Estimate, NamedEffect
-from cpfls_cli.gap.weak_flight import Candidate
+from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 from cpfls_cli.stages.audit_file import audit_of
 from cpfls_cli.stages.tables import rows_of, table
 

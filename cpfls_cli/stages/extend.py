@@ -13,13 +13,13 @@ from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, EXTENDED
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.gap.audit import Audit
-from cpfls_cli.gap.diagnose import Recording
+from cpfls_cli.gap.balance.recording import Recording
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.extend import Extension, extend, worse_axes
 from cpfls_cli.gap.extended import plain
+from cpfls_cli.gap.naming.results import GapSize, NamedEffect, Verdict
 from cpfls_cli.gap.replayed import Replayed, replayed
-from cpfls_cli.gap.results import GapSize, NamedEffect, Verdict
-from cpfls_cli.gap.weak_flight import CHANNELS
+from cpfls_cli.gap.sensors.audit import Audit
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.stages.audit_file import audit_data, audit_of
 from cpfls_cli.stages.base_file import base_artifact, base_data, base_model, model_base

@@ -12,8 +12,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.gap.inertial import InertiaModel
 from cpfls_cli.identification.model import Model, coriolis_matrix
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.stages.extended_file import read_extended

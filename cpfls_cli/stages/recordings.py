@@ -17,7 +17,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.motion import body_rate_of
-from cpfls_cli.gap.diagnose import Recording
+from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.stages.import_log import flight_signals, imported
 from cpfls_cli.stages.rotor_torque import commanded_speed
 from cpfls_cli.stages.same_vehicle import require_same_vehicle

@@ -7,13 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import f as fisher
 
-from cpfls_cli.gap.audit import audit
-from cpfls_cli.gap.balance_system import system
-from cpfls_cli.gap.diagnose import common_windows, considered
-from cpfls_cli.gap.refine import refined
-from cpfls_cli.gap.scoring import REFUSED, candidates_of, layout, normal_equations, score
-from cpfls_cli.gap.search import best_floor, block_index
-from cpfls_cli.gap.weak_flight import weak_flight
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.recording import common_windows
+from cpfls_cli.gap.balance.refine import refined
+from cpfls_cli.gap.balance.weak_flight import weak_flight
+from cpfls_cli.gap.diagnose import considered
+from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of, layout, normal_equations, score
+from cpfls_cli.gap.naming.search import best_floor, block_index
+from cpfls_cli.gap.sensors.audit import audit
 
 
 class Gain(NamedTuple):

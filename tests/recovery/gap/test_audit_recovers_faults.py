@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.audit import audit
-from cpfls_cli.gap.windows import windows
+from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.sensors.audit import audit
 from tests.recovery.gap.audit_flights import LEVELS, Faults, flight, flights
 
 WINDOWS = windows(0.01, 0.4, 0.5)

@@ -7,11 +7,11 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.dependence import rank_dependence
-from cpfls_cli.gap.folds import blocks_of
-from cpfls_cli.gap.state_signals import joined_states, state_signals, without_actuation
-from cpfls_cli.gap.weak_flight import weak_flight
-from cpfls_cli.gap.windows import windows
+from cpfls_cli.gap.balance.folds import blocks_of
+from cpfls_cli.gap.balance.weak_flight import weak_flight
+from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.residual.dependence import rank_dependence
+from cpfls_cli.gap.residual.state_signals import joined_states, state_signals, without_actuation
 from cpfls_cli.vehicle.rigid_body import inertia_tensor
 from cpfls_cli.vehicle.settings import VehicleSettings
 

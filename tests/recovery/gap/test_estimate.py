@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.balance_system import system
-from cpfls_cli.gap.estimate import estimates
-from cpfls_cli.gap.search import block_index
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.naming.estimate import estimates
+from cpfls_cli.gap.naming.search import block_index
 from cpfls_cli.gap.settings import GapSettings
 from tests.unit.gap.synthetic_flights import candidate, fly, weak
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 from cpfls_cli.effects.effect import Columns
-from cpfls_cli.gap.noise_floor import modulated, noise_floor
-from cpfls_cli.gap.windows import windows
+from cpfls_cli.gap.balance.noise_floor import modulated, noise_floor
+from cpfls_cli.gap.balance.windows import windows
 
 PERIOD, SAMPLES = 0.01, 6000
 THROUGH = windows(PERIOD, 0.4, 0.5)

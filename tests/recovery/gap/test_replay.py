@@ -8,9 +8,9 @@ import pytest
 from cpfls_cli import rotations
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.gap.rate_equation import ReplayModel, euler_angles
-from cpfls_cli.gap.replay import held, replay, rigid_body, start_rate, start_samples
-from cpfls_cli.gap.worst_stretch import worst_stretch
+from cpfls_cli.gap.replay.rate_equation import ReplayModel, euler_angles
+from cpfls_cli.gap.replay.replay import held, replay, rigid_body, start_rate, start_samples
+from cpfls_cli.gap.replay.worst_stretch import worst_stretch
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 from cpfls_cli.vehicle.settings import VehicleSettings

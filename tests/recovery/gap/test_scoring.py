@@ -7,10 +7,10 @@ import pytest
 
 from cpfls_cli.effects.effect import Coefficient, Columns, Shape
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance_system import system
-from cpfls_cli.gap.refine import fit
-from cpfls_cli.gap.scoring import REFUSED, candidates_of
-from cpfls_cli.gap.search import block_index, look
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of
+from cpfls_cli.gap.naming.search import block_index, look
 from cpfls_cli.gap.settings import GapSettings
 from tests.unit.gap.synthetic_flights import candidate, fly, weak
 

@@ -7,9 +7,9 @@ import pytest
 from scipy.stats import gumbel_r
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance_system import system
-from cpfls_cli.gap.refine import refined
-from cpfls_cli.gap.search import Step, acceptable, exchanged, forward, look
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.refine import refined
+from cpfls_cli.gap.naming.search import Step, acceptable, exchanged, forward, look
 from cpfls_cli.gap.settings import GapSettings
 from tests.unit.gap.synthetic_flights import candidate, fly, weak
 

@@ -7,8 +7,8 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.weak_flight import Candidate, weak_flight
-from cpfls_cli.gap.windows import windows
+from cpfls_cli.gap.balance.weak_flight import Candidate, weak_flight
+from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 

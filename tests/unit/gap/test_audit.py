@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.gap.audit import audit
-from cpfls_cli.gap.windows import windows
+from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.sensors.audit import audit
 from cpfls_cli.vehicle.rotors import body_wrench
 from tests.recovery.gap.audit_flights import LEVELS, Faults, flight
 

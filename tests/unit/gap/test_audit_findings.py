@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cpfls_cli.gap.audit_findings import findings
-from cpfls_cli.gap.audit_gyro import GyroFit
+from cpfls_cli.gap.sensors.audit_findings import findings
+from cpfls_cli.gap.sensors.audit_gyro import GyroFit
 
 NAMES = ("gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay")
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import f as f_law
 
-from cpfls_cli.gap.dependence import rank_dependence
-from cpfls_cli.gap.mirrored import mirror_shifted
+from cpfls_cli.gap.balance.mirrored import mirror_shifted
+from cpfls_cli.gap.residual.dependence import rank_dependence
 
 FLIGHTS, LENGTH = 3, 120
 FLIGHT_INDEX = np.repeat(np.arange(FLIGHTS), LENGTH)

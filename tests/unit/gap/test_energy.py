@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cpfls_cli.gap.energy import energy_words
+from cpfls_cli.gap.naming.energy import energy_words
 
 RNG = np.random.default_rng(1)
 RATE = RNG.normal(size=(400, 3))

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.stats import binned_statistic_2d
 
-from cpfls_cli.gap.heat_map import heat_map
+from cpfls_cli.gap.residual.heat_map import heat_map
 
 
 def test_cells_hold_the_mean_and_count_every_known_window():

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli import rotations
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.inertial import rotation_balance, translation_balance
-from cpfls_cli.gap.windows import windows
+from cpfls_cli.gap.balance.inertial import rotation_balance, translation_balance
+from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.unit.gap.synthetic_flights import sines

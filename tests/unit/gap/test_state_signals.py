@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.state_signals import joined_states, state_signals
-from cpfls_cli.gap.weak_flight import weak_flight
-from cpfls_cli.gap.windows import windows
+from cpfls_cli.gap.balance.weak_flight import weak_flight
+from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.residual.state_signals import joined_states, state_signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 TIME = 5.0 + 0.01 * np.arange(1000)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.stretches import stretches
+from cpfls_cli.gap.residual.stretches import stretches
 
 HOP = 0.2
 CENTRES = np.tile(0.3 + HOP * np.arange(200), 2)

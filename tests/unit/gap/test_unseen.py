@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance_system import system
-from cpfls_cli.gap.unseen import not_excited
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.naming.unseen import not_excited
 from tests.unit.gap.synthetic_flights import candidate, fly, weak
 
 FLOOR = np.full(6, 0.05)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from cpfls_cli.gap.estimate import Estimates
-from cpfls_cli.gap.results import Estimate, NamedEffect
-from cpfls_cli.gap.vehicle_numbers import parameter_error
+from cpfls_cli.gap.naming.estimate import Estimates
+from cpfls_cli.gap.naming.results import Estimate, NamedEffect
+from cpfls_cli.gap.naming.vehicle_numbers import parameter_error
 
 
 def number(name, value, half):

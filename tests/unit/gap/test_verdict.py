@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.results import Alternative, NamedEffect, Unexplained, Verdict
+from cpfls_cli.gap.naming.results import Alternative, NamedEffect, Unexplained, Verdict
+from cpfls_cli.gap.naming.verdict import gap_stays, matters, verdict_of
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.gap.verdict import gap_stays, matters, verdict_of
 
 RIVAL = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")
 LEFT = Unexplained("torque y", 4.0, "yaw rate", 0.8, None, "neither")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.effect import Columns
-from cpfls_cli.gap.balance_system import system
-from cpfls_cli.gap.weak_flight import actuated, columns_of
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.weak_flight import actuated, columns_of
 from tests.unit.gap.synthetic_flights import THROUGH, VEHICLE, candidate, effect_wrench, fly, weak
 
 EFFECTS = [

@@ -5,8 +5,8 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from cpfls_cli.gap.whiteness import whiteness
-from cpfls_cli.gap.windows import windows
+from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.residual.whiteness import whiteness
 
 FLIGHT_INDEX = np.repeat([0, 1], 300)
 

@@ -11,8 +11,8 @@ from cpfls_cli import rotations
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.gap.weak_flight import weak_flight
-from cpfls_cli.gap.windows import windows
+from cpfls_cli.gap.balance.weak_flight import weak_flight
+from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.simulation import ClosedLoopSettings, SimulationSettings, measure
 from cpfls_cli.trajectory.attitude import flat_attitude
 from cpfls_cli.vehicle import RotorSettings, VehicleSettings

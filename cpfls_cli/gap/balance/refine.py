@@ -1,0 +1,142 @@
+"""Shapes between the points of their grids: the best value, all other coefficients following."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import least_squares, minimize_scalar
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import Shape
+from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.told_torque import compensation
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+
+_EVALUATIONS = 14
+_JOINT_EVALUATIONS = 8
+
+
+def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
+    """Improve the shapes of the chosen effects by the error of the fit.
+
+    The newest shapes first, one by one between the points of their grids; then, where there are several, all together,
+    because a lag and a delay, say, trade with each other.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    floor : array, shape (6,)
+
+    Returns
+    -------
+    System
+    """
+    best = list(chosen)
+    told = system(flights).rotor_wrench
+    shapes = [(place, shape) for place, candidate in enumerate(best) for shape in candidate.effect.shapes]
+    newest = [(place, shape) for place, shape in shapes if place == len(best) - 1]
+    # A second round where there are several: the best length of a cable depends on its damping.
+    for place, shape in newest * min(len(newest), 2):
+        best[place] = _improved(flights, best, place, shape, floor, told)
+    return system(flights, _together(flights, best, shapes, floor, told) if len(shapes) > 1 else best)
+
+
+def fit(hypothesis: System, floor: Array) -> Array:
+    """Fit all free columns.
+
+    Parameters
+    ----------
+    hypothesis : System
+    floor : array, shape (6,)
+
+    Returns
+    -------
+    array, shape (column,)
+    """
+    matrix = (hypothesis.base / floor[:, None]).reshape(-1, hypothesis.base.shape[2])
+    length = np.linalg.norm(matrix, axis=0)
+    scale = 1.0 / np.where(length > 0, length, 1.0)
+    right = (hypothesis.residual / floor).reshape(-1)
+    return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale)
+
+
+def left(hypothesis: System, floor: Array, told: Array) -> Array:
+    """Compute what a hypothesis leaves after its fit, in floors, as if its rotors gave as much torque as told.
+
+    Parameters
+    ----------
+    hypothesis : System
+    floor : array, shape (6,)
+    told : array, shape (window, 6), N m and N
+        Wrench of the rotors without effects on the actuation.
+
+    Returns
+    -------
+    array, shape (window, 6)
+    """
+    weight = compensation(told, hypothesis.rotor_wrench) / floor
+    return np.asarray((hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)) * weight)
+
+
+def _improved(
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    place: int,
+    shape: Shape,
+    floor: Array,
+    told: Array,
+) -> Candidate:
+    candidate = chosen[place]
+
+    def moved(value: float) -> Candidate:
+        return Candidate(candidate.effect, {**candidate.shape, shape.name: float(value)})
+
+    def error(value: float) -> float:
+        hypothesis = system(flights, [*chosen[:place], moved(value), *chosen[place + 1 :]])
+        return float((left(hypothesis, floor, told) ** 2).sum())
+
+    bracket = _bracket(shape.grid, candidate.shape[shape.name])
+    found = minimize_scalar(
+        error, bounds=bracket, method="bounded", options={"maxiter": _EVALUATIONS, "xatol": 1e-3 * np.ptp(bracket)}
+    )
+    return moved(found.x)
+
+
+def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
+    """Find the neighbours of a value on its grid."""
+    place = int(np.argmin(np.abs(np.asarray(grid) - value)))
+    return float(grid[max(0, place - 1)]), float(grid[min(len(grid) - 1, place + 1)])
+
+
+def _together(
+    flights: Sequence[WeakFlight],
+    chosen: list[Candidate],
+    shapes: list[tuple[int, Shape]],
+    floor: Array,
+    told: Array,
+) -> list[Candidate]:
+    low = np.array([shape.grid[0] for _, shape in shapes])
+    high = np.array([shape.grid[-1] for _, shape in shapes])
+    start = np.array([chosen[place].shape[shape.name] for place, shape in shapes])
+
+    def moved(values: Array) -> list[Candidate]:
+        there = list(chosen)
+        for (place, shape), value in zip(shapes, low + values * (high - low), strict=True):
+            there[place] = Candidate(there[place].effect, {**there[place].shape, shape.name: float(value)})
+        return there
+
+    def error(values: Array) -> Array:
+        return left(system(flights, moved(values)), floor, told).reshape(-1)
+
+    found = least_squares(
+        error,
+        np.clip((start - low) / (high - low), 1e-6, 1 - 1e-6),
+        bounds=(0.0, 1.0),
+        diff_step=[1e-3],
+        max_nfev=_JOINT_EVALUATIONS,
+        xtol=1e-4,
+        ftol=1e-5,
+    )
+    return moved(found.x)

@@ -1,0 +1,236 @@
+"""A flight as rows of the balance: one window, three torques and three forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.effects.effect import Columns, Effect
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.inertial import Balance, InertiaModel, rotation_balance, translation_balance
+from cpfls_cli.gap.balance.noise_floor import noise_floor
+from cpfls_cli.gap.balance.windows import Windows
+
+_AXES = ("x", "y", "z")
+
+_TURNING = 4.0
+"""Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth."""
+
+CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
+"""Rows of the balance in each window, body axes, N m and N."""
+
+
+class Candidate(NamedTuple):
+    """An effect with a value for each of its shapes.
+
+    Attributes
+    ----------
+    effect : Effect
+    shape : mapping of str to float
+    """
+
+    effect: Effect
+    shape: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class WeakFlight:
+    """A flight with the inertial side of its balance.
+
+    Attributes
+    ----------
+    name : str
+    signals : Signals
+    windows : Windows
+    inertial : Columns
+        Momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
+    known : array of bool, shape (6,)
+        Channels that the flight has.
+    turns : array, shape (parameter,)
+        1 for numbers of the vehicle that the flight can show, 0 for the inertia about axes that hardly turn.
+    seen : dict
+        Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
+    """
+
+    name: str
+    signals: Signals
+    windows: Windows
+    inertial: Columns
+    known: BoolArray
+    turns: Array
+    seen: dict[tuple[str, tuple[float, ...]], Array] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return self.windows.count(len(self.signals))
+
+    def residual(self, signals: Signals) -> Columns:
+        """Subtract what the rotors do from the inertial side.
+
+        Parameters
+        ----------
+        signals : Signals
+            As they are, or with actuator effects applied.
+
+        Returns
+        -------
+        Columns
+            Of shape (time, 6), N m and N.
+        """
+        return Columns((self.inertial.direct - signals.wrench) * self.known, self.inertial.momentum)
+
+    def rows(self, candidate: Candidate, signals: Signals) -> Array:
+        """Average the columns of a candidate over the windows.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            Of an effect with columns.
+        signals : Signals
+            As they are, or with actuator effects applied.
+
+        Returns
+        -------
+        array, shape (window, 6, coefficient)
+        """
+        if signals is not self.signals:
+            return self._rows(candidate, signals)
+        key = (candidate.effect.name, tuple(candidate.shape.values()))
+        if key not in self.seen:
+            self.seen[key] = self._rows(candidate, signals)
+        return self.seen[key]
+
+    def _rows(self, candidate: Candidate, signals: Signals) -> Array:
+        rows = self.averaged(columns_of(candidate, signals))
+        return rows * self.turns if candidate.effect.kind == "parameter" else rows
+
+    def without_force(self) -> WeakFlight:
+        """Leave the force balance out.
+
+        Returns
+        -------
+        WeakFlight
+        """
+        known = self.known & (np.arange(6) < 3)
+        seen = {key: rows * known[:, None] for key, rows in self.seen.items()}
+        return replace(self, known=known, seen=seen)
+
+    def averaged(self, columns: Columns) -> Array:
+        """Average columns, or a residual, over the windows.
+
+        Parameters
+        ----------
+        columns : Columns
+
+        Returns
+        -------
+        array, shape (window, 6, ...)
+        """
+        rows = self.windows.average(columns.direct)
+        if columns.momentum is not None:
+            rows = rows + self.windows.derivative(columns.momentum)
+        return np.asarray(rows * self.known.reshape(-1, *[1] * (rows.ndim - 2)))
+
+
+def weak_flight(
+    name: str,
+    signals: Signals,
+    windows: Windows,
+    model: InertiaModel | None,
+    force: bool,
+    axes: Sequence[str] = _AXES,
+) -> WeakFlight:
+    """Write down the inertial side of a flight.
+
+    Parameters
+    ----------
+    name : str
+    signals : Signals
+    windows : Windows
+    model : InertiaModel or None
+    force : bool
+        Whether to use the force balance where the flight allows it.
+    axes : sequence of str
+        Body axes of which the torque balance is used.
+
+    Returns
+    -------
+    WeakFlight
+    """
+    with_force = force and signals.has_force
+    rotation = rotation_balance(signals, model)
+    nothing = np.zeros((len(signals), 3))
+    translation = translation_balance(signals) if with_force else Balance(nothing, nothing)
+    inertial = Columns(
+        np.concatenate([rotation.direct, translation.direct], axis=1),
+        np.concatenate([rotation.momentum, translation.momentum], axis=1),
+    )
+    known = np.array([signals.torque is not None and axis in axes for axis in _AXES] + [with_force] * 3)
+    hardly = WeakFlight(name, signals, windows, inertial, known, np.ones(len(nuisance().effect.coefficients)))
+    return replace(hardly, turns=_turns(hardly))
+
+
+def _turns(flight: WeakFlight) -> Array:
+    """Find what the flight shows of the vehicle's own numbers.
+
+    Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to be rid of the noise
+    of the gyroscope, which is not what anybody asked.
+    """
+    left = flight.residual(flight.signals)
+    floor = noise_floor(left, flight.windows)[:3]
+    moved = flight.averaged(flight.inertial)[:, :3].std(axis=0) > _TURNING * floor
+    names = [coefficient.name for coefficient in nuisance().effect.coefficients]
+    about = {f"{kind}_{axis}": moved[n] for kind in ("inertia", "coupling") for n, axis in enumerate("xyz")}
+    return np.array([float(about.get(name, True)) for name in names])
+
+
+def columns_of(candidate: Candidate, signals: Signals) -> Columns:
+    """Evaluate the columns of an effect.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Of an effect with columns.
+    signals : Signals
+
+    Returns
+    -------
+    Columns
+        Of shape (time, 6, coefficient).
+    """
+    assert candidate.effect.columns is not None, "only effects with columns are candidates"
+    return candidate.effect.columns(signals, candidate.shape)
+
+
+def nuisance() -> Candidate:
+    """Give the parameters of the vehicle that stay free in every fit.
+
+    Returns
+    -------
+    Candidate
+    """
+    return Candidate(CATALOGUE["parameter_error"], {})
+
+
+def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
+    """Apply the actuator effects among those chosen.
+
+    Parameters
+    ----------
+    signals : Signals
+    chosen : iterable of Candidate
+        Those that need a signal which the flight lacks leave it as it is: measured speeds, say, do not lag.
+
+    Returns
+    -------
+    Signals
+    """
+    for candidate in chosen:
+        effect = candidate.effect
+        if effect.apply is not None and effect.kind == "actuator" and not effect.missing(signals):
+            signals = effect.apply(signals, candidate.shape)
+    return signals

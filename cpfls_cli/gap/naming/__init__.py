@@ -1,0 +1,1 @@
+"""From a gap to names: search, estimates, rivals, verdict."""

@@ -1,0 +1,146 @@
+"""Coefficients with confidence intervals: all of them fitted together, scattered by leaving out blocks of time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.gap.balance.balance_system import System, is_free
+from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.balance.shape_columns import free_shapes, shape_columns
+from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming.results import Estimate
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """A fitted hypothesis.
+
+    Attributes
+    ----------
+    linear : array, shape (column,)
+        Of the base of the hypothesis.
+    effects : tuple of tuple of Estimate
+        Of each chosen effect: physical coefficients, then shapes.
+    parameters : tuple of Estimate
+        Of the vehicle's own numbers.
+    of_effect : tuple of array, shape (coefficient,)
+        Linear coefficients of each chosen effect; empty where it has none.
+    """
+
+    linear: Array
+    effects: tuple[tuple[Estimate, ...], ...]
+    parameters: tuple[Estimate, ...]
+    of_effect: tuple[Array, ...]
+
+
+def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
+    """Fit a hypothesis and scatter its numbers.
+
+    The jackknife leaves out one block after another, so it holds for residuals that are correlated within blocks and
+    for noise of unequal size. Shapes take part by their derivatives.
+
+    Parameters
+    ----------
+    hypothesis : System
+        With refined shapes.
+    weight : array, shape (6,), N m and N
+        Standard deviation of each channel.
+    block : array of int, shape (window,)
+
+    Returns
+    -------
+    Estimates
+
+    References
+    ----------
+    Efron and Tibshirani 1993, chapter 11 (delete-a-group jackknife).
+    """
+    linear = fit(hypothesis, weight)
+    shapes = [candidate.shape[name] for candidate, name in free_shapes(hypothesis)]
+    values = np.concatenate([linear, shapes])
+    jacobian = np.concatenate([hypothesis.base, shape_columns(hypothesis, linear)], axis=2)
+    rows = (jacobian / weight[:, None], (hypothesis.residual - hypothesis.base @ linear) / weight)
+    left_out = values + _one_step(*rows, block)
+    found, own_linear, first = [], [], hypothesis.columns(hypothesis.free[0]).shape[2]
+    parameters = _of(hypothesis.free[0], hypothesis, values[:first], left_out[:, :first], np.zeros(0), left_out[:, :0])
+    place, shape_place = first, len(linear)
+    for candidate in hypothesis.chosen:
+        width = hypothesis.columns(candidate).shape[2] if is_free(candidate) else 0
+        depth = len(candidate.effect.shapes)
+        own, shaped = slice(place, place + width), slice(shape_place, shape_place + depth)
+        found.append(_of(candidate, hypothesis, values[own], left_out[:, own], values[shaped], left_out[:, shaped]))
+        own_linear.append(linear[own])
+        place, shape_place = place + width, shape_place + depth
+    return Estimates(linear, tuple(found), parameters, tuple(own_linear))
+
+
+def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
+    """Tell whether any number that gives an effect its size is surely not zero.
+
+    Parameters
+    ----------
+    effect : Effect
+    numbers : sequence of Estimate
+        Physical coefficients, then shapes.
+
+    Returns
+    -------
+    bool
+    """
+    if effect.unit_coefficient and not effect.shapes:
+        return True
+    shapes = {shape.name for shape in effect.shapes}
+    sized = [number for number in numbers if (number.name in shapes) == effect.unit_coefficient]
+    return any(number.low > 0 or number.high < 0 for number in sized)
+
+
+def _of(
+    candidate: Candidate, hypothesis: System, linear: Array, linear_out: Array, shape: Array, shape_out: Array
+) -> tuple[Estimate, ...]:
+    effect = candidate.effect
+    vehicle = hypothesis.flights[0].signals.vehicle
+    estimates = []
+    if len(linear):
+        to_physical = effect.physical or (lambda values: values)
+        value = to_physical(linear)
+        scatter = _interval(value, np.array([to_physical(row) for row in linear_out]))
+        estimates += [
+            Estimate(c.name, c.unit, float(v), float(v - s), float(v + s), c.bounds(vehicle))
+            for c, v, s in zip(effect.coefficients, value, scatter, strict=False)
+            if np.isfinite(v)
+        ]
+    scatter = _interval(shape, shape_out)
+    estimates += [
+        Estimate(s.name, s.unit, float(v), float(v - d), float(v + d), (s.grid[0], s.grid[-1]))
+        for s, v, d in zip(effect.shapes, shape, scatter, strict=False)
+    ]
+    return tuple(estimates)
+
+
+def _interval(value: Array, left_out: Array) -> Array:
+    """Half the width of the 95 % interval by the jackknife."""
+    blocks = len(left_out)
+    if blocks < 2:
+        return np.full(len(value), np.inf)
+    error = np.sqrt((blocks - 1) / blocks * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0))
+    return np.asarray(student.ppf(0.975, blocks - 1) * error)
+
+
+def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:
+    """Change of all numbers where a block is left out, one Gauss-Newton step; shape (block, number)."""
+    scale = np.sqrt((jacobian**2).sum(axis=(0, 1)))
+    scaled = jacobian / np.where(scale > 0, scale, 1.0)
+    parts = [
+        (scaled[block == b].reshape(-1, scaled.shape[2]), residual[block == b].reshape(-1)) for b in np.unique(block)
+    ]
+    gram = np.array([x.T @ x for x, _ in parts])
+    moment = np.array([x.T @ r for x, r in parts])
+    ridge = 1e-9 * np.eye(gram.shape[1])
+    change = -np.linalg.solve(gram.sum(axis=0) - gram + ridge, moment[..., None])[..., 0]
+    return np.asarray(change / np.where(scale > 0, scale, 1.0))

@@ -1,0 +1,167 @@
+"""The gap on flights that no fit has seen: how large it was, how large it is with the effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.floor import floors
+from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.naming.results import GapSize
+from cpfls_cli.gap.naming.scatter import scatter_variance
+
+_MARGIN = 1.25
+"""Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
+
+_COUNTS = 0.05
+"""Share of the whole gap, in squared floors, from which on the lesser of torque and force is judged on its own."""
+
+_CLEAR = 1.5
+"""Root mean square in floors that one of its channels has to have: floors of coloured noise are off by a third."""
+
+_SEEN = 0.3
+"""Root mean square in floors that wrong numbers of the vehicle have to explain of one channel."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Residuals of held-out flights under three models.
+
+    Attributes
+    ----------
+    before : array, shape (window, 6), N m and N
+        Of the model as given, on signals as logged.
+    parameters : array, shape (window, 6)
+        Of the model with its own numbers refitted on the training flights.
+    after : array, shape (window, 6)
+        Of the model with effects.
+    floor : array, shape (6,)
+    known : array of bool, shape (window, 6)
+    noise : array, shape (window, 6)
+        Floor of each window with the scatter that belongs to the effects.
+    """
+
+    before: Array
+    parameters: Array
+    after: Array
+    floor: Array
+    known: Array
+    noise: Array
+
+    def size(self, residual: Array) -> GapSize:
+        """Measure a residual.
+
+        Parameters
+        ----------
+        residual : array, shape (window, 6)
+
+        Returns
+        -------
+        GapSize
+        """
+        count = self.known.sum(axis=0)
+        square = (residual**2 * self.known).sum(axis=0)
+        value = np.sqrt(np.where(count > 0, square / np.maximum(count, 1), np.nan))
+        in_floors = ((residual / self.noise) ** 2 * self.known).sum(axis=0)
+        return GapSize(value, np.sqrt(np.where(count > 0, in_floors / np.maximum(count, 1), np.nan)))
+
+    def share(self) -> float:
+        """Give the share of the gap above the floor that the effects take off.
+
+        Of torque or force whichever is less, where each is a part of the gap that counts.
+        """
+        before, after = self.parameters / self.noise, self.after / self.noise
+        kinds = [slice(0, 3), slice(3, 6)]
+        sizes = [_above(before[:, kind], self.known[:, kind]) for kind in kinds]
+        clear = [
+            share_removed(before[:, kind], after[:, kind], self.known[:, kind])
+            for kind, size in zip(kinds, sizes, strict=True)
+            if size > _COUNTS * sum(sizes) and _largest(before[:, kind]) > _CLEAR
+        ]
+        each = [share_removed(before[:, kind], after[:, kind], self.known[:, kind]) for kind in kinds]
+        return min(clear) if clear else max(each)
+
+    def explained_by_parameters(self) -> float:
+        """Give the share of the gap that refitted numbers of the vehicle take off; 0 where nobody would see it."""
+        before, after = self.before / self.noise, self.parameters / self.noise
+        rows = np.maximum(self.known.sum(axis=0), 1)
+        gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
+        return share_removed(before, after, self.known) if gone.max() > _SEEN**2 else 0.0
+
+
+def _largest(residual: Array) -> float:
+    return float(np.sqrt(np.mean(residual**2, axis=0)).max())
+
+
+def share_removed(before: Array, after: Array, known: Array) -> float:
+    """Give the share of a gap above the floor that is gone.
+
+    Parameters
+    ----------
+    before, after : array, shape (window, channel), floors
+    known : array of bool, shape (window, channel)
+
+    Returns
+    -------
+    float
+        0 where nothing is gained.
+    """
+    gone = float(((before**2 - after**2) * known).sum())
+    left = _above(after, known)
+    return max(0.0, gone / (gone + left)) if gone > 0 else 0.0
+
+
+def _above(residual: Array, known: Array) -> float:
+    """Sum what channels have above the floor, in squared floors."""
+    return float(np.maximum((residual**2 * known).sum(axis=0) - _MARGIN * known.sum(axis=0), 0.0).sum())
+
+
+def held_out(
+    logged: Sequence[WeakFlight],
+    repaired: Sequence[WeakFlight],
+    fitted: System,
+    linear: Array,
+    parameters: Array,
+    scatter: float,
+) -> HeldOut:
+    """Apply a fitted hypothesis to flights that it has not seen.
+
+    Parameters
+    ----------
+    logged, repaired : sequence of WeakFlight
+        The flights as logged, and after repair of the sensors.
+    fitted : System
+        Of the training flights.
+    linear : array, shape (column,)
+    parameters : array, shape (parameter,)
+        The vehicle's own numbers where nothing else is fitted.
+    scatter : float
+        Mean square of the relative scatter of the effects, from the training flights.
+
+    Returns
+    -------
+    HeldOut
+
+    Raises
+    ------
+    InputError
+        If they lack a signal that the effects need.
+    """
+    raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
+    if not all(full.can(candidate) for candidate in (*full.free, *full.chosen)):
+        raise InputError("the held-out flights lack a signal that a named effect needs; hold out others")
+    known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in repaired])
+    floor = floors(full, linear)
+    return HeldOut(
+        raw.residual,
+        plain.residual - plain.base @ parameters,
+        full.residual - full.base @ linear,
+        floor,
+        known,
+        np.sqrt(floor**2 + scatter * scatter_variance(full)),
+    )

@@ -1,0 +1,192 @@
+"""What a diagnosis says, as typed objects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.gap.balance.weak_flight import Candidate
+
+
+class Verdict(StrEnum):
+    """What is known of a gap."""
+
+    NAMED = "NAMED"
+    PARTIAL = "PARTIAL"
+    AMBIGUOUS = "AMBIGUOUS"
+    UNEXPLAINED = "UNEXPLAINED"
+    NO_GAP = "NO_GAP"
+    NOT_EXCITED = "NOT_EXCITED"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A coefficient as found.
+
+    Attributes
+    ----------
+    name, unit : str
+    value : float
+    low, high : float
+        95 % confidence interval.
+    plausible : tuple of float
+        Range that is physically possible on the vehicle.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    plausible: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that is part of the diagnosis.
+
+    Attributes
+    ----------
+    name : str
+    candidate : Candidate or None
+        With its shapes; None for faults of sensors.
+    linear : array, shape (coefficient,)
+        Linear coefficients; empty where the effect has none.
+    coefficients : tuple of Estimate
+        Physical coefficients, then shapes.
+    p_value : float
+        Probability that chance explains as much, over the whole catalogue.
+    share : float
+        Part of the gap above the floor that comes back without it.
+    selection_frequency : float
+        Share of the blocks without which it would still be the first choice.
+    sentence : str
+    """
+
+    name: str
+    candidate: Candidate | None
+    linear: Array
+    coefficients: tuple[Estimate, ...]
+    p_value: float
+    share: float
+    selection_frequency: float
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """An effect that the flights cannot tell from a named one.
+
+    Attributes
+    ----------
+    name : str
+    instead_of : str
+    relative_gain : float
+        What it explains, as a share of what the named one explains.
+    separated_by : str
+        The flight that would tell.
+    """
+
+    name: str
+    instead_of: str
+    relative_gain: float
+    separated_by: str
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """A channel with a gap that nothing in the catalogue explains.
+
+    Attributes
+    ----------
+    axis : str
+    floors : float
+        Root mean square of what is left, in floors.
+    signal : str or None
+        The one signal that it depends on most.
+    share : float
+        Share of what is left that the signal, or the narrow band, explains.
+    frequency_hz : float or None
+        Of a narrow band that stands out.
+    energy : str
+        ``feeds``, ``drains`` or ``neither``.
+    """
+
+    axis: str
+    floors: float
+    signal: str | None
+    share: float
+    frequency_hz: float | None
+    energy: str
+
+
+@dataclass(frozen=True)
+class NotExcited:
+    """An effect that these flights could not show.
+
+    Attributes
+    ----------
+    name : str
+    reason : str
+    """
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class GapSize:
+    """Gap of each channel on flights that the fit did not see.
+
+    Attributes
+    ----------
+    value : array, shape (6,), N m and N
+        Root mean square over windows; NaN where unknown.
+    floors : array, shape (6,)
+    """
+
+    value: Array
+    floors: Array
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What is missing in a model.
+
+    Attributes
+    ----------
+    verdict : Verdict
+    effects : tuple of NamedEffect
+    closest : tuple of NamedEffect
+        What explained most where the verdict names nothing.
+    alternatives : tuple of Alternative
+    unexplained : tuple of Unexplained
+    not_excited : tuple of NotExcited
+    parameters : mapping of str to Estimate
+        Relative errors of the vehicle's own numbers, refitted with the effects.
+    share : float
+        Share of the gap above the floor that the effects take off the held-out flights.
+    before, after : GapSize
+        Of the model as it was and with the effects, on the held-out flights.
+    floor : array, shape (6,), N m and N
+    torque_alone : tuple of (str, float)
+        First choices of a look at the torques alone, and the share that each would explain.
+    notes : tuple of str
+        What a reader should know, in sentences.
+    """
+
+    verdict: Verdict
+    effects: tuple[NamedEffect, ...]
+    closest: tuple[NamedEffect, ...]
+    alternatives: tuple[Alternative, ...]
+    unexplained: tuple[Unexplained, ...]
+    not_excited: tuple[NotExcited, ...]
+    parameters: Mapping[str, Estimate]
+    share: float
+    before: GapSize
+    after: GapSize
+    floor: Array
+    torque_alone: tuple[tuple[str, float], ...]
+    notes: tuple[str, ...]

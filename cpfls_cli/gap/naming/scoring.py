@@ -1,0 +1,254 @@
+"""What each candidate explains of blocks that its fit did not see, and what chance explains as well."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.gap.balance.balance_system import System
+from cpfls_cli.gap.balance.folds import Folds, folds
+from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.balance.shape_columns import free_shapes, shape_columns
+from cpfls_cli.gap.balance.told_torque import compensation
+from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming.bounds import information, within_bounds
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+REFUSED = -np.inf
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A candidate and what it explains.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    columns : array of int
+        Of the layout; without those that a bound at 0 took out.
+    gain : float
+        Sum of squares taken off the blocks that the fits did not see, in squared floors; minus infinity where refused.
+    block_error : array, shape (block,)
+        What is left on each block.
+    coefficients : array, shape (coefficient,)
+        Linear, of a fit on all blocks; 0 where a bound took one out.
+    """
+
+    candidate: Candidate
+    columns: IntArray
+    gain: float
+    block_error: Array
+    coefficients: Array
+
+
+class Place(NamedTuple):
+    """Where a candidate stands in a layout.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    columns : array of int
+    weight : array, shape (6,)
+        On the residuals of the channels where the candidate acts on the actuation.
+    """
+
+    candidate: Candidate
+    columns: IntArray
+    weight: Array
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Base columns and candidates side by side.
+
+    Attributes
+    ----------
+    matrix : array, shape (window, 6, column)
+        Weighted.
+    base : array of int
+    candidates : tuple of Place
+    prior : array, shape (column,)
+        What bounds say of the coefficients before any data.
+    """
+
+    matrix: Array
+    base: IntArray
+    candidates: tuple[Place, ...]
+    prior: Array
+
+
+def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
+    """List effects at all points of their grids.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+
+    Returns
+    -------
+    list of Candidate
+    """
+    return [
+        Candidate(effect, dict(zip((shape.name for shape in effect.shapes), values, strict=True)))
+        for effect in effects
+        for values in product(*(shape.tried for shape in effect.shapes))
+    ]
+
+
+def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) -> Layout:
+    """Arrange base and candidates, in floors.
+
+    The shapes of the chosen effects stand in the base by their derivatives, so that a candidate is judged by what it
+    adds after they have moved.
+
+    Parameters
+    ----------
+    hypothesis : System
+    candidates : sequence of Candidate
+    floor : array, shape (6,)
+
+    Returns
+    -------
+    Layout
+    """
+    moving = shape_columns(hypothesis, fit(hypothesis, floor))
+    parts: list[Array] = [hypothesis.base, moving]
+    places: list[Place] = []
+    first = hypothesis.base.shape[2] + moving.shape[2]
+    base = np.arange(first)
+    for candidate in candidates:
+        columns = primary(candidate, hypothesis.columns(candidate))
+        parts.append(columns)
+        places.append(Place(candidate, np.arange(first, first + columns.shape[2]), _weight(hypothesis, candidate)))
+        first += columns.shape[2]
+    widths = [(each, hypothesis.columns(each).shape[2]) for each in hypothesis.free]
+    widths += [(place.candidate, len(place.columns)) for place in places]
+    vehicle = hypothesis.flights[0].signals.vehicle
+    known = [information(each.effect, width, vehicle) for each, width in widths]
+    free, offered = known[: len(hypothesis.free)], known[len(hypothesis.free) :]
+    shapes = np.array([1.0 / np.ptp(_grid(each, name)) ** 2 for each, name in free_shapes(hypothesis)])
+    prior = np.concatenate([*free, shapes, *offered])
+    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(places), prior)
+
+
+def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
+    return next(shape.grid for shape in candidate.effect.shapes if shape.name == name)
+
+
+def primary(candidate: Candidate, columns: Array) -> Array:
+    """Leave out the columns that come in only once an effect is chosen.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    columns : array, shape (window, 6, coefficient)
+
+    Returns
+    -------
+    array, shape (window, 6, coefficient)
+    """
+    secondary = np.array([coefficient.secondary for coefficient in candidate.effect.coefficients], dtype=bool)
+    return columns[..., ~secondary] if secondary.any() and len(secondary) == columns.shape[2] else columns
+
+
+def score(arranged: Layout, normal: Folds, hypothesis: System) -> list[Scored]:
+    """Score every candidate.
+
+    Parameters
+    ----------
+    arranged : Layout
+    normal : Folds
+        Of one right side.
+    hypothesis : System
+
+    Returns
+    -------
+    list of Scored
+        Best first.
+    """
+    _, before = normal.solve(arranged.base)
+    vehicle = hypothesis.flights[0].signals.vehicle
+    scored = [_scored(place, arranged.base, normal, before[:, 0], vehicle) for place in arranged.candidates]
+    return sorted(scored, key=lambda found: -found.gain)
+
+
+def chance(arranged: Layout, normal: Folds) -> Array:
+    """Find what the best candidate explains of each draw of shifted residuals.
+
+    Signs and bounds are not used, so chance is given more than its due.
+
+    Parameters
+    ----------
+    arranged : Layout
+    normal : Folds
+        Of many right sides.
+
+    Returns
+    -------
+    array, shape (draw,)
+    """
+    _, before = normal.solve(arranged.base)
+    best = np.full(before.shape[1], -np.inf)
+    for place in arranged.candidates:
+        best = np.maximum(best, (before - _error(place, place.columns, arranged.base, normal)).sum(axis=0))
+    return best
+
+
+def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArray) -> Folds:
+    """Build the normal equations of a layout.
+
+    Parameters
+    ----------
+    arranged : Layout
+    right : array, shape (window, 6) or (window, 6, draw), N m and N
+    floor : array, shape (6,)
+    block : array of int, shape (window,)
+
+    Returns
+    -------
+    Folds
+    """
+    weighted = right / (floor if right.ndim == 2 else floor[:, None])
+    return folds(arranged.matrix, weighted, block, arranged.prior)
+
+
+def _weight(hypothesis: System, candidate: Candidate) -> Array:
+    if candidate.effect.kind != "actuator":
+        return np.ones(6)
+    told = hypothesis.rotor_wrench
+    return compensation(told, told + hypothesis.columns(candidate)[..., 0])
+
+
+def _error(place: Place, columns: IntArray, base: IntArray, normal: Folds) -> Array:
+    if place.candidate.effect.unit_coefficient:
+        return normal.subtracted(int(columns[0]), base, place.weight).solve(np.arange(len(base)))[1]
+    return normal.solve(np.concatenate([base, columns]))[1]
+
+
+def _scored(place: Place, base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings) -> Scored:
+    candidate, columns, _ = place
+    if len(columns) == 0:
+        return Scored(candidate, columns, REFUSED, before, np.zeros(0))
+    if candidate.effect.unit_coefficient:
+        error = _error(place, columns, base, normal)[:, 0]
+        return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
+    kept = np.ones(len(columns), dtype=bool)
+    for _ in range(len(columns)):
+        fitted, unsure = np.zeros(len(columns)), np.zeros(len(columns))
+        together = np.concatenate([base, columns[kept]])
+        fitted[kept], unsure[kept] = normal.fit(together)[0][len(base) :, 0], normal.errors(together)[len(base) :]
+        keep, admissible = within_bounds(candidate.effect, fitted, unsure, vehicle)
+        if not admissible or not (kept & keep).any():
+            return Scored(candidate, columns, REFUSED, before, fitted)
+        if (kept & keep == kept).all():
+            break
+        kept &= keep
+    used = columns[kept]
+    error = _error(place, used, base, normal)[:, 0]
+    return Scored(candidate, used, float((before - error).sum()), error, fitted)

@@ -1,0 +1,324 @@
+"""The search for the effects that explain a gap: one at a time, against chance, with exchange and dropping."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import gumbel_r
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.floor import floors
+from cpfls_cli.gap.balance.folds import blocks_of
+from cpfls_cli.gap.balance.mirrored import mirror_shifted
+from cpfls_cli.gap.balance.refine import fit, refined
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.ambiguity import simplest, unbeaten
+from cpfls_cli.gap.naming.scoring import (
+    REFUSED,
+    Layout,
+    Scored,
+    candidates_of,
+    chance,
+    layout,
+    normal_equations,
+    score,
+)
+from cpfls_cli.gap.settings import GapSettings
+
+_LEAST_SHARE = 0.05
+"""Share of the remaining gap above the floor that an effect has to explain."""
+
+_LEAST_IN_FLOORS = 0.3
+"""Root mean square that an effect has to explain of one channel, in floors."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One look at all candidates beside a hypothesis.
+
+    Attributes
+    ----------
+    hypothesis : System
+    floor : array, shape (6,)
+    ranking : tuple of Scored
+        Best first, each effect once, at its best shape.
+    chance : array, shape (shift,)
+        What the best candidate explains of shifted residuals.
+    above_floor : float
+        Sum of squares that the hypothesis leaves above the floor, in squared floors.
+    """
+
+    hypothesis: System
+    floor: Array
+    ranking: tuple[Scored, ...]
+    chance: Array
+    above_floor: float
+    block_before: Array
+
+    def p_value(self, gain: float) -> float:
+        """Compute the probability that chance explains as much, over the whole catalogue.
+
+        The share of shifts that do; beyond all of them, the tail of the extreme-value law fitted to them.
+
+        Parameters
+        ----------
+        gain : float
+
+        Returns
+        -------
+        float
+        """
+        if not np.isfinite(gain):
+            return 1.0
+        reached = (1 + int((self.chance >= gain).sum())) / (1 + len(self.chance))
+        if reached > 1.5 / (1 + len(self.chance)):
+            return reached
+        # By moments: a fit by likelihood is several times slower and no better in the tail.
+        scale = max(float(np.std(self.chance)) * np.sqrt(6) / np.pi, 1e-12)
+        return float(min(reached, gumbel_r.sf(gain, np.mean(self.chance) - np.euler_gamma * scale, scale)))
+
+
+def look(
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    effects: Sequence[Effect],
+    settings: GapSettings,
+    rng: np.random.Generator | None,
+    also: Sequence[Candidate] = (),
+) -> Step:
+    """Score all effects beside those chosen.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    effects : sequence of Effect
+        To be scored.
+    settings : GapSettings
+    rng : numpy.random.Generator or None
+        Of the shifts; None for none.
+    also : sequence of Candidate
+        Tried beside the grids, with shapes of their own.
+
+    Returns
+    -------
+    Step
+    """
+    hypothesis = system(flights, chosen)
+    floor = best_floor(hypothesis)
+    names = {candidate.effect.name for candidate in chosen}
+    listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
+    tried = [candidate for candidate in listed if hypothesis.can(candidate)]
+    arranged = layout(hypothesis, tried, floor)
+    block = block_index(hypothesis, settings)
+    normal = normal_equations(arranged, hypothesis.residual, floor, block)
+    ranking = _each_once(score(arranged, normal, hypothesis))
+    left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+    before = normal.solve(arranged.base)[1][:, 0]
+    return Step(
+        hypothesis,
+        floor,
+        ranking,
+        _chance(arranged, left, hypothesis, floor, block, settings, rng),
+        float(max(before.sum() - _rows(hypothesis), 1e-9)),
+        before,
+    )
+
+
+def forward(
+    flights: Sequence[WeakFlight],
+    effects: Sequence[Effect],
+    settings: GapSettings,
+    rng: np.random.Generator,
+    progress: Callable[[int], None] = lambda _: None,
+) -> tuple[tuple[Candidate, ...], list[Step]]:
+    """Add effects one at a time while each explains more than chance and enough of what is left.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    effects : sequence of Effect
+    settings : GapSettings
+    rng : numpy.random.Generator
+    progress : callable
+        Takes the number of looks done.
+
+    Returns
+    -------
+    chosen : tuple of Candidate
+    steps : list of Step
+        The last one has nothing to add.
+    """
+    chosen: tuple[Candidate, ...] = ()
+    steps: list[Step] = []
+    tried: set[frozenset[str]] = {frozenset()}
+    while True:
+        step = look(flights, chosen, effects, settings, rng)
+        steps.append(step)
+        progress(len(steps))
+        if len(chosen) >= settings.effects_max or not acceptable(step, settings):
+            return chosen, steps
+        best = simplest(step.ranking, step.above_floor)
+        found = refined(flights, [*chosen, best.candidate], step.floor)
+        if not quiet_enough(best.gain, step, found):
+            return chosen, steps
+        grown = exchanged(flights, found.chosen, effects, settings) if len(found.chosen) > 1 else found.chosen
+        names = frozenset(candidate.effect.name for candidate in grown)
+        # An exchange can undo what was added; a set that was there before would come round again for ever.
+        if names in tried:
+            return chosen, steps
+        tried.add(names)
+        chosen = grown
+        step.hypothesis.cache.clear()
+
+
+def acceptable(step: Step, settings: GapSettings) -> bool:
+    """Tell whether the best candidate of a look is more than chance and enough.
+
+    Parameters
+    ----------
+    step : Step
+    settings : GapSettings
+
+    Returns
+    -------
+    bool
+    """
+    if not step.ranking or step.ranking[0].gain == REFUSED:
+        return False
+    best = step.ranking[0]
+    return best.gain >= _enough(step) and step.p_value(best.gain) <= settings.significance
+
+
+def _enough(step: Step) -> float:
+    """Give what an effect has to explain to be worth a name, in squared floors."""
+    return max(_LEAST_SHARE * step.above_floor, _LEAST_IN_FLOORS**2 * len(step.hypothesis.residual))
+
+
+def quiet_enough(gain: float, step: Step, found: System) -> bool:
+    """Tell whether an effect explains motion, not noise.
+
+    Columns of rates hold the noise of the gyroscope, and so does the inertial torque: where rates about two axes go
+    hand in hand, a fit can turn one against the other and be rid of noise. What an effect takes off the floor is
+    therefore taken off its gain.
+
+    Parameters
+    ----------
+    gain : float
+        What it explains, in squared floors.
+    step : Step
+        The look that chose it.
+    found : System
+        With the effect.
+
+    Returns
+    -------
+    bool
+    """
+    if not found.chosen[-1].effect.rate_derivative:
+        return True
+    after = floors(found, fit(found, step.floor))
+    rows = np.sum([len(flight) * flight.known for flight in found.flights], axis=0)
+    noise = float((rows * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
+    return gain - noise >= _enough(step)
+
+
+def exchanged(
+    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], effects: Sequence[Effect], settings: GapSettings
+) -> tuple[Candidate, ...]:
+    """Drop effects that later ones made needless, and replace those that another serves better beside the rest.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    effects : sequence of Effect
+    settings : GapSettings
+
+    Returns
+    -------
+    tuple of Candidate
+    """
+    kept = list(chosen)
+    for candidate in list(chosen):
+        others = [other for other in kept if other is not candidate]
+        step = look(flights, others, effects, settings, None, also=(candidate,))
+        own = next((s for s in step.ranking if s.candidate.effect.name == candidate.effect.name), None)
+        if own is None or own.gain < _LEAST_SHARE * step.above_floor:
+            kept = others
+            continue
+        best = step.ranking[0]
+        worse = best.candidate.effect.name != candidate.effect.name and own not in unbeaten(
+            best, step.ranking, step.above_floor
+        )
+        # Beside other effects its own shape may be another one: a delay that is dropped leaves its time to a lag.
+        better = best.candidate if worse else own.candidate
+        if better is not candidate:
+            kept = list(refined(flights, [*others, better], step.floor).chosen)
+    return tuple(kept)
+
+
+def best_floor(hypothesis: System) -> Array:
+    """Estimate the floors from what a hypothesis leaves.
+
+    The fit and the floors depend on each other; starting from equal weights, a second round changes nothing any more.
+
+    Parameters
+    ----------
+    hypothesis : System
+
+    Returns
+    -------
+    array, shape (6,)
+    """
+    rows = hypothesis.residual
+    floor = np.where(rows.any(axis=0), np.sqrt(np.mean(rows**2, axis=0)), 1.0)
+    for _ in range(2):
+        floor = floors(hypothesis, fit(hypothesis, floor))
+    return floor
+
+
+def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
+    """Give each window the number of its cross-validation block.
+
+    Parameters
+    ----------
+    hypothesis : System
+    settings : GapSettings
+
+    Returns
+    -------
+    array of int, shape (window,)
+    """
+    centres = np.concatenate([f.windows.centres(f.signals.time) for f in hypothesis.flights])
+    return blocks_of(hypothesis.flight_index, centres, settings.block_s)
+
+
+def _chance(
+    arranged: Layout,
+    left: Array,
+    hypothesis: System,
+    floor: Array,
+    block: IntArray,
+    settings: GapSettings,
+    rng: np.random.Generator | None,
+) -> Array:
+    if rng is None:
+        return np.zeros(0)
+    draws = mirror_shifted(left, hypothesis.flight_index, settings.shifts, rng)
+    return chance(arranged, normal_equations(arranged, draws, floor, block))
+
+
+def _each_once(ranking: Sequence[Scored]) -> tuple[Scored, ...]:
+    seen: dict[str, Scored] = {}
+    for scored in ranking:
+        seen.setdefault(scored.candidate.effect.name, scored)
+    return tuple(seen.values())
+
+
+def _rows(hypothesis: System) -> int:
+    return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)

@@ -1,0 +1,1 @@
+"""Flights simulated again from their own actuation."""

@@ -1,0 +1,1 @@
+"""Where a residual lives: signals, frequencies, stretches of time."""

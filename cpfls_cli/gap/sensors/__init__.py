@@ -1,0 +1,1 @@
+"""What the sensors of a flight say of each other, before any torque is looked at."""

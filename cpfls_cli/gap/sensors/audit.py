@@ -1,0 +1,191 @@
+"""The sensor audit: faults that look like physics, found and repaired on sensors alone, before any torque."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import comb
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.windows import Windows
+from cpfls_cli.gap.sensors.audit_actuation import ActuationDelay, actuation_delay
+from cpfls_cli.gap.sensors.audit_channels import channel_warnings
+from cpfls_cli.gap.sensors.audit_consistency import ChannelMatch, consistency, frame_warnings
+from cpfls_cli.gap.sensors.audit_findings import AuditFinding, FaultName, findings
+from cpfls_cli.gap.sensors.audit_gyro import GyroFit, fit_gyro, scan
+from cpfls_cli.gap.sensors.audit_kinematics import kinematics
+
+_ALL: tuple[FaultName, ...] = ("gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay")
+# Agreement that no independent attitude reaches, rad/s in a window; every fault of practical size is larger.
+_ROUNDING = 1e-4
+# An independent attitude leaves at least the gyroscope's own noise; this share of it is left by one that contains it.
+_SHARE_OF_NOISE = 0.3
+_TURNING = 0.05
+# What is only mentioned, never repaired.
+_BIAS_APART = 0.0015
+_CROSS = 0.005
+_SIGMAS_APART = 4.0
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What the sensors say about each other.
+
+    Attributes
+    ----------
+    findings : tuple of AuditFinding
+        Faults that were tested, named or not.
+    untested : mapping of str to str
+        Faults that could not be tested, with the reason.
+    warnings : tuple of str
+        Sentences about channels that disagree or look broken; nothing is repaired for them.
+    notes : tuple of str
+        Sentences for information.
+    gyro : GyroFit or None
+        All that was estimated, with the symmetric cross-axis and the differences between flights.
+    matches : tuple of ChannelMatch
+    actuation : ActuationDelay or None
+    """
+
+    findings: tuple[AuditFinding, ...]
+    untested: Mapping[str, str]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    gyro: GyroFit | None
+    matches: tuple[ChannelMatch, ...]
+    actuation: ActuationDelay | None
+
+    @property
+    def named(self) -> tuple[AuditFinding, ...]:
+        """Faults that are significant and matter."""
+        return tuple(finding for finding in self.findings if finding.named)
+
+    def repaired(self, signals: Signals) -> Signals:
+        """Remove the named faults from the gyroscope, ``omega = ((1 + scale) C)^-1 (omega_gyro(t + delay) - bias)``.
+
+        Coefficients that are not named count as 0. The length stays: the end of a flight that is shifted holds its
+        last value.
+
+        Parameters
+        ----------
+        signals : Signals
+
+        Returns
+        -------
+        Signals
+        """
+        if not self.named:
+            return signals
+        axes = ("x", "y", "z")
+        delay = self._values("channel_delay", ("delay",))[0]
+        rate = _shifted(signals, float(delay)) - self._values("gyro_bias", axes)
+        scale = np.diag(1.0 + self._values("gyro_scale", axes))
+        turned = Rotation.from_rotvec(-self._values("imu_misalignment", axes)).as_matrix()
+        return replace(signals, body_rate=rate @ np.linalg.inv(scale @ turned).T)
+
+    def _values(self, name: FaultName, labels: tuple[str, ...]) -> Array:
+        found = [finding.named_values(labels) for finding in self.findings if finding.name == name]
+        return found[0] if found else np.zeros(len(labels))
+
+
+def _shifted(signals: Signals, delay: float) -> Array:
+    if delay == 0:
+        return signals.body_rate
+    later = np.clip(signals.time + delay, signals.time[0], signals.time[-1])
+    return np.asarray(CubicSpline(signals.time, signals.body_rate)(later))
+
+
+def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
+    """Check the sensors of flights with the same hardware against each other.
+
+    Parameters
+    ----------
+    flights : sequence of Signals
+        At least one, with the sampling period of the windows.
+    windows : Windows
+
+    Returns
+    -------
+    Audit
+
+    References
+    ----------
+    Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
+    """
+    tested, untested, fit, frames = _gyro(flights, windows)
+    matches, disagreements = consistency(flights, windows)
+    actuation = actuation_delay(flights)
+    told = () if actuation is None else (actuation.sentence,)
+    return Audit(
+        findings=tested,
+        untested=untested,
+        warnings=(*frames, *disagreements, *channel_warnings(flights)),
+        notes=(*told, *(_gyro_notes(fit) if fit is not None else ())),
+        gyro=fit,
+        matches=matches,
+        actuation=actuation,
+    )
+
+
+_Outcome = tuple[tuple[AuditFinding, ...], Mapping[str, str], GyroFit | None, tuple[str, ...]]
+
+
+def _gyro(flights: Sequence[Signals], windows: Windows) -> _Outcome:
+    if all(signals.attitude is None for signals in flights):
+        return _none("there is no attitude to judge the gyroscope by")
+    cut = [found for signals in flights if (found := kinematics(signals, windows)) is not None]
+    if not cut:
+        return _none("the flights are too short")
+    scanned = scan(cut)
+    frames = frame_warnings("the rate by the attitude and the gyroscope", scanned.seen, scanned.read, _TURNING)
+    if frames:
+        return (), dict.fromkeys(_ALL, "the axes of gyroscope and attitude do not belong together"), None, tuple(frames)
+    raw = scanned.seen - np.concatenate([flight.gyro_rate(0.0) for flight in cut])
+    if np.sqrt((raw**2).mean()) < _ROUNDING:
+        return _none("the attitude agrees with the gyroscope to rounding, as if it were integrated from it")
+    fit = fit_gyro(cut, scanned)
+    if fit is None:
+        return _none("the flights are too short")
+    untested = _untestable(flights, fit, windows)
+    tested = [name for name in _ALL if name not in untested]
+    return findings(fit, tested, windows.period), untested, fit, ()
+
+
+def _none(reason: str) -> _Outcome:
+    return (), dict.fromkeys(_ALL, reason), None, ()
+
+
+def _untestable(flights: Sequence[Signals], fit: GyroFit, windows: Windows) -> Mapping[str, str]:
+    still = "the flights hardly turn, so it would not show"
+    untested = {name: still for name, own in _PLACES.items() if not fit.known[own].any()}
+    if np.sqrt(fit.variance.max()) < _SHARE_OF_NOISE * _gyro_noise(flights, windows):
+        derived = "the attitude contains the gyroscope's own noise, so it is integrated from it and would not show it"
+        untested |= dict.fromkeys(("gyro_scale", "imu_misalignment"), derived)
+    return untested
+
+
+_PLACES = {"gyro_scale": slice(3, 6), "imu_misalignment": slice(6, 9), "channel_delay": slice(12, 13)}
+
+
+def _gyro_noise(flights: Sequence[Signals], windows: Windows) -> float:
+    """Bound the noise of a window from below by fifth differences, which motion hardly reaches, rad/s."""
+    fifth = np.concatenate([np.diff(signals.body_rate, 5, axis=0) for signals in flights])
+    return float(np.sqrt((fifth**2).mean(axis=0).min() / comb(10, 5) * (windows.weight**2).sum()))
+
+
+def _gyro_notes(fit: GyroFit) -> tuple[str, ...]:
+    apart = np.abs(fit.flight_bias) > np.maximum(_BIAS_APART, _SIGMAS_APART * fit.flight_bias_error)
+    cross = fit.known[9:12] & (np.abs(fit.value[9:12]) > np.maximum(_CROSS, _SIGMAS_APART * fit.error[9:12]))
+    said = []
+    if apart.any():
+        between = np.ptp(fit.flight_bias, axis=0).max()
+        said.append(f"The gyroscope's constant error differs between flights by {between:.4f} rad/s.")
+    if cross.any():
+        square = np.abs(fit.value[9:12])[cross].max()
+        said.append(f"The axes of gyroscope or attitude are not square to each other, by {square:.3f}.")
+    return tuple(said)
