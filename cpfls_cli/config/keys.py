@@ -137,7 +137,7 @@ def _choices(hint: Any) -> tuple[Choice, ...] | None:
 
 
 def _entries(hint: Any) -> tuple[Choice, ...]:
-    """Find the names that the entries of a mapping may have."""
+    """Find the names that the entries of a mapping or a list may have."""
     if get_origin(hint) is Annotated:
         return _entries(get_args(hint)[0])
-    return _choices(get_args(hint)[0]) or () if get_origin(hint) in {dict, Mapping} else ()
+    return _choices(get_args(hint)[0]) or () if get_origin(hint) in {dict, Mapping, tuple} else ()
