@@ -24,8 +24,8 @@ from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.results import Diagnosis, NamedEffect, Verdict
 from cpfls_cli.gap.naming.search import Step, block_index, forward, look
 from cpfls_cli.gap.naming.sensor_numbers import sensor_estimates
-from cpfls_cli.gap.naming.unseen import not_excited
-from cpfls_cli.gap.naming.vehicle_numbers import parameter_error
+from cpfls_cli.gap.naming.unseen import look_alikes, not_excited
+from cpfls_cli.gap.naming.vehicle_numbers import impossible, parameter_error
 from cpfls_cli.gap.naming.verdict import gap_stays, matters, verdict_of
 from cpfls_cli.gap.sensors.audit import Audit, audit
 from cpfls_cli.gap.settings import GapSettings
@@ -228,7 +228,11 @@ def _concluded(
     known = [each for each in left.unexplained if matters(each, gap)] if effects else left.unexplained
     stays = gap_stays(unseen.size(unseen.parameters).floors, unseen.size(unseen.after).floors)
     verdict = verdict_of(effects, rivals, known, share, stays, _excited(hypothesis, steps[-1].floor), settings)
+    wrong = impossible(found.parameters)
+    if wrong:
+        verdict = Verdict.UNEXPLAINED
     refused = verdict is Verdict.UNEXPLAINED
+    alike = look_alikes(hypothesis, faults if refused else effects)
     return Diagnosis(
         verdict,
         tuple(faults if refused else effects),
@@ -242,7 +246,9 @@ def _concluded(
         unseen.size(unseen.after),
         unseen.floor,
         torque_alone,
-        (*checked.warnings, *checked.notes),
+        (*wrong, *alike, *checked.warnings, *checked.notes),
+        alike,
+        wrong,
     )
 
 

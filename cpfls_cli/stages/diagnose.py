@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT
+from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.config.study import Study
+from cpfls_cli.errors import InputError
 from cpfls_cli.gap.diagnose import Diagnosed, diagnose
 from cpfls_cli.gap.evidence import Evidence, evidence, model_of
 from cpfls_cli.gap.extended import ExtendedModel
@@ -81,6 +82,11 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     check_ignored(job.study)
     source = read_good(disagreement, DISAGREEMENT)
     require_vehicle_of(disagreement, source, job.study)
+    if any(file.format == EXTENDED.format for file in source.header.inputs.values()):
+        raise InputError(
+            f"{disagreement}: was made with a model that has effects already; `cpfls diagnose` names what a base model "
+            "misses, so compare without --model, or with an identified model"
+        )
     held = read_flights(held_out, job.study)
     split = split_flights(flights_of(source, job.study), held.recordings, job.study.gap)
     base = base_artifact(source)

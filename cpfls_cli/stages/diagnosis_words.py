@@ -46,8 +46,10 @@ def diagnosis_lines(found: Diagnosed, shown: Evidence, split: str) -> list[str]:
     diagnosis = found.diagnosis
     return [
         *headline(diagnosis),
+        *(f"the log looks wrong: {sentence}" for sentence in diagnosis.impossible),
         *(_unexplained_line(left) for left in diagnosis.unexplained),
         *_levels(diagnosis),
+        *diagnosis.look_alikes,
         *gap_lines(diagnosis.before, diagnosis.after),
         *replay_lines("held out, simulated before", shown.before, shown.held),
         *replay_lines("held out, simulated after", shown.after, shown.held),

@@ -19,6 +19,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.motion import body_rate_of
 from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.stages.import_log import flight_signals, imported
+from cpfls_cli.stages.log_quality import found_and_done
 from cpfls_cli.stages.rotor_torque import commanded_speed
 from cpfls_cli.stages.same_vehicle import require_same_vehicle
 from cpfls_cli.stages.sources import read_good
@@ -79,7 +80,8 @@ def read_flights(paths: Sequence[Path], study: Study) -> Flights:
 
 def _log(path: Path, study: Study) -> _Source:
     flight = imported(path, study)
-    return _Source(path.name, flight_signals(flight), _units(study), flight.report.warnings)
+    done = tuple(f"{what} ({count})" for what, count in found_and_done(flight.report).items())
+    return _Source(path.name, flight_signals(flight), _units(study), (*done, *flight.report.warnings))
 
 
 def _artifact(path: Path, study: Study) -> _Source:

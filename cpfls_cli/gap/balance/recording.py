@@ -54,6 +54,11 @@ def common_windows(recordings: Sequence[Recording], settings: GapSettings) -> Wi
                 f"{recording.name}: sampled at {1 / other:.6g} Hz, {recordings[0].name} at {1 / period:.6g} Hz; set "
                 "import.rate_hz to one rate for all flights"
             )
+    shortest = min(recordings, key=lambda recording: len(recording.signals))
+    if settings.window_s > len(shortest.signals) * period:
+        raise InputError(
+            f"gap.window_s = {settings.window_s:g}: longer than {shortest.name}, {len(shortest.signals) * period:.3g} s"
+        )
     own = windows(period, settings.window_s, settings.overlap)
     for recording in recordings:
         if own.count(len(recording.signals)) < _FEWEST_WINDOWS:

@@ -113,7 +113,8 @@ def _of(
         estimates += [
             Estimate(c.name, c.unit, float(v), float(v - s), float(v + s), c.bounds(vehicle))
             for c, v, s in zip(effect.coefficients, value, scatter, strict=False)
-            if np.isfinite(v)
+            # A column of zeros leaves its coefficient open: an offset along x, say, where only x is compared.
+            if np.isfinite(v) and (v != 0 or s != 0 or effect.kind == "parameter")
         ]
     scatter = _interval(shape, shape_out)
     estimates += [

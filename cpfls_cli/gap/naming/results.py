@@ -175,6 +175,10 @@ class Diagnosis:
         First choices of a look at the torques alone, and the share that each would explain.
     notes : tuple of str
         What a reader should know, in sentences.
+    look_alikes : tuple of str
+        Effects that look like a named one and that the flights lack signals for, in sentences.
+    impossible : tuple of str
+        Numbers of the vehicle that would have to be what no vehicle has, in sentences: the log is wrong.
     """
 
     verdict: Verdict
@@ -190,3 +194,5 @@ class Diagnosis:
     floor: Array
     torque_alone: tuple[tuple[str, float], ...]
     notes: tuple[str, ...]
+    look_alikes: tuple[str, ...] = ()
+    impossible: tuple[str, ...] = ()

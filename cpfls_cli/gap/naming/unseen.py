@@ -8,9 +8,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.results import NotExcited
+from cpfls_cli.gap.naming.results import NamedEffect, NotExcited
 
 _USUAL_OF_BOUND = 0.2
 """A coefficient that is large but not unheard of, as a share of its bound."""
@@ -38,9 +39,39 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
     return tuple(NotExcited(name, reason) for name, reason in found if reason)
 
 
+def look_alikes(hypothesis: System, named: Sequence[NamedEffect]) -> tuple[str, ...]:
+    """Say which effects look like a named one and cannot be ruled out, because the flights lack their signals.
+
+    Parameters
+    ----------
+    hypothesis : System
+    named : sequence of NamedEffect
+
+    Returns
+    -------
+    tuple of str
+        Sentences.
+    """
+    sentences = []
+    for effect in named:
+        unseen = {}
+        for name in CATALOGUE[effect.name].rivals:
+            missing = [CATALOGUE[name].missing(signals) for signals in hypothesis.signals]
+            if all(missing) and not {"command", "measured_rotor_speed"} & set(missing[0]):
+                unseen[name] = missing[0]
+        if unseen:
+            lacking = sorted({signal.replace("_", " ") for signals in unseen.values() for signal in signals})
+            sentences.append(
+                f"{effect.name}: {', '.join(unseen)} would look alike and cannot be ruled out; log {', '.join(lacking)}"
+            )
+    return tuple(sentences)
+
+
 def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
     missing = [effect.missing(signals) for signals in hypothesis.signals]
     if all(missing):
+        if "command" in missing[0]:
+            return "rotor speeds are measured, so what lies between command and speed does not show"
         return f"the flights lack {', '.join(name.replace('_', ' ') for name in missing[0])}"
     if effect.columns is None:
         return ""

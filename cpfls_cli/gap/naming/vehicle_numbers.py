@@ -47,6 +47,35 @@ def parameter_error(found: Estimates, effects: Sequence[NamedEffect], share: flo
     return NamedEffect(effect.name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, effect.sentence)
 
 
+def impossible(numbers: Sequence[Estimate]) -> tuple[str, ...]:
+    """Say which numbers of the vehicle would have to be what no vehicle has: then the log is wrong, not the vehicle.
+
+    Parameters
+    ----------
+    numbers : sequence of Estimate
+        Relative errors.
+
+    Returns
+    -------
+    tuple of str
+        Sentences.
+    """
+    return tuple(
+        f"{_WORDS[number.name]} would have to be {1 + number.value:.3g} times that of the config, which no vehicle has:"
+        " check signs, units and order of the gyroscope's and the rotors' columns"
+        for number in numbers
+        if number.name in _WORDS and (number.high < number.plausible[0] or number.low > number.plausible[1])
+    )
+
+
+_WORDS = {
+    "inertia_x": "the inertia about x",
+    "inertia_y": "the inertia about y",
+    "inertia_z": "the inertia about z",
+    "thrust_scale": "the thrust",
+}
+
+
 def _told(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
     if not number.name.startswith(("inertia", "thrust")):
         return False

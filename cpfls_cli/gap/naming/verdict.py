@@ -18,6 +18,10 @@ _PART = 0.05
 _STAYS = 0.7
 """Root mean square that is left of a clear gap about an axis, as a share, from which on nothing explained it."""
 
+_LARGE = 3.0
+_REST = 0.1
+"""Root mean square that is left, in floors and as a share of the gap, that no name for the gap may leave behind."""
+
 _MAIN = 0.1
 """Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
 
@@ -64,7 +68,7 @@ def verdict_of(
 
 
 def gap_stays(before: Array, after: Array) -> bool:
-    """Tell whether the gap about an axis stays that is a part of the whole.
+    """Tell whether the gap about an axis, or along one, stays that is a part of the whole.
 
     Parameters
     ----------
@@ -75,9 +79,13 @@ def gap_stays(before: Array, after: Array) -> bool:
     -------
     bool
     """
-    own, left = before[:3], after[:3]
+    return any(_stays(before[kind], after[kind]) for kind in (slice(0, 3), slice(3, 6)))
+
+
+def _stays(own: Array, left: Array) -> bool:
     clear = (own > _CLEAR) & (own**2 > _PART * np.nanmax(own, initial=0.0) ** 2)
-    return bool((clear & (left > _STAYS * own)).any())
+    large = (left > _LARGE) & (left > _REST * own)
+    return bool((clear & ((left > _STAYS * own) | large)).any())
 
 
 def matters(left: Unexplained, before: Array) -> bool:

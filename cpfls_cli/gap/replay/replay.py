@@ -15,6 +15,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.replay.rate_equation import ReplayModel, free_runs
 from cpfls_cli.vehicle.rigid_body import inertia_tensor
 
+_ROTATION = 0.5
+_ENDLESS = 1e9
 _SMOOTHED_SAMPLES = 7
 _SMOOTHED_DEGREE = 2
 
@@ -156,15 +158,26 @@ def _held_rotation(signals: Signals, starts: IntArray, rate: Array, horizon: int
 def _compared(signals: Signals, starts: IntArray, runs: Iterable[tuple[Array, Array | None]]) -> ReplayError:
     rates: list[Array] = []
     attitudes: list[Array] = []
-    for step, (rate, rotation) in enumerate(runs, start=1):
-        at = starts + step
-        rates.append(_rms(rate - signals.body_rate[at]))
-        if rotation is not None:
-            away = signals.rotation[at].swapaxes(1, 2) @ rotation
-            attitudes.append(_rms(Rotation.from_matrix(away).as_rotvec()))
+    # A wrong model can run away within a horizon; what overflows then is large, and that is all there is to say.
+    with np.errstate(over="ignore", invalid="ignore"):
+        for step, (rate, rotation) in enumerate(runs, start=1):
+            at = starts + step
+            rates.append(_rms(rate - signals.body_rate[at]))
+            if rotation is not None:
+                away = signals.rotation[at].swapaxes(1, 2) @ rotation
+                attitudes.append(_rms(_turned(away)))
     horizon_s: Array = signals.period * np.arange(1, len(rates) + 1, dtype=float)
     return ReplayError(horizon_s, np.array(rates), np.array(attitudes) if attitudes else None, len(starts))
 
 
+def _turned(away: Array) -> Array:
+    """Give the turn of each rotation; half a turn, the most there is, where a simulation ran away."""
+    usable = np.isfinite(away).all(axis=(1, 2)) & (np.abs(np.linalg.det(np.nan_to_num(away)) - 1) < _ROTATION)
+    turn = np.full((len(away), 3), np.pi / np.sqrt(3))
+    if usable.any():
+        turn[usable] = Rotation.from_matrix(away[usable]).as_rotvec()
+    return turn
+
+
 def _rms(error: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(error**2, axis=0)))
+    return np.asarray(np.nan_to_num(np.sqrt(np.mean(error**2, axis=0)), nan=_ENDLESS, posinf=_ENDLESS))

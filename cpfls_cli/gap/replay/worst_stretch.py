@@ -11,6 +11,8 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.replay.rate_equation import ReplayModel, free_runs
 from cpfls_cli.gap.replay.replay import start_rate, start_samples
 
+_ENDLESS = 1e6
+
 
 @dataclass(frozen=True)
 class WorstStretch:
@@ -91,5 +93,8 @@ def worst_stretch(
 def _runs(signals: Signals, model: ReplayModel, starts: IntArray, samples: int) -> Array:
     """Simulate every run, its start included, shape (run, sample, 3)."""
     rate = start_rate(signals)[starts]
-    steps = [step for step, _ in free_runs(model, signals, starts, rate, samples - 1)]
-    return np.stack([rate, *steps], axis=1)
+    # A wrong model can run away; beyond any rate that a picture shows it is all the same how far.
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = [step for step, _ in free_runs(model, signals, starts, rate, samples - 1)]
+    run = np.nan_to_num(np.stack([rate, *steps], axis=1), nan=_ENDLESS)
+    return np.asarray(np.clip(run, -_ENDLESS, _ENDLESS))

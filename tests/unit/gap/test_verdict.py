@@ -74,9 +74,10 @@ def test_an_axis_that_keeps_its_gap_is_not_all_explained():
         ([20.0, 8.0, 1.0], [1.0, 2.0, 1.0], False),
         ([20.0, 2.0, 1.0], [1.0, 2.0, 1.0], False),
         ([1.2, 1.1, 1.0], [1.2, 1.1, 1.0], False),
+        ([1500.0, 9.0, 1.0], [250.0, 2.0, 1.0], True),
     ],
-    ids=["one axis stays", "all shrink", "a small part of the whole", "no clear gap"],
+    ids=["one axis stays", "all shrink", "a small part of the whole", "no clear gap", "a large rest"],
 )
 def test_a_gap_stays_where_an_axis_is_clear_and_counts(before, after, stays):
-    forces = [9.0, 9.0, 9.0]
-    assert gap_stays(np.array(before + forces), np.array(after + forces)) == stays
+    assert gap_stays(np.array(before + [1.0] * 3), np.array(after + [1.0] * 3)) == stays
+    assert gap_stays(np.array([9.0] * 3 + before), np.array([1.0] * 3 + after)) == stays
