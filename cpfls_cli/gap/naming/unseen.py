@@ -54,6 +54,8 @@ def look_alikes(hypothesis: System, named: Sequence[NamedEffect]) -> tuple[str, 
     """
     sentences = []
     for effect in named:
+        if CATALOGUE[effect.name].kind in ("parameter", "sensor"):
+            continue
         unseen = {}
         for name in CATALOGUE[effect.name].rivals:
             missing = [CATALOGUE[name].missing(signals) for signals in hypothesis.signals]
