@@ -63,7 +63,7 @@ def _totals(judged):
     rows = [
         ("one effect: exactly right", percent(right), "at least 96 %"),
         (f"one effect with a torque of {score.VISIBLE} floors or more: exactly right", percent(seen), "at least 96 %"),
-        ("one effect: exactly right, white noise", percent(_right(single, "white")), "prototype 95 %"),
+        ("one effect: exactly right, white noise", percent(_right(single, "white")), "95 % (earlier study)"),
         ("one effect: exactly right, coloured noise", percent(_right(single, "coloured")), "at least 96 %"),
         ("one effect: wrong name", percent([each.outcome == score.WRONG for each in single]), "0"),
         ("any group: wrong name", percent([_wrong(each) for each in judged]), "0"),
