@@ -14,11 +14,10 @@ from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.balance.recording import Recording, common_windows
 from cpfls_cli.gap.balance.refine import fit, refined
-from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, weak_flight
-from cpfls_cli.gap.balance.windows import Windows
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.contributions import shares
-from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, estimates
-from cpfls_cli.gap.naming.held_out import HeldOut, held_out
+from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, weighted_estimates
+from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
 from cpfls_cli.gap.naming.judged import Judged, judge_effect
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.results import Diagnosis, NamedEffect, Verdict
@@ -28,6 +27,8 @@ from cpfls_cli.gap.naming.unseen import look_alikes, not_excited
 from cpfls_cli.gap.naming.vehicle_numbers import impossible, parameter_error
 from cpfls_cli.gap.naming.verdict import gap_stays, matters, verdict_of
 from cpfls_cli.gap.sensors.audit import Audit, audit
+from cpfls_cli.gap.sensors.audit_findings import AuditFinding
+from cpfls_cli.gap.sensors.preparation import Preparation
 from cpfls_cli.gap.settings import GapSettings
 
 _EXCITED_FLOORS = 3.0
@@ -95,14 +96,15 @@ def diagnose(
     progress(0.0, "sensor audit")
     own = common_windows([*training, *held], settings)
     checked = audit([recording.signals for recording in training], own)
-    weak = [_weak(r, own, model, settings, checked) for r in training]
+    prepared = Preparation(own, model, settings, checked)
+    weak = prepared.repaired(training)
     effects = considered(settings)
     chosen, steps = forward(weak, effects, settings, rng, lambda n: progress(0.1 + 0.1 * min(n, 5), "search"))
     progress(0.65, "estimates")
     hypothesis, block, found = _sure(weak, chosen, steps[-1].floor, settings)
     chosen = hypothesis.chosen
     left = leftover(hypothesis, found.linear, steps[-1].floor, block, settings, rng)
-    unseen = _unseen(held, own, model, settings, checked, hypothesis, found, left.scatter)
+    unseen = judged_unseen(held, prepared, hypothesis, found.linear, left.scatter)
     progress(0.75, "rivals")
     own_shares = shares(weak, chosen, found, steps[-1].floor)
     judged = [
@@ -110,7 +112,7 @@ def diagnose(
         for place in range(len(chosen))
     ]
     progress(0.9, "sensor faults")
-    faults = [_fault(finding, training, weak, own, model, settings) for finding in checked.named]
+    faults = [_fault(finding, prepared.logged(training), weak) for finding in checked.named]
     torque_alone = _torque_alone(weak, settings, effects)
     diagnosis = _concluded(judged, faults, found, unseen, left, steps, hypothesis, settings, torque_alone, checked)
     return Diagnosed(diagnosis, checked, hypothesis, found, left, unseen)
@@ -134,64 +136,28 @@ def considered(settings: GapSettings) -> list[Effect]:
     ]
 
 
-def _weak(
-    recording: Recording, own: Windows, model: InertiaModel | None, settings: GapSettings, checked: Audit | None
-) -> WeakFlight:
-    signals = recording.signals if checked is None else checked.repaired(recording.signals)
-    return weak_flight(recording.name, signals, own, model, settings.force, settings.axes)
-
-
 def _sure(
     weak: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings
 ) -> tuple[System, IntArray, Estimates]:
     """Fit the chosen effects, and once more without those that may as well be zero."""
     hypothesis = system(weak, chosen)
     block = block_index(hypothesis, settings)
-    found = _estimated(hypothesis, floor, block)
+    found = weighted_estimates(hypothesis, floor, block)
     pairs = zip(chosen, found.effects, strict=True)
     kept = [candidate for candidate, numbers in pairs if differs_from_zero(candidate.effect, numbers)]
     if len(kept) == len(chosen):
         return hypothesis, block, found
     hypothesis = refined(weak, kept, floor)
-    return hypothesis, block, _estimated(hypothesis, floor, block)
+    return hypothesis, block, weighted_estimates(hypothesis, floor, block)
 
 
-def _estimated(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
-    """Fit once with the floors as weights, then with what is left, which is more where something is unexplained."""
-    left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-    weight = np.maximum(floor, np.sqrt(np.mean(left**2, axis=0)))
-    return estimates(hypothesis, weight, block)
-
-
-def _unseen(
-    held: Sequence[Recording],
-    own: Windows,
-    model: InertiaModel | None,
-    settings: GapSettings,
-    checked: Audit,
-    hypothesis: System,
-    found: Estimates,
-    scatter: float,
-) -> HeldOut:
-    plain = system(hypothesis.flights)
-    weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
-    return held_out(
-        [_weak(r, own, model, settings, None) for r in held],
-        [_weak(r, own, model, settings, checked) for r in held],
-        hypothesis,
-        found.linear,
-        fit(plain, weight),
-        scatter,
-    )
-
-
-def _fault(finding, training, weak, own, model, settings) -> NamedEffect:  # type: ignore[no-untyped-def] # noqa: ANN001
-    logged = system([_weak(recording, own, model, settings, None) for recording in training])
+def _fault(finding: AuditFinding, as_logged: Sequence[WeakFlight], weak: Sequence[WeakFlight]) -> NamedEffect:
+    logged = system(as_logged)
     repaired = system(weak)
     weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
     before, after = ((s.residual - s.base @ fit(s, weight)) / weight for s in (logged, repaired))
     share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
-    coefficients = sensor_estimates(finding, training[0].signals.vehicle)
+    coefficients = sensor_estimates(finding, weak[0].signals.vehicle)
     return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)
 
 

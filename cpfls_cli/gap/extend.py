@@ -12,17 +12,17 @@ from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.balance.recording import Recording, common_windows
-from cpfls_cli.gap.balance.refine import fit, refined
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, weak_flight
-from cpfls_cli.gap.balance.windows import Windows
+from cpfls_cli.gap.balance.refine import refined
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
-from cpfls_cli.gap.naming.estimate import Estimates, estimates
-from cpfls_cli.gap.naming.held_out import HeldOut, held_out
+from cpfls_cli.gap.naming.estimate import Estimates, weighted_estimates
+from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.naming.scatter import scatter_size, scatter_variance
 from cpfls_cli.gap.naming.search import best_floor, block_index
 from cpfls_cli.gap.naming.told_effect import told_effect
 from cpfls_cli.gap.sensors.audit import Audit
+from cpfls_cli.gap.sensors.preparation import Preparation
 from cpfls_cli.gap.settings import GapSettings
 
 _TOUCHED = 0.2
@@ -84,52 +84,20 @@ def extend(
     ComputationError
         If the gap on the held-out flights does not shrink in the channels that change.
     """
-    own = common_windows([*training, *held], settings)
-    flights = [_weak(r, own, base, settings, audit) for r in training]
+    prepared = Preparation(common_windows([*training, *held], settings), base, settings, audit)
+    flights = prepared.repaired(training)
     chosen = [effect.candidate for effect in effects if effect.candidate is not None]
     hypothesis = refined(flights, chosen, best_floor(system(flights, chosen)))
-    found = _estimated(hypothesis, settings)
-    unseen = _judged(held, own, base, settings, audit, hypothesis, found)
+    floor = best_floor(hypothesis)
+    found = weighted_estimates(hypothesis, floor, block_index(hypothesis, settings))
+    left = hypothesis.residual - hypothesis.base @ found.linear
+    scatter = scatter_size(scatter_variance(hypothesis), left, floor)
+    unseen = judged_unseen(held, prepared, hypothesis, found.linear, scatter)
     _require_smaller(unseen)
     fitted = tuple(FittedEffect(*pair) for pair in zip(hypothesis.chosen, found.of_effect, strict=True))
     width = len(found.linear) - sum(len(linear) for linear in found.of_effect)
     model = ExtendedModel(base, found.linear[:width], fitted, audit)
     return Extension(model, tuple(_renewed(effects, hypothesis, found)), found, unseen)
-
-
-def _weak(
-    recording: Recording, own: Windows, base: InertiaModel | None, settings: GapSettings, audit: Audit | None
-) -> WeakFlight:
-    signals = recording.signals if audit is None else audit.repaired(recording.signals)
-    return weak_flight(recording.name, signals, own, base, settings.force, settings.axes)
-
-
-def _estimated(hypothesis: System, settings: GapSettings) -> Estimates:
-    floor = best_floor(hypothesis)
-    left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-    weight = np.maximum(floor, np.sqrt(np.mean(left**2, axis=0)))
-    return estimates(hypothesis, weight, block_index(hypothesis, settings))
-
-
-def _judged(
-    held: Sequence[Recording],
-    own: Windows,
-    base: InertiaModel | None,
-    settings: GapSettings,
-    audit: Audit,
-    hypothesis: System,
-    found: Estimates,
-) -> HeldOut:
-    plain = system(hypothesis.flights)
-    left = hypothesis.residual - hypothesis.base @ found.linear
-    return held_out(
-        [_weak(r, own, base, settings, None) for r in held],
-        [_weak(r, own, base, settings, audit) for r in held],
-        hypothesis,
-        found.linear,
-        fit(plain, best_floor(plain)),
-        scatter_size(scatter_variance(hypothesis), left, best_floor(hypothesis)),
-    )
 
 
 def _require_smaller(unseen: HeldOut) -> None:

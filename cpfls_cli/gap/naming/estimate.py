@@ -80,6 +80,23 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     return Estimates(linear, tuple(found), parameters, tuple(own_linear))
 
 
+def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
+    """Fit once with the floors as weights, then with what is left, which is more where something is unexplained.
+
+    Parameters
+    ----------
+    hypothesis : System
+    floor : array, shape (6,)
+    block : array of int, shape (window,)
+
+    Returns
+    -------
+    Estimates
+    """
+    left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+    return estimates(hypothesis, np.maximum(floor, np.sqrt(np.mean(left**2, axis=0))), block)
+
+
 def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
     """Tell whether any number that gives an effect its size is surely not zero.
 

@@ -11,9 +11,12 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.floor import floors
+from cpfls_cli.gap.balance.recording import Recording
+from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.results import GapSize
 from cpfls_cli.gap.naming.scatter import scatter_variance
+from cpfls_cli.gap.sensors.preparation import Preparation
 
 _MARGIN = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
@@ -96,6 +99,31 @@ class HeldOut:
 
 def _largest(residual: Array) -> float:
     return float(np.sqrt(np.mean(residual**2, axis=0)).max())
+
+
+def judged_unseen(
+    held: Sequence[Recording], prepared: Preparation, fitted: System, linear: Array, scatter: float
+) -> HeldOut:
+    """Judge a fitted hypothesis on recordings that it has not seen, beside the model with its own numbers refitted.
+
+    Parameters
+    ----------
+    held : sequence of Recording
+    prepared : Preparation
+    fitted : System
+        Of the training flights.
+    linear : array, shape (column,)
+    scatter : float
+        Mean square of the relative scatter of the effects.
+
+    Returns
+    -------
+    HeldOut
+    """
+    plain = system(fitted.flights)
+    weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
+    parameters = fit(plain, weight)
+    return held_out(prepared.logged(held), prepared.repaired(held), fitted, linear, parameters, scatter)
 
 
 def share_removed(before: Array, after: Array, known: Array) -> float:
