@@ -86,6 +86,8 @@ def seen_twice(given: Iterable[InputFile], held_out: Iterable[InputFile]) -> tup
 
 
 def _thirds(flight: Recording, settings: GapSettings) -> Split:
+    # What the whole flight cannot be cut into windows for is no matter of its length.
+    common_windows([flight], settings)
     cut = 2 * len(flight.signals) // 3
     training = Recording(f"{flight.name} (first two thirds)", _cut(flight.signals, slice(0, cut)))
     last = Recording(f"{flight.name} (last third)", _cut(flight.signals, slice(cut, None)))
