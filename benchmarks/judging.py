@@ -34,7 +34,7 @@ def main(config: Path, flight: Path, selection: Path) -> None:
     print("| judged on | members of the front | with relative error above 100 % | relative error of the chosen one |")
     print("|---|---|---|---|")
     for name, evaluator in evaluators.items():
-        front, _ = search(evaluator, study.identification, generator(study, "identify"), None)
+        front = search(evaluator, study.identification, generator(study, "identify")).front
         errors = np.array([relative_error(whole, chromosome) for chromosome in front.chromosomes])
         print(f"| {name} | {len(errors)} | {np.sum(errors > 1)} | {errors[front.chosen]:.2%} |", flush=True)
 

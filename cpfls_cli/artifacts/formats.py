@@ -127,6 +127,12 @@ SELECTION = ArtifactSpec(
     ("flight",),
 )
 
+_OBJECTIVES = "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number"
+_HISTORY = (
+    DatasetSpec("history/evaluations", ("generation",), "1", NO_FRAME, "chromosomes evaluated so far"),
+    DatasetSpec("history/best", ("generation", "3"), "SI", NO_FRAME, "best of each objective so far", gaps=True),
+    DatasetSpec("history/front_size", ("generation",), "1", NO_FRAME, "members of the Pareto front so far"),
+)
 _JUDGED = ("judged_model", "part", "axis")
 
 MODEL = ArtifactSpec(
@@ -168,12 +174,26 @@ MODEL = ArtifactSpec(
             ("member", "3"),
             "SI",
             NO_FRAME,
-            "MSE (rigid-body base: cross-validated, scaled by axis), largest error, condition number",
+            _OBJECTIVES,
         ),
         DatasetSpec("front/chosen", (), "1", NO_FRAME, "index of the chosen member"),
-        DatasetSpec("history/evaluations", ("generation",), "1", NO_FRAME, "chromosomes evaluated so far"),
-        DatasetSpec("history/best", ("generation", "3"), "SI", NO_FRAME, "best of each objective so far", gaps=True),
-        DatasetSpec("history/front_size", ("generation",), "1", NO_FRAME, "members of the Pareto front so far"),
+        *_HISTORY,
+        DatasetSpec(
+            "search/stop_reason",
+            (),
+            "text",
+            NO_FRAME,
+            "generations, converged, time-limit or interrupted",
+            required=False,
+        ),
+        DatasetSpec(
+            "search/complete",
+            (),
+            "1",
+            NO_FRAME,
+            "1 where the search came to its end, 0 where `--resume` goes on",
+            required=False,
+        ),
         DatasetSpec("judged/models", ("judged_model",), "text", NO_FRAME, "the model and its baselines"),
         DatasetSpec("judged/parts", ("part",), "text", NO_FRAME, "training, held-out rest, other flights"),
         DatasetSpec("judged/samples", ("part",), "1", NO_FRAME, "samples judged"),
@@ -190,6 +210,27 @@ MODEL = ArtifactSpec(
         DatasetSpec("ridge/standard_error", ("tried",), "1", NO_FRAME, "its standard error", required=False),
         DatasetSpec("training/indices", ("sample",), "1", NO_FRAME, "samples of the flight that trained"),
         DatasetSpec("findings", ("finding",), "text", NO_FRAME, "what failed or was not excited, in words"),
+    ),
+    ("flight", "selection", "validate"),
+)
+
+CHECKPOINT = ArtifactSpec(
+    "cpfls/checkpoint",
+    "a search that has not come to its end: all that its next generation depends on",
+    "identify",
+    (
+        DatasetSpec("generation", (), "1", NO_FRAME, "generations bred; 0 is the initial population"),
+        DatasetSpec("generator", (), "text", NO_FRAME, "state of the random generator of all subpopulations, as JSON"),
+        DatasetSpec("population/genes", ("individual", "gene"), "1", NO_FRAME, "chromosomes, 16-bit weights"),
+        DatasetSpec("population/objectives", ("individual", "3"), "SI", NO_FRAME, _OBJECTIVES, gaps=True),
+        DatasetSpec("population/subpopulation", ("individual",), "1", NO_FRAME, "label of the subpopulation"),
+        DatasetSpec(
+            "archive/submitted", ("evaluation", "gene"), "1", NO_FRAME, "chromosomes as bred, in order of evaluation"
+        ),
+        DatasetSpec("archive/genes", ("evaluation", "gene"), "1", NO_FRAME, "what local search made of them"),
+        DatasetSpec("archive/objectives", ("evaluation", "3"), "SI", NO_FRAME, _OBJECTIVES, gaps=True),
+        *_HISTORY,
+        DatasetSpec("sha256", (), "text", NO_FRAME, "of the bytes of all datasets above, in this order"),
     ),
     ("flight", "selection", "validate"),
 )
@@ -212,7 +253,7 @@ PREDICTION = ArtifactSpec(
     ("model", "flight"),
 )
 
-FORMATS = (TRAJECTORY, FLIGHT, SELECTION, MODEL, PREDICTION, DISAGREEMENT, DIAGNOSIS, EXTENDED)
+FORMATS = (TRAJECTORY, FLIGHT, SELECTION, MODEL, CHECKPOINT, PREDICTION, DISAGREEMENT, DIAGNOSIS, EXTENDED)
 """Every artifact format, in the order of the pipeline."""
 
 

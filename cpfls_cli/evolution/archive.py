@@ -46,6 +46,13 @@ class Archive:
         self._objectives: list[Array] = []
         self._front = np.empty(0, dtype=np.int64)
 
+    @classmethod
+    def of(cls, submitted: IntArray, evaluation: Evaluation) -> Archive:
+        """Rebuild an archive from its `submitted` and `results`: it knows, gives and counts the same."""
+        archive = cls()
+        archive.store(submitted, evaluation)
+        return archive
+
     def __len__(self) -> int:
         """Count the evaluations."""
         return len(self._genes)
@@ -57,7 +64,7 @@ class Archive:
 
     @property
     def results(self) -> Evaluation:
-        """Refined genes and objectives of all evaluations; with `submitted`, all that `store` needs again."""
+        """Refined genes and objectives of all evaluations; with `submitted`, all that `of` needs."""
         return self._rows(range(len(self)))
 
     @property

@@ -11,6 +11,7 @@ from cpfls_cli.arrays import IntArray
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
 from cpfls_cli.evolution.coding import BITS_PER_GENE, gray_decode, gray_encode
+from cpfls_cli.evolution.history import History
 from cpfls_cli.evolution.migration import migrate
 from cpfls_cli.evolution.operators import mutate, single_point_crossover
 from cpfls_cli.evolution.ranking import rank
@@ -18,6 +19,7 @@ from cpfls_cli.evolution.reinsertion import reinsert
 from cpfls_cli.evolution.selection import linear_ranking_fitness, stochastic_universal_sampling
 from cpfls_cli.evolution.settings import EvolutionSettings
 from cpfls_cli.evolution.state import EvolutionState, Generation
+from cpfls_cli.evolution.stopping import ended
 from cpfls_cli.evolution.subpopulations import members, subpopulation_labels
 
 
@@ -45,7 +47,7 @@ def evolve(
     Yields
     ------
     Generation
-        First the initial population, then one for each of ``settings.generations``.
+        First the initial population, then one for each of ``settings.generations``, or up to convergence.
 
     Raises
     ------
@@ -58,7 +60,7 @@ def evolve(
     """
     state = start(evaluate, gene_count, settings, rng, initial)
     yield state.report()
-    while state.index < settings.generations:
+    while ended(state, settings) is None:
         state = step(state, evaluate, settings)
         yield state.report()
 
@@ -83,7 +85,8 @@ def start(
     archive = Archive()
     evaluation = archive.evaluate(genes, _checked(evaluate))
     labels = subpopulation_labels(settings.population, settings.subpopulations)
-    return EvolutionState(0, evaluation.genes, evaluation.objectives, labels, archive, rng)
+    history = History.empty(evaluation.objectives.shape[1]).extended(archive)
+    return EvolutionState(0, evaluation.genes, evaluation.objectives, labels, archive, history, rng)
 
 
 def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings) -> EvolutionState:
@@ -92,7 +95,8 @@ def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings)
     Returns
     -------
     EvolutionState
-        Of the next generation. It shares the archive and the random generator with the given one.
+        Of the next generation. It shares the archive and the random generator with the given one, which is of
+        no use for another step, also where the evaluation raises an error.
     """
     offspring_genes, offspring_labels = _breed(state, settings)
     offspring = state.archive.evaluate(offspring_genes, _checked(evaluate))
@@ -110,7 +114,8 @@ def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings)
     index = state.index + 1
     if index % settings.migration_interval == 0:
         kept = kept[migrate(state.subpopulations, settings.migration_rate, state.rng)]
-    return replace(state, index=index, genes=genes[kept], objectives=objectives[kept])
+    history = state.history.extended(state.archive)
+    return replace(state, index=index, genes=genes[kept], objectives=objectives[kept], history=history)
 
 
 def _breed(state: EvolutionState, settings: EvolutionSettings) -> tuple[IntArray, IntArray]:

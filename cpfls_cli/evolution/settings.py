@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt, Le, Lt
 from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
@@ -51,6 +51,15 @@ class EvolutionSettings(Settings):
     reinsertion: Annotated[
         Reinsertion, Doc("parents replaced by offspring: uniform (at random) or fitness (the least fit)")
     ] = "uniform"
+    stall_generations: Annotated[
+        int | None, Ge(1), Doc("end when the best of no objective improved over so many generations; null: never")
+    ] = None
+    stall_improvement: Annotated[
+        float,
+        Ge(0),
+        Lt(1),
+        Doc("relative improvement over stall_generations up to which an objective counts as stalled"),
+    ] = 1e-3
 
     def __post_init__(self) -> None:
         """Refuse a population that is too small for its subpopulations."""

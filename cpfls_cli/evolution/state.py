@@ -8,6 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Archive
+from cpfls_cli.evolution.history import History
 
 
 @dataclass(frozen=True)
@@ -43,10 +44,10 @@ class Generation:
 
 @dataclass(frozen=True)
 class EvolutionState:
-    """Hold all that the next generation depends on.
+    """Hold all that the next generation depends on, and all that a stopped evolution needs to go on.
 
-    The archive and the random generator are carried along and change with each step; copy the state deeply to
-    be able to return to it.
+    The archive and the random generator are carried along and change with each step; copy the state deeply, or
+    store its parts, to be able to return to it. One generator serves all subpopulations, in their order.
 
     Parameters
     ----------
@@ -57,6 +58,8 @@ class EvolutionState:
     subpopulations : array of int, shape (population,)
     archive : Archive
         Every chromosome evaluated so far.
+    history : History
+        One row for each generation, this one included.
     rng : numpy.random.Generator
     """
 
@@ -65,6 +68,7 @@ class EvolutionState:
     objectives: Array
     subpopulations: IntArray
     archive: Archive
+    history: History
     rng: np.random.Generator
 
     def report(self) -> Generation:

@@ -21,7 +21,8 @@ from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.physics import not_positive_definite
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.rigid_base import RigidBaseSolver
-from cpfls_cli.identification.search import Progress, search
+from cpfls_cli.identification.search import search
+from cpfls_cli.identification.search_run import UNWATCHED, SearchRun
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import Regressor, data_ranges
@@ -37,7 +38,7 @@ def identify(
     held_out: Mapping[str, TorqueData],
     settings: IdentificationSettings,
     rng: np.random.Generator,
-    progress: Progress | None = None,
+    run: SearchRun = UNWATCHED,
     stated_inertia: Array | None = None,
 ) -> Identification:
     """Identify a model and judge it beside its baselines.
@@ -52,8 +53,8 @@ def identify(
         Data that nothing is learned from, by name (not ``training``); judged once, at the end.
     settings : IdentificationSettings
     rng : numpy.random.Generator
-    progress : callable, optional
-        Called after each evaluated chromosome.
+    run : SearchRun, optional
+        How the search is run; by default from the start to its end, without being watched.
     stated_inertia : array, shape (6,), kg m^2, optional
         Inertia stated for the vehicle, to compare with what the flight says.
 
@@ -73,8 +74,8 @@ def identify(
     Paper section 9; method.md sections 4, 5, 7 and 8.
     """
     evaluator = model_evaluator(training, learned, settings)
-    front, history = search(evaluator, settings, rng, progress)
-    solved = _solve(evaluator, front.chromosomes[front.chosen], training)
+    found = search(evaluator, settings, rng, run)
+    solved = _solve(evaluator, found.front.chromosomes[found.front.chosen], training)
     if solved is None:
         raise ComputationError("no chromosome gave a finite model; the data may not move at all")
     model, fit = solved
@@ -99,9 +100,7 @@ def identify(
     )
     ridge = evaluator.solver.curve(model.partitions) if isinstance(evaluator.solver, RigidBaseSolver) else None
     told = tuple(findings(evidence))
-    return Identification(
-        **vars(evidence), model=model, front=front, history=history, ridge=ridge, baselines=baselines, findings=told
-    )
+    return Identification(**vars(evidence), **vars(found), model=model, ridge=ridge, baselines=baselines, findings=told)
 
 
 def model_evaluator(training: TorqueData, learned: TorqueData, settings: IdentificationSettings) -> Evaluator:

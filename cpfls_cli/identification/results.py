@@ -3,31 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import get_args
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.evolution.history import History
+from cpfls_cli.evolution.stopping import End
 from cpfls_cli.identification.baselines import Baseline
 from cpfls_cli.identification.cross_validation import RidgeCurve
 from cpfls_cli.identification.findings import Evidence
 from cpfls_cli.identification.model import Model
-
-
-@dataclass(frozen=True)
-class History:
-    """Course of the search.
-
-    Attributes
-    ----------
-    evaluations : array of int, shape (generations + 1,)
-        Chromosomes evaluated so far.
-    best : array, shape (generations + 1, 3)
-        Best of each objective so far.
-    front_size : array of int, shape (generations + 1,)
-        Members of the Pareto front so far.
-    """
-
-    evaluations: IntArray
-    best: Array
-    front_size: IntArray
+from cpfls_cli.identification.search_run import StopReason
 
 
 @dataclass(frozen=True)
@@ -56,6 +41,8 @@ class Identification(Evidence):
     model : Model
     front : Front
     history : History
+    stop_reason : str
+        Why the search ended: generations, converged, time-limit or interrupted.
     ridge : RidgeCurve or None
         For a rigid-body base: how the ridge weight was chosen.
     baselines : tuple of Baseline
@@ -67,6 +54,12 @@ class Identification(Evidence):
     model: Model
     front: Front
     history: History
+    stop_reason: StopReason
     ridge: RidgeCurve | None
     baselines: tuple[Baseline, ...]
     findings: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether the search came to its end."""
+        return self.stop_reason in get_args(End)

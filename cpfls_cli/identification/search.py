@@ -2,51 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import IntArray
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.evolution.archive import Evaluate, Evaluation
-from cpfls_cli.evolution.engine import evolve
-from cpfls_cli.evolution.state import Generation, best
+from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
+from cpfls_cli.evolution.engine import start, step
+from cpfls_cli.evolution.history import History
+from cpfls_cli.evolution.state import EvolutionState
+from cpfls_cli.evolution.stopping import ended
 from cpfls_cli.identification.choice import choose
 from cpfls_cli.identification.chromosome import uniform_chromosome
-from cpfls_cli.identification.evaluator import Evaluator
-from cpfls_cli.identification.results import Front, History
+from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator
+from cpfls_cli.identification.results import Front
+from cpfls_cli.identification.search_run import UNWATCHED, SearchRun, SearchStep, Stop, StopReason, Workers
 from cpfls_cli.identification.settings import IdentificationSettings
 
 
 @dataclass(frozen=True)
-class SearchStep:
-    """How far a search has come.
+class SearchResult:
+    """What a search found.
 
     Attributes
     ----------
-    generation : int
-        The generation under evaluation; 0 is the initial population.
-    generations : int
-        The last one.
-    share : float
-        Share of its new chromosomes that are evaluated.
-    best : array, shape (3,), or None
-        Best of each objective up to the generation before; None during the first.
+    front : Front
+    history : History
+        Where the search stopped within a generation, the last row is of what was evaluated of it.
+    stop_reason : str
+        ``generations`` or ``converged`` for a search that came to its end, else ``time-limit`` or ``interrupted``.
     """
 
-    generation: int
-    generations: int
-    share: float
-    best: Array | None
+    front: Front
+    history: History
+    stop_reason: StopReason
 
 
-Progress = Callable[[SearchStep], None]
+class NothingFoundError(ComputationError):
+    """A search ended without a finite model.
+
+    Parameters
+    ----------
+    stop_reason : str
+        Why it ended.
+    """
+
+    def __init__(self, stop_reason: StopReason) -> None:
+        super().__init__("no chromosome gave a finite model; the data may not move at all")
+        self.stop_reason = stop_reason
+
+
+class _StoppedError(Exception):
+    """Leave a generation, with what was evaluated of it."""
+
+    def __init__(self, reason: Stop, submitted: IntArray, evaluation: Evaluation) -> None:
+        super().__init__(reason)
+        self.reason, self.submitted, self.evaluation = reason, submitted, evaluation
 
 
 def search(
-    evaluator: Evaluator, settings: IdentificationSettings, rng: np.random.Generator, progress: Progress | None
-) -> tuple[Front, History]:
+    evaluator: Evaluator,
+    settings: IdentificationSettings,
+    rng: np.random.Generator,
+    run: SearchRun = UNWATCHED,
+) -> SearchResult:
     """Search for non-dominated partitions.
 
     Parameters
@@ -54,54 +74,85 @@ def search(
     evaluator : Evaluator
     settings : IdentificationSettings
     rng : numpy.random.Generator
-    progress : callable, optional
+        Not used by a search that goes on, which has its own.
+    run : SearchRun
 
     Returns
     -------
-    front : Front
-    history : History
+    SearchResult
 
     Raises
     ------
-    ComputationError
+    NothingFoundError
         If no chromosome gives a finite model.
     """
-    structure = evaluator.structure
-    if structure.genes == 0:
-        only = evaluator(uniform_chromosome(structure)[None])
-        objectives = only.objectives
-        history = History(np.array([1]), objectives, np.array([1]))
-        return Front(only.genes, objectives, 0), history
-    generations: list[Generation] = []
-    evaluate = _watched(evaluator, generations, settings.generations, progress) if progress else evaluator
-    initial = uniform_chromosome(structure)[None] if settings.start == "with-uniform" else None
-    for generation in evolve(evaluate, structure.genes, settings, rng, initial):
-        # One at a time: the progress of the next one reads them while it is bred.
-        generations.append(generation)  # noqa: PERF402
-    last = generations[-1]
-    usable = np.isfinite(last.front_objectives).all(axis=1)
-    if not usable.any():
-        raise ComputationError("no chromosome gave a finite model; the data may not move at all")
-    objectives = last.front_objectives[usable]
-    front = Front(last.front_genes[usable], objectives, choose(objectives, settings.choice))
-    history = History(
-        np.array([g.evaluations for g in generations]),
-        np.array([best(g) for g in generations]),
-        np.array([len(g.front_genes) for g in generations]),
-    )
-    return front, history
+    if evaluator.structure.genes == 0:
+        only = evaluator(uniform_chromosome(evaluator.structure)[None])
+        archive = Archive.of(only.genes, only)
+        return _result(archive, History.empty(OBJECTIVES).extended(archive), "generations", settings)
+    with run.workers(evaluator) as workers:
+        return _result(*_evolved(evaluator, workers, settings, rng, run), settings)
 
 
-def _watched(evaluator: Evaluator, past: Sequence[Generation], last: int, progress: Progress) -> Evaluate:
-    """Evaluate one chromosome after the other, so that a long generation shows how far it has come."""
+def _evolved(
+    evaluator: Evaluator,
+    workers: Workers,
+    settings: IdentificationSettings,
+    rng: np.random.Generator,
+    run: SearchRun,
+) -> tuple[Archive, History, StopReason]:
+    """Breed until the end, or until asked to stop; then what of a generation is evaluated counts too."""
+    state = run.resumed
+    try:
+        if state is None:
+            structure = evaluator.structure
+            initial = uniform_chromosome(structure)[None] if settings.start == "with-uniform" else None
+            state = start(_watched(workers, run, settings, None), structure.genes, settings, rng, initial)
+            run.on_generation(state)
+        while (reason := ended(state, settings) or run.should_stop()) is None:
+            state = step(state, _watched(workers, run, settings, state), settings)
+            run.on_generation(state)
+    except _StoppedError as stopped:
+        archive, history = (Archive(), History.empty(OBJECTIVES)) if state is None else (state.archive, state.history)
+        archive.store(stopped.submitted, stopped.evaluation)
+        return archive, history.extended(archive), stopped.reason
+    return state.archive, state.history, reason
+
+
+def _watched(
+    workers: Workers, run: SearchRun, settings: IdentificationSettings, before: EvolutionState | None
+) -> Evaluate:
+    """Gather the evaluations of a generation, show how far it has come, and stop when asked to."""
+    generation, best = (0, None) if before is None else (before.index + 1, before.history.best[-1])
 
     def evaluate(genes: IntArray) -> Evaluation:
-        best_so_far = best(past[-1]) if past else None
-        parts = []
-        for done in range(1, len(genes) + 1):
-            parts.append(evaluator(genes[done - 1 : done]))
-            progress(SearchStep(len(past), last, done / len(genes), best_so_far))
-        refined, objectives = ([getattr(part, name) for part in parts] for name in ("genes", "objectives"))
-        return Evaluation(np.concatenate(refined), np.concatenate(objectives))
+        ready: list[tuple[IntArray, Evaluation]] = []
+        done = 0
+        for rows, evaluation in workers.stream(genes):
+            ready.append((rows, evaluation))
+            done += len(rows)
+            run.progress(SearchStep(generation, settings.generations, done / len(genes), best))
+            if done < len(genes) and (reason := run.should_stop()) is not None:
+                finished, gathered = _gathered(ready)
+                raise _StoppedError(reason, genes[finished], gathered)
+        return _gathered(ready)[1]
 
     return evaluate
+
+
+def _gathered(ready: list[tuple[IntArray, Evaluation]]) -> tuple[IntArray, Evaluation]:
+    """Put evaluations in the order of their rows, whatever the order they came in."""
+    rows = np.concatenate([rows for rows, _ in ready])
+    order = np.argsort(rows)
+    genes = np.concatenate([evaluation.genes for _, evaluation in ready])
+    objectives = np.concatenate([evaluation.objectives for _, evaluation in ready])
+    return rows[order], Evaluation(genes[order], objectives[order])
+
+
+def _result(archive: Archive, history: History, reason: StopReason, settings: IdentificationSettings) -> SearchResult:
+    front = archive.front
+    usable = np.isfinite(front.objectives).all(axis=1)
+    if not usable.any():
+        raise NothingFoundError(reason)
+    objectives = front.objectives[usable]
+    return SearchResult(Front(front.genes[usable], objectives, choose(objectives, settings.choice)), history, reason)

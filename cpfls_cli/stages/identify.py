@@ -16,7 +16,7 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import TRAINING, identify
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.results import Identification
-from cpfls_cli.identification.search import SearchStep
+from cpfls_cli.identification.search_run import SearchRun, SearchStep
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.stages.job import Job, Outcome, Started, begin, finish
 from cpfls_cli.stages.model_file import model_data
@@ -67,7 +67,9 @@ def _identify(job: Job, flight: Path, data: TrainingData, held_out: dict[str, To
                 held_out,
                 job.study.identification,
                 generator(job.study, "identify"),
-                lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step)),
+                SearchRun(
+                    progress=lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step))
+                ),
                 six_parameters(job.study.vehicle.inertia_kg_m2),
             )
     except ComputationError as error:

@@ -133,6 +133,8 @@ def _search(result: Identification) -> dict[str, Any]:
         "history/evaluations": result.history.evaluations,
         "history/best": result.history.best,
         "history/front_size": result.history.front_size,
+        "search/stop_reason": np.array(result.stop_reason),
+        "search/complete": np.uint8(result.complete),
     }
 
 

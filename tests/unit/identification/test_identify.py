@@ -5,6 +5,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
+from cpfls_cli.identification.search_run import SearchRun
 from cpfls_cli.identification.settings import LocalSearchSettings, RidgeSettings
 from cpfls_cli.regressor import Motion
 from cpfls_cli.vehicle import newton_euler_torque
@@ -23,7 +24,14 @@ def flight(samples=100, noise=0.02, seed=22, limit=np.pi):
 def identified(settings, data=None, progress=None, seed=1):
     data = flight() if data is None else data
     held_out = {"held out": flight(seed=23)}
-    return identify(data, data, held_out, IdentificationSettings(**settings), np.random.default_rng(seed), progress)
+    return identify(
+        data,
+        data,
+        held_out,
+        IdentificationSettings(**settings),
+        np.random.default_rng(seed),
+        SearchRun(progress=progress or (lambda _: None)),
+    )
 
 
 @pytest.mark.parametrize("base", ["none", "rigid-body"])

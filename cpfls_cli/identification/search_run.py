@@ -1,0 +1,101 @@
+"""How one search is run: where it starts, where it evaluates, who watches it and when it stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.evolution.archive import Evaluate, Evaluation
+from cpfls_cli.evolution.state import EvolutionState
+from cpfls_cli.evolution.stopping import End
+
+Stop = Literal["time-limit", "interrupted"]
+StopReason = End | Stop
+
+
+class Workers(Protocol):
+    """Evaluate chromosomes somewhere."""
+
+    def stream(self, genes: IntArray) -> Iterator[tuple[IntArray, Evaluation]]:
+        """Take chromosomes, shape (n, genes), and give rows of them with their evaluations, as they are ready."""
+        ...
+
+
+@dataclass(frozen=True)
+class SearchStep:
+    """How far a search has come.
+
+    Attributes
+    ----------
+    generation : int
+        The generation under evaluation; 0 is the initial population.
+    generations : int
+        The last one.
+    share : float
+        Share of its new chromosomes that are evaluated.
+    best : array, shape (3,), or None
+        Best of each objective up to the generation before; None during the first.
+    """
+
+    generation: int
+    generations: int
+    share: float
+    best: Array | None
+
+
+@dataclass(frozen=True)
+class _Here:
+    """Evaluates one chromosome after the other, here."""
+
+    evaluate: Evaluate
+
+    def stream(self, genes: IntArray) -> Iterator[tuple[IntArray, Evaluation]]:
+        for row in range(len(genes)):
+            yield np.array([row]), self.evaluate(genes[row : row + 1])
+
+
+def _here(evaluate: Evaluate) -> AbstractContextManager[Workers]:
+    return nullcontext(_Here(evaluate))
+
+
+def _unwatched(_: object) -> None:
+    pass
+
+
+def _unstopped() -> None:
+    return None
+
+
+@dataclass(frozen=True)
+class SearchRun:
+    """How one search is run; nothing of it changes what a search that comes to its end finds.
+
+    Attributes
+    ----------
+    resumed : EvolutionState or None
+        Where to go on; None starts with a new population.
+    workers : callable
+        Takes the evaluator; gives the context in which workers evaluate by it, one chromosome after the other in
+        this process by default.
+    progress : callable
+        Takes a `SearchStep`, after each part of a generation that was evaluated.
+    on_generation : callable
+        Takes the state after each generation, the initial population included. The next generation changes it.
+    should_stop : callable
+        Asked after each part of a generation: why to stop now, or None.
+    """
+
+    resumed: EvolutionState | None = None
+    workers: Callable[[Evaluate], AbstractContextManager[Workers]] = _here
+    progress: Callable[[SearchStep], None] = _unwatched
+    on_generation: Callable[[EvolutionState], None] = _unwatched
+    should_stop: Callable[[], Stop | None] = _unstopped
+
+
+UNWATCHED = SearchRun()
+"""From the start to the end, one chromosome after the other."""
