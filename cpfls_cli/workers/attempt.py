@@ -1,0 +1,79 @@
+"""Carry a failure from a worker to whoever waits for its result.
+
+Failures travel as plain text, because not every exception survives being pickled.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from cpfls_cli.errors import ComputationError, CpflsError
+
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What went wrong in a worker.
+
+    Parameters
+    ----------
+    message : str
+        For the user.
+    origin : str
+        Traceback in the worker, for whoever looks for a fault of the program.
+    """
+
+    message: str
+    origin: str
+
+
+def attempt(work: Callable[[], _Result]) -> _Result | Failure:
+    """Do some work and return its result, or else what went wrong.
+
+    Parameters
+    ----------
+    work : callable
+
+    Returns
+    -------
+    object or Failure
+    """
+    try:
+        return work()
+    except Exception as error:
+        return Failure(_message(error), traceback.format_exc())
+
+
+def result_of(outcome: _Result | Failure) -> _Result:
+    """Return what an attempt brought, or raise what it failed with.
+
+    Parameters
+    ----------
+    outcome : object or Failure
+
+    Returns
+    -------
+    object
+
+    Raises
+    ------
+    ComputationError
+        With the message of the failure; the worker's traceback is a note on it.
+    """
+    if isinstance(outcome, Failure):
+        error = ComputationError(outcome.message)
+        error.add_note(outcome.origin)
+        raise error
+    return outcome
+
+
+def _message(error: Exception) -> str:
+    if isinstance(error, CpflsError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "a worker ran out of memory: take fewer workers, or give the machine more memory"
+    return f"a worker failed with {type(error).__name__}: {error}; take one worker without a scheduler to see more"

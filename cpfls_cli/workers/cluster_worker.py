@@ -1,0 +1,62 @@
+"""The worker's side of a cluster: an evaluator that each thread loads once, and the work on a chunk."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+from functools import partial
+
+from cpfls_cli.arrays import IntArray
+from cpfls_cli.evolution.archive import Evaluate, Evaluation
+from cpfls_cli.workers.attempt import Failure, attempt
+
+
+class Shipped:
+    """A pickled evaluator on its way to the workers.
+
+    Threads of one worker do not share an evaluator, because nothing says that it may be used by two at once.
+
+    Parameters
+    ----------
+    evaluator : bytes
+    """
+
+    def __init__(self, evaluator: bytes) -> None:
+        self._evaluator = evaluator
+        self._loaded = threading.local()
+
+    def __reduce__(self) -> tuple[type[Shipped], tuple[bytes]]:
+        return Shipped, (self._evaluator,)
+
+    def __sizeof__(self) -> int:
+        return len(self._evaluator)
+
+    def evaluate(self, genes: IntArray) -> Evaluation:
+        """Evaluate chromosomes by this thread's own evaluator."""
+        if not hasattr(self._loaded, "evaluate"):
+            self._loaded.evaluate = self._load()
+        evaluation: Evaluation = self._loaded.evaluate(genes)
+        return evaluation
+
+    def _load(self) -> Evaluate:
+        from threadpoolctl import threadpool_limits
+
+        evaluate: Evaluate = pickle.loads(self._evaluator)
+        # Loading has loaded the libraries of linear algebra too. Sums in one order give the same bytes everywhere.
+        threadpool_limits(limits=1)
+        return evaluate
+
+
+def evaluate_shipped(shipped: Shipped, genes: IntArray) -> Evaluation | Failure:
+    """Evaluate chromosomes on a worker of a cluster.
+
+    Parameters
+    ----------
+    shipped : Shipped
+    genes : array of int, shape (individuals, genes)
+
+    Returns
+    -------
+    Evaluation or Failure
+    """
+    return attempt(partial(shipped.evaluate, genes))

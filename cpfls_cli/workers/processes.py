@@ -1,0 +1,175 @@
+"""Evaluate in processes on this machine.
+
+One pipe for each process in place of the standard library's pool: a process whose parent was killed sees its pipe
+close and ends, where a pool's would wait forever; and one that vanishes is known by its exit code.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import pickle
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing.connection import wait
+
+from cpfls_cli.arrays import IntArray
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.evolution.archive import Evaluate, Evaluation
+from cpfls_cli.workers.attempt import Failure, result_of
+from cpfls_cli.workers.chunks import chunks
+from cpfls_cli.workers.process_worker import work
+from cpfls_cli.workers.workforce import Workforce
+
+_LONGEST_FAREWELL_S = 5.0
+
+
+class _Process:
+    """A started process and our end of its pipe."""
+
+    def __init__(self) -> None:
+        # A forked process would inherit locks that other threads hold; a spawned one starts clean.
+        context = multiprocessing.get_context("spawn")
+        self.connection, theirs = context.Pipe()
+        self._process = context.Process(target=work, args=(theirs,), daemon=True)
+        self._process.start()
+        theirs.close()
+        self.busy = False
+
+    def load(self, evaluator: bytes) -> None:
+        """Send the pickled evaluator; the answer is None."""
+        with self._alive():
+            self.connection.send_bytes(evaluator)
+            self.busy = True
+
+    def give(self, genes: IntArray) -> None:
+        """Send chromosomes; the answer is their evaluation."""
+        with self._alive():
+            self.connection.send(genes)
+            self.busy = True
+
+    def answer(self) -> Evaluation | None:
+        """Receive what the process answers."""
+        with self._alive():
+            outcome: Evaluation | Failure | None = self.connection.recv()
+            self.busy = False
+            return result_of(outcome)
+
+    def end(self) -> None:
+        """End the process, whatever it is doing."""
+        self.connection.close()
+        self._process.kill()
+        self._process.join()
+        self._process.close()
+
+    @contextmanager
+    def _alive(self) -> Iterator[None]:
+        try:
+            yield
+        except (EOFError, OSError) as error:
+            self._process.join(_LONGEST_FAREWELL_S)
+            raise ComputationError(
+                f"a worker process vanished ({_ending(self._process.exitcode)}); where the machine ran out of memory, "
+                "take fewer workers or less data, or add memory"
+            ) from error
+
+
+class Processes(Workforce):
+    """Processes on this machine, each with its own copy of the evaluator.
+
+    Parameters
+    ----------
+    processes : list of _Process
+        Started, and with the evaluator on its way.
+    """
+
+    def __init__(self, processes: list[_Process]) -> None:
+        self._processes = processes
+
+    def stream(self, genes: IntArray) -> Iterator[tuple[IntArray, Evaluation]]:
+        """Evaluate chromosomes; parameters are those of `Workforce.stream`."""
+        waiting = chunks(len(genes), len(self._processes))
+        given: dict[_Process, IntArray] = {}
+        self._hand_out(genes, waiting, given)
+        while waiting or given:
+            for process in self._answering():
+                answer, rows = process.answer(), given.pop(process, None)
+                self._hand_out(genes, waiting, given)
+                # Whatever was not given here answers to loading, or to a stream that was given up.
+                if rows is not None and answer is not None:
+                    yield rows, answer
+
+    def _hand_out(self, genes: IntArray, waiting: list[IntArray], given: dict[_Process, IntArray]) -> None:
+        for process in self._processes:
+            if waiting and not process.busy:
+                given[process] = waiting.pop(0)
+                process.give(genes[given[process]])
+
+    def _answering(self) -> list[_Process]:
+        ready = wait([process.connection for process in self._processes if process.busy])
+        return [process for process in self._processes if process.connection in ready]
+
+
+@contextmanager
+def processes(evaluate: Evaluate, count: int) -> Iterator[Processes]:
+    """Start processes and end them afterwards, whatever they are doing.
+
+    Linear algebra takes as many threads in them as the environment of this process says.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Evaluator of chromosomes that can be pickled; sent to each process once.
+    count : int
+        Number of processes, >= 1.
+
+    Yields
+    ------
+    Processes
+
+    Raises
+    ------
+    ComputationError
+        If the processes cannot be started.
+    """
+    evaluator = pickle.dumps(evaluate, protocol=pickle.HIGHEST_PROTOCOL)
+    started: list[_Process] = []
+    try:
+        with _interrupts_held_back():
+            _start(started, count)
+        for process in started:
+            process.load(evaluator)
+        yield Processes(started)
+    finally:
+        for process in started:
+            process.end()
+
+
+def _start(started: list[_Process], count: int) -> None:
+    try:
+        for _ in range(count):
+            started.append(_Process())  # noqa: PERF401 - kept one by one, to be ended when a later one fails
+    except OSError as error:
+        raise ComputationError(f"worker {len(started) + 1} of {count} cannot start ({error}): take fewer") from error
+
+
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Hold signals back, also in the processes started meanwhile, which are open to them before they run our code."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _ending(exit_code: int | None) -> str:
+    if exit_code is None:
+        return "its pipe closed"
+    if exit_code < 0:
+        return f"killed by {signal.Signals(-exit_code).name}"
+    return f"exit code {exit_code}"

@@ -1,0 +1,51 @@
+"""What all kinds of workers are to the genetic algorithm: an evaluator whose rows can be watched as they finish."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+
+import numpy as np
+
+from cpfls_cli.arrays import IntArray
+from cpfls_cli.evolution.archive import Evaluation
+
+
+class Workforce(ABC):
+    """Evaluate chromosomes somewhere.
+
+    The evaluator must treat each chromosome by itself, whatever others it is given with. Then the result does not
+    depend on the number or the kind of workers.
+    """
+
+    @abstractmethod
+    def stream(self, genes: IntArray) -> Iterator[tuple[IntArray, Evaluation]]:
+        """Evaluate chromosomes and hand out each part as soon as it is finished, in any order.
+
+        Whoever stops iterating and closes the iterator gives up the rest: what has not begun is never begun, and
+        what is under way is thrown away.
+
+        Parameters
+        ----------
+        genes : array of int, shape (individuals, genes)
+
+        Yields
+        ------
+        rows : array of int, shape (part,)
+            Rows of `genes`; each appears once over all parts.
+        evaluation : Evaluation
+            Of these rows, in their order.
+
+        Raises
+        ------
+        ComputationError
+            If the evaluator fails, or a worker vanishes.
+        """
+
+    def __call__(self, genes: IntArray) -> Evaluation:
+        """Evaluate chromosomes and wait for all of them; the interface of an evaluator."""
+        rows, parts = zip(*self.stream(genes), strict=True)
+        order = np.argsort(np.concatenate(rows))
+        refined = np.concatenate([part.genes for part in parts])
+        objectives = np.concatenate([part.objectives for part in parts])
+        return Evaluation(refined[order], objectives[order])
