@@ -24,7 +24,7 @@ class Failure:
     message : str
         For the user.
     origin : str
-        Traceback in the worker, for whoever looks for a fault of the program.
+        Traceback in the worker, for whoever looks for a fault of the program; empty where the message says all.
     """
 
     message: str
@@ -44,8 +44,14 @@ def attempt(work: Callable[[], _Result]) -> _Result | Failure:
     """
     try:
         return work()
+    except CpflsError as error:
+        return Failure(str(error), "")
+    except MemoryError:
+        return Failure("a worker ran out of memory: take fewer workers, or give the machine more memory", "")
     except Exception as error:
-        return Failure(_message(error), traceback.format_exc())
+        kind = type(error).__name__
+        message = f"a worker failed with {kind}: {error}; take one worker without a scheduler to see more"
+        return Failure(message, traceback.format_exc())
 
 
 def result_of(outcome: _Result | Failure) -> _Result:
@@ -62,18 +68,11 @@ def result_of(outcome: _Result | Failure) -> _Result:
     Raises
     ------
     ComputationError
-        With the message of the failure; the worker's traceback is a note on it.
+        With the message of the failure; the worker's traceback, if there is one, is a note on it.
     """
     if isinstance(outcome, Failure):
         error = ComputationError(outcome.message)
-        error.add_note(outcome.origin)
+        if outcome.origin:
+            error.add_note(outcome.origin)
         raise error
     return outcome
-
-
-def _message(error: Exception) -> str:
-    if isinstance(error, CpflsError):
-        return str(error)
-    if isinstance(error, MemoryError):
-        return "a worker ran out of memory: take fewer workers, or give the machine more memory"
-    return f"a worker failed with {type(error).__name__}: {error}; take one worker without a scheduler to see more"

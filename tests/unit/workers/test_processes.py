@@ -1,0 +1,193 @@
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.workers import employ
+from tests.unit.workers.evaluators import POISON, Failing, Loading, Logging, Reporting, Uneven, Unloadable
+
+ROOT = Path(__file__).parents[3]
+GENES = np.random.default_rng(5).integers(0, 32768, (40, 6))
+
+
+def column(*values):
+    return np.array(values)[:, np.newaxis]
+
+
+@pytest.fixture(scope="module")
+def two():
+    with employ(Uneven(np.linspace(0, 1, 50)), count=2) as workers:
+        yield workers
+
+
+def test_two_processes_give_the_same_bytes_as_the_evaluator_itself(two):
+    here = Uneven(np.linspace(0, 1, 50))(GENES)
+    there = two(GENES)
+    assert there.genes.tobytes() == here.genes.tobytes()
+    assert there.objectives.tobytes() == here.objectives.tobytes()
+
+
+def test_one_worker_is_this_process():
+    with employ(Reporting()) as workers:
+        assert set(workers(GENES).objectives[:, 0]) == {os.getpid()}
+
+
+def test_one_worker_gives_the_same_bytes_as_the_evaluator_itself():
+    evaluate = Uneven(np.linspace(0, 1, 50), longest_s=0.0)
+    with employ(evaluate) as workers:
+        assert workers(GENES).objectives.tobytes() == evaluate(GENES).objectives.tobytes()
+
+
+def test_parts_say_which_rows_they_are(two):
+    seen = []
+    for rows, part in two.stream(GENES):
+        assert part.genes.tolist() == (GENES[rows, ::-1] + 1).tolist()
+        seen.extend(rows.tolist())
+    assert sorted(seen) == list(range(len(GENES)))
+
+
+def test_one_chromosome_and_many_follow_each_other(two):
+    for count in (1, 3, 40):
+        assert two(GENES[:count]).genes.tolist() == (GENES[:count, ::-1] + 1).tolist()
+
+
+def test_a_stream_that_is_given_up_leaves_nothing_to_the_next(two):
+    stream = two.stream(GENES)
+    next(stream)
+    stream.close()
+    assert two(GENES[:5] + 1).genes.tolist() == (GENES[:5, ::-1] + 2).tolist()
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_what_is_given_up_before_it_begins_is_never_evaluated(count, tmp_path):
+    with employ(Logging(tmp_path), count=count) as workers:
+        stream = workers.stream(column(*range(100)))
+        next(stream)
+        stream.close()
+    assert 0 < len(list(tmp_path.iterdir())) < 60
+
+
+def test_the_evaluator_is_loaded_once_by_each_of_both_processes(tmp_path):
+    with employ(Loading(tmp_path), count=2) as workers:
+        for _ in range(3):
+            workers(GENES)
+    loaded = [path.name.split("-")[0] for path in tmp_path.iterdir()]
+    assert len(loaded) <= 2
+    assert len(set(loaded)) == len(loaded)
+    assert str(os.getpid()) not in loaded
+
+
+@pytest.mark.parametrize(
+    ("way", "message"),
+    [
+        ("domain", "^flight.h5: gravity_m_s2 = 0: take the Earth's$"),
+        ("unpicklable", "a worker failed with SettingError: an error that cannot be unpickled"),
+        ("memory", "ran out of memory: take fewer workers"),
+        ("killed", r"vanished \(killed by SIGKILL\).*take fewer workers"),
+        ("left", r"vanished \(exit code 3\)"),
+    ],
+)
+def test_a_failing_worker_is_an_error_in_words_and_leaves_no_process(way, message):
+    before = set(multiprocessing.active_children())
+    with pytest.raises(ComputationError, match=message), employ(Failing(way), count=2) as workers:
+        workers(column(*range(POISON + 5)))
+    assert set(multiprocessing.active_children()) <= before
+
+
+def test_the_traceback_of_a_worker_is_a_note_for_whoever_looks_for_the_fault():
+    with pytest.raises(ComputationError) as caught, employ(Failing("unpicklable"), count=2) as workers:
+        workers(column(POISON))
+    assert "evaluators.py" in caught.value.__notes__[0]
+
+
+def test_an_idle_worker_that_was_killed_is_noticed_at_the_next_evaluation():
+    with employ(Reporting(), count=2) as workers:
+        victim = int(workers(GENES).objectives[0, 0])
+        os.kill(victim, signal.SIGKILL)
+        with pytest.raises(ComputationError, match="vanished"):
+            workers(GENES)
+
+
+def test_an_evaluator_that_cannot_be_loaded_is_an_error_in_words():
+    with (
+        pytest.raises(ComputationError, match="ModuleNotFoundError: No module named 'compiled_kernel'"),
+        employ(Unloadable(), count=2) as workers,
+    ):
+        workers(GENES)
+
+
+def test_no_process_is_left_after_success():
+    before = set(multiprocessing.active_children())
+    with employ(Reporting(), count=2) as workers:
+        workers(GENES)
+    assert set(multiprocessing.active_children()) <= before
+
+
+PARENT = """
+import sys
+import time
+from cpfls_cli.cli.threads import use_one_thread
+if __name__ == "__main__":
+    use_one_thread()
+    import numpy as np
+    from cpfls_cli.workers import employ
+    from tests.unit.workers.evaluators import Reporting
+    with employ(Reporting(), count=2) as workers:
+        seen = workers(np.ones((40, 2), dtype=int)).objectives
+        print(*sorted({int(process) for process in seen[:, 0]}), flush=True)
+        print(seen[:, 1].max(), flush=True)
+        sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def parent(tmp_path):
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    free = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    with subprocess.Popen(
+        [sys.executable, script],
+        env=free | {"PYTHONPATH": str(ROOT)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        yield process
+        process.kill()
+
+
+def exists(process):
+    """Whether a process runs; one that ended and was not yet collected by its parent does not."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_workers_take_one_thread_from_the_command_line_and_end_when_their_parent_is_killed(parent):
+    processes = [int(text) for text in parent.stdout.readline().split()]
+    assert float(parent.stdout.readline()) == 1.0
+    assert all(exists(process) for process in processes)
+    parent.kill()
+    deadline = time.monotonic() + 10.0
+    while any(exists(process) for process in processes) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not any(exists(process) for process in processes)
+    assert parent.stderr.read() == ""
+
+
+def test_an_interrupt_of_the_whole_group_reaches_only_the_parent(parent):
+    parent.stdout.readline()
+    os.killpg(parent.pid, signal.SIGINT)
+    errors = parent.communicate()[1]
+    assert errors.count("Traceback") == 1
+    assert errors.strip().endswith("KeyboardInterrupt")
