@@ -13,6 +13,10 @@ class ComputationError(CpflsError):
     """A stage ran on valid input and could not produce a result (exit code 1)."""
 
 
+class OutputError(CpflsError):
+    """A file cannot be written, though it could when the command began: a full disk (exit code 1)."""
+
+
 class InputError(CpflsError):
     """A file, an artifact or an option is not what the command needs (exit code 2)."""
 

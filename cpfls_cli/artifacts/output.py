@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import InputError, OutputError
 
 
 def check_output(path: Path, force: bool) -> None:
@@ -25,13 +25,23 @@ def check_output(path: Path, force: bool) -> None:
     InputError
         If the file exists, its folder does not, or the folder cannot be written.
     """
-    with atomic_path(path):
+    with _asked_for(path):
         if path.is_dir():
             raise InputError(f"{path}: is a folder; -o names a file")
         if path.exists() and not path.is_file():
             raise InputError(f"{path}: is a device or a pipe; -o names a file")
         if path.exists() and not force:
             raise InputError(f"{path}: exists already; --force replaces it")
+
+
+@contextmanager
+def _asked_for(path: Path) -> Iterator[None]:
+    """Make sure that the folder can be written; before anything is computed it is the option that is wrong."""
+    try:
+        with atomic_path(path):
+            yield
+    except OutputError as error:
+        raise InputError(str(error)) from None
 
 
 @contextmanager
@@ -49,13 +59,13 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
     Raises
     ------
-    InputError
+    OutputError
         If the folder does not exist or cannot be written.
     """
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     except OSError as error:
-        raise InputError(f"{path}: cannot write into the folder {path.parent}: {error.strerror}") from None
+        raise OutputError(f"{path}: cannot write into the folder {path.parent}: {error.strerror}") from None
     temporary = Path(name)
     try:
         os.close(handle)
@@ -78,7 +88,7 @@ def write_text(path: Path, text: str) -> None:
 
     Raises
     ------
-    InputError
+    OutputError
         If the file cannot be written.
     """
     with atomic_path(path) as temporary:
@@ -86,4 +96,4 @@ def write_text(path: Path, text: str) -> None:
             temporary.write_text(text, encoding="utf-8")
             os.replace(temporary, path)
         except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error}") from None
+            raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from cpfls_cli.artifacts.hashing import text_sha256
 from cpfls_cli.artifacts.output import atomic_path
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.spec import CONFIG, INPUTS, SCHEMA_VERSION, DatasetSpec
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import OutputError
 
 
 def write_artifact(path: Path, artifact: Artifact) -> None:
@@ -27,17 +28,28 @@ def write_artifact(path: Path, artifact: Artifact) -> None:
 
     Raises
     ------
-    InputError
+    OutputError
         If the file cannot be written.
     """
+    image = _image(artifact)
     with atomic_path(path) as temporary:
         try:
-            with h5py.File(temporary, "w") as file:
-                _write_header(file, artifact)
-                _write_data(file, artifact)
+            with temporary.open("wb") as file:
+                file.write(image)
+                file.flush()
+                os.fsync(file.fileno())
             os.replace(temporary, path)
         except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error}") from None
+            raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def _image(artifact: Artifact) -> memoryview:
+    """Make the file in memory: HDF5 crashes the program where a disk fills up under it."""
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        _write_header(file, artifact)
+        _write_data(file, artifact)
+    return image.getbuffer()
 
 
 def _write_header(file: h5py.File, artifact: Artifact) -> None:

@@ -1,5 +1,8 @@
 """Where results go: nothing is replaced, half written or written in a dry run unless it was asked for."""
 
+import subprocess
+import sys
+
 import pytest
 
 
@@ -70,10 +73,21 @@ def test_full_disk_leaves_the_old_output(refuse, study, tmp_path, monkeypatch):
     def fail(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("cpfls_cli.artifacts.writing._write_dataset", fail)
-    (line,) = refuse("trajectory", study, "-o", output, "--force")
-    assert line.startswith(f"{output}: cannot be written: ")
-    assert "No space left on device" in line
+    monkeypatch.setattr("os.fsync", fail)
+    (line,) = refuse("trajectory", study, "-o", output, "--force", code=1)
+    assert line == f"{output}: cannot be written: No space left on device"
+
+
+@pytest.mark.parametrize("limit", [100, 60_000])
+def test_output_larger_than_the_system_allows(study, tmp_path, limit):
+    """A real refusal by the system, in the first and in a later block; HDF5 must not crash when the program ends."""
+    limited = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0})); "
+    code = limited.format(limit) + "from cpfls_cli.cli.main import run; sys.argv[0] = 'cpfls'; run()"
+    words = ["trajectory", str(study), "-o", str(tmp_path / "trajectory.h5")]
+    result = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr == f"cpfls: error: {tmp_path / 'trajectory.h5'}: cannot be written: File too large\n"
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("command", ["trajectory", "simulate", "reduce", "identify", "predict"])
