@@ -17,6 +17,21 @@ class OutputError(CpflsError):
     """A file cannot be written, though it could when the command began: a full disk (exit code 1)."""
 
 
+class StoppedError(CpflsError):
+    """Work was stopped by an interrupt before it had a result.
+
+    Parameters
+    ----------
+    message : str
+    exit_code : int
+        128 plus the number of the signal.
+    """
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code
+
+
 class InputError(CpflsError):
     """A file, an artifact or an option is not what the command needs (exit code 2)."""
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cpfls_cli import __version__
+from cpfls_cli.cli.durations import seconds
+from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.narration import Narration
 from cpfls_cli.cli.options import Common, ConfigArgument, OutputOption, with_common
 from cpfls_cli.cli.terminal import messages_for_errors, progress_bar, tell
@@ -52,6 +54,25 @@ ModelOption = Annotated[
 HeldOutOption = Annotated[
     list[Path] | None,
     typer.Option("--held-out", metavar="FLIGHT", help="Judge on this flight, learn nothing of it; may be repeated."),
+]
+ResumeOption = Annotated[
+    bool, typer.Option("--resume", help="Go on with a search that was stopped, from OUTPUT.checkpoint.")
+]
+TimeLimitOption = Annotated[
+    float | None,
+    typer.Option(
+        "--time-limit",
+        metavar="TIME",
+        parser=seconds,
+        help="Stop the search after TIME (90, 90s, 10m, 2h) and write the best so far; --resume goes on.",
+    ),
+]
+WorkersOption = Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that evaluate.")]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler", metavar="ADDRESS", help="Evaluate on the workers of this Dask scheduler (tcp://host:port)."
+    ),
 ]
 
 
@@ -176,6 +197,10 @@ def identify(
         list[Path] | None,
         typer.Option("--validate", metavar="FLIGHT", help="Judge on another flight too; may be repeated."),
     ] = None,
+    resume: ResumeOption = False,
+    time_limit: TimeLimitOption = None,
+    workers: WorkersOption = 1,
+    scheduler: SchedulerOption = None,
     *,
     common: Common,
 ) -> None:
@@ -183,8 +208,10 @@ def identify(
 
     def call(job: Job) -> Outcome:
         from cpfls_cli.stages import identify as stage
+        from cpfls_cli.stages.resumable import SearchOptions
 
-        return stage.run(job, flight, selection, validate or [])
+        options = SearchOptions(resume, time_limit, workers, scheduler)
+        return stage.run(job, flight, selection, validate or [], options)
 
     _run("identify", config, output, common, call)
 
@@ -358,7 +385,10 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
         study = common.study(config)
         narration.reads(config)
         with progress_bar(title, common) as progress:
-            outcome = call(Job(study, output, common.force, common.dry_run, progress, narration.reads))
+            job = Job(study, output, common.force, common.dry_run, progress, narration.reads, deferred_interrupts)
+            outcome = call(job)
         if not common.dry_run:
             narration.wrote(output)
         tell(outcome, common)
+        if outcome.exit_code:
+            raise typer.Exit(outcome.exit_code)

@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 _MESSAGE = b"cpfls: error: interrupted: no half-written file is left\n"
 
@@ -49,6 +50,29 @@ def interruptible() -> Iterator[None]:
         _install(signal.SIG_DFL)
 
 
+@contextmanager
+def deferred_interrupts() -> Iterator[Callable[[], int | None]]:
+    """Take the first interrupt as a wish to stop, which the work inside asks for; the next one acts as it does outside.
+
+    Yields
+    ------
+    callable
+        Gives the number of the signal received, or None; also afterwards.
+    """
+    received: list[int] = []
+    outside = {number: signal.getsignal(number) for number in _SIGNALS}
+
+    def note(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        received.append(number)
+        _restore(outside)
+
+    _install(note)
+    try:
+        yield lambda: received[0] if received else None
+    finally:
+        _restore(outside)
+
+
 def _leave(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
     os.write(2, _MESSAGE)
     os._exit(128 + number)
@@ -59,3 +83,8 @@ def _install(handler: _Handler | signal.Handlers) -> None:
         # A shell starts background work with interrupts ignored; that is the user's wish.
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
+
+
+def _restore(handlers: dict[signal.Signals, Any]) -> None:
+    for number, handler in handlers.items():
+        signal.signal(number, handler)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import get_args
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.history import History
-from cpfls_cli.evolution.stopping import End
 from cpfls_cli.identification.baselines import Baseline
 from cpfls_cli.identification.cross_validation import RidgeCurve
 from cpfls_cli.identification.findings import Evidence
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.search_run import StopReason
+from cpfls_cli.identification.search_run import StopReason, is_end
 
 
 @dataclass(frozen=True)
@@ -62,4 +60,4 @@ class Identification(Evidence):
     @property
     def complete(self) -> bool:
         """Whether the search came to its end."""
-        return self.stop_reason in get_args(End)
+        return is_end(self.stop_reason)

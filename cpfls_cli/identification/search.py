@@ -17,8 +17,9 @@ from cpfls_cli.identification.choice import choose
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator
 from cpfls_cli.identification.results import Front
-from cpfls_cli.identification.search_run import UNWATCHED, SearchRun, SearchStep, Stop, StopReason, Workers
+from cpfls_cli.identification.search_run import UNWATCHED, SearchRun, SearchStep, Stop, StopReason
 from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.workers.workforce import Workforce
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def search(
 
 def _evolved(
     evaluator: Evaluator,
-    workers: Workers,
+    workers: Workforce,
     settings: IdentificationSettings,
     rng: np.random.Generator,
     run: SearchRun,
@@ -109,6 +110,8 @@ def _evolved(
             initial = uniform_chromosome(structure)[None] if settings.start == "with-uniform" else None
             state = start(_watched(workers, run, settings, None), structure.genes, settings, rng, initial)
             run.on_generation(state)
+        elif state.index < settings.generations:
+            run.progress(SearchStep(state.index + 1, settings.generations, 0.0, state.history.best[-1]))
         while (reason := ended(state, settings) or run.should_stop()) is None:
             state = step(state, _watched(workers, run, settings, state), settings)
             run.on_generation(state)
@@ -120,7 +123,7 @@ def _evolved(
 
 
 def _watched(
-    workers: Workers, run: SearchRun, settings: IdentificationSettings, before: EvolutionState | None
+    workers: Workforce, run: SearchRun, settings: IdentificationSettings, before: EvolutionState | None
 ) -> Evaluate:
     """Gather the evaluations of a generation, show how far it has come, and stop when asked to."""
     generation, best = (0, None) if before is None else (before.index + 1, before.history.best[-1])

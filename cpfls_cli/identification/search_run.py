@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, get_args
 
-import numpy as np
-
-from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.evolution.archive import Evaluate, Evaluation
+from cpfls_cli.arrays import Array
+from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.evolution.state import EvolutionState
 from cpfls_cli.evolution.stopping import End
+from cpfls_cli.workers.employ import employ
+from cpfls_cli.workers.workforce import Workforce
 
 Stop = Literal["time-limit", "interrupted"]
 StopReason = End | Stop
 
 
-class Workers(Protocol):
-    """Evaluate chromosomes somewhere."""
-
-    def stream(self, genes: IntArray) -> Iterator[tuple[IntArray, Evaluation]]:
-        """Take chromosomes, shape (n, genes), and give rows of them with their evaluations, as they are ready."""
-        ...
+def is_end(reason: StopReason) -> bool:
+    """Tell a search that came to its end from one that was stopped; the parameters are those reasons."""
+    return reason in get_args(End)
 
 
 @dataclass(frozen=True)
@@ -46,21 +43,6 @@ class SearchStep:
     generations: int
     share: float
     best: Array | None
-
-
-@dataclass(frozen=True)
-class _Here:
-    """Evaluates one chromosome after the other, here."""
-
-    evaluate: Evaluate
-
-    def stream(self, genes: IntArray) -> Iterator[tuple[IntArray, Evaluation]]:
-        for row in range(len(genes)):
-            yield np.array([row]), self.evaluate(genes[row : row + 1])
-
-
-def _here(evaluate: Evaluate) -> AbstractContextManager[Workers]:
-    return nullcontext(_Here(evaluate))
 
 
 def _unwatched(_: object) -> None:
@@ -91,7 +73,7 @@ class SearchRun:
     """
 
     resumed: EvolutionState | None = None
-    workers: Callable[[Evaluate], AbstractContextManager[Workers]] = _here
+    workers: Callable[[Evaluate], AbstractContextManager[Workforce]] = employ
     progress: Callable[[SearchStep], None] = _unwatched
     on_generation: Callable[[EvolutionState], None] = _unwatched
     should_stop: Callable[[], Stop | None] = _unstopped

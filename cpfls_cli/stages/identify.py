@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -16,17 +16,20 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import TRAINING, identify
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.results import Identification
+from cpfls_cli.identification.search import NothingFoundError
 from cpfls_cli.identification.search_run import SearchRun, SearchStep
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
-from cpfls_cli.stages.job import Job, Outcome, Started, begin, finish
+from cpfls_cli.stages.job import Job, Outcome, Started, finish
 from cpfls_cli.stages.model_file import model_data
+from cpfls_cli.stages.resumable import SearchOptions, Watch, begin_search
+from cpfls_cli.stages.stopped import stopped, without_model
 from cpfls_cli.stages.study import generator, settings_of
 from cpfls_cli.stages.training import TrainingData, read_torque_data, read_training
 
 REST = "held-out rest"
 
 
-def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]) -> Outcome:
+def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path], options: SearchOptions) -> Outcome:
     """Identify a model and write it.
 
     Parameters
@@ -37,20 +40,28 @@ def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]
         Samples to learn from; all of the training part if None.
     validate : sequence of Path
         Other flights to judge the model on; nothing is learned from them.
+    options : SearchOptions
+        How the search is run.
 
     Returns
     -------
     Outcome
     """
-    started = begin(job, _roles(flight, selection, validate))
+    started, search = begin_search(job, _roles(flight, selection, validate), options)
     data = read_training(flight, selection, job.study)
     held_out = _held_out(job, data, started, validate)
     if started.dry_run is not None:
         return started.dry_run
     clock = time.perf_counter()
-    result = _identify(job, flight, data, held_out)
+    watch = Watch(job, options.time_limit_s)
+    result = _identify(job, flight, data, held_out, search.run(options, watch, _shown(job)))
+    if isinstance(result, NothingFoundError):
+        search.end(result.stop_reason)
+        raise without_model(result.stop_reason, watch.signal, search.checkpoint) or _of(flight, result)
     finish(job, MODEL, model_data(result, job.study.identification.base, data.learned), started.inputs)
-    return _outcome(job, result, len(data.learned), time.perf_counter() - clock)
+    search.end(result.stop_reason)
+    outcome = _outcome(job, result, len(data.learned), time.perf_counter() - clock)
+    return stopped(outcome, result.stop_reason, watch.signal, search.checkpoint)
 
 
 def _roles(flight: Path, selection: Path | None, validate: Sequence[Path]) -> dict[str, Path]:
@@ -58,7 +69,9 @@ def _roles(flight: Path, selection: Path | None, validate: Sequence[Path]) -> di
     return roles | {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
 
 
-def _identify(job: Job, flight: Path, data: TrainingData, held_out: dict[str, TorqueData]) -> Identification:
+def _identify(
+    job: Job, flight: Path, data: TrainingData, held_out: dict[str, TorqueData], run: SearchRun
+) -> Identification | NothingFoundError:
     try:
         with settings_of("identification", job.study):
             return identify(
@@ -67,13 +80,17 @@ def _identify(job: Job, flight: Path, data: TrainingData, held_out: dict[str, To
                 held_out,
                 job.study.identification,
                 generator(job.study, "identify"),
-                SearchRun(
-                    progress=lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step))
-                ),
+                run,
                 six_parameters(job.study.vehicle.inertia_kg_m2),
             )
+    except NothingFoundError as error:
+        return error
     except ComputationError as error:
-        raise ComputationError(f"{flight}: {error}") from None
+        raise _of(flight, error) from None
+
+
+def _of(flight: Path, error: ComputationError) -> ComputationError:
+    return ComputationError(f"{flight}: {error}")
 
 
 def _held_out(job: Job, data: TrainingData, started: Started, validate: Sequence[Path]) -> dict[str, TorqueData]:
@@ -97,6 +114,11 @@ def _free_name(name: str, taken: set[str]) -> str:
     return next(candidate for candidate in chain([name], numbered) if candidate not in taken)
 
 
+def _shown(job: Job) -> Callable[[SearchStep], None]:
+    """Show the progress of a search on that of its job."""
+    return lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step))
+
+
 def _note(step: SearchStep) -> str:
     generation = f"generation {step.generation} of {step.generations}"
     if step.best is None:
@@ -115,6 +137,8 @@ def _outcome(job: Job, result: Identification, learned: int, seconds: float) -> 
         "parameters": result.system.row_space.shape[1],
         "generations": len(result.history.evaluations) - 1,
         "evaluations": int(result.history.evaluations[-1]),
+        "stop_reason": result.stop_reason,
+        "complete": result.complete,
         "front": len(result.front.objectives),
         "samples": result.samples["training"],
         "learned": learned,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -27,6 +28,14 @@ class Progress(Protocol):
         ...
 
 
+Interrupted = Callable[[], int | None]
+"""Gives the number of the signal that asks to stop, or None."""
+
+
+def _uninterrupted() -> AbstractContextManager[Interrupted]:
+    return nullcontext(lambda: None)
+
+
 @dataclass(frozen=True)
 class Job:
     """One run of a stage.
@@ -42,6 +51,8 @@ class Job:
     progress : Progress
     reads : callable
         Takes note of every input file.
+    deferred_interrupts : callable
+        Gives a context in which an interrupt does not end the program, but is told to whoever asks.
     """
 
     study: Study
@@ -50,6 +61,7 @@ class Job:
     dry_run: bool
     progress: Progress
     reads: Callable[[Path], None]
+    deferred_interrupts: Callable[[], AbstractContextManager[Interrupted]] = _uninterrupted
 
 
 @dataclass(frozen=True)
@@ -63,11 +75,14 @@ class Outcome:
     lines : tuple of str
         The same for people.
     warnings : tuple of str
+    exit_code : int
+        Of the command, which has done what it could.
     """
 
     summary: Mapping[str, Any]
     lines: tuple[str, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+    exit_code: int = 0
 
 
 @dataclass(frozen=True)
@@ -106,9 +121,23 @@ def begin(job: Job, inputs: Mapping[str, Path]) -> Started:
     """
     files = take_inputs(job, inputs)
     check_output(job.output, job.force)
+    return Started(files, dry_run(job))
+
+
+def dry_run(job: Job) -> Outcome | None:
+    """Say that all is good, where that is all that is asked for.
+
+    Parameters
+    ----------
+    job : Job
+
+    Returns
+    -------
+    Outcome or None
+        None where the stage has to go on.
+    """
     line = f"{job.output}: would be written; the config and all inputs are good"
-    dry_run = Outcome({"dry_run": True, "output": str(job.output)}, (line,)) if job.dry_run else None
-    return Started(files, dry_run)
+    return Outcome({"dry_run": True, "output": str(job.output)}, (line,)) if job.dry_run else None
 
 
 def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
@@ -155,8 +184,23 @@ def finish(job: Job, spec: ArtifactSpec, data: Mapping[str, Any], inputs: Mappin
     inputs : mapping of str to InputFile
         By role.
     """
-    header = Header(cpfls_cli.__version__, job.study.seed, resolved_yaml(job.study), inputs)
-    write_artifact(job.output, Artifact(spec, header, data))
+    write_artifact(job.output, Artifact(spec, header_of(job.study, inputs), data))
+
+
+def header_of(study: Study, inputs: Mapping[str, InputFile]) -> Header:
+    """Tell where an artifact comes from.
+
+    Parameters
+    ----------
+    study : Study
+    inputs : mapping of str to InputFile
+        By role.
+
+    Returns
+    -------
+    Header
+    """
+    return Header(cpfls_cli.__version__, study.seed, resolved_yaml(study), inputs)
 
 
 def input_file(path: Path) -> InputFile:

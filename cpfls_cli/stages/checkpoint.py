@@ -1,0 +1,132 @@
+"""The checkpoint of a search: written beside the output after every generation, and continued from."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cpfls_cli.artifacts.formats import CHECKPOINT
+from cpfls_cli.artifacts.records import Artifact, Header
+from cpfls_cli.artifacts.writing import write_artifact
+from cpfls_cli.config.load import parse_config
+from cpfls_cli.errors import InputError
+from cpfls_cli.evolution.state import EvolutionState
+from cpfls_cli.stages.sources import read_good
+from cpfls_cli.stages.state_file import state_data, state_of
+
+_SECTION = "identification"
+_GENERATIONS = f"{_SECTION}.generations"
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """Where a search leaves its state.
+
+    Attributes
+    ----------
+    path : Path
+    header : Header
+        Of the search that is run now: its config, seed and inputs.
+    """
+
+    path: Path
+    header: Header
+
+    @classmethod
+    def beside(cls, output: Path, header: Header) -> Checkpoint:
+        """Name the checkpoint of an output: ``model.h5.checkpoint`` of ``model.h5``."""
+        return cls(output.with_name(f"{output.name}.checkpoint"), header)
+
+    @property
+    def output(self) -> Path:
+        """What the search is for."""
+        return self.path.with_suffix("")
+
+    def write(self, state: EvolutionState) -> None:
+        """Replace what was there by this state, or leave it as it was.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        write_artifact(self.path, Artifact(CHECKPOINT, self.header, state_data(state)))
+
+    def read(self) -> EvolutionState:
+        """Take up the state that was left.
+
+        Returns
+        -------
+        EvolutionState
+
+        Raises
+        ------
+        InputError
+            If there is none, if it is damaged, or if it is of another search.
+        """
+        if not self.path.exists():
+            raise InputError(f"{self.path}: no such checkpoint, so nothing to resume; start without --resume")
+        try:
+            artifact = read_good(self.path, CHECKPOINT)
+            state = state_of(artifact)
+        except InputError as error:
+            raise InputError(f"{error}; --force without --resume starts again") from None
+        except (ValueError, LookupError, TypeError) as error:
+            raise InputError(f"{self.path}: damaged: {error}; --force without --resume starts again") from None
+        self._require_same_search(artifact.header, state)
+        return state
+
+    def remove(self) -> None:
+        """Remove the checkpoint, if there is one."""
+        self.path.unlink(missing_ok=True)
+
+    def tidy(self) -> None:
+        """Remove what a killed search left half-written of the checkpoint and of its output."""
+        for name in (self.path.name, self.output.name):
+            for part in self.path.parent.glob(f".{glob.escape(name)}.????????.part"):
+                part.unlink(missing_ok=True)
+
+    def _require_same_search(self, then: Header, state: EvolutionState) -> None:
+        differing = [*_differences(then, self.header)]
+        generations = _keys(self.header)[_GENERATIONS]
+        if state.index > generations:
+            differing.append(f"{_GENERATIONS} = {generations}, but it has come to generation {state.index}")
+        if differing:
+            raise InputError(
+                f"{self.path}: is of another search: {'; '.join(differing)}. Repeat the command as it was, with "
+                "--resume, or start again with --force alone"
+            )
+
+
+def _differences(then: Header, now: Header) -> Iterator[str]:
+    """Name what changes the result of a search."""
+    if then.version != now.version:
+        yield f"written by cpfls {then.version}, this is {now.version}"
+    if then.seed != now.seed:
+        yield f"seed = {then.seed} there, {now.seed} here"
+    old, new = _keys(then), _keys(now)
+    for key in sorted((old.keys() | new.keys()) - {_GENERATIONS}):
+        if old.get(key) != new.get(key):
+            yield f"{key} = {old.get(key)} there, {new.get(key)} here"
+    for role in sorted(role for role in then.inputs.keys() | now.inputs.keys() if not role.startswith("validate")):
+        files = [header.inputs.get(role) for header in (then, now)]
+        first, second = (file.sha256 if file else None for file in files)
+        if first != second:
+            names = [f"{file.name} ({file.sha256[:12]})" if file else "none" for file in files]
+            yield f"{role} = {names[0]} there, {names[1]} here"
+
+
+def _keys(header: Header) -> dict[str, Any]:
+    """List the keys that a search depends on, with dots."""
+    return dict(_flat(_SECTION, parse_config(header.config, "/config")[_SECTION]))
+
+
+def _flat(prefix: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(f"{prefix}.{key}", value)
+        else:
+            yield f"{prefix}.{key}", value

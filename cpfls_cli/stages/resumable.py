@@ -1,0 +1,198 @@
+"""A search that leaves checkpoints, goes on from them, and stops when asked to."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.artifacts.output import check_output
+from cpfls_cli.artifacts.reading import format_name, read_artifact
+from cpfls_cli.artifacts.records import Header
+from cpfls_cli.errors import InputError
+from cpfls_cli.evolution.archive import Evaluate
+from cpfls_cli.evolution.state import EvolutionState
+from cpfls_cli.identification.search_run import SearchRun, SearchStep, Stop, StopReason, is_end
+from cpfls_cli.stages.checkpoint import Checkpoint
+from cpfls_cli.stages.job import Interrupted, Job, Started, dry_run, header_of, take_inputs
+from cpfls_cli.workers.employ import employ
+from cpfls_cli.workers.workforce import Workforce
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How a command runs its search; nothing of it changes what a search that comes to its end finds.
+
+    Attributes
+    ----------
+    resume : bool
+        Go on from the checkpoint.
+    time_limit_s : float or None
+        Stop the search after so much time, and keep what it has.
+    workers : int
+        Processes that evaluate.
+    scheduler : str or None
+        Address of a Dask scheduler whose workers evaluate.
+    """
+
+    resume: bool = False
+    time_limit_s: float | None = None
+    workers: int = 1
+    scheduler: str | None = None
+
+
+class Watch:
+    """Knows when a search has to stop: at an interrupt, or when its time is over.
+
+    Parameters
+    ----------
+    job : Job
+    time_limit_s : float or None
+        From now on.
+    """
+
+    def __init__(self, job: Job, time_limit_s: float | None) -> None:
+        self._job = job
+        self._end = None if time_limit_s is None else time.monotonic() + time_limit_s
+        self._interrupted: Interrupted = lambda: None
+
+    @property
+    def signal(self) -> int | None:
+        """Number of the signal that asked to stop, or None."""
+        return self._interrupted()
+
+    @contextmanager
+    def deferring(self) -> Iterator[None]:
+        """Take an interrupt for a wish to stop, as long as the work inside looks at this watch."""
+        with self._job.deferred_interrupts() as self._interrupted:
+            yield
+
+    def should_stop(self) -> Stop | None:
+        """Tell why to stop, or None."""
+        if self.signal is not None:
+            return "interrupted"
+        return "time-limit" if self._end is not None and time.monotonic() >= self._end else None
+
+
+@dataclass(frozen=True)
+class Resumable:
+    """One search and its checkpoint.
+
+    Attributes
+    ----------
+    checkpoint : Checkpoint
+    resumed : EvolutionState or None
+        Where to go on, or None to start.
+    """
+
+    checkpoint: Checkpoint
+    resumed: EvolutionState | None
+
+    def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
+        """Say how the search is run; from here on a checkpoint that is not resumed is given up.
+
+        Parameters
+        ----------
+        options : SearchOptions
+        watch : Watch
+        progress : callable
+
+        Returns
+        -------
+        SearchRun
+            Interrupts are deferred as long as its workers are employed, which is as long as it searches.
+        """
+        self.checkpoint.tidy()
+        if self.resumed is None:
+            self.checkpoint.remove()
+
+        @contextmanager
+        def workers(evaluate: Evaluate) -> Iterator[Workforce]:
+            with watch.deferring(), employ(evaluate, count=options.workers, scheduler=options.scheduler) as workforce:
+                yield workforce
+
+        return SearchRun(self.resumed, workers, progress, self.checkpoint.write, watch.should_stop)
+
+    def end(self, reason: StopReason) -> None:
+        """Remove the checkpoint of a search that came to its end, after what it found is written.
+
+        Parameters
+        ----------
+        reason : str
+            Why the search ended.
+        """
+        if is_end(reason):
+            self.checkpoint.remove()
+
+
+def begin_search(job: Job, inputs: Mapping[str, Path], options: SearchOptions) -> tuple[Started, Resumable]:
+    """Check inputs, checkpoint and output of a search before anything is computed.
+
+    Parameters
+    ----------
+    job : Job
+    inputs : mapping of str to Path
+        By role.
+    options : SearchOptions
+
+    Returns
+    -------
+    started : Started
+    search : Resumable
+
+    Raises
+    ------
+    InputError
+        As `begin`; also if there is a checkpoint that nothing is said of, or none that can be resumed.
+    """
+    if options.scheduler is not None and options.workers > 1:
+        raise InputError("--scheduler: knows its own workers; leave --workers out")
+    files = take_inputs(job, inputs)
+    header = header_of(job.study, files)
+    search = resumable(job.output, header, resume=options.resume, force=job.force)
+    check_output(job.output, job.force or (options.resume and _may_be_replaced(job.output, header)))
+    return Started(files, dry_run(job)), search
+
+
+def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Resumable:
+    """Find the checkpoint of a search, and read it where the search is to go on.
+
+    Parameters
+    ----------
+    output : Path
+        What the search is for; the checkpoint lies beside it.
+    header : Header
+        Config, seed and inputs of the search.
+    resume : bool
+    force : bool
+        Allow a checkpoint to be given up.
+
+    Returns
+    -------
+    Resumable
+
+    Raises
+    ------
+    InputError
+        If there is a checkpoint and neither is said, or none that can be resumed.
+    """
+    checkpoint = Checkpoint.beside(output, header)
+    if resume:
+        return Resumable(checkpoint, checkpoint.read())
+    if checkpoint.path.exists() and not force:
+        raise InputError(
+            f"{checkpoint.path}: a search for {output} was stopped here; --resume continues it, --force starts again"
+        )
+    return Resumable(checkpoint, None)
+
+
+def _may_be_replaced(output: Path, header: Header) -> bool:
+    """Tell whether an output is what a stopped search left: incomplete, or complete with its checkpoint still there."""
+    if not output.is_file() or format_name(output) != MODEL.format:
+        return False
+    model = read_artifact(output, MODEL)
+    complete = "search/complete" not in model.data or bool(model.data["search/complete"])
+    return not complete or model.header == header
