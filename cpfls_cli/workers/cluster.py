@@ -5,12 +5,14 @@ from __future__ import annotations
 import pickle
 import warnings
 from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Evaluate, Evaluation
+from cpfls_cli.workers.address import require_address
 from cpfls_cli.workers.attempt import result_of
 from cpfls_cli.workers.chunks import chunks
 from cpfls_cli.workers.cluster_worker import Shipped, evaluate_shipped
@@ -48,7 +50,7 @@ class Cluster(Workforce):
         """Evaluate chromosomes; parameters are those of `Workforce.stream`."""
         given: dict[Future, IntArray] = {}
         try:
-            with _explained(self._address):
+            with _explained(self._client, self._address):
                 given.update(self._hand_out(genes))
                 while given:
                     for future in self._finished(list(given)):
@@ -70,7 +72,8 @@ class Cluster(Workforce):
 
         while True:
             try:
-                return list(wait(futures, timeout=_LONGEST_SILENCE_S, return_when="FIRST_COMPLETED").done)
+                with self._client.as_current():
+                    return list(wait(futures, timeout=_LONGEST_SILENCE_S, return_when="FIRST_COMPLETED").done)
             except TimeoutError:
                 _require_workers(self._client, self._address)
 
@@ -94,12 +97,14 @@ def cluster(evaluate: Evaluate, address: str, *, patience_s: float = 10.0) -> It
 
     Raises
     ------
+    InputError
+        If the address is none.
     ComputationError
         If Dask is not installed, the scheduler does not answer, it has no workers, or they have other versions.
     """
     evaluator = pickle.dumps(evaluate, protocol=pickle.HIGHEST_PROTOCOL)
     with _connected(address, patience_s) as client:
-        with _explained(address):
+        with _explained(client, address):
             _require_workers(client, address, patience_s)
             require_same_versions(client)
             shipped = client.scatter(Shipped(evaluator), broadcast=True, hash=False)
@@ -108,6 +113,7 @@ def cluster(evaluate: Evaluate, address: str, *, patience_s: float = 10.0) -> It
 
 @contextmanager
 def _connected(address: str, patience_s: float) -> Iterator[Client]:
+    require_address(address)
     try:
         from distributed import Client
     except ModuleNotFoundError as error:
@@ -120,10 +126,10 @@ def _connected(address: str, patience_s: float) -> Iterator[Client]:
                 # Dask warns of versions that differ; here those that matter are an error.
                 warnings.simplefilter("ignore")
                 client = Client(address, timeout=patience_s, set_as_default=False)
-        except (OSError, ValueError, ImportError) as error:
+        except (OSError, ImportError) as error:
             raise ComputationError(
-                f"no Dask scheduler answers at {address} within {patience_s:g} s: start one with `dask scheduler`, "
-                "and give its address as tcp://host:port"
+                f"no Dask scheduler of a fitting version answers at {address} within {patience_s:g} s: start one with "
+                "`dask scheduler`, and give the address that it prints"
             ) from error
         try:
             yield client
@@ -141,15 +147,22 @@ def _require_workers(client: Client, address: str, patience_s: float = _LONGEST_
 
 
 @contextmanager
-def _explained(address: str) -> Iterator[None]:
+def _explained(client: Client, address: str) -> Iterator[None]:
     """Say in words what Dask raises, which is of many types."""
     try:
         yield
     except ComputationError:
         raise
     except Exception as error:
-        reason = str(error).strip() or type(error).__name__
-        raise ComputationError(
-            f"the Dask cluster at {address} failed ({reason}); where workers ran out of memory, take fewer on each "
-            "machine, and where the scheduler ended, start it again"
-        ) from error
+        raise ComputationError(_words(error, client, address)) from error
+
+
+def _words(error: Exception, client: Client, address: str) -> str:
+    if client.status != "running":
+        return f"the Dask scheduler at {address} vanished: start it and its workers again"
+    if isinstance(error, CancelledError) or type(error).__name__ == "KilledWorker":
+        return (
+            f"the workers of the Dask scheduler at {address} vanished; where their machines ran out of memory, take "
+            "fewer workers on each, or add memory"
+        )
+    return f"the Dask cluster at {address} failed with {type(error).__name__}: {error}"

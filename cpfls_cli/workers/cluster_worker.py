@@ -28,6 +28,7 @@ class Shipped:
     def __reduce__(self) -> tuple[type[Shipped], tuple[bytes]]:
         return Shipped, (self._evaluator,)
 
+    # Dask spills and moves data by their size.
     def __sizeof__(self) -> int:
         return len(self._evaluator)
 

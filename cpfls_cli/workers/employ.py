@@ -30,6 +30,8 @@ def employ(evaluate: Evaluate, *, count: int = 1, scheduler: str | None = None) 
 
     Raises
     ------
+    InputError
+        On entry, if the address of the scheduler is none.
     ComputationError
         On entry, if the workers cannot be had; in use, if one vanishes or the evaluator fails.
     """

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.errors import SettingError
 from cpfls_cli.evolution import Evaluation
 
 POISON = 13
@@ -30,31 +30,22 @@ class Uneven:
         return [np.sin(phase).sum(), np.cos(phase).prod(), np.tan(chromosome.sum())]
 
 
-@dataclass(frozen=True)
 class Failing:
-    """Fail in some way at a chromosome that begins with the poison."""
-
-    way: str
+    """Fail at a chromosome that begins with the poison, by an error that does not survive being pickled."""
 
     def __call__(self, genes):
         if POISON in genes[:, 0]:
-            getattr(self, self.way)()
+            raise SettingError("size", "cannot be unpickled")
         return Evaluation(genes, genes.astype(float))
 
-    def domain(self):
-        raise ComputationError("flight.h5: gravity_m_s2 = 0: take the Earth's")
 
-    def unpicklable(self):
-        raise SettingError("size", "an error that cannot be unpickled")
+class Killed:
+    """Be killed at a chromosome that begins with the poison, as by a machine without memory."""
 
-    def memory(self):
-        raise MemoryError
-
-    def killed(self):
-        os.kill(os.getpid(), signal.SIGKILL)
-
-    def left(self):
-        os._exit(3)
+    def __call__(self, genes):
+        if POISON in genes[:, 0]:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return Evaluation(genes, genes.astype(float))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.workers import employ
-from tests.unit.workers.evaluators import POISON, Failing, Loading, Logging, Reporting, Uneven, Unloadable
+from tests.unit.workers.evaluators import POISON, Failing, Killed, Loading, Logging, Reporting, Uneven, Unloadable
 
 ROOT = Path(__file__).parents[3]
 GENES = np.random.default_rng(5).integers(0, 32768, (40, 6))
@@ -65,9 +65,16 @@ def test_a_stream_that_is_given_up_leaves_nothing_to_the_next(two):
     assert two(GENES[:5] + 1).genes.tolist() == (GENES[:5, ::-1] + 2).tolist()
 
 
-@pytest.mark.parametrize("count", [1, 2])
-def test_what_is_given_up_before_it_begins_is_never_evaluated(count, tmp_path):
-    with employ(Logging(tmp_path), count=count) as workers:
+def test_what_is_given_up_before_it_begins_is_never_evaluated_here(tmp_path):
+    with employ(Logging(tmp_path)) as workers:
+        stream = workers.stream(column(*range(100)))
+        next(stream)
+        stream.close()
+    assert [path.name for path in tmp_path.iterdir()] == ["0"]
+
+
+def test_what_is_given_up_before_it_begins_is_never_evaluated_in_processes(tmp_path):
+    with employ(Logging(tmp_path), count=2) as workers:
         stream = workers.stream(column(*range(100)))
         next(stream)
         stream.close()
@@ -84,27 +91,25 @@ def test_the_evaluator_is_loaded_once_by_each_of_both_processes(tmp_path):
     assert str(os.getpid()) not in loaded
 
 
-@pytest.mark.parametrize(
-    ("way", "message"),
-    [
-        ("domain", "^flight.h5: gravity_m_s2 = 0: take the Earth's$"),
-        ("unpicklable", "a worker failed with SettingError: an error that cannot be unpickled"),
-        ("memory", "ran out of memory: take fewer workers"),
-        ("killed", r"vanished \(killed by SIGKILL\).*take fewer workers"),
-        ("left", r"vanished \(exit code 3\)"),
-    ],
-)
-def test_a_failing_worker_is_an_error_in_words_and_leaves_no_process(way, message):
+def test_a_killed_worker_is_an_error_in_words_and_leaves_no_process():
     before = set(multiprocessing.active_children())
-    with pytest.raises(ComputationError, match=message), employ(Failing(way), count=2) as workers:
+    with (
+        pytest.raises(ComputationError, match=r"vanished \(killed by SIGKILL\).*take fewer workers"),
+        employ(Killed(), count=2) as workers,
+    ):
         workers(column(*range(POISON + 5)))
     assert set(multiprocessing.active_children()) <= before
 
 
-def test_the_traceback_of_a_worker_is_a_note_for_whoever_looks_for_the_fault():
-    with pytest.raises(ComputationError) as caught, employ(Failing("unpicklable"), count=2) as workers:
-        workers(column(POISON))
+def test_a_failing_evaluator_is_an_error_in_words_and_leaves_no_process():
+    before = set(multiprocessing.active_children())
+    with (
+        pytest.raises(ComputationError, match="SettingError: cannot be unpickled") as caught,
+        employ(Failing(), count=2) as workers,
+    ):
+        workers(column(*range(POISON + 5)))
     assert "evaluators.py" in caught.value.__notes__[0]
+    assert set(multiprocessing.active_children()) <= before
 
 
 def test_an_idle_worker_that_was_killed_is_noticed_at_the_next_evaluation():
@@ -121,13 +126,6 @@ def test_an_evaluator_that_cannot_be_loaded_is_an_error_in_words():
         employ(Unloadable(), count=2) as workers,
     ):
         workers(GENES)
-
-
-def test_no_process_is_left_after_success():
-    before = set(multiprocessing.active_children())
-    with employ(Reporting(), count=2) as workers:
-        workers(GENES)
-    assert set(multiprocessing.active_children()) <= before
 
 
 PARENT = """

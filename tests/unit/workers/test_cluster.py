@@ -1,0 +1,159 @@
+"""Evaluation by a real Dask scheduler and worker processes on the loopback."""
+
+import os
+import re
+import socket
+import subprocess
+import sys
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.workers import employ
+from cpfls_cli.workers.cluster import cluster
+from tests.unit.workers.evaluators import POISON, Failing, Loading, Logging, Reporting, Uneven
+
+pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cpfls[dask]'")
+pytest.importorskip("threadpoolctl", reason="threadpoolctl is not installed: pip install 'cpfls[dask]'")
+
+ROOT = Path(__file__).parents[3]
+GENES = np.random.default_rng(5).integers(0, 32768, (40, 6))
+EVALUATOR = Uneven(np.linspace(0, 1, 50))
+
+
+@contextmanager
+def running(folder, *words, announced=None):
+    """A process of Dask that ends with the context, and what it prints after some words."""
+    # A folder for its own temporary files, and the threads that a machine gives by itself.
+    free = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    with subprocess.Popen(
+        [sys.executable, "-m", *words, "--no-dashboard"],
+        cwd=folder,
+        env=free | {"PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE if announced else subprocess.DEVNULL,
+        text=True,
+    ) as process:
+        try:
+            yield (
+                process,
+                announced and next(match[1] for line in process.stderr if (match := re.search(announced, line))),
+            )
+        finally:
+            process.kill()
+
+
+@contextmanager
+def dask(folder, workers):
+    from distributed import Client
+
+    scheduler = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show"]
+    with ExitStack() as stack:
+        process, address = stack.enter_context(running(folder, *scheduler, announced=r"Scheduler at:\s+(tcp://\S+)"))
+        worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny"]
+        others = [stack.enter_context(running(folder, *worker))[0] for _ in range(workers)]
+        if workers:
+            with Client(address, set_as_default=False) as client:
+                client.wait_for_workers(workers, timeout=60)
+        yield address, process, others
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    with dask(tmp_path_factory.mktemp("dask"), workers=2) as (address, _, _):
+        yield address
+
+
+def test_two_dask_workers_give_the_same_bytes_as_two_processes_and_one(address):
+    with employ(EVALUATOR) as one, employ(EVALUATOR, count=2) as two, employ(EVALUATOR, scheduler=address) as dask:
+        expected, *others = [workers(GENES) for workers in (one, two, dask)]
+    for other in others:
+        assert other.genes.tobytes() == expected.genes.tobytes()
+        assert other.objectives.tobytes() == expected.objectives.tobytes()
+
+
+def test_both_workers_work_and_take_one_thread_for_linear_algebra(address):
+    with employ(Reporting(), scheduler=address) as workers:
+        processes, threads = workers(np.ones((400, 3), dtype=int)).objectives.T
+    assert len(set(processes)) == 2
+    assert os.getpid() not in processes
+    assert set(threads) == {1.0}
+
+
+def test_the_evaluator_is_loaded_once_by_each_worker(address, tmp_path):
+    with employ(Loading(tmp_path), scheduler=address) as workers:
+        for _ in range(3):
+            workers(GENES)
+    loaded = [path.name.split("-")[0] for path in tmp_path.iterdir()]
+    assert 1 <= len(set(loaded)) == len(loaded) <= 2
+
+
+def test_what_is_given_up_before_it_begins_is_never_evaluated(address, tmp_path):
+    with employ(Logging(tmp_path), scheduler=address) as workers:
+        stream = workers.stream(np.arange(100)[:, np.newaxis])
+        rows, part = next(stream)
+        stream.close()
+        assert part.genes[:, 0].tolist() == rows.tolist()
+        assert len(workers(np.arange(1000, 1010)[:, np.newaxis]).genes) == 10
+    assert len([path for path in tmp_path.iterdir() if int(path.name) < 100]) < 80
+
+
+def test_a_failing_evaluator_is_an_error_in_words(address, capfd):
+    with (
+        pytest.raises(ComputationError, match="SettingError: cannot be unpickled"),
+        employ(Failing(), scheduler=address) as workers,
+    ):
+        workers(np.arange(POISON + 5)[:, np.newaxis])
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_vanished_worker_is_replaced_by_the_other_until_that_vanishes_too(tmp_path, capfd):
+    slow = Uneven(np.linspace(0, 1, 50), longest_s=0.05)
+    with dask(tmp_path, workers=2) as (address, _, (first, second)), cluster(slow, address) as workers:
+        parts = workers.stream(GENES)
+        rows = next(parts)[0].tolist()
+        first.kill()
+        rows += [row for part in parts for row in part[0]]
+        assert sorted(rows) == list(range(len(GENES)))
+        parts = workers.stream(GENES)
+        next(parts)
+        second.kill()
+        with pytest.raises(ComputationError, match=r"workers of the Dask scheduler at tcp://127.0.0.1.* vanished"):
+            list(parts)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_vanished_scheduler_is_an_error_in_words(tmp_path, capfd):
+    with (
+        dask(tmp_path, workers=1) as (address, scheduler, _),
+        cluster(EVALUATOR, address) as workers,
+    ):
+        parts = workers.stream(GENES)
+        next(parts)
+        scheduler.kill()
+        with pytest.raises(ComputationError, match=r"scheduler at tcp://127.0.0.1:.* vanished"):
+            list(parts)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_scheduler_without_workers_is_an_error_in_words(tmp_path, capfd):
+    with (
+        dask(tmp_path, workers=0) as (address, _, _),
+        pytest.raises(ComputationError, match="has no workers: start some with `dask worker tcp://"),
+        cluster(EVALUATOR, address, patience_s=0.2),
+    ):
+        pass
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_address_where_nothing_answers_is_an_error_in_words(capfd):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    with (
+        pytest.raises(ComputationError, match=f"answers at tcp://127.0.0.1:{port} within 0.3 s"),
+        cluster(EVALUATOR, f"tcp://127.0.0.1:{port}", patience_s=0.3),
+    ):
+        pass
+    assert capfd.readouterr() == ("", "")
