@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import scipy.linalg
 
@@ -22,19 +24,38 @@ class TriangularFactor:
     def __init__(self, columns: int, rank_tolerance: float) -> None:
         self._triangle: Array = np.zeros((columns, columns))
         self._tolerance = rank_tolerance
-        self._decompose()
 
     def add(self, rows: Array) -> None:
         """Add the rows of one sample or of several, array of shape (rows, columns)."""
         stacked = np.vstack([self._triangle, rows])
         triangle = scipy.linalg.qr(stacked, mode="r", check_finite=False)[0]
         self._triangle = np.asarray(triangle[: self.columns], dtype=np.float64)
-        self._decompose()
+        for name in ("singular_values", "singular_vectors"):
+            self.__dict__.pop(name, None)
 
-    def _decompose(self) -> None:
-        _, values, basis = np.linalg.svd(self._triangle)
-        self.singular_values: Array = values
-        self.singular_vectors: Array = basis.T
+    @cached_property
+    def singular_values(self) -> Array:
+        """Singular values of the chosen rows, descending."""
+        return np.asarray(np.linalg.svd(self._triangle, compute_uv=False), dtype=np.float64)
+
+    @cached_property
+    def singular_vectors(self) -> Array:
+        """Right singular vectors of the chosen rows, in columns."""
+        return np.linalg.svd(self._triangle)[2].T
+
+    def solve(self, rows: Array) -> Array:
+        """Solve ``G X = rows^T``; the rank must be full.
+
+        Parameters
+        ----------
+        rows : array, shape (rows, columns)
+
+        Returns
+        -------
+        array, shape (columns, rows)
+        """
+        half = scipy.linalg.solve_triangular(self._triangle, rows.T, trans="T", check_finite=False)
+        return np.asarray(scipy.linalg.solve_triangular(self._triangle, half, check_finite=False))
 
     @property
     def columns(self) -> int:

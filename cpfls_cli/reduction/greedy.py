@@ -47,12 +47,7 @@ def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = No
     ----------
     Paper, section 8, eq. (19); method.md, section 6.
     """
-    run, limit = _prepare(Q, settings)
-    while not (reason := _stop_reason(run, settings, limit)):
-        run.step()
-        if progress is not None:
-            progress(len(run.indices), limit)
-    return run.selection(settings.criterion, reason)
+    return choose(row_space(Q, settings.rank_tolerance), settings, progress)
 
 
 def check_reducible(Q: Array, settings: ReductionSettings) -> None:
@@ -68,12 +63,53 @@ def check_reducible(Q: Array, settings: ReductionSettings) -> None:
     ComputationError, SettingError
         See `reduce`.
     """
-    _prepare(Q, settings)
+    check_space(row_space(Q, settings.rank_tolerance), settings)
 
 
-def _prepare(Q: Array, settings: ReductionSettings) -> tuple[Run, int]:
+def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
+    """Choose samples of a row space as `reduce` does.
+
+    Parameters
+    ----------
+    space : RowSpace
+    settings : ReductionSettings
+    progress : callable, optional
+
+    Returns
+    -------
+    Selection
+
+    Raises
+    ------
+    SettingError
+        See `reduce`.
+    """
+    run, limit = _prepare(space, settings)
+    while not (reason := _stop_reason(run, settings, limit)):
+        run.step()
+        if progress is not None:
+            progress(len(run.indices), limit)
+    return run.selection(settings.criterion, reason)
+
+
+def check_space(space: RowSpace, settings: ReductionSettings) -> None:
+    """Refuse what `choose` would refuse, without the work of choosing.
+
+    Parameters
+    ----------
+    space : RowSpace
+    settings : ReductionSettings
+
+    Raises
+    ------
+    SettingError
+        See `reduce`.
+    """
+    _prepare(space, settings)
+
+
+def _prepare(space: RowSpace, settings: ReductionSettings) -> tuple[Run, int]:
     """Set up a run and the most samples it may choose."""
-    space = row_space(Q, settings.rank_tolerance)
     limit = _sample_limit(space, settings)
     start = _start(space, settings.criterion, limit)
     return Run(space, make_criterion(space, settings.criterion), start), limit

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.reduction.row_space import project
+from cpfls_cli.reduction.survey import project
 from cpfls_cli.reduction.ties import TIE_TOLERANCE
 
 Predicate = Callable[[Array, float], BoolArray]

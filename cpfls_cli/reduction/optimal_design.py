@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.reduction.factor import TriangularFactor
-from cpfls_cli.reduction.row_space import project
+from cpfls_cli.reduction.survey import project
 from cpfls_cli.reduction.ties import first_best
 
 # Updates lose a little accuracy each; an exact refresh costs as much as some ten of them.
@@ -66,19 +66,18 @@ class OptimalDesign:
 
     def _update(self, factor: TriangularFactor, index: int) -> None:
         """Update by ``(G + R^T R)^-1 = G^-1 - B S B^T`` with ``B = G^-1 R^T`` and ``S = (I + R B)^-1``."""
-        vectors, values = factor.singular_vectors, factor.singular_values
-        scaled = (self._rows[index] @ vectors) / values**2
+        B = factor.solve(self._rows[index])
         S = np.linalg.inv(np.eye(3) + self._K[index])
         if self._optimality == "D":
-            C = project(self._rows, vectors @ scaled.T)
+            C = project(self._rows, B)
             self._K = self._K - project(C, S) @ C.swapaxes(1, 2)
             return
-        both = project(self._rows, vectors @ np.vstack([scaled, scaled / values**2]).T)
+        both = project(self._rows, np.hstack([B, factor.solve(B.T)]))
         C, E = both[:, :, :3], both[:, :, 3:]
         CS = project(C, S)
         cross = CS @ E.swapaxes(1, 2)
         self._K = self._K - CS @ C.swapaxes(1, 2)
-        self._M = self._M - cross - cross.swapaxes(1, 2) + project(CS, scaled @ scaled.T) @ CS.swapaxes(1, 2)
+        self._M = self._M - cross - cross.swapaxes(1, 2) + project(CS, B.T @ B) @ CS.swapaxes(1, 2)
 
 
 def information_growth(K: Array) -> Array:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.reduction.row_space import RowSpace, project
+from cpfls_cli.reduction.row_space import RowSpace
+from cpfls_cli.reduction.survey import project
 from cpfls_cli.reduction.ties import first_best
 
 # The Gram matrix of a residual squares its singular values, so below this fraction they are rounding.

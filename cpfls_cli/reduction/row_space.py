@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.reduction.survey import Survey, survey
 
 
 @dataclass(frozen=True)
 class RowSpace:
-    """All samples of a regressor, expressed in an orthonormal basis of their row space.
+    """Samples of a regressor, expressed in an orthonormal basis of the row space of all its samples.
 
     Attributes
     ----------
@@ -71,37 +70,21 @@ def row_space(Q: Array, rank_tolerance: float) -> RowSpace:
     ComputationError
         If the shape is wrong, a value is not finite, or all values are zero.
     """
-    _require_regressor(Q)
-    triangle = scipy.linalg.qr(Q.reshape(-1, Q.shape[2]), mode="r", check_finite=False)[0]
-    _, values, basis = scipy.linalg.svd(triangle[: Q.shape[2]], full_matrices=False)
-    rank = int(np.count_nonzero(values > rank_tolerance * values[0]))
-    if rank == 0:
-        raise ComputationError("Q: every value is zero, so no sample is worth more than another")
-    return RowSpace(project(Q, basis[:rank].T), values[:rank], Q.shape[2], rank_tolerance)
+    surveyed = survey(lambda: [Q], rank_tolerance)
+    return space_of(surveyed, np.concatenate(list(surveyed.projected())))
 
 
-def project(rows: Array, vectors: Array) -> Array:
-    """Multiply every sample's rows with the same vectors, in one matrix product.
+def space_of(surveyed: Survey, rows: Array) -> RowSpace:
+    """Place samples in the row space of a surveyed regressor.
 
     Parameters
     ----------
-    rows : array, shape (samples, 3, columns)
-    vectors : array, shape (columns, vectors)
+    surveyed : Survey
+    rows : array, shape (samples, 3, rank)
+        Some or all of its samples, projected.
 
     Returns
     -------
-    array, shape (samples, 3, vectors)
+    RowSpace
     """
-    product: Array = rows.reshape(-1, rows.shape[2]) @ vectors
-    return product.reshape(len(rows), 3, -1)
-
-
-def _require_regressor(Q: Array) -> None:
-    if Q.ndim != 3 or Q.shape[1] != 3 or 0 in Q.shape:
-        raise ComputationError(f"Q: expected shape (samples, 3, parameters), got {Q.shape}")
-    broken = np.flatnonzero(~np.isfinite(Q).all(axis=(1, 2)))
-    if broken.size:
-        raise ComputationError(
-            f"Q: sample {broken[0]} is not finite ({broken.size} of {len(Q)} samples in all); "
-            "remove such samples before the reduction"
-        )
+    return RowSpace(rows, surveyed.singular_values, surveyed.parameters, surveyed.rank_tolerance)

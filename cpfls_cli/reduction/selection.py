@@ -7,7 +7,7 @@ from typing import Literal
 
 from cpfls_cli.arrays import Array, IntArray
 
-StopReason = Literal["size", "condition-number", "all-samples"]
+StopReason = Literal["size", "condition-number", "all-samples", "pool"]
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class Selection(Subset):
         Largest singular value after each sample.
     rank_trace : array of int, shape (size,)
         Numerical rank after each sample.
-    stop_reason : {"size", "condition-number", "all-samples"}
-        Which limit ended the selection.
+    stop_reason : {"size", "condition-number", "all-samples", "pool"}
+        Which limit ended the selection; the pool where it, and not all samples, was used up.
     """
 
     condition_number_trace: Array

@@ -36,6 +36,12 @@ class ReductionSettings(Settings):
         float, Gt(0), Lt(1), Doc("singular values below this fraction of the largest one count as zero")
     ] = 1e-10
 
+    pool: Annotated[
+        int, Ge(1), Doc("samples held in memory to choose from; longer flights are sampled, by leverage")
+    ] = 20000
+
     def __post_init__(self) -> None:
+        if self.size is not None and self.size > self.pool:
+            raise SettingError("pool", f"expected at least size = {self.size}: samples are chosen from the pool")
         if self.size is None and self.condition_number is None:
             raise SettingError("size", "give a size, a condition_number or both: nothing would stop the reduction")

@@ -7,7 +7,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.reduction.factor import TriangularFactor
 from cpfls_cli.reduction.lazy_search import lazy_best
-from cpfls_cli.reduction.row_space import project
+from cpfls_cli.reduction.survey import project
 from cpfls_cli.reduction.updated_spectrum import eigenvalues_below
 
 # Lowest eigenvectors of the successive Rayleigh-Ritz bounds for the samples still in doubt.
