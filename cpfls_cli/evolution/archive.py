@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,7 @@ class Archive:
         self._submitted: list[IntArray] = []
         self._genes: list[IntArray] = []
         self._objectives: list[Array] = []
+        self._count = 0
         self._front = np.empty(0, dtype=np.int64)
 
     @classmethod
@@ -55,17 +57,17 @@ class Archive:
 
     def __len__(self) -> int:
         """Count the evaluations."""
-        return len(self._genes)
+        return self._count
 
     @property
     def submitted(self) -> IntArray:
         """Chromosomes as they were evaluated, shape (evaluations, genes)."""
-        return np.array(self._submitted)
+        return _whole(self._submitted)
 
     @property
     def results(self) -> Evaluation:
         """Refined genes and objectives of all evaluations; with `submitted`, all that `of` needs."""
-        return self._rows(range(len(self)))
+        return Evaluation(_whole(self._genes), _whole(self._objectives))
 
     @property
     def front(self) -> Evaluation:
@@ -113,22 +115,29 @@ class Archive:
             If the evaluation does not fit the chromosomes.
         """
         _require_fit(submitted, evaluation)
-        first_row = len(self)
-        self._submitted.extend(submitted)
-        self._genes.extend(np.asarray(evaluation.genes, dtype=np.int64))
-        self._objectives.extend(worst_where_not_finite(evaluation.objectives))
-        self._register(submitted, first_row)
-        self._register(self._genes[first_row:], first_row)
-        candidates = np.append(self._front, np.arange(first_row, len(self)))
+        first_row = self._count
+        self._count += len(submitted)
+        self._submitted.append(np.array(submitted, dtype=np.int64))
+        self._genes.append(np.array(evaluation.genes, dtype=np.int64))
+        self._objectives.append(worst_where_not_finite(evaluation.objectives))
+        self._register(self._submitted[-1], first_row)
+        self._register(self._genes[-1], first_row)
+        candidates = np.append(self._front, np.arange(first_row, self._count))
         self._front = candidates[pareto_front(self._rows(candidates).objectives)]
 
-    def _register(self, chromosomes: IntArray | list[IntArray], first_row: int) -> None:
+    def _register(self, chromosomes: IntArray, first_row: int) -> None:
         for row, chromosome in enumerate(chromosomes, start=first_row):
             self._row_of.setdefault(_key(chromosome), row)
 
-    def _rows(self, rows: IntArray | list[int] | range) -> Evaluation:
-        genes = np.array([self._genes[row] for row in rows])
-        return Evaluation(genes, np.array([self._objectives[row] for row in rows]))
+    def _rows(self, rows: IntArray | list[int]) -> Evaluation:
+        return Evaluation(_whole(self._genes)[rows], _whole(self._objectives)[rows])
+
+
+def _whole(blocks: list[Any]) -> Any:
+    """Put what was stored block by block into one array, and keep it so."""
+    if len(blocks) > 1:
+        blocks[:] = [np.concatenate(blocks)]
+    return blocks[0]
 
 
 def _key(chromosome: IntArray) -> bytes:

@@ -83,3 +83,25 @@ def test_an_archive_is_restored_from_its_records():
 def test_an_evaluation_that_does_not_fit_is_refused(genes, objectives, name):
     with pytest.raises(ComputationError, match=f"evaluation.{name}: expected"):
         Archive().evaluate(np.arange(6).reshape(3, 2), lambda _: Evaluation(genes, objectives))
+
+
+def test_rebuilt_archive_knows_counts_and_gives_the_same():
+    rng = np.random.default_rng(8)
+
+    def evaluate(genes):
+        # Refined to even genes: what one chromosome becomes, another one is, and equal objectives are common.
+        refined = genes // 2 * 2
+        objectives = np.column_stack([refined.sum(axis=1) % 5, refined[:, 0] % 7]).astype(float)
+        objectives[refined[:, 1] > 12] = np.nan
+        return Evaluation(refined, objectives)
+
+    archive = Archive()
+    for _ in range(8):
+        archive.evaluate(rng.integers(0, 16, (12, 2)), evaluate)
+    rebuilt = Archive.of(archive.submitted, archive.results)
+    assert len(rebuilt) == len(archive)
+    asked = np.stack(np.meshgrid(np.arange(16), np.arange(16)), axis=-1).reshape(-1, 2)
+    for one, other in ((archive.front, rebuilt.front), *[[a.evaluate(asked, evaluate) for a in (archive, rebuilt)]]):
+        np.testing.assert_array_equal(one.genes, other.genes)
+        np.testing.assert_array_equal(one.objectives, other.objectives)
+    np.testing.assert_array_equal(archive.submitted, rebuilt.submitted)
