@@ -1,0 +1,74 @@
+"""A search of several generations, and ways to end it too early."""
+
+import itertools
+import os
+import signal
+
+import pytest
+
+from cpfls_cli.workers import employ
+
+GENERATIONS = 6
+SEARCH = """\
+seed: 1
+trajectory: {sample_time_s: 0.1}
+identification:
+  consequents: seesaw
+  products: additive
+  membership_functions: 5
+  base: none
+  population: 16
+  generations: 6
+  subpopulations: 2
+  local_search: {enabled: false}
+"""
+
+
+@pytest.fixture(scope="session")
+def search(tmp_path_factory):
+    path = tmp_path_factory.mktemp("search") / "search.yaml"
+    path.write_text(SEARCH)
+    return path
+
+
+@pytest.fixture(scope="session")
+def words(search, pipeline):
+    """The command, without its output."""
+    return ("identify", search, pipeline.flight, "--selection", pipeline.selection)
+
+
+@pytest.fixture(scope="session")
+def whole(cpfls, words, tmp_path_factory):
+    """The model of a search that nobody stopped."""
+    output = tmp_path_factory.mktemp("whole") / "model.h5"
+    result = cpfls(*words, "-o", output)
+    assert result.exit_code == 0, result.stderr
+    assert [path.name for path in output.parent.iterdir()] == ["model.h5"]
+    return output
+
+
+@pytest.fixture
+def at_evaluation(monkeypatch):
+    """Do something when so many chromosomes are evaluated."""
+
+    def arrange(number, action):
+        count = itertools.count(1)
+
+        def counting(evaluate, **options):
+            def evaluate_and_count(genes):
+                evaluation = evaluate(genes)
+                if next(count) == number:
+                    action()
+                return evaluation
+
+            return employ(evaluate_and_count, **options)
+
+        monkeypatch.setattr("cpfls_cli.stages.resumable.employ", counting)
+
+    return arrange
+
+
+@pytest.fixture
+def interrupt_at(at_evaluation):
+    """Send this very process an interrupt when so many chromosomes are evaluated."""
+    return lambda number: at_evaluation(number, lambda: os.kill(os.getpid(), signal.SIGINT))

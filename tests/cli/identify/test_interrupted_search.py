@@ -1,0 +1,167 @@
+"""Searches that are interrupted or run out of time, and go on."""
+
+import json
+import signal
+
+import h5py
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts import check_artifact, read_artifact
+from cpfls_cli.stages.resumable import Watch
+
+NOTE = "cpfls: note: "
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def stored(path, name):
+    with h5py.File(path) as file:
+        return file[name][()]
+
+
+def test_search_that_comes_to_its_end_says_so(whole):
+    assert stored(whole, "search/stop_reason") == b"generations"
+    assert stored(whole, "search/complete") == 1
+
+
+@pytest.mark.parametrize("evaluations", [20, 33, 48])
+def test_interrupted_search_keeps_a_model_and_goes_on_to_the_same_end(
+    cpfls, words, whole, tmp_path, interrupt_at, monkeypatch, evaluations
+):
+    output = tmp_path / "model.h5"
+    interrupt_at(evaluations)
+    result = cpfls(*words, "-o", output, "--json")
+    assert result.exit_code == 130
+    assert names(tmp_path) == ["model.h5", "model.h5.checkpoint"]
+    summary = json.loads(result.stdout)
+    assert (summary["stop_reason"], summary["complete"]) == ("interrupted", False)
+    assert summary["evaluations"] == evaluations == stored(output, "history/evaluations")[-1]
+    assert result.stderr.splitlines()[-1] == (
+        f"{NOTE}{output}: is incomplete, because the search was interrupted; the same command with --resume goes on"
+    )
+    assert check_artifact(read_artifact(output)) == []
+    assert stored(output, "search/complete") == 0
+    monkeypatch.undo()
+    result = cpfls(*words, "-o", output, "--resume")
+    assert result.exit_code == 0, result.stderr
+    assert output.read_bytes() == whole.read_bytes()
+    assert names(tmp_path) == ["model.h5"]
+
+
+def test_incomplete_model_predicts(cpfls, words, search, pipeline, tmp_path, interrupt_at):
+    interrupt_at(40)
+    assert cpfls(*words, "-o", tmp_path / "model.h5").exit_code == 130
+    result = cpfls("predict", search, tmp_path / "model.h5", pipeline.flight, "-o", tmp_path / "prediction.h5")
+    assert result.exit_code == 0, result.stderr
+
+
+def test_interrupted_before_the_first_generation_is_finished(cpfls, words, tmp_path, interrupt_at):
+    output = tmp_path / "model.h5"
+    interrupt_at(5)
+    result = cpfls(*words, "-o", output)
+    assert result.exit_code == 130
+    assert names(tmp_path) == ["model.h5"]
+    assert stored(output, "history/evaluations").tolist() == [5]
+    assert result.stderr.endswith("no generation was finished, so there is nothing to resume\n")
+
+
+def test_interrupted_in_the_last_evaluation_it_is_complete(cpfls, words, whole, tmp_path, interrupt_at):
+    interrupt_at(int(stored(whole, "history/evaluations")[-1]))
+    result = cpfls(*words, "-o", tmp_path / "model.h5")
+    assert result.exit_code == 0
+    assert (tmp_path / "model.h5").read_bytes() == whole.read_bytes()
+    assert names(tmp_path) == ["model.h5"]
+
+
+def test_interrupted_without_a_finite_model(cpfls, words, tmp_path, interrupt_at, monkeypatch):
+    def nothing(_, genes):
+        from cpfls_cli.evolution import Evaluation
+
+        return Evaluation(genes, np.full((len(genes), 3), np.inf))
+
+    monkeypatch.setattr("cpfls_cli.identification.evaluator.Evaluator.__call__", nothing)
+    interrupt_at(20)
+    result = cpfls(*words, "-o", tmp_path / "model.h5")
+    assert (result.exit_code, result.stdout) == (130, "")
+    assert names(tmp_path) == ["model.h5.checkpoint"]
+    assert result.stderr == (
+        "cpfls: error: the search was interrupted before a model was found, so none is written; "
+        "the same command with --resume goes on\n"
+    )
+
+
+def test_search_that_found_nothing_at_its_end_leaves_nothing(cpfls, words, pipeline, tmp_path, monkeypatch):
+    def nothing(_, genes):
+        from cpfls_cli.evolution import Evaluation
+
+        return Evaluation(genes, np.full((len(genes), 3), np.inf))
+
+    monkeypatch.setattr("cpfls_cli.identification.evaluator.Evaluator.__call__", nothing)
+    result = cpfls(*words, "-o", tmp_path / "model.h5")
+    assert result.exit_code == 1
+    assert result.stderr == (
+        f"cpfls: error: {pipeline.flight}: no chromosome gave a finite model; the data may not move at all\n"
+    )
+    assert names(tmp_path) == []
+
+
+def test_handlers_are_as_they_were(cpfls, words, tmp_path, interrupt_at):
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    interrupt_at(20)
+    cpfls(*words, "-o", tmp_path / "model.h5")
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_path, at_evaluation, monkeypatch):
+    output = tmp_path / "model.h5"
+    clock = [100.0]
+    monkeypatch.setattr("cpfls_cli.stages.resumable.time.monotonic", lambda: clock[0])
+    at_evaluation(40, lambda: clock.__setitem__(0, 700.0))
+    result = cpfls(*words, "-o", output, "--time-limit", "10m")
+    assert result.exit_code == 0
+    assert stored(output, "search/stop_reason") == b"time-limit"
+    assert stored(output, "history/evaluations")[-1] == 40
+    assert result.stderr.splitlines()[-1] == (
+        f"{NOTE}{output}: is incomplete, because --time-limit ended the search; the same command with --resume goes on"
+    )
+    monkeypatch.undo()
+    assert cpfls(*words, "-o", output, "--resume", "--time-limit", "2h").exit_code == 0
+    assert output.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("text", "limit"), [("90", 90.0), ("90s", 90.0), ("1.5m", 90.0), ("2h", 7200.0), ("1e3", 1000.0)]
+)
+def test_time_limit_in_several_units(cpfls, words, tmp_path, monkeypatch, text, limit):
+    seen = []
+
+    class Seeing(Watch):
+        def __init__(self, job, time_limit_s):
+            seen.append(time_limit_s)
+            super().__init__(job, time_limit_s)
+
+    monkeypatch.setattr("cpfls_cli.stages.identify.Watch", Seeing)
+    settings = ("--set", "identification.membership_functions=1", "--time-limit", text)
+    assert cpfls(*words, "-o", tmp_path / "model.h5", *settings).exit_code == 0
+    assert seen == [limit]
+
+
+@pytest.mark.parametrize("text", ["0", "-3s", "soon", "", "10 days", "nan", "inf", "h"])
+def test_time_limit_that_is_none(cpfls, words, tmp_path, text):
+    result = cpfls(*words, "-o", tmp_path / "model.h5", f"--time-limit={text}")
+    assert result.exit_code == 2
+    assert "--time-limit" in result.stderr
+    assert "10m" in result.stderr
+    assert names(tmp_path) == []
+
+
+def test_stalled_search_ends_converged(cpfls, words, tmp_path):
+    stall = ("--set", "identification.stall_generations=1", "--set", "identification.stall_improvement=0.9")
+    result = cpfls(*words, "-o", tmp_path / "model.h5", *stall, "--json")
+    assert result.exit_code == 0
+    summary = json.loads(result.stdout)
+    assert (summary["stop_reason"], summary["complete"], summary["generations"] < 6) == ("converged", True, True)
+    assert names(tmp_path) == ["model.h5"]

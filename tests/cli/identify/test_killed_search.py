@@ -1,0 +1,222 @@
+"""Processes that are killed at any moment, interrupted twice, or find the disk full."""
+
+import itertools
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from types import SimpleNamespace
+
+import pytest
+
+from cpfls_cli.artifacts import writing
+from cpfls_cli.cli import main
+from cpfls_cli.evolution import engine
+
+
+class Forked:
+    """The program in a process of its own, which need not load it again."""
+
+    def __init__(self, folder, words, patch=lambda: None):
+        self._printed = [folder / ".stdout", folder / ".stderr"]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self._pid = os.fork()
+        if self._pid == 0:
+            self._become_program(words, patch)
+        self._status = None
+
+    def _become_program(self, words, patch):
+        code = 70
+        try:
+            for number, path in enumerate(self._printed, start=1):
+                os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+            sys.stdout, sys.stderr = (os.fdopen(number, "w", buffering=1) for number in (1, 2))
+            patch()
+            sys.argv = ["cpfls", *map(str, words)]
+            main.run()
+        except SystemExit as end:
+            code = end.code or 0
+        finally:
+            os._exit(code)
+
+    def poll(self):
+        if self._status is None:
+            pid, status = os.waitpid(self._pid, os.WNOHANG)
+            self._status = status if pid else None
+        return None if self._status is None else os.waitstatus_to_exitcode(self._status)
+
+    def kill(self):
+        os.kill(self._pid, signal.SIGKILL)
+
+    def wait(self):
+        while self.poll() is None:
+            time.sleep(0.001)
+        stdout, stderr = (path.read_text() for path in self._printed)
+        return SimpleNamespace(returncode=self.poll(), stdout=stdout, stderr=stderr)
+
+
+@pytest.fixture
+def program(words, tmp_path_factory):
+    """Start the search in a process."""
+    return lambda output, *options, patch=lambda: None: Forked(
+        tmp_path_factory.mktemp("printed"), [*words, "-o", output, *options], patch
+    )
+
+
+def at_call(number, owner, name, action):
+    """Do something to itself at the n-th call of a function: the same moment every time, whatever the machine."""
+
+    def patch():
+        calls, function = itertools.count(1), getattr(owner, name)
+
+        def counting(*args, **kwargs):
+            if next(calls) == number:
+                action()
+            return function(*args, **kwargs)
+
+        setattr(owner, name, counting)
+
+    return patch
+
+
+def kill_itself():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def wait_for_change(process, path):
+    """Wait until a file is replaced, or the process has ended; whether it is still running."""
+
+    def identity():
+        return (path.stat().st_ino, path.stat().st_mtime_ns) if path.exists() else None
+
+    before = identity()
+    while process.poll() is None:
+        if identity() not in (before, None):
+            return True
+        time.sleep(0.001)
+    return False
+
+
+def kill_at_random(start, output, moments, most):
+    """Start, kill and resume a search until it comes to its end; how often it was killed."""
+    checkpoint, options = output.with_name(f"{output.name}.checkpoint"), ()
+    kills, ended = 0, None
+    while ended != 0:
+        process = start(output, *options)
+        if kills < most and wait_for_change(process, checkpoint):
+            time.sleep(moments.uniform(0.0, 0.05))
+            process.kill()
+        process.wait()
+        ended = process.poll()
+        assert ended in (0, -signal.SIGKILL)
+        kills += ended != 0
+        options = ("--resume",)
+    return kills
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_killed_at_random_moments_it_ends_the_same(program, whole, tmp_path, seed):
+    output = tmp_path / "model.h5"
+    assert kill_at_random(program, output, random.Random(seed), 100) > 0
+    assert output.read_bytes() == whole.read_bytes()
+    assert names(tmp_path) == ["model.h5"]
+
+
+def test_killed_twice_and_started_from_nothing(words, whole, tmp_path):
+    def start(output, *options):
+        called = [sys.executable, "-m", "cpfls_cli", *map(str, words), "-o", str(output), *options]
+        return subprocess.Popen(called, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    output = tmp_path / "model.h5"
+    assert kill_at_random(start, output, random.Random(7), 2) > 0
+    assert output.read_bytes() == whole.read_bytes()
+    assert names(tmp_path) == ["model.h5"]
+
+
+# The initial population and six generations leave a checkpoint each; the eighth file is the model.
+@pytest.mark.parametrize(
+    ("call", "owner", "name"),
+    [(1, os, "fsync"), (3, os, "fsync"), (3, os, "replace"), (8, os, "fsync"), (8, os, "replace")],
+)
+def test_killed_while_writing_it_ends_the_same(program, whole, tmp_path, call, owner, name):
+    output = tmp_path / "model.h5"
+    killed = program(output, patch=at_call(call, owner, name, kill_itself)).wait()
+    assert killed.returncode == -signal.SIGKILL
+    assert any(name.endswith(".part") for name in names(tmp_path))
+    options = ["--resume"] if call > 1 else []
+    assert ("model.h5.checkpoint" in names(tmp_path)) == (call > 1)
+    ended = program(output, *options).wait()
+    assert ended.returncode == 0, ended.stderr
+    assert output.read_bytes() == whole.read_bytes()
+    assert names(tmp_path) == ["model.h5"]
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_first_signal_stops_the_search_and_a_second_one_the_program(program, whole, tmp_path, number, code):
+    def signals(count):
+        return at_call(3, engine, "reinsert", lambda: [os.kill(os.getpid(), number) for _ in range(count)])
+
+    once = program(tmp_path / "one.h5", patch=signals(1)).wait()
+    assert once.returncode == code, once.stderr
+    assert once.stdout.startswith("113 parameters from 60 samples")
+    assert names(tmp_path) == ["one.h5", "one.h5.checkpoint"]
+    twice = program(tmp_path / "two.h5", patch=signals(2)).wait()
+    assert (twice.returncode, twice.stdout) == (code, "")
+    assert twice.stderr == "cpfls: error: interrupted: no half-written file is left\n"
+    assert names(tmp_path) == ["one.h5", "one.h5.checkpoint", "two.h5.checkpoint"]
+    for output in (tmp_path / "one.h5", tmp_path / "two.h5"):
+        assert program(output, "--resume").wait().returncode == 0
+        assert output.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("call", "file", "size"),
+    [
+        (1, "model.h5.checkpoint", 0),
+        (4, "model.h5.checkpoint", 20_000),
+        (8, "model.h5", 0),
+        (8, "model.h5", 20_000),
+    ],
+)
+def test_full_disk_leaves_the_checkpoint_before(program, whole, tmp_path, call, file, size):
+    """The system refuses what goes beyond a size, in the first or a later block."""
+
+    def fill():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+        # The limit is for all files; what is printed goes to files here.
+        sys.stdout, sys.stderr = (os.fdopen(os.dup(pipe), "w", buffering=1) for pipe in printed)
+
+    reading, writing_end = os.pipe()
+    printed = (writing_end, writing_end)
+    output = tmp_path / "model.h5"
+    result = program(output, patch=at_call(call, writing, "_image", fill)).wait()
+    os.close(writing_end)
+    with open(reading) as messages:
+        message = messages.read()
+    assert result.returncode == 1
+    assert message == f"cpfls: error: {tmp_path / file}: cannot be written: File too large\n"
+    assert names(tmp_path) == ([] if call == 1 else ["model.h5.checkpoint"])
+    if call > 1:
+        assert program(output, "--resume").wait().returncode == 0
+        assert output.read_bytes() == whole.read_bytes()
+
+
+def test_folder_that_vanishes(program, tmp_path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    result = program(folder / "model.h5", patch=at_call(3, writing, "_image", lambda: shutil.rmtree(folder))).wait()
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr == (
+        f"cpfls: error: {folder / 'model.h5.checkpoint'}: cannot write into the folder {folder}: "
+        "No such file or directory\n"
+    )

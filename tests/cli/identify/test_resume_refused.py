@@ -1,0 +1,115 @@
+"""When a search may go on, start again, or replace what lies there."""
+
+import pytest
+
+
+@pytest.fixture
+def stopped(cpfls, words, tmp_path, interrupt_at, monkeypatch):
+    """An incomplete model with its checkpoint."""
+    interrupt_at(33)
+    assert cpfls(*words, "-o", tmp_path / "model.h5").exit_code == 130
+    monkeypatch.undo()
+    return tmp_path / "model.h5"
+
+
+def test_nothing_to_resume(refuse, words, tmp_path):
+    (line,) = refuse(*words, "-o", tmp_path / "model.h5", "--resume")
+    assert (
+        line == f"{tmp_path / 'model.h5'}.checkpoint: no such checkpoint, so nothing to resume; start without --resume"
+    )
+
+
+@pytest.mark.parametrize("option", [(), ("--dry-run",)])
+def test_checkpoint_of_which_nothing_is_said(refuse, words, stopped, option):
+    expected = (
+        f"{stopped}.checkpoint: a search for {stopped} was stopped here; --resume continues it, --force starts again"
+    )
+    assert refuse(*words, "-o", stopped, *option) == [expected]
+    stopped.unlink()
+    assert refuse(*words, "-o", stopped, *option) == [expected]
+
+
+@pytest.mark.parametrize("option", ["--resume", "--force"])
+def test_dry_run_changes_nothing(cpfls, words, stopped, option):
+    before = {path: path.read_bytes() for path in stopped.parent.iterdir()}
+    assert cpfls(*words, "-o", stopped, option, "--dry-run").exit_code == 0
+    assert {path: path.read_bytes() for path in stopped.parent.iterdir()} == before
+
+
+def test_force_starts_again(cpfls, words, stopped, whole):
+    assert cpfls(*words, "-o", stopped, "--force").exit_code == 0
+    assert stopped.read_bytes() == whole.read_bytes()
+    assert [path.name for path in stopped.parent.iterdir()] == ["model.h5"]
+
+
+def test_forced_search_gives_up_the_checkpoint_from_the_start(cpfls, words, stopped, interrupt_at):
+    interrupt_at(3)
+    result = cpfls(*words, "-o", stopped, "--force")
+    assert result.exit_code == 130
+    assert [path.name for path in stopped.parent.iterdir()] == ["model.h5"]
+    assert "nothing to resume" in result.stderr
+
+
+def test_search_that_is_refused_keeps_the_checkpoint(refuse, words, stopped, tmp_path):
+    refuse(*words, "-o", stopped, "--force", "--validate", tmp_path / "none.h5")
+    refuse(*words, "-o", stopped, "--resume", "--validate", tmp_path / "none.h5")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--seed", 2), "seed = 1 there, 2 here"),
+        (("--set", "identification.population=18"), "identification.population = 16 there, 18 here"),
+        (("--set", "identification.generations=0"), "identification.generations = 0, but it has come to generation"),
+    ],
+)
+def test_other_config(refuse, words, stopped, options, said):
+    (line,) = refuse(*words, "-o", stopped, "--resume", *options)
+    assert line.startswith(f"{stopped}.checkpoint: is of another search: {said}")
+
+
+def test_other_selection_and_other_flight(cpfls, refuse, search, pipeline, stopped, tmp_path):
+    (line,) = refuse("identify", search, pipeline.flight, "-o", stopped, "--resume")
+    assert "selection = selection.h5 (" in line
+    assert "none here" in line
+    other = tmp_path / "other.h5"
+    noise = ("--set", "simulation.relative_noise={torque: 0.05}")
+    assert cpfls("simulate", search, pipeline.trajectory, "-o", other, *noise).exit_code == 0
+    (line,) = refuse("identify", search, other, "-o", stopped, "--resume")
+    assert "flight = flight.h5 (" in line
+    assert "other.h5 (" in line
+
+
+def test_more_generations(cpfls, words, stopped, tmp_path):
+    more = ("--set", "identification.generations=8")
+    assert cpfls(*words, "-o", stopped, "--resume", *more).exit_code == 0
+    assert cpfls(*words, "-o", tmp_path / "straight.h5", *more).exit_code == 0
+    assert stopped.read_bytes() == (tmp_path / "straight.h5").read_bytes()
+
+
+def test_damaged_checkpoint(refuse, words, stopped):
+    checkpoint = stopped.with_name("model.h5.checkpoint")
+    content = bytearray(checkpoint.read_bytes())
+    checkpoint.write_bytes(content[: len(content) // 2])
+    (line,) = refuse(*words, "-o", stopped, "--resume")
+    assert line.startswith(f"{checkpoint}: ")
+    assert line.endswith("--force without --resume starts again")
+
+
+def test_other_file_in_the_place_of_the_output_is_not_replaced(refuse, words, stopped, pipeline):
+    for content in (b"precious", pipeline.model.read_bytes()):
+        stopped.write_bytes(content)
+        assert refuse(*words, "-o", stopped, "--resume") == [f"{stopped}: exists already; --force replaces it"]
+
+
+def test_killed_between_the_model_and_the_removal_of_its_checkpoint(cpfls, words, stopped, whole):
+    stopped.write_bytes(whole.read_bytes())
+    assert cpfls(*words, "-o", stopped, "--resume").exit_code == 0
+    assert stopped.read_bytes() == whole.read_bytes()
+    assert [path.name for path in stopped.parent.iterdir()] == ["model.h5"]
+
+
+def test_workers_and_scheduler_exclude_each_other(refuse, words, tmp_path):
+    several = ("--workers", 2, "--scheduler", "tcp://127.0.0.1:1")
+    (line,) = refuse(*words, "-o", tmp_path / "model.h5", *several)
+    assert line == "--scheduler: knows its own workers; leave --workers out"
