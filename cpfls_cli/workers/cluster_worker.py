@@ -6,14 +6,18 @@ import pickle
 import threading
 from functools import partial
 
+from distributed import WorkerPlugin, get_worker
+from threadpoolctl import threadpool_limits
+
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.evolution.archive import Evaluate, Evaluation
 from cpfls_cli.workers.attempt import Failure, attempt
 
 
-class Shipped:
-    """A pickled evaluator on its way to the workers.
+class Shipped(WorkerPlugin):  # type: ignore[misc]
+    """A pickled evaluator that the scheduler gives to each worker, also to one that joins or comes back later.
 
+    Scattered data would not stay: Dask drops copies while they are idle, and then the only one with its worker.
     Threads of one worker do not share an evaluator, because nothing says that it may be used by two at once.
 
     Parameters
@@ -28,10 +32,6 @@ class Shipped:
     def __reduce__(self) -> tuple[type[Shipped], tuple[bytes]]:
         return Shipped, (self._evaluator,)
 
-    # Dask spills and moves data by their size.
-    def __sizeof__(self) -> int:
-        return len(self._evaluator)
-
     def evaluate(self, genes: IntArray) -> Evaluation:
         """Evaluate chromosomes by this thread's own evaluator."""
         if not hasattr(self._loaded, "evaluate"):
@@ -40,24 +40,24 @@ class Shipped:
         return evaluation
 
     def _load(self) -> Evaluate:
-        from threadpoolctl import threadpool_limits
-
         evaluate: Evaluate = pickle.loads(self._evaluator)
         # Loading has loaded the libraries of linear algebra too. Sums in one order give the same bytes everywhere.
         threadpool_limits(limits=1)
         return evaluate
 
 
-def evaluate_shipped(shipped: Shipped, genes: IntArray) -> Evaluation | Failure:
+def evaluate_shipped(genes: IntArray, name: str) -> Evaluation | Failure:
     """Evaluate chromosomes on a worker of a cluster.
 
     Parameters
     ----------
-    shipped : Shipped
     genes : array of int, shape (individuals, genes)
+    name : str
+        By which the evaluator was shipped.
 
     Returns
     -------
     Evaluation or Failure
     """
+    shipped: Shipped = get_worker().plugins[name]
     return attempt(partial(shipped.evaluate, genes))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Evaluate
-from cpfls_cli.workers.cluster import cluster
+from cpfls_cli.workers.address import require_address
 from cpfls_cli.workers.processes import processes
 from cpfls_cli.workers.serial import Serial
 from cpfls_cli.workers.workforce import Workforce
@@ -31,12 +32,24 @@ def employ(evaluate: Evaluate, *, count: int = 1, scheduler: str | None = None) 
     Raises
     ------
     InputError
-        On entry, if the address of the scheduler is none.
+        If the address of the scheduler is none.
     ComputationError
-        On entry, if the workers cannot be had; in use, if one vanishes or the evaluator fails.
+        If Dask is not installed; on entry, if the workers cannot be had; in use, if one vanishes or the evaluator
+        fails.
     """
     if scheduler is not None:
-        return cluster(evaluate, scheduler)
+        return _cluster(evaluate, scheduler)
     if count > 1:
         return processes(evaluate, count)
     return nullcontext(Serial(evaluate))
+
+
+def _cluster(evaluate: Evaluate, address: str) -> AbstractContextManager[Workforce]:
+    require_address(address)
+    try:
+        from cpfls_cli.workers.cluster import cluster
+    except ModuleNotFoundError as error:
+        raise ComputationError(
+            f"a scheduler needs Dask, which is not installed here ({error}): pip install 'cpfls[dask]'"
+        ) from error
+    return cluster(evaluate, address)

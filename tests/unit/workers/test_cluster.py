@@ -1,5 +1,6 @@
 """Evaluation by a real Dask scheduler and worker processes on the loopback."""
 
+import importlib
 import os
 import re
 import socket
@@ -13,11 +14,12 @@ import pytest
 
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.workers import employ
-from cpfls_cli.workers.cluster import cluster
 from tests.unit.workers.evaluators import POISON, Failing, Loading, Logging, Reporting, Uneven
 
 pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cpfls[dask]'")
 pytest.importorskip("threadpoolctl", reason="threadpoolctl is not installed: pip install 'cpfls[dask]'")
+
+cluster = importlib.import_module("cpfls_cli.workers.cluster").cluster
 
 ROOT = Path(__file__).parents[3]
 GENES = np.random.default_rng(5).integers(0, 32768, (40, 6))
@@ -111,7 +113,7 @@ def test_a_failing_evaluator_is_an_error_in_words(address, capfd):
 
 def test_a_vanished_worker_is_replaced_by_the_other_until_that_vanishes_too(tmp_path, capfd):
     slow = Uneven(np.linspace(0, 1, 50), longest_s=0.05)
-    with dask(tmp_path, workers=2) as (address, _, (first, second)), cluster(slow, address) as workers:
+    with dask(tmp_path, workers=2) as (address, _, (first, second)), cluster(slow, address, patience_s=2.0) as workers:
         parts = workers.stream(GENES)
         rows = next(parts)[0].tolist()
         first.kill()
@@ -120,7 +122,7 @@ def test_a_vanished_worker_is_replaced_by_the_other_until_that_vanishes_too(tmp_
         parts = workers.stream(GENES)
         next(parts)
         second.kill()
-        with pytest.raises(ComputationError, match=r"workers of the Dask scheduler at tcp://127.0.0.1.* vanished"):
+        with pytest.raises(ComputationError, match="has no workers: start some"):
             list(parts)
     assert capfd.readouterr() == ("", "")
 
@@ -133,7 +135,7 @@ def test_a_vanished_scheduler_is_an_error_in_words(tmp_path, capfd):
         parts = workers.stream(GENES)
         next(parts)
         scheduler.kill()
-        with pytest.raises(ComputationError, match=r"scheduler at tcp://127.0.0.1:.* vanished"):
+        with pytest.raises(ComputationError, match="Dask scheduler vanished: start it"):
             list(parts)
     assert capfd.readouterr() == ("", "")
 

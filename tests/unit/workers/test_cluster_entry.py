@@ -42,12 +42,10 @@ def test_a_worker_with_other_software_is_named(package, answer, words):
 
 
 def test_without_dask_the_message_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with (
-        pytest.raises(ComputationError, match=r"pip install 'cpfls\[dask\]'"),
-        employ(print, scheduler="tcp://127.0.0.1:8786"),
-    ):
-        pass
+    for module in ("distributed", "cpfls_cli.workers.cluster"):
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(ComputationError, match=r"pip install 'cpfls\[dask\]'"):
+        employ(print, scheduler="tcp://127.0.0.1:8786")
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:8786", "tls://host.example:1", "tcp://[::1]:8786"])
