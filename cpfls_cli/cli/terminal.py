@@ -36,6 +36,8 @@ def messages_for_errors() -> Iterator[None]:
         yield
     except CpflsError as error:
         _complain(str(error))
+        for note in getattr(error, "__notes__", ()):
+            _complain(note, "note")
         raise typer.Exit(error.exit_code) from None
     except MemoryError:
         _complain("not enough memory for this flight and structure; reduce the flight or the number of functions")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -29,6 +29,8 @@ class Evaluation:
     genes: IntArray
     objectives: Array
 
+
+_Block = TypeVar("_Block", Array, IntArray)
 
 Evaluate = Callable[[IntArray], Evaluation]
 
@@ -133,10 +135,10 @@ class Archive:
         return Evaluation(_whole(self._genes)[rows], _whole(self._objectives)[rows])
 
 
-def _whole(blocks: list[Any]) -> Any:
+def _whole(blocks: list[_Block]) -> _Block:
     """Put what was stored block by block into one array, and keep it so."""
     if len(blocks) > 1:
-        blocks[:] = [np.concatenate(blocks)]
+        blocks[:] = [cast(_Block, np.concatenate(blocks))]
     return blocks[0]
 
 

@@ -54,11 +54,13 @@ def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]
         return started.dry_run
     clock = time.perf_counter()
     watch = Watch(job, options.time_limit_s)
-    result = _identify(job, flight, data, held_out, search.run(options, watch, _shown(job)))
+    with search.kept():
+        result = _identify(job, flight, data, held_out, search.run(options, watch, _shown(job)))
     if isinstance(result, NothingFoundError):
         search.end(result.stop_reason)
         raise without_model(result.stop_reason, watch.signal, search.checkpoint) or _of(flight, result)
-    finish(job, MODEL, model_data(result, job.study.identification.base, data.learned), started.inputs)
+    with search.kept():
+        finish(job, MODEL, model_data(result, job.study.identification.base, data.learned), started.inputs)
     search.end(result.stop_reason)
     outcome = _outcome(job, result, len(data.learned), time.perf_counter() - clock)
     return stopped(outcome, result.stop_reason, watch.signal, search.checkpoint)

@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.reading import format_name, read_artifact
 from cpfls_cli.artifacts.records import Header
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.evolution.state import EvolutionState
 from cpfls_cli.identification.search_run import SearchRun, SearchStep, Stop, StopReason, is_end
@@ -115,6 +115,21 @@ class Resumable:
                 yield workforce
 
         return SearchRun(self.resumed, workers, progress, self.checkpoint.write, watch.should_stop)
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Say of whatever fails inside that the search can go on nevertheless.
+
+        Yields
+        ------
+        None
+        """
+        try:
+            yield
+        except (ComputationError, OutputError) as error:
+            if self.checkpoint.path.exists():
+                error.add_note(f"{self.checkpoint.path}: is intact; the same command with --resume goes on")
+            raise
 
     def end(self, reason: StopReason) -> None:
         """Remove the checkpoint of a search that came to its end, after what it found is written.

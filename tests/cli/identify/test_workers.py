@@ -1,0 +1,58 @@
+"""The model does not depend on who evaluates, and a worker that is lost leaves the checkpoint."""
+
+import multiprocessing
+
+import pytest
+
+from cpfls_cli.evolution import engine
+
+CONFIGS = {
+    "rigid-body base, local search": ("base=rigid-body", "local_search.enabled=true", "population=10", "generations=1"),
+    "paper's base": ("base=none",),
+}
+
+
+def options(keys):
+    return [word for key in keys for word in ("--set", f"identification.{key}")]
+
+
+@pytest.mark.parametrize("keys", CONFIGS.values(), ids=CONFIGS)
+def test_two_processes_and_a_cluster_give_the_same_bytes(cpfls, words, tmp_path, keys, request):
+    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cpfls[dask]'")
+    address = request.getfixturevalue("address")
+    for name, who in {"one": (), "two": ("--workers", 2), "dask": ("--scheduler", address)}.items():
+        result = cpfls(*words, "-o", tmp_path / name, *options(keys), *who)
+        assert result.exit_code == 0, result.stderr
+    one, two, dask = ((tmp_path / name).read_bytes() for name in ("one", "two", "dask"))
+    assert one == two
+    assert one == dask
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    from tests.unit.workers.test_cluster import dask
+
+    with dask(tmp_path_factory.mktemp("dask"), workers=2) as (address, _, _):
+        yield address
+
+
+def test_search_goes_on_with_other_workers_after_one_was_lost(cpfls, words, whole, tmp_path, monkeypatch):
+    output, reinsert, bred = tmp_path / "model.h5", engine.reinsert, []
+
+    def lose_one(*args):
+        bred.append(None)
+        if len(bred) == 3:
+            multiprocessing.active_children()[0].kill()
+        return reinsert(*args)
+
+    monkeypatch.setattr(engine, "reinsert", lose_one)
+    result = cpfls(*words, "-o", output, "--workers", 2)
+    monkeypatch.undo()
+    assert (result.exit_code, result.stdout) == (1, "")
+    error, note = result.stderr.splitlines()
+    assert error.startswith("cpfls: error: ")
+    assert "killed" in error
+    assert note == f"cpfls: note: {output}.checkpoint: is intact; the same command with --resume goes on"
+    assert [path.name for path in tmp_path.iterdir()] == ["model.h5.checkpoint"]
+    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    assert output.read_bytes() == whole.read_bytes()
