@@ -8,6 +8,9 @@ import sys
 
 import pytest
 
+from cpfls_cli.cli.options import Common
+from cpfls_cli.cli.terminal import progress_bar
+
 
 def on_terminal(*words, columns=200):
     """Run a command with standard error on a terminal; give exit code, output and what was shown."""
@@ -68,3 +71,24 @@ def test_bar_and_time_stay_whole_on_a_terminal_of_80_columns(identify):
     assert last, lines
     # The note is longer than what is left of the line.
     assert any(line.endswith("…") for line in last)
+
+
+def test_time_left_of_a_resumed_search_is_that_of_its_own_pace(monkeypatch):
+    from rich import progress
+
+    clock, bars = [0.0], []
+
+    class Timed(progress.Progress):
+        def __init__(self, *columns, **options):
+            super().__init__(*columns, get_time=lambda: clock[0], **options)
+            bars.append(self)
+
+    monkeypatch.setattr(progress, "Progress", Timed)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with progress_bar("identify", Common()) as show:
+        # Eight generations of 26 were bred before, and say nothing of how long one takes.
+        for done in (8.0, 8.5, 9.0, 9.5):
+            show(done, 26)
+            clock[0] += 3.0
+        (task,) = bars[0].tasks
+        assert task.time_remaining == pytest.approx((26 - 9.5) * 6.0, abs=1.0)
