@@ -22,7 +22,7 @@ from cpfls_cli.workers.quiet import quiet
 from cpfls_cli.workers.same_versions import require_same_versions
 from cpfls_cli.workers.workforce import Workforce
 
-_LONGEST_SILENCE_S = 2.0
+_LONGEST_SILENCE_S = 1.0
 
 
 class Cluster(Workforce):

@@ -12,6 +12,7 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.evolution import Evaluation
 
 POISON = 13
+DEADLY_POISON = 113
 
 
 @dataclass(frozen=True)
@@ -31,32 +32,26 @@ class Uneven:
 
 
 class Failing:
-    """Fail at a chromosome that begins with the poison, by an error that does not survive being pickled."""
+    """Raise what does not survive being pickled at one poison, and be killed, as for want of memory, at another."""
 
     def __call__(self, genes):
         if POISON in genes[:, 0]:
             raise SettingError("size", "cannot be unpickled")
-        return Evaluation(genes, genes.astype(float))
-
-
-class Killed:
-    """Be killed at a chromosome that begins with the poison, as by a machine without memory."""
-
-    def __call__(self, genes):
-        if POISON in genes[:, 0]:
+        if DEADLY_POISON in genes[:, 0]:
             os.kill(os.getpid(), signal.SIGKILL)
         return Evaluation(genes, genes.astype(float))
 
 
 @dataclass(frozen=True)
 class Reporting:
-    """Give the process and the threads of its linear algebra for objectives."""
+    """Give for objectives the process, the threads of its linear algebra, and whether interrupts cannot reach it."""
 
     def __call__(self, genes):
         from threadpoolctl import threadpool_info
 
         threads = max(library["num_threads"] for library in threadpool_info())
-        return Evaluation(genes, np.tile([float(os.getpid()), threads], (len(genes), 1)))
+        blocked = {signal.SIGINT, signal.SIGTERM} <= signal.pthread_sigmask(signal.SIG_BLOCK, ())
+        return Evaluation(genes, np.tile([float(os.getpid()), threads, blocked], (len(genes), 1)))
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ def test_two_dask_workers_give_the_same_bytes_as_two_processes_and_one(address):
 
 def test_both_workers_work_and_take_one_thread_for_linear_algebra(address):
     with employ(Reporting(), scheduler=address) as workers:
-        processes, threads = workers(np.ones((400, 3), dtype=int)).objectives.T
+        processes, threads, _ = workers(np.ones((400, 3), dtype=int)).objectives.T
     assert len(set(processes)) == 2
     assert os.getpid() not in processes
     assert set(threads) == {1.0}
@@ -113,7 +113,7 @@ def test_a_failing_evaluator_is_an_error_in_words(address, capfd):
 
 def test_a_vanished_worker_is_replaced_by_the_other_until_that_vanishes_too(tmp_path, capfd):
     slow = Uneven(np.linspace(0, 1, 50), longest_s=0.05)
-    with dask(tmp_path, workers=2) as (address, _, (first, second)), cluster(slow, address, patience_s=2.0) as workers:
+    with dask(tmp_path, workers=2) as (address, _, (first, second)), cluster(slow, address, patience_s=1.0) as workers:
         parts = workers.stream(GENES)
         rows = next(parts)[0].tolist()
         first.kill()
