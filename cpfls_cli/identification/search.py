@@ -17,7 +17,7 @@ from cpfls_cli.identification.choice import choose
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator
 from cpfls_cli.identification.results import Front
-from cpfls_cli.identification.search_run import UNWATCHED, SearchRun, SearchStep, Stop, StopReason
+from cpfls_cli.identification.search_run import UNWATCHED, SearchRun, SearchStep, Stop, StopReason, Unfinished
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.workers.workforce import Workforce
 
@@ -57,9 +57,9 @@ class NothingFoundError(ComputationError):
 class _StoppedError(Exception):
     """Leave a generation, with what was evaluated of it."""
 
-    def __init__(self, reason: Stop, submitted: IntArray, evaluation: Evaluation) -> None:
+    def __init__(self, reason: Stop, unfinished: Unfinished) -> None:
         super().__init__(reason)
-        self.reason, self.submitted, self.evaluation = reason, submitted, evaluation
+        self.reason, self.unfinished = reason, unfinished
 
 
 def search(
@@ -117,7 +117,8 @@ def _evolved(
             run.on_generation(state)
     except _StoppedError as stopped:
         archive, history = (Archive(), History.empty(OBJECTIVES)) if state is None else (state.archive, state.history)
-        archive.store(stopped.submitted, stopped.evaluation)
+        run.on_stop(stopped.unfinished)
+        archive.store(stopped.unfinished.submitted, stopped.unfinished.evaluation)
         return archive, history.extended(archive), stopped.reason
     return state.archive, state.history, reason
 
@@ -129,18 +130,29 @@ def _watched(
     generation, best = (0, None) if before is None else (before.index + 1, before.history.best[-1])
 
     def evaluate(genes: IntArray) -> Evaluation:
-        ready: list[tuple[IntArray, Evaluation]] = []
-        done = 0
-        for rows, evaluation in workers.stream(genes):
-            ready.append((rows, evaluation))
-            done += len(rows)
+        ready, unknown = _recalled(genes, run.unfinished)
+        done = len(genes) - len(unknown)
+        for part, evaluation in workers.stream(genes[unknown]):
+            ready.append((unknown[part], evaluation))
+            done += len(part)
             run.progress(SearchStep(generation, settings.generations, done / len(genes), best))
             if done < len(genes) and (reason := run.should_stop()) is not None:
-                finished, gathered = _gathered(ready)
-                raise _StoppedError(reason, genes[finished], gathered)
+                rows, gathered = _gathered(ready)
+                raise _StoppedError(reason, Unfinished(genes[rows], gathered))
         return _gathered(ready)[1]
 
     return evaluate
+
+
+def _recalled(genes: IntArray, unfinished: Unfinished | None) -> tuple[list[tuple[IntArray, Evaluation]], IntArray]:
+    """Take what is evaluated already; also the rows that are not."""
+    if unfinished is None:
+        return [], np.arange(len(genes))
+    row_of = {chromosome.tobytes(): row for row, chromosome in enumerate(unfinished.submitted)}
+    found = np.array([row_of.get(chromosome.tobytes(), -1) for chromosome in genes])
+    known, evaluation = found[found >= 0], unfinished.evaluation
+    recalled = Evaluation(evaluation.genes[known], evaluation.objectives[known])
+    return [(np.flatnonzero(found >= 0), recalled)], np.flatnonzero(found < 0)
 
 
 def _gathered(ready: list[tuple[IntArray, Evaluation]]) -> tuple[IntArray, Evaluation]:

@@ -7,8 +7,8 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.evolution.archive import Evaluate
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.evolution.archive import Evaluate, Evaluation
 from cpfls_cli.evolution.state import EvolutionState
 from cpfls_cli.evolution.stopping import End
 from cpfls_cli.workers.employ import employ
@@ -45,6 +45,21 @@ class SearchStep:
     best: Array | None
 
 
+@dataclass(frozen=True)
+class Unfinished:
+    """What was evaluated of a generation that was not finished.
+
+    Attributes
+    ----------
+    submitted : array of int, shape (evaluations, genes)
+        Chromosomes as they were before the evaluation.
+    evaluation : Evaluation
+    """
+
+    submitted: IntArray
+    evaluation: Evaluation
+
+
 def _unwatched(_: object) -> None:
     pass
 
@@ -61,6 +76,8 @@ class SearchRun:
     ----------
     resumed : EvolutionState or None
         Where to go on; None starts with a new population.
+    unfinished : Unfinished or None
+        What need not be evaluated again in the generation that comes first.
     workers : callable
         Takes the evaluator; gives the context in which workers evaluate by it, one chromosome after the other in
         this process by default.
@@ -68,14 +85,18 @@ class SearchRun:
         Takes a `SearchStep`, after each part of a generation that was evaluated.
     on_generation : callable
         Takes the state after each generation, the initial population included. The next generation changes it.
+    on_stop : callable
+        Takes what is `Unfinished` where the search is stopped within a generation.
     should_stop : callable
         Asked after each part of a generation: why to stop now, or None.
     """
 
     resumed: EvolutionState | None = None
+    unfinished: Unfinished | None = None
     workers: Callable[[Evaluate], AbstractContextManager[Workforce]] = employ
     progress: Callable[[SearchStep], None] = _unwatched
     on_generation: Callable[[EvolutionState], None] = _unwatched
+    on_stop: Callable[[Unfinished], None] = _unwatched
     should_stop: Callable[[], Stop | None] = _unstopped
 
 

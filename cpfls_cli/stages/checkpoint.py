@@ -14,8 +14,9 @@ from cpfls_cli.artifacts.writing import write_artifact
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.state import EvolutionState
+from cpfls_cli.identification.search_run import Unfinished
 from cpfls_cli.stages.sources import read_good
-from cpfls_cli.stages.state_file import state_data, state_of
+from cpfls_cli.stages.state_file import StoppedSearch, nothing_data, state_data, stopped_search, with_unfinished
 
 _SECTION = "identification"
 _GENERATIONS = f"{_SECTION}.generations"
@@ -55,12 +56,25 @@ class Checkpoint:
         """
         write_artifact(self.path, Artifact(CHECKPOINT, self.header, state_data(state)))
 
-    def read(self) -> EvolutionState:
-        """Take up the state that was left.
+    def add(self, unfinished: Unfinished) -> None:
+        """Add what was evaluated of the next generation, so that it need not be done again.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written; what was there is left as it was.
+        """
+        data = nothing_data(unfinished)
+        if self.path.exists():
+            data = with_unfinished(read_good(self.path, CHECKPOINT).data, unfinished)
+        write_artifact(self.path, Artifact(CHECKPOINT, self.header, data))
+
+    def read(self) -> StoppedSearch:
+        """Take up what was left.
 
         Returns
         -------
-        EvolutionState
+        StoppedSearch
 
         Raises
         ------
@@ -71,13 +85,13 @@ class Checkpoint:
             raise InputError(f"{self.path}: no such checkpoint, so nothing to resume; start without --resume")
         try:
             artifact = read_good(self.path, CHECKPOINT)
-            state = state_of(artifact)
+            stopped = stopped_search(artifact)
         except InputError as error:
             raise InputError(f"{error}; --force without --resume starts again") from None
         except (ValueError, LookupError, TypeError) as error:
             raise InputError(f"{self.path}: damaged: {error}; --force without --resume starts again") from None
-        self._require_same_search(artifact.header, state)
-        return state
+        self._require_same_search(artifact.header, 0 if stopped.state is None else stopped.state.index)
+        return stopped
 
     def remove(self) -> None:
         """Remove the checkpoint, if there is one."""
@@ -89,11 +103,11 @@ class Checkpoint:
             for part in self.path.parent.glob(f".{glob.escape(name)}.????????.part"):
                 part.unlink(missing_ok=True)
 
-    def _require_same_search(self, then: Header, state: EvolutionState) -> None:
+    def _require_same_search(self, then: Header, generation: int) -> None:
         differing = [*_differences(then, self.header)]
         generations = _keys(self.header)[_GENERATIONS]
-        if state.index > generations:
-            differing.append(f"{_GENERATIONS} = {generations}, but it has come to generation {state.index}")
+        if generation > generations:
+            differing.append(f"{_GENERATIONS} = {generations}, but it has come to generation {generation}")
         if differing:
             raise InputError(
                 f"{self.path}: is of another search: {'; '.join(differing)}. Repeat the command as it was, with "

@@ -58,12 +58,12 @@ def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]
         result = _identify(job, flight, data, held_out, search.run(options, watch, _shown(job)))
     if isinstance(result, NothingFoundError):
         search.end(result.stop_reason)
-        raise without_model(result.stop_reason, watch.signal, search.checkpoint) or _of(flight, result)
+        raise without_model(result.stop_reason, watch.signal) or _of(flight, result)
     with search.kept():
         finish(job, MODEL, model_data(result, job.study.identification.base, data.learned), started.inputs)
     search.end(result.stop_reason)
     outcome = _outcome(job, result, len(data.learned), time.perf_counter() - clock)
-    return stopped(outcome, result.stop_reason, watch.signal, search.checkpoint)
+    return stopped(outcome, result.stop_reason, watch.signal, job.output)
 
 
 def _roles(flight: Path, selection: Path | None, validate: Sequence[Path]) -> dict[str, Path]:

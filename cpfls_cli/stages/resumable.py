@@ -14,10 +14,10 @@ from cpfls_cli.artifacts.reading import format_name, read_artifact
 from cpfls_cli.artifacts.records import Header
 from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.evolution.archive import Evaluate
-from cpfls_cli.evolution.state import EvolutionState
 from cpfls_cli.identification.search_run import SearchRun, SearchStep, Stop, StopReason, is_end
 from cpfls_cli.stages.checkpoint import Checkpoint
 from cpfls_cli.stages.job import Interrupted, Job, Started, dry_run, header_of, take_inputs
+from cpfls_cli.stages.state_file import StoppedSearch
 from cpfls_cli.workers.employ import employ
 from cpfls_cli.workers.workforce import Workforce
 
@@ -84,12 +84,12 @@ class Resumable:
     Attributes
     ----------
     checkpoint : Checkpoint
-    resumed : EvolutionState or None
+    stopped : StoppedSearch or None
         Where to go on, or None to start.
     """
 
     checkpoint: Checkpoint
-    resumed: EvolutionState | None
+    stopped: StoppedSearch | None
 
     def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
         """Say how the search is run; from here on a checkpoint that is not resumed is given up.
@@ -106,7 +106,7 @@ class Resumable:
             Interrupts are deferred as long as its workers are employed, which is as long as it searches.
         """
         self.checkpoint.tidy()
-        if self.resumed is None:
+        if self.stopped is None:
             self.checkpoint.remove()
 
         @contextmanager
@@ -114,7 +114,15 @@ class Resumable:
             with watch.deferring(), employ(evaluate, count=options.workers, scheduler=options.scheduler) as workforce:
                 yield workforce
 
-        return SearchRun(self.resumed, workers, progress, self.checkpoint.write, watch.should_stop)
+        return SearchRun(
+            resumed=self.stopped.state if self.stopped else None,
+            unfinished=self.stopped.unfinished if self.stopped else None,
+            workers=workers,
+            progress=progress,
+            on_generation=self.checkpoint.write,
+            on_stop=self.checkpoint.add,
+            should_stop=watch.should_stop,
+        )
 
     @contextmanager
     def kept(self) -> Iterator[None]:

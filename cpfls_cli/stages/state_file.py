@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,26 @@ from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.evolution.archive import Archive, Evaluation
 from cpfls_cli.evolution.history import History
 from cpfls_cli.evolution.state import EvolutionState
+from cpfls_cli.identification.search_run import Unfinished
 
+_BEFORE_ALL = -1
 _SEAL = "sha256"
+
+
+@dataclass(frozen=True)
+class StoppedSearch:
+    """What a search left.
+
+    Attributes
+    ----------
+    state : EvolutionState or None
+        After its last generation; None if not even the initial population was evaluated.
+    unfinished : Unfinished
+        What was evaluated of the generation after it.
+    """
+
+    state: EvolutionState | None
+    unfinished: Unfinished
 
 
 def state_data(state: EvolutionState) -> dict[str, Any]:
@@ -30,23 +49,61 @@ def state_data(state: EvolutionState) -> dict[str, Any]:
     -------
     dict of str to array
     """
-    results = state.archive.results
     data = {
         "generation": state.index,
         "generator": np.array(json.dumps(state.rng.bit_generator.state)),
         "population/genes": state.genes.astype(np.uint16),
         "population/objectives": state.objectives,
         "population/subpopulation": state.subpopulations,
-        "archive/submitted": state.archive.submitted.astype(np.uint16),
-        "archive/genes": results.genes.astype(np.uint16),
-        "archive/objectives": results.objectives,
+        **_evaluated("archive", state.archive.submitted, state.archive.results),
         **{f"history/{name}": values for name, values in vars(state.history).items()},
     }
-    return {**data, _SEAL: np.array(_seal(data))}
+    return with_unfinished(data, Unfinished(state.genes[:0], Evaluation(state.genes[:0], state.objectives[:0])))
 
 
-def state_of(artifact: Artifact) -> EvolutionState:
-    """Rebuild the state of a search.
+def nothing_data(unfinished: Unfinished) -> dict[str, Any]:
+    """Arrange a search that has not evaluated its initial population.
+
+    Parameters
+    ----------
+    unfinished : Unfinished
+        What it has evaluated of it.
+
+    Returns
+    -------
+    dict of str to array
+    """
+    genes, objectives = unfinished.submitted[:0], unfinished.evaluation.objectives[:0]
+    data = {
+        "generation": _BEFORE_ALL,
+        "generator": np.array("null"),
+        "population/genes": genes.astype(np.uint16),
+        "population/objectives": objectives,
+        "population/subpopulation": np.arange(0),
+        **_evaluated("archive", genes, Evaluation(genes, objectives)),
+        **{f"history/{name}": values for name, values in vars(History.empty(objectives.shape[1])).items()},
+    }
+    return with_unfinished(data, unfinished)
+
+
+def with_unfinished(data: Mapping[str, Any], unfinished: Unfinished) -> dict[str, Any]:
+    """Add what was evaluated of the next generation to the datasets of a checkpoint.
+
+    Parameters
+    ----------
+    data : mapping of str to array
+    unfinished : Unfinished
+
+    Returns
+    -------
+    dict of str to array
+    """
+    added = {**data, **_evaluated("unfinished", unfinished.submitted, unfinished.evaluation)}
+    return {**added, _SEAL: np.array(_seal(added))}
+
+
+def stopped_search(artifact: Artifact) -> StoppedSearch:
+    """Rebuild what a search left.
 
     Parameters
     ----------
@@ -55,8 +112,8 @@ def state_of(artifact: Artifact) -> EvolutionState:
 
     Returns
     -------
-    EvolutionState
-        Equal to the one that was stored, down to the last bit.
+    StoppedSearch
+        Equal to what was stored, down to the last bit.
 
     Raises
     ------
@@ -66,18 +123,34 @@ def state_of(artifact: Artifact) -> EvolutionState:
     data = artifact.data
     if artifact.text(_SEAL) != _seal(data):
         raise ValueError("its datasets were changed after it was written (sha256 differs)")
+    unfinished = Unfinished(*_evaluations(data, "unfinished"))
+    return StoppedSearch(_state(data) if data["generation"] > _BEFORE_ALL else None, unfinished)
+
+
+def _state(data: Mapping[str, Any]) -> EvolutionState:
     rng = np.random.default_rng()
-    rng.bit_generator.state = json.loads(artifact.text("generator"))
-    archived = Evaluation(_genes(data["archive/genes"]), data["archive/objectives"])
+    rng.bit_generator.state = json.loads(str(data["generator"]))
     return EvolutionState(
         int(data["generation"]),
         _genes(data["population/genes"]),
         data["population/objectives"],
         data["population/subpopulation"],
-        Archive.of(_genes(data["archive/submitted"]), archived),
+        Archive.of(*_evaluations(data, "archive")),
         History(data["history/evaluations"], data["history/best"], data["history/front_size"]),
         rng,
     )
+
+
+def _evaluated(group: str, submitted: IntArray, evaluation: Evaluation) -> dict[str, Any]:
+    return {
+        f"{group}/submitted": submitted.astype(np.uint16),
+        f"{group}/genes": evaluation.genes.astype(np.uint16),
+        f"{group}/objectives": evaluation.objectives,
+    }
+
+
+def _evaluations(data: Mapping[str, Any], group: str) -> tuple[IntArray, Evaluation]:
+    return _genes(data[f"{group}/submitted"]), Evaluation(_genes(data[f"{group}/genes"]), data[f"{group}/objectives"])
 
 
 def _genes(stored: Any) -> IntArray:
@@ -90,5 +163,5 @@ def _seal(data: Mapping[str, Any]) -> str:
     for spec in CHECKPOINT.datasets:
         if spec.path != _SEAL:
             value = np.asarray(data[spec.path])
-            digest.update(str(value).encode() if value.ndim == 0 else np.ascontiguousarray(value).data)
+            digest.update(str(value).encode() if value.ndim == 0 else value.tobytes())
     return digest.hexdigest()

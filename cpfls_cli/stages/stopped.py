@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from cpfls_cli.errors import ComputationError, CpflsError, StoppedError
 from cpfls_cli.identification.search_run import StopReason, is_end
-from cpfls_cli.stages.checkpoint import Checkpoint
 from cpfls_cli.stages.job import Outcome
 
 _STOPPED = {"interrupted": "the search was interrupted", "time-limit": "--time-limit ended the search"}
+_REMEDY = "the same command with --resume goes on"
 _FROM_SIGNAL = 128
 
 
-def stopped(outcome: Outcome, reason: StopReason, signal: int | None, checkpoint: Checkpoint) -> Outcome:
+def stopped(outcome: Outcome, reason: StopReason, signal: int | None, output: Path) -> Outcome:
     """Add to what is said of a model that its search was stopped.
 
     Parameters
@@ -23,7 +24,8 @@ def stopped(outcome: Outcome, reason: StopReason, signal: int | None, checkpoint
         Why the search ended.
     signal : int or None
         Number of the signal that stopped it.
-    checkpoint : Checkpoint
+    output : Path
+        The model.
 
     Returns
     -------
@@ -32,12 +34,12 @@ def stopped(outcome: Outcome, reason: StopReason, signal: int | None, checkpoint
     """
     if is_end(reason):
         return outcome
-    note = f"{checkpoint.output}: is incomplete, because {_STOPPED[reason]}; {_remedy(checkpoint)}"
+    note = f"{output}: is incomplete, because {_STOPPED[reason]}; {_REMEDY}"
     code = 0 if signal is None else _FROM_SIGNAL + signal
     return replace(outcome, warnings=(*outcome.warnings, note), exit_code=code)
 
 
-def without_model(reason: StopReason, signal: int | None, checkpoint: Checkpoint) -> CpflsError | None:
+def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
     """Say that a search was stopped before it had a model to write.
 
     Parameters
@@ -46,7 +48,6 @@ def without_model(reason: StopReason, signal: int | None, checkpoint: Checkpoint
         Why the search ended.
     signal : int or None
         Number of the signal that stopped it.
-    checkpoint : Checkpoint
 
     Returns
     -------
@@ -55,11 +56,5 @@ def without_model(reason: StopReason, signal: int | None, checkpoint: Checkpoint
     """
     if is_end(reason):
         return None
-    message = f"{_STOPPED[reason]} before a model was found, so none is written; {_remedy(checkpoint)}"
+    message = f"{_STOPPED[reason]} before a model was found, so none is written; {_REMEDY}"
     return ComputationError(message) if signal is None else StoppedError(message, _FROM_SIGNAL + signal)
-
-
-def _remedy(checkpoint: Checkpoint) -> str:
-    if checkpoint.path.exists():
-        return "the same command with --resume goes on"
-    return "no generation was finished, so there is nothing to resume"

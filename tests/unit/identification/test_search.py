@@ -89,6 +89,23 @@ def test_stopped_after_the_running_evaluation_it_keeps_what_it_has(evaluations):
     assert len(found.history.best) == len(found.history.front_size) == len(found.history)
 
 
+@pytest.mark.parametrize("evaluations", [1, 10, 24, 25, 33, 60])
+def test_what_is_evaluated_of_a_generation_is_not_evaluated_again(evaluations):
+    first, second, states, unfinished = Bowls(), Bowls(), [None], [None]
+    searched(
+        first,
+        should_stop=stop_after(first, evaluations),
+        on_generation=lambda state: states.append(copy.deepcopy(state)),
+        on_stop=unfinished.append,
+    )
+    steps = []
+    found = searched(second, resumed=states[-1], unfinished=unfinished[-1], progress=steps.append)
+    assert_same(found, searched())
+    assert len(set(first.evaluated) | set(second.evaluated)) == found.history.evaluations[-1]
+    assert set(first.evaluated).isdisjoint(second.evaluated)
+    assert np.all(np.diff([step.generation + step.share for step in steps]) > 0)
+
+
 def test_stopped_between_generations_it_counts_no_further_one():
     kept = []
     found = searched(on_generation=kept.append, should_stop=lambda: "time-limit" if len(kept) == 3 else None)

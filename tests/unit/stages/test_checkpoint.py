@@ -10,6 +10,7 @@ from cpfls_cli.artifacts.writing import write_artifact
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution import Evaluation, start, step
+from cpfls_cli.identification.search_run import Unfinished
 from cpfls_cli.stages.checkpoint import Checkpoint
 from cpfls_cli.stages.job import header_of
 
@@ -68,7 +69,7 @@ def test_it_lies_beside_the_output(checkpoint, tmp_path):
 
 
 def test_state_comes_back_bit_by_bit_and_goes_on_the_same(checkpoint):
-    read, kept = checkpoint.read(), evolved()
+    read, kept = checkpoint.read().state, evolved()
     assert np.isinf(kept.archive.results.objectives).any()
     assert_same(read, kept)
     for _ in range(5):
@@ -76,10 +77,39 @@ def test_state_comes_back_bit_by_bit_and_goes_on_the_same(checkpoint):
     assert_same(read, kept)
 
 
+def unfinished():
+    genes = np.random.default_rng(12).integers(0, 65536, (7, 5))
+    evaluation = failing_sometimes(genes)
+    evaluation.objectives[2] = np.nan
+    return Unfinished(genes, evaluation)
+
+
+@pytest.mark.parametrize("finished", [True, False], ids=["with a generation", "before the first"])
+def test_what_was_evaluated_of_the_next_generation_comes_back(checkpoint, finished):
+    assert len(checkpoint.read().unfinished.submitted) == 0
+    if not finished:
+        checkpoint.remove()
+    checkpoint.add(unfinished())
+    assert check_artifact(read_artifact(checkpoint.path, CHECKPOINT)) == []
+    stopped = checkpoint.read()
+    for stored, kept in (
+        (stopped.unfinished.submitted, unfinished().submitted),
+        (stopped.unfinished.evaluation.genes, unfinished().evaluation.genes),
+        (stopped.unfinished.evaluation.objectives, unfinished().evaluation.objectives),
+    ):
+        assert stored.dtype == kept.dtype
+        np.testing.assert_array_equal(stored, kept)
+    assert (stopped.state is not None) == finished
+    if stopped.state is not None:
+        assert_same(stopped.state, evolved())
+        checkpoint.write(stopped.state)
+        assert len(checkpoint.read().unfinished.submitted) == 0
+
+
 def test_it_is_a_good_artifact_and_equal_states_are_equal_files(checkpoint, tmp_path):
     assert check_artifact(read_artifact(checkpoint.path, CHECKPOINT)) == []
     other = Checkpoint.beside(tmp_path / "other.h5", header())
-    other.write(checkpoint.read())
+    other.write(checkpoint.read().state)
     assert other.path.read_bytes() == checkpoint.path.read_bytes()
 
 
@@ -122,10 +152,11 @@ def test_checkpoint_of_another_search_names_the_difference(checkpoint, now, said
     ],
 )
 def test_what_does_not_change_the_search_may_change(checkpoint, now):
-    assert_same(Checkpoint(checkpoint.path, now).read(), evolved())
+    assert_same(Checkpoint(checkpoint.path, now).read().state, evolved())
 
 
 def test_every_bit_of_the_datasets_counts(checkpoint):
+    checkpoint.add(unfinished())
     artifact = read_artifact(checkpoint.path, CHECKPOINT)
     for name, value in artifact.data.items():
         if np.asarray(value).dtype.kind == "U":
