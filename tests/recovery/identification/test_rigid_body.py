@@ -57,7 +57,7 @@ def relative_errors(training_torque, base="none"):
     found = identify(data, data, {}, settings, np.random.default_rng(0))
     motions = motion, full_rotations(**INDEPENDENT)[1]
     errors = [np.abs(found.model.torque(m) - exact(m)).max() / np.abs(exact(m)).max() for m in motions]
-    return (*errors, found.fit.system)
+    return (*errors, found.system)
 
 
 def test_path_passes_through_complete_circles():

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from cpfls_cli.identification import TorqueData
 from cpfls_cli.identification.excitation import outside_visited, rule_excitation, visited_cells
-from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.identification.samples import Ready, Samples
+from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 
 DEGREE = np.pi / 180
 
@@ -13,7 +15,7 @@ def at(roll, pitch):
 
 
 def test_visited_cell_and_its_neighbours_count_as_inside():
-    visited = visited_cells(at(12, -3))
+    visited = visited_cells([at(12, -3)])
     assert visited.sum() == 9
     assert not outside_visited(visited, at(12, -3))
     assert not outside_visited(visited, at(17, -8))
@@ -22,21 +24,21 @@ def test_visited_cell_and_its_neighbours_count_as_inside():
 
 
 def test_cells_wrap_at_half_a_turn():
-    visited = visited_cells(at(179, 0))
+    visited = visited_cells([at(179, 0)])
     for roll in (-179, 179, 181, 179 - 360, 174):
         assert not outside_visited(visited, at(roll, 0))
     assert outside_visited(visited, at(-174, 0))
     edges = np.array([[np.pi, -np.pi, 0.0], [-np.pi, np.pi, 0.0], [np.nextafter(-np.pi, -4), 0.0, 0.0]])
-    assert not outside_visited(visited_cells(edges), edges).any()
+    assert not outside_visited(visited_cells([edges]), edges).any()
 
 
 def excitation(attitude, noise=0.0, **settings):
     rng = np.random.default_rng(15)
     motion = Motion(attitude, rng.standard_normal(attitude.shape), rng.standard_normal(attitude.shape))
     structure = model_structure(StructureSettings(consequents="seesaw", products="additive", **settings))
-    regressor = Regressor(structure, motion, data_ranges(structure, attitude))
-    partitions = uniform_breakpoints(structure)
-    return rule_excitation(regressor, partitions, regressor.matrix(partitions), noise, 0.5, 1e-10)
+    data = TorqueData(0.01 * np.arange(len(motion)), motion, np.zeros_like(attitude))
+    samples = Samples.of(Ready(data, rigid=False), structure, data_ranges(structure, attitude))
+    return rule_excitation(samples, uniform_breakpoints(structure), noise, 0.5, 1e-10)
 
 
 def test_rules_that_never_fire_are_named():

@@ -109,7 +109,7 @@ def test_objectives_are_judged_on_all_of_training():
     settings = IdentificationSettings(**{**SEARCHED, "base": "none"})
     found = identify(data, data[selected], {}, settings, np.random.default_rng(0))
     error = data.torque - found.model.torque(data.motion)
-    expected = [np.mean(error**2), np.abs(error).max(), found.fit.system.conditioning]
+    expected = [np.mean(error**2), np.abs(error).max(), found.fit.conditioning]
     np.testing.assert_allclose(found.front.objectives[found.front.chosen], expected, rtol=1e-9)
     assert np.mean(error[selected] ** 2) < 0.5 * np.mean(error**2)
 

@@ -34,7 +34,7 @@ def case(request):
         decode(structure, rng.uniform(1, 2, structure.genes)),
         rng.standard_normal(structure.parameters),
         rng.standard_normal(6),
-        visited_cells(attitude),
+        visited_cells([attitude]),
     )
     return model, Motion(attitude, *rng.standard_normal((2, 50, 3)))
 
