@@ -6,13 +6,14 @@ import pytest
 from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.data import axis_scale
-from cpfls_cli.identification.rigid_base import RigidBaseSolver, rigid_columns
-from cpfls_cli.identification.settings import RidgeSettings
-from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.rigid_columns import rigid_columns
+from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.vehicle import newton_euler_torque
 
 PARAMETERS = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
-STRUCTURE = model_structure(StructureSettings(harmonic_order=2, products="tensor", membership_functions=1))
+SETTINGS = IdentificationSettings(base="rigid-body", harmonic_order=2, products="tensor", membership_functions=1)
+STRUCTURE = model_structure(SETTINGS)
 PARTITIONS = uniform_breakpoints(STRUCTURE)
 TENSOR = np.array([[0.6, 0.03, -0.02], [0.03, 0.7, 0.04], [-0.02, 0.04, 1.2]])
 
@@ -47,8 +48,7 @@ def fitted(torque_of, noise):
     torque = torque_of(m)
     torque = torque + noise * torque.std(axis=0) * np.random.default_rng(28).standard_normal(torque.shape)
     data = TorqueData(0.01 * np.arange(len(m)), m, torque)
-    whole = (data, regressor(m))
-    return RigidBaseSolver.of(whole, whole, RidgeSettings(), 1e-10).fit(PARTITIONS), data
+    return model_evaluator(data, data, SETTINGS).solver.fit(PARTITIONS), data
 
 
 def regressor(m):
@@ -74,7 +74,7 @@ def test_noisy_rigid_data_switch_the_fuzzy_part_off(noise):
     fit, data = fitted(rigid_torque, noise)
     assert fit.ridge_weight == np.inf
     np.testing.assert_array_equal(fit.coefficients, np.zeros(61))
-    rigid = fit_baselines(data, 1 / axis_scale(data.torque), 1e-10)[0]
+    rigid = fit_baselines(data, 1 / axis_scale(data), 1e-10)[0]
     np.testing.assert_allclose(fit.rigid_body, rigid.parameters, atol=1e-12)
     np.testing.assert_allclose(fit.rigid_body, PARAMETERS, atol=noise)
 
@@ -82,7 +82,7 @@ def test_noisy_rigid_data_switch_the_fuzzy_part_off(noise):
 def test_inertia_that_depends_on_attitude_switches_it_on_and_beats_the_rigid_body():
     fit, data = fitted(bent_torque, noise=0.05)
     assert fit.ridge_weight < 0.1
-    rigid = fit_baselines(data, 1 / axis_scale(data.torque), 1e-10)[0]
+    rigid = fit_baselines(data, 1 / axis_scale(data), 1e-10)[0]
     held_out = motion(29)
     ours, theirs = (
         np.mean((p - bent_torque(held_out)) ** 2) for p in (predicted(fit, held_out), rigid.torque(held_out))
@@ -108,10 +108,9 @@ def test_what_a_selection_misses_is_judged_all_the_same():
     data = TorqueData(0.01 * np.arange(len(m)), m, rigid_torque(m) + 0.05 * rigid_torque(motion(31)))
     few = np.flatnonzero(np.abs(m.attitude[:, 0]) < 0.5)
     learned = data[few]
-    solver = RigidBaseSolver.of((learned, regressor(learned.motion)), (data, regressor(m)), RidgeSettings(), 1e-10)
-    curve = solver.curve(PARTITIONS)
+    curve = model_evaluator(data, learned, SETTINGS).solver.curve(PARTITIONS)
     assert curve.weight[curve.chosen] == np.inf
-    blind = RigidBaseSolver.of(*[(learned, regressor(learned.motion))] * 2, RidgeSettings(), 1e-10).curve(PARTITIONS)
+    blind = model_evaluator(learned, learned, SETTINGS).solver.curve(PARTITIONS)
     assert curve.error[0] > 10 * blind.error[0]
 
 

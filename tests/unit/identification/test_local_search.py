@@ -9,8 +9,9 @@ import pytest
 from cpfls_cli.identification import IdentificationSettings, TorqueData, local_search
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.identification.settings import LocalSearchSettings
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor import Motion, Regressor, data_ranges
 from cpfls_cli.vehicle import newton_euler_torque
 
 STRUCTURES = {
@@ -42,9 +43,28 @@ def captured(monkeypatch, solver, weights):
         return SimpleNamespace(x=start)
 
     monkeypatch.setattr(local_search, "least_squares", optimiser)
-    start = solver.fit(decode(solver.regressor.structure, weights))
+    start = solver.fit(decode(solver.learned.structure, weights))
     local_search.refine(solver, weights, start, 1)
     return handed["residual"], handed["jacobian"], start
+
+
+def written_out(evaluator, start):
+    """All rows of the least-squares problem at given weights, those of the ridge below them."""
+    data, structure = evaluator.judge.ready.source, evaluator.structure
+    regressor = Regressor(structure, data.motion, data_ranges(structure, data.motion.attitude))
+    ridge = np.sqrt(start.ridge_weight * data.torque.size) * np.eye(structure.parameters)
+
+    def rows(weights):
+        A = regressor.matrix(decode(structure, weights)) / start.column_size
+        if evaluator.cross_validated:
+            A = np.concatenate([rigid_columns(data.motion), A], axis=2)
+        A = (A * start.row_scale[:, None]).reshape(data.torque.size, -1)
+        y = (data.torque * start.row_scale).ravel()
+        if not evaluator.cross_validated:
+            return A, y
+        return np.vstack([A, np.pad(ridge, ((0, 0), (RIGID, 0)))]), np.append(y, np.zeros(structure.parameters))
+
+    return rows
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
@@ -60,19 +80,33 @@ def test_gradient_of_the_reduced_cost(monkeypatch, structure, base):
     np.testing.assert_allclose(gradient, expected, atol=1e-5 * np.abs(expected).max())
 
 
-def test_jacobian_is_that_of_the_residual_beside_what_the_regressor_spans(monkeypatch):
-    """Kaufman's approximation leaves out only the part inside the span, which the coefficients follow."""
-    evaluator, rng = problem("seesaw", "none")
-    regressor = evaluator.solver.regressor
-    weights = rng.uniform(0.3, 0.9, regressor.structure.genes)
-    residual, jacobian, _ = captured(monkeypatch, evaluator.solver, weights)
-    by_weight = [
-        (residual(weights + STEP * unit) - residual(weights - STEP * unit)) / (2 * STEP) for unit in np.eye(13)
-    ]
-    Q = regressor.matrix(decode(regressor.structure, weights)).reshape(360, -1)
-    inside = Q @ np.linalg.pinv(Q, rcond=1e-10)
-    expected = np.transpose(by_weight) - inside @ np.transpose(by_weight)
-    np.testing.assert_allclose(jacobian(weights), expected, atol=1e-5 * np.abs(expected).max())
+@pytest.mark.parametrize("structure", STRUCTURES)
+@pytest.mark.parametrize("base", ["none", "rigid-body"])
+def test_jacobian_is_that_of_the_residual_beside_what_the_regressor_spans(monkeypatch, structure, base):
+    """Kaufman's approximation leaves out only the part inside the span, which the coefficients follow.
+
+    The rows are turned so that few of them are not zero; a turn leaves their products as they are.
+    """
+    evaluator, rng = problem(structure, base)
+    weights = rng.uniform(0.3, 0.9, evaluator.structure.genes)
+    residual, jacobian, start = captured(monkeypatch, evaluator.solver, weights)
+    rows = written_out(evaluator, start)
+
+    def beside(weights):
+        A, y = rows(weights)
+        return y - A @ np.linalg.lstsq(A, y, rcond=1e-10)[0]
+
+    by_weight = np.transpose(
+        [(beside(weights + STEP * unit) - beside(weights - STEP * unit)) / (2 * STEP) for unit in np.eye(len(weights))]
+    )
+    A, _ = rows(weights)
+    expected = by_weight - A @ np.linalg.lstsq(A, by_weight, rcond=1e-10)[0]
+    J, r = jacobian(weights), residual(weights)
+    square = expected.T @ expected
+    np.testing.assert_allclose(J.T @ J, square, atol=1e-5 * np.abs(square).max())
+    gradient = expected.T @ beside(weights)
+    np.testing.assert_allclose(J.T @ r, gradient, atol=1e-5 * np.abs(gradient).max())
+    assert r @ r == pytest.approx(np.sum(beside(weights) ** 2), rel=1e-9)
 
 
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
@@ -105,12 +139,10 @@ def test_undefined_chromosomes_get_the_worst_objectives():
 
 def test_objectives_are_those_of_a_plain_least_squares_fit():
     evaluator, rng = problem("seesaw", "none")
-    solver = evaluator.solver
-    regressor = solver.regressor
-    chromosome = rng.integers(20000, LARGEST_GENE, regressor.structure.genes)
+    chromosome = rng.integers(20000, LARGEST_GENE, evaluator.structure.genes)
     evaluated = evaluator(chromosome[None])
-    Q = regressor.matrix(decode(regressor.structure, chromosome.astype(float))).reshape(360, -1)
-    error = solver.torque.ravel() - Q @ (np.linalg.pinv(Q, rcond=1e-10) @ solver.torque.ravel())
+    Q, torque = written_out(evaluator, evaluator.fit(chromosome))(chromosome.astype(float))
+    error = torque - Q @ (np.linalg.pinv(Q, rcond=1e-10) @ torque)
     singular = np.linalg.svd(Q, compute_uv=False)
     singular = singular[singular > 1e-10 * singular[0]]
     expected = [np.mean(error**2), np.abs(error).max(), singular[0] / singular[-1]]
