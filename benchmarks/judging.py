@@ -15,8 +15,11 @@ import numpy as np
 
 from cpfls_cli.config.load import load_study
 from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.identification.evaluator import Evaluator, Judge
+from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.judge import score_of
+from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import search
 from cpfls_cli.stages.study import generator
 from cpfls_cli.stages.training import read_training
@@ -24,13 +27,11 @@ from cpfls_cli.stages.training import read_training
 
 def main(config: Path, flight: Path, selection: Path) -> None:
     study = load_study(config)
-    data = read_training(flight, selection, study)
-    learned = data.flight[data.learned]
-    whole = model_evaluator(data.flight[data.split.training], learned, study.identification)
-    evaluators = {
-        "selected samples": replace(whole, judge=Judge.of(learned, whole.solver.regressor)),
-        "whole training part": whole,
-    }
+    data = read_training([flight], selection, study)
+    whole = model_evaluator(data.training, data.learned, study.identification)
+    judge = whole.judge
+    selected = Samples.of(Ready(data.learned, judge.ready.rigid), judge.structure, judge.ranges)
+    evaluators = {"selected samples": replace(whole, judge=selected), "whole training part": whole}
     print("| judged on | members of the front | with relative error above 100 % | relative error of the chosen one |")
     print("|---|---|---|---|")
     for name, evaluator in evaluators.items():
@@ -43,8 +44,10 @@ def relative_error(evaluator: Evaluator, chromosome) -> float:
     """Largest error over largest torque on the whole training part, worst axis."""
     fit = evaluator.fit(chromosome)
     assert fit is not None
-    error = evaluator.judge.error(decode(evaluator.structure, chromosome.astype(float)), fit)
-    return float(np.max(np.max(np.abs(error), axis=0) / np.max(np.abs(evaluator.judge.torque), axis=0)))
+    judge, nowhere = evaluator.judge, np.zeros((0, 0), dtype=bool)
+    partitions = decode(judge.structure, chromosome.astype(float))
+    model = Model(judge.structure, judge.ranges, partitions, fit.coefficients, fit.rigid_body, nowhere)
+    return score_of(judge.ready.source, model.torque).worst_relative_error
 
 
 if __name__ == "__main__":
