@@ -31,6 +31,9 @@ app = typer.Typer(
 
 TrajectoryArgument = Annotated[Path, typer.Argument(metavar="TRAJECTORY", help="Made by `cpfls trajectory`.")]
 FlightArgument = Annotated[Path, typer.Argument(metavar="FLIGHT", help="Made by `cpfls simulate` or `cpfls import`.")]
+TrainingArgument = Annotated[
+    list[Path], typer.Argument(metavar="FLIGHT...", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
+]
 LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help="Flight log, .csv or .csv.gz.")]
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`.")]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
@@ -170,13 +173,13 @@ def import_(config: ConfigArgument, log: LogArgument, output: OutputOption, *, c
 
 @app.command()
 @with_common
-def reduce(config: ConfigArgument, flight: FlightArgument, output: OutputOption, *, common: Common) -> None:
-    """Pick the samples of a flight that are worth learning from."""
+def reduce(config: ConfigArgument, flights: TrainingArgument, output: OutputOption, *, common: Common) -> None:
+    """Pick the samples of flights that are worth learning from."""
 
     def call(job: Job) -> Outcome:
         from cpfls_cli.stages import reduce as stage
 
-        return stage.run(job, flight)
+        return stage.run(job, flights)
 
     _run("reduce", config, output, common, call)
 
@@ -185,7 +188,7 @@ def reduce(config: ConfigArgument, flight: FlightArgument, output: OutputOption,
 @with_common
 def identify(
     config: ConfigArgument,
-    flight: FlightArgument,
+    flights: TrainingArgument,
     output: OutputOption,
     selection: Annotated[
         Path | None,
@@ -211,7 +214,7 @@ def identify(
         from cpfls_cli.stages.resumable import SearchOptions
 
         options = SearchOptions(resume, time_limit, workers, scheduler)
-        return stage.run(job, flight, selection, validate or [], options)
+        return stage.run(job, flights, selection, validate or [], options)
 
     _run("identify", config, output, common, call)
 

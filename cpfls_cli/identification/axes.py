@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.data import TorqueData, axis_scale
-from cpfls_cli.identification.judge import r_squared
-from cpfls_cli.identification.least_squares import solve
-from cpfls_cli.identification.rigid_base import rigid_columns
+from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale
+from cpfls_cli.identification.judge import Explained
+from cpfls_cli.identification.least_squares import Triangle
+from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.rotations import body_acceleration, body_torque, euler_rate_matrix
 
 
@@ -36,30 +36,34 @@ class AxisEvidence:
     acceleration: Array
 
 
-def axis_evidence(data: TorqueData, rank_tolerance: float) -> AxisEvidence:
+def axis_evidence(source: TorqueSource, rank_tolerance: float) -> AxisEvidence:
     """Fit six inertia parameters and a constant body torque.
 
     Parameters
     ----------
-    data : TorqueData
+    source : TorqueSource
     rank_tolerance : float
 
     Returns
     -------
     AxisEvidence
     """
-    rigid = rigid_columns(data.motion)
+    scale = 1.0 / axis_scale(source)
+    rows = ((_columns(data) * scale[:, None], data.torque * scale) for data in source.chunks())
+    triangle = Triangle.of((columns.reshape(-1, columns.shape[2]), torque.reshape(-1)) for columns, torque in rows)
+    parameters = triangle.solve(rank_tolerance).coefficients
+    explained, torque, acceleration = Explained(), np.zeros(3), np.zeros(3)
+    for data in source.chunks():
+        motion = data.motion
+        measured = body_torque(motion.attitude, data.torque)
+        explained.add(measured, measured - body_torque(motion.attitude, _columns(data) @ parameters))
+        torque += np.sum(measured**2, axis=0)
+        acceleration += np.sum(body_acceleration(motion.attitude, motion.rate, motion.acceleration) ** 2, axis=0)
+    size = np.sqrt(np.array([torque, acceleration]) / len(source))
+    return AxisEvidence(parameters[RIGID:], explained.r2, size[0], size[1])
+
+
+def _columns(data: TorqueData) -> Array:
+    """Columns of six inertia parameters and three constant body torques, shape (samples, 3, 9)."""
     constant = euler_rate_matrix(data.motion.attitude).swapaxes(1, 2)
-    columns = np.concatenate([rigid, constant], axis=2)
-    scale = 1.0 / axis_scale(data.torque)
-    matrix, right_side = columns * scale[:, None], data.torque * scale
-    parameters = solve(matrix.reshape(-1, columns.shape[2]), right_side.reshape(-1), rank_tolerance).coefficients
-    attitude = data.motion.attitude
-    measured = body_torque(attitude, data.torque)
-    r2 = r_squared(measured, measured - body_torque(attitude, columns @ parameters))
-    accelerated = body_acceleration(attitude, data.motion.rate, data.motion.acceleration)
-    return AxisEvidence(parameters[rigid.shape[2] :], r2, _root_mean_square(measured), _root_mean_square(accelerated))
-
-
-def _root_mean_square(values: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
+    return np.concatenate([rigid_columns(data.motion), constant], axis=2)

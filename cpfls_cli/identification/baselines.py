@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.least_squares import solve
-from cpfls_cli.identification.rigid_base import rigid_columns
+from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.least_squares import Triangle
+from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.inertia import symmetric_columns
 from cpfls_cli.regressor.motion import Motion
 
@@ -66,12 +66,12 @@ def no_torque_columns(motion: Motion) -> Array:
     return np.zeros((len(motion), 3, 0))
 
 
-def fit_baselines(data: TorqueData, row_scale: Array, rank_tolerance: float) -> tuple[Baseline, ...]:
+def fit_baselines(source: TorqueSource, row_scale: Array, rank_tolerance: float) -> tuple[Baseline, ...]:
     """Fit all baselines to the samples that a model is trained on.
 
     Parameters
     ----------
-    data : TorqueData
+    source : TorqueSource
     row_scale : array, shape (3,)
         Weight of each axis, the model's own.
     rank_tolerance : float
@@ -86,12 +86,10 @@ def fit_baselines(data: TorqueData, row_scale: Array, rank_tolerance: float) -> 
         ("constant-inertia", constant_inertia_columns),
         ("torque-zero", no_torque_columns),
     )
-    return tuple(Baseline(name, columns, _fit(columns, data, row_scale, rank_tolerance)) for name, columns in kinds)
+    return tuple(Baseline(name, columns, _fit(columns, source, row_scale, rank_tolerance)) for name, columns in kinds)
 
 
-def _fit(columns: Columns, data: TorqueData, row_scale: Array, rank_tolerance: float) -> Array:
-    matrix = columns(data.motion) * row_scale[:, None]
-    parameters = matrix.shape[2]
-    if parameters == 0:
-        return np.empty(0)
-    return solve(matrix.reshape(-1, parameters), (data.torque * row_scale).reshape(-1), rank_tolerance).coefficients
+def _fit(columns: Columns, source: TorqueSource, row_scale: Array, rank_tolerance: float) -> Array:
+    blocks = ((columns(data.motion) * row_scale[:, None], data.torque * row_scale) for data in source.chunks())
+    rows = ((matrix.reshape(torque.size, matrix.shape[2]), torque.reshape(-1)) for matrix, torque in blocks)
+    return Triangle.of(rows).solve(rank_tolerance).coefficients

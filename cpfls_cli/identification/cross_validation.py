@@ -9,8 +9,11 @@ from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
+from cpfls_cli.identification.rigid_columns import RIGID
+from cpfls_cli.identification.samples import Products
 
-RIGID = 6
+SMALLEST_ERROR = 1e-12
+"""Share of the mean squared torque below which sums of products cannot tell errors apart."""
 
 
 @dataclass(frozen=True)
@@ -27,26 +30,6 @@ class Blocks:
 
     validation: BoolArray
     left_out: BoolArray
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Rows of a linear regression by sample and axis, all scaled.
-
-    Attributes
-    ----------
-    matrix : array, shape (samples, 3, 6 + parameters)
-        Rigid-body columns, then fuzzy columns.
-    right_side : array, shape (samples, 3)
-        Torque.
-    """
-
-    matrix: Array
-    right_side: Array
-
-    def of(self, samples: BoolArray) -> tuple[Array, Array]:
-        """Stack the rows of some samples."""
-        return self.matrix[samples].reshape(-1, self.matrix.shape[2]), self.right_side[samples].reshape(-1)
 
 
 @dataclass(frozen=True)
@@ -106,22 +89,25 @@ def contiguous_blocks(judged: Array, learned: Array, folds: int, embargo: float)
     return Blocks(validation, left_out)
 
 
-def ridge_curve(learned: Rows, judged: Rows, blocks: Blocks, weights: Array) -> RidgeCurve:
+def ridge_curve(learned: Products, judged: Products, left_out: BoolArray, weights: Array, size: Array) -> RidgeCurve:
     """Cross-validate the ridge weight on the columns after the first six.
 
     The six rigid-body columns are free of penalty. For each fold they are eliminated (Schur complement), and one
-    eigendecomposition of the rest serves all weights.
+    eigendecomposition of the rest serves all weights. Errors that only rounding tells apart count as equal.
 
     Parameters
     ----------
-    learned : Rows
-        Of the samples that train.
-    judged : Rows
-        Of the samples that judge: all of the flight's training part, so that what a selection leaves between its
-        samples is seen.
-    blocks : Blocks
+    learned : Products
+        Of the samples that train, by label.
+    judged : Products
+        Of the samples that judge, by fold: all of the flight's training part, so that what a selection leaves between
+        its samples is seen.
+    left_out : array of bool, shape (folds, labels)
+        Labels that do not train in each fold.
     weights : array, shape (tried,)
         Finite ridge weights, ascending, as shares of the number of rows.
+    size : array, shape (parameters,)
+        What the penalised columns are divided by.
 
     Returns
     -------
@@ -132,9 +118,9 @@ def ridge_curve(learned: Rows, judged: Rows, blocks: Blocks, weights: Array) -> 
     method.md section 8; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, section 7.10
     (one-standard-error rule).
     """
-    errors = np.array([_fold_errors(learned, judged, blocks, fold, weights) for fold in range(len(blocks.validation))])
-    samples = np.sum(blocks.validation, axis=1)
-    mean = np.average(errors, axis=0, weights=samples)
+    folds = range(len(left_out))
+    errors = np.array([_fold_errors(learned.sum(~left_out[fold]), judged, fold, weights, size) for fold in folds])
+    mean = np.average(errors, axis=0, weights=judged.rows)
     spread = np.std(errors, axis=0, ddof=1) / np.sqrt(len(errors)) if len(errors) > 1 else np.zeros_like(mean)
     best = int(np.argmin(mean))
     # The more ridge the safer: a fuzzy part must earn its place.
@@ -142,12 +128,16 @@ def ridge_curve(learned: Rows, judged: Rows, blocks: Blocks, weights: Array) -> 
     return RidgeCurve(np.append(weights, np.inf), mean, spread, chosen)
 
 
-def _fold_errors(learned: Rows, judged: Rows, blocks: Blocks, fold: int, weights: Array) -> Array:
+def _fold_errors(learned: Products, judged: Products, fold: int, weights: Array, size: Array) -> Array:
     """Mean squared error on one block for every weight, the fuzzy part off last."""
-    A, y = learned.of(~blocks.left_out[fold])
-    V, z = judged.of(blocks.validation[fold])
-    residual = z[:, None] - V @ _ridge_path(A.T @ A, A.T @ y, weights * len(y))
-    return np.asarray(np.mean(residual**2, axis=0))
+    divide = np.concatenate([np.ones(RIGID), 1.0 / size])
+    path = _ridge_path(
+        learned.gram[0] * divide * divide[:, None], learned.moment[0] * divide, weights * learned.rows[0]
+    )
+    path = path * divide[:, None]
+    explained = 2.0 * judged.moment[fold] @ path - np.einsum("pw,pw->w", path, judged.gram[fold] @ path)
+    square, rows = judged.square[fold], judged.rows[fold]
+    return np.asarray(np.maximum(square - explained, SMALLEST_ERROR * square) / rows)
 
 
 def _ridge_path(gram: Array, moment: Array, weights: Array) -> Array:

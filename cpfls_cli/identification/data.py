@@ -2,13 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray, require_columns
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.regressor.motion import Motion
+
+CHUNK = 65536
+"""Samples worked on at a time: 7 MB of motion and torque, whatever the length of a flight."""
+
+# Between one flight and the next on their common time: far longer than any embargo.
+_PAUSE = 1e4
+
+
+class TorqueSource(Protocol):
+    """Samples in the order of time, in memory or not: they are met chunk by chunk, as often as asked for."""
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        ...
+
+    def chunks(self) -> Iterator[TorqueData]:
+        """Yield the samples, `CHUNK` at a time."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -44,6 +64,81 @@ class TorqueData:
     def __getitem__(self, samples: slice | IntArray) -> TorqueData:
         """Take some of the samples."""
         return TorqueData(self.time[samples], self.motion[samples], self.torque[samples])
+
+    def chunks(self) -> Iterator[TorqueData]:
+        """Yield the samples, `CHUNK` at a time."""
+        for start in range(0, len(self), CHUNK):
+            yield self[start : start + CHUNK]
+
+
+@dataclass(frozen=True)
+class Flights:
+    """Several flights, one after the other with a pause between.
+
+    Attributes
+    ----------
+    flights : tuple of TorqueSource
+    """
+
+    flights: tuple[TorqueSource, ...]
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        return sum(len(flight) for flight in self.flights)
+
+    def chunks(self) -> Iterator[TorqueData]:
+        """Yield the samples, `CHUNK` at a time; no chunk holds samples of two flights."""
+        end = 0.0
+        for number, flight in enumerate(self.flights):
+            offset = end if number else 0.0
+            for data in flight.chunks():
+                yield replace(data, time=data.time + offset)
+                end = float(data.time[-1]) + offset + _PAUSE
+
+
+def joined(flights: Sequence[TorqueSource]) -> TorqueSource:
+    """Take several flights as one source; a single one stays as it is."""
+    return flights[0] if len(flights) == 1 else Flights(tuple(flights))
+
+
+def gathered(source: TorqueSource, samples: IntArray) -> TorqueData:
+    """Gather some samples in memory.
+
+    Parameters
+    ----------
+    source : TorqueSource
+    samples : array of int
+        Indices, ascending.
+
+    Returns
+    -------
+    TorqueData
+    """
+    parts, start = [], 0
+    for data in source.chunks():
+        first, last = np.searchsorted(samples, [start, start + len(data)])
+        parts.append(data[samples[first:last] - start])
+        start += len(data)
+    motion = [np.concatenate([getattr(part.motion, name) for part in parts]) for name in vars(parts[0].motion)]
+    return TorqueData(
+        np.concatenate([part.time for part in parts]),
+        Motion(*motion),
+        np.concatenate([part.torque for part in parts]),
+    )
+
+
+def sample_times(source: TorqueSource) -> Array:
+    """Gather the times of all samples.
+
+    Parameters
+    ----------
+    source : TorqueSource
+
+    Returns
+    -------
+    array, shape (samples,), s
+    """
+    return np.concatenate([data.time for data in source.chunks()])
 
 
 @dataclass(frozen=True)
@@ -85,18 +180,18 @@ def split_flight(time: Array, training_share: float, embargo: float) -> Split:
     return Split(slice(0, end), slice(start, samples))
 
 
-def axis_scale(torque: Array) -> Array:
+def axis_scale(source: TorqueSource) -> Array:
     """Scale of the torque about each axis.
 
     Parameters
     ----------
-    torque : array, shape (samples, 3), N m
+    source : TorqueSource
 
     Returns
     -------
     array, shape (3,), N m
         Root mean square; for an axis without torque the largest of the others, so that it does not blow up.
     """
-    scale = np.sqrt(np.mean(torque**2, axis=0))
+    scale = np.sqrt(sum(np.sum(data.torque**2, axis=0) for data in source.chunks()) / len(source))
     largest = float(np.max(scale)) or 1.0
     return np.where(scale > 1e-9 * largest, scale, largest)

@@ -9,55 +9,15 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode
-from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.fit import CoefficientSolver, Fit
+from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.local_search import refine
-from cpfls_cli.identification.rigid_base import rigid_columns
+from cpfls_cli.identification.samples import Samples
 from cpfls_cli.identification.settings import LocalSearchSettings
-from cpfls_cli.regressor.regressor import Regressor
+from cpfls_cli.identification.solver import Solver
 from cpfls_cli.regressor.structure import ModelStructure
 
 OBJECTIVES = 3
 NOT_DEFINED = np.full(OBJECTIVES, np.inf)
-
-
-@dataclass(frozen=True)
-class Judge:
-    """Measures torque errors of fits over the whole training part, not only over the samples they learned from.
-
-    A membership function that falls between two learned samples costs nothing there and everything beside them.
-
-    Attributes
-    ----------
-    regressor : Regressor
-        Of the training part.
-    rigid : array, shape (samples, 3, 6)
-    torque : array, shape (samples, 3), N m
-    """
-
-    regressor: Regressor
-    rigid: Array
-    torque: Array
-
-    @classmethod
-    def of(cls, training: TorqueData, regressor: Regressor) -> Judge:
-        """Prepare a judge for a training part and its regressor."""
-        return cls(regressor, rigid_columns(training.motion), training.torque)
-
-    def error(self, partitions: tuple[Array, ...], fit: Fit) -> Array:
-        """Compute the torque error of a fit.
-
-        Parameters
-        ----------
-        partitions : tuple of array
-        fit : Fit
-
-        Returns
-        -------
-        array, shape (samples, 3), N m
-        """
-        model = self.regressor.torque(partitions, fit.coefficients) + self.rigid @ fit.rigid_body
-        return np.asarray(self.torque - model)
 
 
 @dataclass(frozen=True)
@@ -66,22 +26,24 @@ class Evaluator:
 
     Attributes
     ----------
-    solver : CoefficientSolver
-    judge : Judge
+    solver : Solver
+    judge : Samples
+        The whole training part, not only the samples learned from: a membership function that falls between two of
+        them costs nothing there and everything beside them.
     local_search : LocalSearchSettings
     cross_validated : bool
         Take the solver's cross-validated error for the first objective, not the training part's.
     """
 
-    solver: CoefficientSolver
-    judge: Judge
+    solver: Solver
+    judge: Samples
     local_search: LocalSearchSettings
     cross_validated: bool
 
     @property
     def structure(self) -> ModelStructure:
         """Structure of the models."""
-        return self.solver.regressor.structure
+        return self.judge.structure
 
     def __call__(self, genes: IntArray) -> Evaluation:
         """Evaluate chromosomes, refining each by local search if enabled.
@@ -115,7 +77,7 @@ class Evaluator:
         if not all(np.isfinite(part).all() for part in partitions):
             return None
         fit = self.solver.fit(partitions)
-        return fit if fit is not None and np.isfinite(fit.mean_squared_error) and fit.system.rank > 0 else None
+        return fit if fit is not None and np.isfinite([fit.mean_squared_error, fit.conditioning]).all() else None
 
     def objectives(self, chromosome: IntArray, fit: Fit) -> Array:
         """Judge a fit by all objectives.
@@ -130,9 +92,10 @@ class Evaluator:
         array, shape (3,)
             All infinite where one is not finite.
         """
-        error = self.judge.error(self._decode(chromosome), fit)
-        mean_squared = fit.mean_squared_error if self.cross_validated else float(np.mean(error**2))
-        objectives = np.array([mean_squared, np.max(np.abs(error)), fit.system.conditioning])
+        squares, largest = self.judge.errors(self._decode(chromosome), fit.coefficients, fit.rigid_body)
+        rows = 3 * len(self.judge.ready.source)
+        mean_squared = fit.mean_squared_error if self.cross_validated else squares[0] / rows
+        objectives = np.array([mean_squared, largest[0], fit.conditioning])
         return objectives if np.isfinite(objectives).all() else NOT_DEFINED
 
     def _evaluate(self, chromosome: IntArray) -> tuple[IntArray, Array]:

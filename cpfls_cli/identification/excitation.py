@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,10 @@ from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.fuzzy.inputs import wrap
-from cpfls_cli.regressor.regressor import Breakpoints, Regressor
+from cpfls_cli.identification.dense import regressor_blocks
+from cpfls_cli.identification.least_squares import Triangle
+from cpfls_cli.identification.samples import Samples
+from cpfls_cli.regressor.regressor import Breakpoints
 
 CELLS = 72
 """Cells per turn, 5 degrees each."""
@@ -42,12 +46,13 @@ class RuleExcitation:
         return np.asarray((self.firing > SILENT_FIRING) & (self.determined >= DETERMINED_SHARE))
 
 
-def visited_cells(attitude: Array) -> BoolArray:
+def visited_cells(attitudes: Iterable[Array]) -> BoolArray:
     """Mark the cells of roll and pitch that data visit, and their neighbours.
 
     Parameters
     ----------
-    attitude : array, shape (samples, 3), rad
+    attitudes : iterable of array, shape (samples, 3), rad
+        Chunk by chunk.
 
     Returns
     -------
@@ -55,7 +60,8 @@ def visited_cells(attitude: Array) -> BoolArray:
         Roll along the first axis, from -180 degrees.
     """
     visited = np.zeros((CELLS, CELLS), dtype=bool)
-    visited[_cells(attitude[:, 0]), _cells(attitude[:, 1])] = True
+    for attitude in attitudes:
+        visited[_cells(attitude[:, 0]), _cells(attitude[:, 1])] = True
     shifts = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     return np.asarray(np.any([np.roll(visited, shift, axis=(0, 1)) for shift in shifts], axis=0))
 
@@ -76,7 +82,7 @@ def outside_visited(visited: BoolArray, attitude: Array) -> BoolArray:
 
 
 def rule_excitation(
-    regressor: Regressor, partitions: Breakpoints, Q: Array, noise: float, inertia: float, rank_tolerance: float
+    learned: Samples, partitions: Breakpoints, noise: float, inertia: float, rank_tolerance: float
 ) -> RuleExcitation:
     """Measure how far samples excite each rule.
 
@@ -85,10 +91,8 @@ def rule_excitation(
 
     Parameters
     ----------
-    regressor : Regressor
+    learned : Samples
     partitions : sequence of array
-    Q : array, shape (samples, 3, parameters)
-        The regressor's matrix for these partitions.
     noise : float, N m
         Root mean square of what no model explains.
     inertia : float, kg m^2
@@ -99,16 +103,32 @@ def rule_excitation(
     -------
     RuleExcitation
     """
-    rows = Q.reshape(-1, Q.shape[2])
-    _, singular_values, Vt = linalg.svd(rows, full_matrices=False, check_finite=False)
+    blocks, singular_values, Vt = learned.structure.blocks, *_decomposed(learned, partitions)
     floor = max(rank_tolerance * singular_values[0], noise / inertia if inertia > 0 else 0.0)
     share = np.sum(Vt[singular_values > floor] ** 2, axis=0)
-    names, firing, determined = [], [], []
-    for index, block in enumerate(regressor.structure.blocks):
-        names += [f"{block.function.name} rule {rule + 1}" for rule in range(block.rules)]
-        firing.append(np.max(regressor.firing(index, partitions), axis=0))
-        determined.append(np.mean(share[block.columns].reshape(block.rules, block.features), axis=1))
-    return RuleExcitation(tuple(names), np.concatenate(firing), np.concatenate(determined))
+    names = [f"{block.function.name} rule {rule + 1}" for block in blocks for rule in range(block.rules)]
+    determined = [np.mean(share[block.columns].reshape(block.rules, block.features), axis=1) for block in blocks]
+    return RuleExcitation(tuple(names), _firing(learned, partitions), np.concatenate(determined))
+
+
+def _decomposed(learned: Samples, partitions: Breakpoints) -> tuple[Array, Array]:
+    """Singular values and right singular vectors of the fuzzy columns alone."""
+    rows = (
+        (regressor.matrix(partitions).reshape(-1, learned.structure.parameters), data.torque.reshape(-1))
+        for data, regressor in regressor_blocks(learned)
+    )
+    _, singular_values, Vt = linalg.svd(Triangle.of(rows).matrix[:, :-1], full_matrices=False, check_finite=False)
+    return singular_values, Vt
+
+
+def _firing(learned: Samples, partitions: Breakpoints) -> Array:
+    """Largest firing strength of every rule over the samples."""
+    blocks = range(len(learned.structure.blocks))
+    strongest = [
+        np.concatenate([np.max(regressor.firing(index, partitions), axis=0) for index in blocks])
+        for _, regressor in regressor_blocks(learned)
+    ]
+    return np.asarray(np.max(strongest, axis=0))
 
 
 def _cells(angle: Array) -> IntArray:

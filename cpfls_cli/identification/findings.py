@@ -130,7 +130,7 @@ def _training(evidence: Evidence) -> str:
 
 
 def _rank(evidence: Evidence) -> Iterator[str]:
-    parameters = evidence.system.row_space.shape[1]
+    parameters = evidence.system.parameters
     if evidence.system.rank < parameters:
         yield f"rank {evidence.system.rank} of {parameters}: the minimum-norm solution was taken"
 

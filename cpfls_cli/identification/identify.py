@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.axes import axis_evidence
 from cpfls_cli.identification.baselines import Baseline, fit_baselines
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
-from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.evaluator import Evaluator, Judge
+from cpfls_cli.identification.data import TorqueSource, axis_scale
+from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.excitation import RuleExcitation, rule_excitation, visited_cells
 from cpfls_cli.identification.findings import Evidence, findings
-from cpfls_cli.identification.fit import CoefficientSolver, Fit, PlainSolver
-from cpfls_cli.identification.judge import Score, score
+from cpfls_cli.identification.fit import Fit
+from cpfls_cli.identification.folds import with_folds
+from cpfls_cli.identification.judge import Score, score_of
+from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.physics import not_positive_definite
 from cpfls_cli.identification.results import Identification
-from cpfls_cli.identification.rigid_base import RigidBaseSolver
+from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import search
 from cpfls_cli.identification.search_run import UNWATCHED, SearchRun
 from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.identification.solver import Solver
 from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges
+from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
 from cpfls_cli.regressor.structure import model_structure
 
 TRAINING = "training"
@@ -33,9 +37,9 @@ UNIFORM = "uniform-partitions"
 
 
 def identify(
-    training: TorqueData,
-    learned: TorqueData,
-    held_out: Mapping[str, TorqueData],
+    training: TorqueSource,
+    learned: TorqueSource,
+    held_out: Mapping[str, TorqueSource],
     settings: IdentificationSettings,
     rng: np.random.Generator,
     run: SearchRun = UNWATCHED,
@@ -45,11 +49,11 @@ def identify(
 
     Parameters
     ----------
-    training : TorqueData
+    training : TorqueSource
         The whole training part; input ranges and visited attitudes are taken from it, and it is judged.
-    learned : TorqueData
+    learned : TorqueSource
         The samples of it that parameters are learned from: all, or a selection, in the order of time.
-    held_out : mapping of str to TorqueData
+    held_out : mapping of str to TorqueSource
         Data that nothing is learned from, by name (not ``training``); judged once, at the end.
     settings : IdentificationSettings
     rng : numpy.random.Generator
@@ -75,42 +79,41 @@ def identify(
     """
     evaluator = model_evaluator(training, learned, settings)
     found = search(evaluator, settings, rng, run)
-    solved = _solve(evaluator, found.front.chromosomes[found.front.chosen], training)
+    solved = _solve(evaluator, found.front.chromosomes[found.front.chosen])
     if solved is None:
         raise ComputationError("no chromosome gave a finite model; the data may not move at all")
-    model, fit = solved
+    model, fit, system = solved
     baselines = fit_baselines(learned, fit.row_scale, settings.rank_tolerance)
     predictors = {"model": model.torque} | {baseline.name: baseline.torque for baseline in baselines}
-    uniform = _solve(evaluator, uniform_chromosome(model.structure), training)
+    uniform = _solve(evaluator, uniform_chromosome(model.structure))
     if uniform is not None and model.structure.genes > 0:
         predictors[UNIFORM] = uniform[0].torque
     parts = {TRAINING: training, **held_out}
     scores = {part: _scores(predictors, data) for part, data in parts.items()}
     evidence = Evidence(
         fit=fit,
-        system=evaluator.solver.unpenalised(model.partitions, fit),
+        system=system,
         excitation=_excitation(evaluator, model, baselines[0], scores[TRAINING], settings),
         axes=axis_evidence(training, settings.rank_tolerance),
         rigid_body=baselines[0].parameters,
         stated=stated_inertia,
-        indefinite=int(np.sum(not_positive_definite(model.inertia(training.motion.attitude).value))),
+        indefinite=_count(training, lambda attitude: not_positive_definite(model.inertia(attitude).value)),
         samples={part: len(data) for part, data in parts.items()},
-        outside={part: int(np.sum(model.outside(data.motion.attitude))) for part, data in parts.items()},
+        outside={part: _count(data, model.outside) for part, data in parts.items()},
         scores=scores,
     )
-    ridge = evaluator.solver.curve(model.partitions) if isinstance(evaluator.solver, RigidBaseSolver) else None
-    told = tuple(findings(evidence))
+    ridge, told = evaluator.solver.curve(model.partitions), tuple(findings(evidence))
     return Identification(**vars(evidence), **vars(found), model=model, ridge=ridge, baselines=baselines, findings=told)
 
 
-def model_evaluator(training: TorqueData, learned: TorqueData, settings: IdentificationSettings) -> Evaluator:
+def model_evaluator(training: TorqueSource, learned: TorqueSource, settings: IdentificationSettings) -> Evaluator:
     """Prepare the evaluator of chromosomes.
 
     Parameters
     ----------
-    training : TorqueData
+    training : TorqueSource
         Judges, and gives the input ranges.
-    learned : TorqueData
+    learned : TorqueSource
         Solves.
     settings : IdentificationSettings
 
@@ -118,40 +121,36 @@ def model_evaluator(training: TorqueData, learned: TorqueData, settings: Identif
     -------
     Evaluator
     """
-    structure = model_structure(settings)
-    ranges = data_ranges(structure, training.motion.attitude)
-    whole = Regressor(structure, training.motion, ranges)
-    selected = whole if len(learned) == len(training) else Regressor(structure, learned.motion, ranges)
-    solver = _solver((learned, selected), (training, whole), settings)
-    return Evaluator(solver, Judge.of(training, whole), settings.local_search, settings.base == "rigid-body")
+    structure, over_rigid_body = model_structure(settings), settings.base == "rigid-body"
+    ranges = joined_ranges(data_ranges(structure, data.motion.attitude) for data in training.chunks())
+    whole = Samples.of(Ready(training, over_rigid_body), structure, ranges)
+    part = whole if len(learned) == len(training) else Samples.of(Ready(learned, over_rigid_body), structure, ranges)
+    ridge = None
+    if over_rigid_body:
+        scale = 1.0 / axis_scale(learned)
+        part, ridge = with_folds(replace(part, scale=scale), replace(whole, scale=scale), settings.ridge)
+    return Evaluator(Solver(part, ridge, settings.rank_tolerance), whole, settings.local_search, over_rigid_body)
 
 
-def _solver(
-    learned: tuple[TorqueData, Regressor], training: tuple[TorqueData, Regressor], settings: IdentificationSettings
-) -> CoefficientSolver:
-    """Prepare the solver that the base asks for."""
-    data, regressor = learned
-    if settings.base == "none":
-        return PlainSolver(regressor, data.torque, settings.rank_tolerance)
-    if len(data) < 2 * settings.ridge.folds:
-        raise SettingError("ridge.folds", f"{len(data)} samples are too few for that many blocks; use more samples")
-    return RigidBaseSolver.of(learned, training, settings.ridge, settings.rank_tolerance)
-
-
-def _solve(evaluator: Evaluator, chromosome: IntArray, training: TorqueData) -> tuple[Model, Fit] | None:
+def _solve(evaluator: Evaluator, chromosome: IntArray) -> tuple[Model, Fit, LeastSquares] | None:
     """Solve one chromosome in full precision; None where it has no finite model."""
     fit = evaluator.fit(chromosome)
     if fit is None:
         return None
-    regressor = evaluator.solver.regressor
-    partitions = decode(regressor.structure, chromosome.astype(float))
-    visited = visited_cells(training.motion.attitude)
-    model = Model(regressor.structure, regressor.ranges, partitions, fit.coefficients, fit.rigid_body, visited)
-    return model, fit
+    learned = evaluator.solver.learned
+    partitions = decode(learned.structure, chromosome.astype(float))
+    exact, system = evaluator.solver.exact(partitions, fit)
+    visited = visited_cells(data.motion.attitude for data in evaluator.judge.ready.source.chunks())
+    model = Model(learned.structure, learned.ranges, partitions, exact.coefficients, exact.rigid_body, visited)
+    return model, exact, system
 
 
-def _scores(predictors: Mapping[str, Callable[[Motion], Array]], data: TorqueData) -> dict[str, Score]:
-    return {name: score(data, torque(data.motion)) for name, torque in predictors.items()}
+def _scores(predictors: Mapping[str, Callable[[Motion], Array]], data: TorqueSource) -> dict[str, Score]:
+    return {name: score_of(data, torque) for name, torque in predictors.items()}
+
+
+def _count(source: TorqueSource, flag: Callable[[Array], BoolArray]) -> int:
+    return sum(int(np.sum(flag(data.motion.attitude))) for data in source.chunks())
 
 
 def _excitation(
@@ -162,8 +161,6 @@ def _excitation(
     settings: IdentificationSettings,
 ) -> RuleExcitation:
     """Measure what of the fuzzy part alone the samples determine beyond their noise, whatever lies underneath."""
-    regressor = evaluator.solver.regressor
-    Q = regressor.matrix(model.partitions)
     noise = float(np.sqrt(min(np.mean(scores[name].mse) for name in ("model", rigid_body.name))))
     inertia = float(np.mean(np.abs(rigid_body.parameters[:3])))
-    return rule_excitation(regressor, model.partitions, Q, noise, inertia, settings.rank_tolerance)
+    return rule_excitation(evaluator.solver.learned, model.partitions, noise, inertia, settings.rank_tolerance)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.data import TorqueData, TorqueSource
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.rotations import body_torque
 
 
@@ -54,33 +56,84 @@ def score(data: TorqueData, predicted: Array) -> Score:
     -------
     Score
     """
-    error = data.torque - predicted
-    max_error, largest = np.max(np.abs(error), axis=0), np.max(np.abs(data.torque), axis=0)
-    attitude = data.motion.attitude
-    return Score(
-        mse=np.mean(error**2, axis=0),
-        max_error=max_error,
-        relative_error=_ratio(max_error, largest),
-        r2=r_squared(data.torque, error),
-        r2_body=r_squared(body_torque(attitude, data.torque), body_torque(attitude, error)),
-    )
+    sums = _Sums()
+    sums.add(data, predicted)
+    return sums.score()
 
 
-def r_squared(measured: Array, error: Array) -> Array:
-    """Share of the variance explained, ``1 - sum e^2 / sum (y - mean y)^2``.
+def score_of(source: TorqueSource, torque: Callable[[Motion], Array]) -> Score:
+    """Compare the predictions of a model with the torque of flights, chunk by chunk.
 
     Parameters
     ----------
-    measured : array, shape (samples, channels)
-    error : array, shape (samples, channels)
+    source : TorqueSource
+    torque : callable
+        Predicts the generalised torque of a motion.
 
     Returns
     -------
-    array, shape (channels,)
-        NaN where the measured channel does not vary.
+    Score
     """
-    total = np.sum((measured - np.mean(measured, axis=0)) ** 2, axis=0)
-    return 1.0 - _ratio(np.sum(error**2, axis=0), total)
+    sums = _Sums()
+    for data in source.chunks():
+        sums.add(data, torque(data.motion))
+    return sums.score()
+
+
+class Explained:
+    """Sums for the share of the variance explained, ``1 - sum e^2 / sum (y - mean y)^2``, chunk by chunk.
+
+    References
+    ----------
+    Chan, Golub and LeVeque, The American Statistician 37 (1983), 242 (sums of squares about a mean, pairwise).
+    """
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._mean, self._about_mean, self._error = np.zeros(3), np.zeros(3), np.zeros(3)
+
+    def add(self, measured: Array, error: Array) -> None:
+        """Take note of samples; both arrays have the shape (samples, 3)."""
+        count, mean = len(measured), np.mean(measured, axis=0)
+        both, apart = self._count + count, mean - self._mean
+        self._about_mean = self._about_mean + np.sum((measured - mean) ** 2, axis=0)
+        self._about_mean += apart**2 * (self._count * count / both)
+        self._mean, self._count = self._mean + apart * (count / both), both
+        self._error = self._error + np.sum(error**2, axis=0)
+
+    @property
+    def mean_squared_error(self) -> Array:
+        """Mean squared error by channel."""
+        return np.asarray(self._error / self._count)
+
+    @property
+    def r2(self) -> Array:
+        """Share of the variance explained by channel; NaN where the measured channel does not vary."""
+        return 1.0 - _ratio(self._error, self._about_mean)
+
+
+class _Sums:
+    """What a score needs of the samples."""
+
+    def __init__(self) -> None:
+        self._largest, self._largest_error = np.zeros(3), np.zeros(3)
+        self._euler, self._body = Explained(), Explained()
+
+    def add(self, data: TorqueData, predicted: Array) -> None:
+        error, attitude = data.torque - predicted, data.motion.attitude
+        self._euler.add(data.torque, error)
+        self._body.add(body_torque(attitude, data.torque), body_torque(attitude, error))
+        self._largest = np.maximum(self._largest, np.max(np.abs(data.torque), axis=0))
+        self._largest_error = np.maximum(self._largest_error, np.max(np.abs(error), axis=0))
+
+    def score(self) -> Score:
+        return Score(
+            mse=self._euler.mean_squared_error,
+            max_error=self._largest_error,
+            relative_error=_ratio(self._largest_error, self._largest),
+            r2=self._euler.r2,
+            r2_body=self._body.r2,
+        )
 
 
 def _ratio(numerator: Array, denominator: Array) -> Array:

@@ -1,7 +1,8 @@
-"""Minimum-norm least squares by singular value decomposition, with its rank and condition number."""
+"""Minimum-norm least squares by singular value decomposition, block of samples after block."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,14 +19,10 @@ class LeastSquares:
     ----------
     coefficients : array, shape (parameters,)
         Of minimum norm where the data do not determine all.
-    residual : array, shape (rows,)
-        Right-hand side minus fit.
     singular_values : array, shape (min(rows, parameters),)
         Descending.
     rank : int
         Number of singular values above the tolerance.
-    range_basis : array, shape (rows, rank)
-        Orthonormal basis of what the columns span.
     row_space : array, shape (rank, parameters)
         Orthonormal basis of the directions that the data determine.
     rank_tolerance : float
@@ -33,12 +30,15 @@ class LeastSquares:
     """
 
     coefficients: Array
-    residual: Array
     singular_values: Array
     rank: int
-    range_basis: Array
     row_space: Array
     rank_tolerance: float
+
+    @property
+    def parameters(self) -> int:
+        """Number of parameters."""
+        return len(self.coefficients)
 
     @property
     def condition_number(self) -> float:
@@ -47,27 +47,59 @@ class LeastSquares:
             return float("inf")
         return float(self.singular_values[0] / self.singular_values[self.rank - 1])
 
-    @property
-    def conditioning(self) -> float:
-        """Condition number for comparing systems: one of smaller rank is always worse, and finite.
 
-        Over the kept singular values alone, a system would gain by losing rank.
-        """
-        missing = len(self.singular_values) - self.rank
-        return self.condition_number if missing == 0 else (1.0 + missing) / self.rank_tolerance
+@dataclass(frozen=True)
+class Triangle:
+    """Triangular factor of columns and a right-hand side: all that least squares need to know of any number of rows.
 
-    def reject(self, columns: Array) -> Array:
-        """Project columns off what the regressor spans.
+    Attributes
+    ----------
+    matrix : array, shape (up to parameters + 1, parameters + 1)
+        ``R`` of a QR decomposition of the columns with the right-hand side as the last one.
+    """
+
+    matrix: Array
+
+    @classmethod
+    def of(cls, blocks: Iterable[tuple[Array, Array]]) -> Triangle:
+        """Decompose rows block by block.
 
         Parameters
         ----------
-        columns : array, shape (rows, n)
+        blocks : iterable of tuple of array
+            Columns, shape (rows, parameters), and right-hand side, shape (rows,), block by block.
 
         Returns
         -------
-        array, shape (rows, n)
+        Triangle
         """
-        return np.asarray(columns - self.range_basis @ (self.range_basis.T @ columns))
+        triangle: Array | None = None
+        for columns, right_side in blocks:
+            block = np.column_stack([columns, right_side])
+            stacked = block if triangle is None else np.vstack([triangle, block])
+            R = linalg.qr(stacked, mode="r", check_finite=False, overwrite_a=True)[0]
+            triangle = np.asarray(R[: R.shape[1]], dtype=float)
+        if triangle is None:
+            raise ValueError("no rows")
+        return cls(triangle)
+
+    def below(self, rows: Array) -> Triangle:
+        """Add rows whose right-hand side is zero, such as those of a penalty, shape (rows, parameters)."""
+        return Triangle(np.vstack([self.matrix, np.column_stack([rows, np.zeros(len(rows))])]))
+
+    def solve(self, rank_tolerance: float) -> LeastSquares:
+        """Solve for the parameters of smallest norm.
+
+        Parameters
+        ----------
+        rank_tolerance : float
+            Singular values below this share of the largest count as zero.
+
+        Returns
+        -------
+        LeastSquares
+        """
+        return solve(self.matrix[:, :-1], self.matrix[:, -1], rank_tolerance)
 
 
 def solve(matrix: Array, right_side: Array, rank_tolerance: float) -> LeastSquares:
@@ -91,8 +123,6 @@ def solve(matrix: Array, right_side: Array, rank_tolerance: float) -> LeastSquar
     U, singular_values, Vt = linalg.svd(matrix, full_matrices=False, check_finite=False, lapack_driver="gesdd")
     largest = singular_values[0] if len(singular_values) else 0.0
     rank = int(np.count_nonzero(singular_values > rank_tolerance * largest)) if largest > 0 else 0
-    range_basis, row_space = U[:, :rank], Vt[:rank]
-    projected = range_basis.T @ right_side
-    coefficients = row_space.T @ (projected / singular_values[:rank])
-    residual = right_side - range_basis @ projected
-    return LeastSquares(coefficients, residual, singular_values, rank, range_basis, row_space, rank_tolerance)
+    projected = U[:, :rank].T @ right_side
+    coefficients = Vt[:rank].T @ (projected / singular_values[:rank])
+    return LeastSquares(coefficients, singular_values, rank, Vt[:rank], rank_tolerance)

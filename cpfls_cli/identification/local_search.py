@@ -1,57 +1,67 @@
-"""Local search: partition weights refined by variable projection, the coefficients eliminated."""
+"""Local search: partition weights refined by variable projection, the linear parameters eliminated."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy import linalg
 from scipy.optimize import least_squares
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.chromosome import decode, weight_jacobian
-from cpfls_cli.identification.fit import CoefficientSolver, Fit
-from cpfls_cli.regressor.sensitivity import torque_sensitivity
+from cpfls_cli.fuzzy.partition import breakpoint_jacobian
+from cpfls_cli.identification.chromosome import decode
+from cpfls_cli.identification.fit import Fit
+from cpfls_cli.identification.normal_equations import quick_solution
+from cpfls_cli.identification.solver import Solver
+from cpfls_cli.regressor.structure import ModelStructure
+
+
+@dataclass(frozen=True)
+class _Linearised:
+    """The residual of all samples and its Jacobian, turned so that all but the first few rows are zero.
+
+    A turn changes neither the sum of squares nor its derivatives, and a trust-region method sees nothing else.
+    """
+
+    residual: Array
+    jacobian: Array
 
 
 @dataclass
 class _ReducedProblem:
-    """Residual and Jacobian of the weights with the coefficients solved for, each point computed once."""
+    """Residual and Jacobian of the weights with the linear parameters solved for, each point computed once."""
 
-    solver: CoefficientSolver
+    solver: Solver
     start: Fit
     _point: Array = field(default_factory=lambda: np.empty(0))
-    _fit: Fit | None = None
+    _linearised: _Linearised | None = None
 
     def residual(self, weights: Array) -> Array:
-        return self._at(weights).system.residual
+        return self._at(weights).residual
 
     def jacobian(self, weights: Array) -> Array:
-        """Kaufman's approximation: the derivative of the fit, projected off what the regressor spans."""
-        fit = self._at(weights)
-        regressor = self.solver.regressor
-        moved = torque_sensitivity(regressor, decode(regressor.structure, weights), fit.coefficients)
-        by_weight = weight_jacobian(regressor.structure, weights, moved) * fit.row_scale[:, None]
-        rows = np.zeros((len(fit.system.residual), by_weight.shape[2]))
-        rows[: by_weight.shape[0] * 3] = by_weight.reshape(-1, by_weight.shape[2])
-        return -fit.system.reject(rows)
+        return self._at(weights).jacobian
 
-    def _at(self, weights: Array) -> Fit:
-        if self._fit is None or not np.array_equal(weights, self._point):
-            self._fit = self.solver.refit(decode(self.solver.regressor.structure, weights), self.start)
-            self._point = weights.copy()
-        return self._fit
+    def _at(self, weights: Array) -> _Linearised:
+        if self._linearised is None or not np.array_equal(weights, self._point):
+            self._linearised, self._point = _linearise(self.solver, weights, self.start), weights.copy()
+        return self._linearised
 
 
-def refine(solver: CoefficientSolver, weights: Array, start: Fit, evaluations: int) -> Array:
-    """Refine partition weights by nonlinear least squares with the coefficients eliminated.
+def refine(solver: Solver, weights: Array, start: Fit, evaluations: int) -> Array:
+    """Refine partition weights by nonlinear least squares with the linear parameters eliminated.
+
+    Ridge weight and column sizes stay those of the start: a penalty that moved with the columns would add a term to
+    the gradient that variable projection leaves out.
 
     Parameters
     ----------
-    solver : CoefficientSolver
+    solver : Solver
     weights : array, shape (genes,)
         On [0, 1], no partition all zero.
     start : Fit
-        The fit at these weights.
+        The fit at these weights; its ridge weight is finite.
     evaluations : int
         Largest number of model evaluations.
 
@@ -69,3 +79,45 @@ def refine(solver: CoefficientSolver, weights: Array, start: Fit, evaluations: i
         problem.residual, weights, jac=problem.jacobian, bounds=(0.0, 1.0), max_nfev=evaluations, x_scale="jac"
     )
     return np.asarray(found.x, dtype=float)
+
+
+def _linearise(solver: Solver, weights: Array, start: Fit) -> _Linearised:
+    """Linearise the residual by Kaufman's approximation, from sums over samples alone.
+
+    With M the derivatives of the torque by the weights at fixed parameters and A the columns, the Jacobian is
+    ``J = -(I - A A^+) M``: so ``J^T J = M^T M - (A^T M)^T (A^T A)^-1 (A^T M)``, and ``J^T r = -M^T r`` because the
+    residual is orthogonal to A.
+    """
+    structure = solver.learned.structure
+    partitions = decode(structure, weights)
+    equations = solver.equations(partitions, start.ridge_weight, start.column_size)
+    solution, factor, scale = quick_solution(equations)
+    coefficients, rigid_body = solver.parameters(solution, start.column_size)
+    moved = solver.learned.moved(partitions, coefficients, rigid_body)
+    by_weight = _weight_jacobian(structure, weights)
+    divide = np.ones(len(solution))
+    divide[len(solution) - len(start.column_size) :] = start.column_size
+    onto = (moved.columns @ by_weight) / divide[:, None]
+    spanned = onto.T @ (scale[:, None] * linalg.cho_solve(factor, scale[:, None] * onto, check_finite=False))
+    square = moved.square + float(equations.penalty @ solution**2)
+    return _turned(by_weight.T @ moved.moved @ by_weight - spanned, -by_weight.T @ moved.residual, square)
+
+
+def _turned(normal: Array, gradient: Array, square: float) -> _Linearised:
+    """Find few rows with given ``J^T J``, ``J^T r`` and ``r^T r``."""
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (normal + normal.T))
+    # Directions that leave every breakpoint where it is, up to rounding.
+    roots = np.sqrt(np.where(eigenvalues > 1e-14 * max(eigenvalues[-1], 0.0), eigenvalues, 0.0))
+    along = np.where(roots > 0, vectors.T @ gradient / np.where(roots > 0, roots, 1.0), 0.0)
+    rest = np.sqrt(max(square - float(along @ along), 0.0))
+    jacobian = np.vstack([roots[:, None] * vectors.T, np.zeros(len(roots))])
+    return _Linearised(np.append(along, rest), jacobian)
+
+
+def _weight_jacobian(structure: ModelStructure, weights: Array) -> Array:
+    """Differentiate all inner breakpoints by all weights, shape (breakpoints, genes)."""
+    return np.asarray(linalg.block_diag(*(_partition_jacobian(weights[part]) for part in structure.weight_slices())))
+
+
+def _partition_jacobian(weights: Array) -> Array:
+    return breakpoint_jacobian(weights) if len(weights) > 1 else np.zeros((0, len(weights)))

@@ -9,7 +9,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.excitation import outside_visited
-from cpfls_cli.identification.rigid_base import rigid_columns
+from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor

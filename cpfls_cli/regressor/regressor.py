@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +62,25 @@ def data_ranges(structure: ModelStructure, attitude: Array) -> tuple[InputRange,
         Roll and pitch.
     """
     roll, pitch = (input_range(attitude[:, angle], structure.circular) for angle in (ROLL, PITCH))
+    return roll, pitch
+
+
+def joined_ranges(ranges: Iterable[tuple[InputRange, InputRange]]) -> tuple[InputRange, InputRange]:
+    """Join the ranges of several parts of the training data.
+
+    Parameters
+    ----------
+    ranges : iterable of tuple of InputRange
+        Roll and pitch, part by part.
+
+    Returns
+    -------
+    tuple of InputRange
+    """
+    roll, pitch = (
+        InputRange(min(part.minimum for part in parts), max(part.maximum for part in parts))
+        for parts in zip(*ranges, strict=True)
+    )
     return roll, pitch
 
 

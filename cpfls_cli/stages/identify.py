@@ -12,30 +12,31 @@ import numpy as np
 
 from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
-from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, identify
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.search import NothingFoundError
 from cpfls_cli.identification.search_run import SearchRun, SearchStep
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.stages.flight_source import flight_source
 from cpfls_cli.stages.job import Job, Outcome, Started, finish
 from cpfls_cli.stages.model_file import model_data
 from cpfls_cli.stages.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.stages.stopped import stopped, without_model
 from cpfls_cli.stages.study import generator, settings_of
-from cpfls_cli.stages.training import TrainingData, read_torque_data, read_training
-
-REST = "held-out rest"
+from cpfls_cli.stages.training import TrainingData, flight_roles, read_training
 
 
-def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path], options: SearchOptions) -> Outcome:
+def run(
+    job: Job, flights: Sequence[Path], selection: Path | None, validate: Sequence[Path], options: SearchOptions
+) -> Outcome:
     """Identify a model and write it.
 
     Parameters
     ----------
     job : Job
-    flight : Path
+    flights : sequence of Path
     selection : Path or None
         Samples to learn from; all of the training part if None.
     validate : sequence of Path
@@ -47,38 +48,38 @@ def run(job: Job, flight: Path, selection: Path | None, validate: Sequence[Path]
     -------
     Outcome
     """
-    started, search = begin_search(job, _roles(flight, selection, validate), options)
-    data = read_training(flight, selection, job.study)
+    started, search = begin_search(job, _roles(flights, selection, validate), options)
+    data = read_training(flights, selection, job.study)
     held_out = _held_out(job, data, started, validate)
     if started.dry_run is not None:
         return started.dry_run
     clock = time.perf_counter()
     watch = Watch(job, options.time_limit_s)
     with search.kept():
-        result = _identify(job, flight, data, held_out, search.run(options, watch, _shown(job)))
+        result = _identify(job, flights, data, held_out, search.run(options, watch, _shown(job)))
     if isinstance(result, NothingFoundError):
         search.end(result.stop_reason)
-        raise without_model(result.stop_reason, watch.signal) or _of(flight, result)
+        raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
     with search.kept():
-        finish(job, MODEL, model_data(result, job.study.identification.base, data.learned), started.inputs)
+        finish(job, MODEL, model_data(result, job.study.identification.base, data.indices), started.inputs)
     search.end(result.stop_reason)
     outcome = _outcome(job, result, len(data.learned), time.perf_counter() - clock)
     return stopped(outcome, result.stop_reason, watch.signal, job.output)
 
 
-def _roles(flight: Path, selection: Path | None, validate: Sequence[Path]) -> dict[str, Path]:
-    roles = {"flight": flight} | ({"selection": selection} if selection else {})
+def _roles(flights: Sequence[Path], selection: Path | None, validate: Sequence[Path]) -> dict[str, Path]:
+    roles = flight_roles(flights) | ({"selection": selection} if selection else {})
     return roles | {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
 
 
 def _identify(
-    job: Job, flight: Path, data: TrainingData, held_out: dict[str, TorqueData], run: SearchRun
+    job: Job, flights: Sequence[Path], data: TrainingData, held_out: dict[str, TorqueSource], run: SearchRun
 ) -> Identification | NothingFoundError:
     try:
         with settings_of("identification", job.study):
             return identify(
-                data.flight[data.split.training],
-                data.flight[data.learned],
+                data.training,
+                data.learned,
                 held_out,
                 job.study.identification,
                 generator(job.study, "identify"),
@@ -88,26 +89,26 @@ def _identify(
     except NothingFoundError as error:
         return error
     except ComputationError as error:
-        raise _of(flight, error) from None
+        raise _of(flights, error) from None
 
 
-def _of(flight: Path, error: ComputationError) -> ComputationError:
-    return ComputationError(f"{flight}: {error}")
+def _of(flights: Sequence[Path], error: ComputationError) -> ComputationError:
+    return ComputationError(f"{' '.join(str(path) for path in flights)}: {error}")
 
 
-def _held_out(job: Job, data: TrainingData, started: Started, validate: Sequence[Path]) -> dict[str, TorqueData]:
+def _held_out(job: Job, data: TrainingData, started: Started, validate: Sequence[Path]) -> dict[str, TorqueSource]:
     """Gather what is judged but not learned from, under names of their own."""
-    rest = data.flight[data.split.held_out]
-    if job.study.identification.training_share < 1 and not len(rest):
+    if job.study.identification.training_share < 1 and not data.rests:
         raise ConfigError(
             f"identification.embargo_s = {job.study.identification.embargo_s:g}: leaves nothing of the flight to be "
             "held out; lower it, or lower identification.training_share"
         )
-    parts = {REST: rest} if len(rest) else {}
+    parts = dict(data.rests)
+    learned = {file.sha256 for role, file in started.inputs.items() if role.startswith("flight")}
     for number, path in enumerate(validate, start=1):
-        if started.inputs[f"validate-{number}"].sha256 == started.inputs["flight"].sha256:
+        if started.inputs[f"validate-{number}"].sha256 in learned:
             raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
-        parts[_free_name(path.name, {TRAINING, *parts})] = read_torque_data(path)
+        parts[_free_name(path.name, {TRAINING, *parts})] = flight_source(path)
     return parts
 
 
@@ -136,7 +137,7 @@ def _outcome(job: Job, result: Identification, learned: int, seconds: float) -> 
         **_score_summary(training["model"]),
         "condition_number": result.system.condition_number,
         "rank": result.system.rank,
-        "parameters": result.system.row_space.shape[1],
+        "parameters": result.system.parameters,
         "generations": len(result.history.evaluations) - 1,
         "evaluations": int(result.history.evaluations[-1]),
         "stop_reason": result.stop_reason,
@@ -183,7 +184,7 @@ def _score_summary(score: Score) -> dict[str, Any]:
 def _lines(result: Identification, learned: int) -> list[str]:
     system = result.system
     lines = [
-        f"{system.row_space.shape[1]} parameters from {learned} samples; rank {system.rank}, "
+        f"{system.parameters} parameters from {learned} samples; rank {system.rank}, "
         f"condition number {system.condition_number:.5g}; {result.history.evaluations[-1]} evaluations"
     ]
     moments = " ".join(f"{name} {value:.4g}" for name, value in zip(INERTIA_PARAMETERS, result.rigid_body, strict=True))

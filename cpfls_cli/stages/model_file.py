@@ -110,7 +110,7 @@ def _solution(result: Identification) -> dict[str, Any]:
         "solve/singular_values": result.system.singular_values,
         "solve/rank": result.system.rank,
         "solve/condition_number": result.system.condition_number,
-        "solve/parameters": result.system.row_space.shape[1],
+        "solve/parameters": result.system.parameters,
         "rules/name": np.array(result.excitation.name),
         "rules/firing": result.excitation.firing,
         "rules/determined": result.excitation.determined,

@@ -16,11 +16,11 @@ from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.physics import not_positive_definite
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.stages.extended_file import is_extended
+from cpfls_cli.stages.flight_source import MOTION, flight_motion
 from cpfls_cli.stages.job import Job, Outcome, begin, finish
 from cpfls_cli.stages.model_file import read_model
 from cpfls_cli.stages.predict_extended import extended_prediction
 from cpfls_cli.stages.sources import read_good, read_with
-from cpfls_cli.stages.training import MOTION, flight_motion
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:

@@ -2,78 +2,83 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.formats import FLIGHT, SELECTION
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.formats import SELECTION
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.identification.data import split_flight
-from cpfls_cli.reduction.baseline import random_selections
-from cpfls_cli.reduction.greedy import check_reducible, reduce
+from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.reduction.baseline import random_streamed
 from cpfls_cli.reduction.selection import Selection
-from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.reduction.streamed import check_streamed, reduce_streamed
+from cpfls_cli.reduction.survey import survey
+from cpfls_cli.regressor.regressor import Regressor, data_ranges, joined_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.stages.job import Job, Outcome, begin, finish
-from cpfls_cli.stages.sources import read_with
 from cpfls_cli.stages.study import generator, settings_of
-from cpfls_cli.stages.training import MOTION, flight_motion
+from cpfls_cli.stages.training import flight_roles, split_training
 
 RANDOM_DRAWS = 20
 
+# Samples whose regressor is written out at a time.
+_BLOCK = 4096
 
-def run(job: Job, flight: Path) -> Outcome:
-    """Select samples of a flight and write their indices.
+
+def run(job: Job, flights: Sequence[Path]) -> Outcome:
+    """Select samples of flights and write their indices.
 
     Parameters
     ----------
     job : Job
-    flight : Path
+    flights : sequence of Path
 
     Returns
     -------
     Outcome
     """
-    started = begin(job, {"flight": flight})
-    source = read_with(flight, FLIGHT, "time", *MOTION)
-    with _naming(flight), settings_of("reduction", job.study):
-        Q = _regressor(source, job.study)
+    started = begin(job, flight_roles(flights))
+    split = split_training(flights, job.study, torque=False)
+    settings, rng = job.study.reduction, generator(job.study, "reduce")
+    with _naming(flights), settings_of("reduction", job.study):
+        surveyed = survey(_regressor(split.training, job.study), settings.rank_tolerance)
         if started.dry_run is not None:
-            check_reducible(Q, job.study.reduction)
+            check_streamed(surveyed, settings, rng)
             return started.dry_run
-        selection = reduce(Q, job.study.reduction, job.progress)
-        random = _random(Q, len(selection.indices), job.study)
-    finish(job, SELECTION, _data(selection, len(Q), random), started.inputs)
-    return _outcome(selection, len(Q), random, job.study.reduction.condition_number)
+        selection = reduce_streamed(surveyed, settings, rng, job.progress)
+        draws = random_streamed(surveyed, len(selection.indices), RANDOM_DRAWS, rng)
+    random = np.array([draw.condition_number for draw in draws])
+    indices = split.training_indices[selection.indices]
+    finish(job, SELECTION, _data(replace(selection, indices=indices), surveyed.samples, random), started.inputs)
+    return _outcome(selection, surveyed.samples, random, settings.condition_number)
 
 
 @contextmanager
-def _naming(flight: Path) -> Iterator[None]:
+def _naming(flights: Sequence[Path]) -> Iterator[None]:
     try:
         yield
     except ComputationError as error:
-        raise ComputationError(f"{flight}: {error}") from None
+        raise ComputationError(f"{' '.join(str(path) for path in flights)}: {error}") from None
 
 
-def _regressor(flight: Artifact, study: Study) -> Array:
-    """Regressor of the part of a flight that trains, at uniform partitions."""
-    training = split_flight(flight.array("time"), study.identification.training_share, 0.0).training
-    motion = flight_motion(flight)[training]
+def _regressor(training: TorqueSource, study: Study) -> Callable[[], Iterator[Array]]:
+    """Regressor of the parts of flights that train, at uniform partitions, block by block."""
     structure = model_structure(study.identification)
-    return Regressor(structure, motion, data_ranges(structure, motion.attitude)).matrix(uniform_breakpoints(structure))
+    partitions = uniform_breakpoints(structure)
+    ranges = joined_ranges(data_ranges(structure, data.motion.attitude) for data in training.chunks())
 
+    def blocks() -> Iterator[Array]:
+        for data in training.chunks():
+            for start in range(0, len(data), _BLOCK):
+                yield Regressor(structure, data.motion[start : start + _BLOCK], ranges).matrix(partitions)
 
-def _random(Q: Array, size: int, study: Study) -> Array:
-    """Condition numbers of random choices of equal size: what any rule must beat."""
-    rng = generator(study, "reduce")
-    draws = random_selections(Q, size, RANDOM_DRAWS, rng, study.reduction.rank_tolerance)
-    return np.array([draw.condition_number for draw in draws])
+    return blocks
 
 
 def _data(selection: Selection, candidates: int, random: Array) -> dict[str, Any]:

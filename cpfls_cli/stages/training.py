@@ -1,81 +1,127 @@
-"""Training data of a study: one flight, split, and where given reduced to a selection."""
+"""Training data of a study: flights, each split, and where given reduced to a selection."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from cpfls_cli.arrays import IntArray
-from cpfls_cli.artifacts.formats import FLIGHT, SELECTION
+from cpfls_cli.artifacts.formats import SELECTION
 from cpfls_cli.artifacts.hashing import file_sha256
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
-from cpfls_cli.identification.data import Split, TorqueData, split_flight
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.stages.sources import read_good, read_with
+from cpfls_cli.identification.data import Split, TorqueSource, gathered, joined, sample_times, split_flight
+from cpfls_cli.stages.flight_source import flight_source, part_of
+from cpfls_cli.stages.sources import read_good
 
-MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
+REST = "held-out rest"
+
+
+@dataclass(frozen=True)
+class SplitFlights:
+    """Flights, each with a leading part that trains and a rest that is held out.
+
+    Attributes
+    ----------
+    paths : tuple of Path
+    flights : tuple of TorqueSource
+    splits : tuple of Split
+    """
+
+    paths: tuple[Path, ...]
+    flights: tuple[TorqueSource, ...]
+    splits: tuple[Split, ...]
+
+    @property
+    def training(self) -> TorqueSource:
+        """The parts that train, one after the other."""
+        return joined(
+            [part_of(flight, split.training) for flight, split in zip(self.flights, self.splits, strict=True)]
+        )
+
+    @property
+    def training_indices(self) -> IntArray:
+        """Indices of the samples that train among all samples of the flights, one after the other."""
+        starts = np.cumsum([0, *(len(flight) for flight in self.flights)])
+        return np.concatenate(
+            [start + np.arange(split.training.stop) for start, split in zip(starts, self.splits, strict=False)]
+        )
+
+    @property
+    def rests(self) -> dict[str, TorqueSource]:
+        """The parts that are held out, by name."""
+        several = len(self.paths) > 1
+        return {
+            f"{REST} of {path.name}" if several else REST: part_of(flight, split.held_out)
+            for path, flight, split in zip(self.paths, self.flights, self.splits, strict=True)
+            if split.held_out.stop > split.held_out.start
+        }
 
 
 @dataclass(frozen=True)
 class TrainingData:
-    """A flight and what of it trains.
+    """What a model is learned from and judged on.
 
     Attributes
     ----------
-    flight : TorqueData
-        The whole flight.
-    split : Split
-    learned : array of int, shape (samples,)
-        Indices into the flight that parameters are learned from, ascending.
+    training : TorqueSource
+        All that trains: judges chromosomes, and gives the input ranges.
+    learned : TorqueSource
+        The samples of it that parameters are learned from.
+    rests : mapping of str to TorqueSource
+        What of the flights is held out, by name.
+    indices : array of int, shape (learned samples,)
+        Of the learned samples among all samples of the flights, one flight after the other; ascending.
     """
 
-    flight: TorqueData
-    split: Split
-    learned: IntArray
+    training: TorqueSource
+    learned: TorqueSource
+    rests: Mapping[str, TorqueSource]
+    indices: IntArray
 
 
-def flight_motion(flight: Artifact) -> Motion:
-    """Take the motion of a flight.
+def flight_roles(flights: Sequence[Path]) -> dict[str, Path]:
+    """Give the flights that train their roles as inputs: ``flight``, ``flight-2`` and so on."""
+    return {"flight" if number == 1 else f"flight-{number}": path for number, path in enumerate(flights, start=1)}
+
+
+def split_training(flights: Sequence[Path], study: Study, *, torque: bool = True) -> SplitFlights:
+    """Open flights and split each as the study says.
 
     Parameters
     ----------
-    flight : Artifact
+    flights : sequence of Path
+    study : Study
+    torque : bool
+        Whether their torque is needed.
 
     Returns
     -------
-    Motion
+    SplitFlights
+
+    Raises
+    ------
+    InputError
+        If one is no good flight, or is given twice.
     """
-    attitude, rate, acceleration = (flight.array(name) for name in MOTION)
-    return Motion(attitude, rate, acceleration)
+    _refuse_twice(flights)
+    settings, sources = study.identification, [flight_source(path, torque=torque) for path in flights]
+    splits = [split_flight(sample_times(source), settings.training_share, settings.embargo_s) for source in sources]
+    return SplitFlights(tuple(flights), tuple(sources), tuple(splits))
 
 
-def read_torque_data(path: Path) -> TorqueData:
-    """Read a flight with its torque.
+def read_training(flights: Sequence[Path], selection: Path | None, study: Study) -> TrainingData:
+    """Open flights and find what of them trains.
 
     Parameters
     ----------
-    path : Path
-
-    Returns
-    -------
-    TorqueData
-    """
-    flight = read_with(path, FLIGHT, "time", *MOTION, "torque")
-    return TorqueData(flight.array("time"), flight_motion(flight), flight.array("torque"))
-
-
-def read_training(path: Path, selection: Path | None, study: Study) -> TrainingData:
-    """Read a flight and find what of it trains.
-
-    Parameters
-    ----------
-    path : Path
+    flights : sequence of Path
     selection : Path, optional
-        Made from this very flight.
+        Made from these very flights.
     study : Study
 
     Returns
@@ -85,31 +131,52 @@ def read_training(path: Path, selection: Path | None, study: Study) -> TrainingD
     Raises
     ------
     InputError
-        If the selection was made from another flight, or holds samples of the held-out part.
+        If the selection was made from other flights, or holds samples of a held-out part.
     """
-    flight = read_torque_data(path)
-    split = split_flight(flight.time, study.identification.training_share, study.identification.embargo_s)
-    indices = np.arange(split.training.stop)
-    if selection is not None:
-        indices = _selected(path, selection, split.training.stop)
-    return TrainingData(flight, split, indices)
+    split = split_training(flights, study)
+    training, candidates = split.training, split.training_indices
+    if selection is None:
+        return TrainingData(training, training, split.rests, candidates)
+    indices = _selected(flights, selection, candidates)
+    learned = gathered(training, np.searchsorted(candidates, indices))
+    return TrainingData(training, learned, split.rests, indices)
 
 
-def _selected(path: Path, selection: Path, training_end: int) -> IntArray:
+def _refuse_twice(flights: Sequence[Path]) -> None:
+    known: dict[str, Path] = {}
+    for path in flights if len(flights) > 1 else ():
+        if path.is_file() and known.setdefault(file_sha256(path), path) is not path:
+            raise InputError(f"{path}: holds the same flight as {known[file_sha256(path)]}; give each flight once")
+
+
+def _selected(flights: Sequence[Path], selection: Path, candidates: IntArray) -> IntArray:
     artifact = read_good(selection, SELECTION)
-    source = artifact.header.inputs.get("flight")
-    if source is None or source.sha256 != file_sha256(path):
-        name = source.name if source else "an unknown flight"
-        raise InputError(
-            f"{selection}: was made from another flight ({name}, sha256 differs from {path}); "
-            f"run `cpfls reduce` on {path}"
-        )
+    _require_made_from(flights, selection, artifact)
     indices = np.unique(artifact.array("indices").astype(np.int64))
     if len(indices) == 0 or indices[0] < 0 or len(indices) != len(artifact.array("indices")):
         raise InputError(f"{selection}: indices is empty, negative or repeats itself; run `cpfls reduce` again")
-    if indices[-1] >= training_end:
+    if not np.isin(indices, candidates).all():
         raise InputError(
-            f"{selection}: selects samples beyond the first {training_end} that train; "
+            f"{selection}: selects samples beyond the {len(candidates)} that train; "
             "identification.training_share has changed since: run `cpfls reduce` again"
         )
     return indices
+
+
+def _require_made_from(flights: Sequence[Path], selection: Path, artifact: Artifact) -> None:
+    sources = {role: source for role, source in artifact.header.inputs.items() if role.startswith("flight")}
+    roles = flight_roles(flights)
+    names = " ".join(str(path) for path in flights)
+    if len(sources) != len(roles):
+        raise InputError(
+            f"{selection}: was made from {len(sources)} flight(s), not from these {len(roles)}; "
+            f"run `cpfls reduce` on {names}"
+        )
+    for role, path in roles.items():
+        source = sources.get(role)
+        if source is None or source.sha256 != file_sha256(path):
+            name = source.name if source else "an unknown flight"
+            raise InputError(
+                f"{selection}: was made from another flight ({name}, sha256 differs from {path}); "
+                f"run `cpfls reduce` on {names}"
+            )

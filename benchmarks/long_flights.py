@@ -1,0 +1,169 @@
+"""Time per sample and peak memory of reduction and identification, from 5e3 to 5e6 samples.
+
+python benchmarks/long_flights.py [--most 5000000] [--plot docs/long-flights.svg]
+
+Each flight is the paper's, tiled, with noise on its motion and torque. Every line runs in a process of its own, whose
+peak memory is read at its end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import h5py
+import numpy as np
+
+from benchmarks.shared.studies import CONFIG, paper_flight, paper_study
+from cpfls_cli import __version__
+from cpfls_cli.artifacts.hashing import text_sha256
+from cpfls_cli.artifacts.spec import SCHEMA_VERSION
+from cpfls_cli.config.resolved import resolved_yaml
+from cpfls_cli.identification.chromosome import LARGEST_GENE
+from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.local_search import refine
+from cpfls_cli.stages.flight_source import MOTION, flight_source
+
+SIZES = (5_000, 50_000, 500_000, 5_000_000)
+NOISE = 0.01
+EVALUATIONS = 3
+BUDGET = 4
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--most", type=int, default=SIZES[-1])
+    parser.add_argument("--plot", type=Path)
+    parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
+    asked = parser.parse_args()
+    if asked.one:
+        print(json.dumps(measure(asked.one)))
+        return
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for samples in (size for size in SIZES if size <= asked.most):
+            flight = Path(folder) / "flight.h5"
+            write_tiled(flight, samples)
+            one = in_own_process(flight)
+            reduced = by_command("reduce", flight, Path(folder) / "selection.h5")
+            rows.append((samples, one["evaluation"], one["search"], one["memory"], *reduced))
+            flight.unlink()
+    columns = (
+        "samples",
+        "evaluation, us per sample",
+        "local search, us per sample",
+        "peak memory, MB",
+        "`cpfls reduce` to 685, s",
+        "its peak memory, MB",
+    )
+    table("long_flights", columns, rows)
+    if asked.plot:
+        plot(rows, asked.plot)
+
+
+def write_tiled(path: Path, samples: int) -> None:
+    """Write a flight artifact block by block: the paper's flight over and over, with noise."""
+    flight, rng = paper_flight(), np.random.default_rng(6)
+    names = ("attitude", "rate", "acceleration")
+    signals = dict(zip(MOTION, (getattr(flight.motion, name) for name in names), strict=True)) | {
+        "torque": flight.torque
+    }
+    config = resolved_yaml(paper_study())
+    with h5py.File(path, "w") as file:
+        header = {"format": "cpfls/flight", "schema_version": SCHEMA_VERSION, "cpfls_version": __version__, "seed": 6}
+        file.attrs.update(header | {"config_sha256": text_sha256(config)})
+        file["config"] = np.bytes_(config.encode())
+        file["time"] = 0.01 * np.arange(samples)
+        for name, values in signals.items():
+            dataset, scale = file.create_dataset(name, (samples, 3)), NOISE * values.std(axis=0)
+            for start in range(0, samples, len(flight)):
+                count = min(len(flight), samples - start)
+                dataset[start : start + count] = values[:count] + scale * rng.standard_normal((count, 3))
+
+
+def measure(path: Path) -> dict[str, float]:
+    """Time evaluations of a flight; report microseconds per sample and peak memory in MB."""
+    source = flight_source(path)
+    evaluator = model_evaluator(source, source, paper_study().identification)
+    chromosome = np.full(evaluator.structure.genes, 30000)
+    evaluator.objectives(chromosome, fitted(evaluator, chromosome))
+    evaluation = np.median(
+        [
+            per_sample(lambda: evaluator.objectives(chromosome, fitted(evaluator, chromosome)), source)
+            for _ in range(EVALUATIONS)
+        ]
+    )
+    fit = fitted(evaluator, chromosome)
+    search = per_sample(partial(refine, evaluator.solver, chromosome / LARGEST_GENE, fit, BUDGET), source)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return {"evaluation": float(evaluation), "search": search, "memory": peak}
+
+
+def fitted(evaluator, chromosome: np.ndarray):
+    fit = evaluator.fit(chromosome)
+    assert fit is not None
+    return fit
+
+
+def per_sample(work, source: TorqueSource) -> float:
+    start = perf_counter()
+    work()
+    return 1e6 * (perf_counter() - start) / len(source)
+
+
+def in_own_process(path: Path) -> dict[str, float]:
+    command = [sys.executable, __file__, "--one", str(path)]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def by_command(command: str, flight: Path, output: Path) -> tuple[float, float]:
+    """Run a command of the program on a flight: seconds, and peak memory in MB."""
+    code = (
+        "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
+        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)"
+    )
+    full = [sys.executable, "-m", "cpfls_cli", command, str(CONFIG), str(flight), "-o", str(output), "--force"]
+    start = perf_counter()
+    done = subprocess.run([sys.executable, "-c", code, *full], check=True, capture_output=True, text=True)
+    return perf_counter() - start, float(done.stdout)
+
+
+def plot(rows, path: Path) -> None:
+    """Draw time per sample and peak memory over the number of samples."""
+    import matplotlib as mpl
+
+    mpl.use("svg")
+    import matplotlib.pyplot as plt
+
+    mpl.rcParams["svg.hashsalt"] = "cpfls"
+    samples = [row[0] for row in rows]
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2), layout="constrained")
+    left.loglog(samples, [row[1] for row in rows], "k-o", label="one evaluation")
+    left.loglog(samples, [row[2] for row in rows], "k--s", label="one local search, 4 evaluations")
+    left.set(xlabel="samples", ylabel="time per sample, us")
+    right.semilogx(samples, [row[3] for row in rows], "k-o", label="identification")
+    right.semilogx(samples, [row[5] for row in rows], "k--s", label="reduction")
+    right.axhline(1024, color="0.6", label="1 GB")
+    right.set(xlabel="samples", ylabel="peak memory, MB", ylim=(0, None))
+    for axes in (left, right):
+        axes.grid(color="0.9")
+        axes.legend(frameon=False)
+    figure.savefig(path, metadata={"Date": None})
+
+
+if __name__ == "__main__":
+    main()

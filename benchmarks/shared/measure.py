@@ -1,0 +1,74 @@
+"""Two things timed in turn, tables in Markdown, and the same as JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+RESULTS = Path(__file__).resolve().parents[1] / "results"
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """How much longer one thing takes than another, both timed in turn."""
+
+    slow_s: float
+    fast_s: float
+    ratio: float
+    lowest: float
+    highest: float
+
+    @property
+    def range(self) -> str:
+        return f"{self.ratio:.3g} ({self.lowest:.3g} to {self.highest:.3g})"
+
+
+def in_turn(slow: Callable[[], object], fast: Callable[[], object], repeats: int = 7) -> Ratio:
+    """Time two things in turn, each once unmeasured before; medians, and the range of the ratio."""
+    slow(), fast()
+    times = [(seconds(slow), seconds(fast)) for _ in range(repeats)]
+    ratios = [one / other for one, other in times]
+    both = (median(time[place] for time in times) for place in (0, 1))
+    return Ratio(*both, median(ratios), min(ratios), max(ratios))
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """Time something once."""
+    start = perf_counter()
+    work()
+    return perf_counter() - start
+
+
+def pin_threads() -> None:
+    """Limit linear algebra to one thread; call it before anything numerical is imported."""
+    from cpfls_cli.cli.threads import use_one_thread
+
+    use_one_thread()
+
+
+def table(name: str, columns: Sequence[str], rows: Sequence[Sequence[Any]], **more: Any) -> None:
+    """Print a Markdown table and write it, with the machine in words, to ``benchmarks/results/NAME.json``."""
+    print("| " + " | ".join(columns) + " |")
+    print("|" + "---|" * len(columns))
+    for row in rows:
+        print("| " + " | ".join(_text(value) for value in row) + " |", flush=True)
+    RESULTS.mkdir(exist_ok=True)
+    records = [dict(zip(columns, row, strict=True)) for row in rows]
+    content: Mapping[str, Any] = {"machine": machine(), "rows": records, **more}
+    (RESULTS / f"{name}.json").write_text(json.dumps(content, indent=1, default=float) + "\n", encoding="utf-8")
+
+
+def machine() -> str:
+    """Describe the machine in words."""
+    return f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
+
+
+def _text(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,261 @@
+"""Samples to fit or to judge: sums over them for any partitions, without a regressor in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.identification.data import TorqueData, TorqueSource
+from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
+from cpfls_cli.regressor import kernels
+from cpfls_cli.regressor.kernels import Chunk, Table
+from cpfls_cli.regressor.regressor import Breakpoints
+from cpfls_cli.regressor.structure import ModelStructure
+from cpfls_cli.regressor.table import padded_breakpoints, structure_table
+
+# Samples that are kept ready for the compiled loops, 96 to 240 bytes each; more are made ready each time anew.
+_KEPT = 200_000
+
+
+@dataclass(frozen=True)
+class Products:
+    """Sums of products over samples, one for each label; the six rigid-body columns, if any, come first.
+
+    Attributes
+    ----------
+    gram : array, shape (labels, columns, columns)
+        ``A^T A`` of the columns.
+    moment : array, shape (labels, columns)
+        ``A^T tau``.
+    square : array, shape (labels,)
+        ``tau^T tau``.
+    rows : array of int, shape (labels,)
+        Rows summed over, three per sample.
+    """
+
+    gram: Array
+    moment: Array
+    square: Array
+    rows: IntArray
+
+    def sum(self, labels: Array | slice = slice(None)) -> Products:
+        """Add up some labels; the result has one."""
+        parts = (self.gram, self.moment, self.square, self.rows)
+        return Products(*(np.sum(part[labels], axis=0, keepdims=True) for part in parts))
+
+
+@dataclass(frozen=True)
+class MovedProducts:
+    """Products with the derivatives M of the model torque by the inner breakpoints, at fixed parameters.
+
+    Attributes
+    ----------
+    columns : array, shape (columns, breakpoints)
+        ``A^T M``.
+    moved : array, shape (breakpoints, breakpoints)
+        ``M^T M``.
+    residual : array, shape (breakpoints,)
+        ``M^T r``, r the residual.
+    square : float
+        ``r^T r``.
+    """
+
+    columns: Array
+    moved: Array
+    residual: Array
+    square: float
+
+
+@dataclass(frozen=True)
+class Ready:
+    """Samples made ready for compiled loops, chunk by chunk.
+
+    Attributes
+    ----------
+    source : TorqueSource
+    rigid : bool
+        Whether a rigid body stands beside the fuzzy columns.
+    """
+
+    source: TorqueSource
+    rigid: bool
+
+    def __iter__(self) -> Iterator[Chunk]:
+        """Make one chunk ready after the other, or take those that are kept."""
+        return iter(self._kept) if len(self.source) <= _KEPT else self._made()
+
+    @cached_property
+    def _kept(self) -> list[Chunk]:
+        return list(self._made())
+
+    def _made(self) -> Iterator[Chunk]:
+        for data in self.source.chunks():
+            yield _chunk(data, self.rigid)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples whose rows are scaled by axis and added up by label.
+
+    Attributes
+    ----------
+    ready : Ready
+    structure : ModelStructure
+    ranges : tuple of InputRange
+        Of roll and pitch over the training data.
+    scale : array, shape (3,)
+    label : array of int, shape (samples,)
+        From 0.
+    labels : int
+    """
+
+    ready: Ready
+    structure: ModelStructure
+    ranges: tuple[InputRange, InputRange]
+    scale: Array
+    label: IntArray
+    labels: int
+
+    @classmethod
+    def of(cls, ready: Ready, structure: ModelStructure, ranges: tuple[InputRange, InputRange]) -> Samples:
+        """Take samples as they are, all under one label."""
+        return cls(ready, structure, ranges, np.ones(3), np.zeros(len(ready.source), dtype=np.int64), 1)
+
+    @cached_property
+    def table(self) -> Table:
+        """The structure as compiled loops read it."""
+        return structure_table(self.structure, self.ranges)
+
+    def products(self, partitions: Breakpoints) -> Products:
+        """Add up the products of all columns with each other and with the torque.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+
+        Returns
+        -------
+        Products
+        """
+        P, dense = self.table.parameters, self._dense_products
+        gram, moment = np.zeros((self.labels, P, P)), np.zeros((self.labels, P, dense.shape[1]))
+        breakpoints = padded_breakpoints(partitions)
+        for chunk, label in self._chunks():
+            kernels.add_gram(self.table, breakpoints, chunk, self.scale, label, gram, moment)
+        gram = gram + gram.swapaxes(1, 2)
+        gram[:, np.arange(P), np.arange(P)] *= 0.5
+        rigid = moment[:, :, 1:]
+        whole = np.block([[dense[:, 1:, 1:], rigid.swapaxes(1, 2)], [rigid, gram]])
+        columns = np.concatenate([dense[:, 1:, 0], moment[:, :, 0]], axis=1)
+        return Products(whole, columns, dense[:, 0, 0], 3 * np.bincount(self.label, minlength=self.labels))
+
+    def errors(self, partitions: Breakpoints, coefficients: Array, rigid_body: Array) -> tuple[Array, Array]:
+        """Add up the squared residuals of a model and find the largest.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+        coefficients : array, shape (parameters,)
+        rigid_body : array, shape (6,)
+            Not used without a rigid body.
+
+        Returns
+        -------
+        square : array, shape (labels,)
+        largest : array, shape (labels,)
+        """
+        square, largest = np.zeros((self.labels, 1)), np.zeros((self.labels, 1))
+        breakpoints, weights = padded_breakpoints(partitions), self._weights(rigid_body)
+        for chunk, label in self._chunks():
+            kernels.add_errors(
+                self.table, breakpoints, chunk, self.scale, label, coefficients[None], weights, square, largest
+            )
+        return square[:, 0], largest[:, 0]
+
+    def projected(self, partitions: Breakpoints, parameters: Array, directions: Array) -> tuple[Array, Array]:
+        """Multiply out residual and columns, without the loss that products of products would have.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+        parameters : array, shape (columns,)
+        directions : array, shape (columns, n)
+
+        Returns
+        -------
+        square : array, shape (n, n)
+            ``(A V)^T (A V)`` of the directions V.
+        back : array, shape (columns,)
+            ``A^T r`` of the residual of the parameters.
+        """
+        rigid = RIGID if self.ready.rigid else 0
+        models = np.vstack([parameters, -directions.T])
+        weights = np.hstack([np.zeros((len(models), 1)), -models[:, :rigid]])
+        weights[0, 0] = 1.0
+        square, columns = np.zeros((len(models), len(models))), 1 + rigid
+        back, dense_back = np.zeros((self.table.parameters, 1)), np.zeros((columns, 1))
+        breakpoints, coefficients = padded_breakpoints(partitions), np.ascontiguousarray(models[:, rigid:])
+        for chunk, _ in self._chunks():
+            kernels.add_combined(
+                self.table, breakpoints, chunk, self.scale, coefficients, weights, square, back, dense_back
+            )
+        return square[1:, 1:], np.concatenate([dense_back[1:, 0], back[:, 0]])
+
+    def moved(self, partitions: Breakpoints, coefficients: Array, rigid_body: Array) -> MovedProducts:
+        """Add up the products with the derivatives of the torque by the inner breakpoints.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+        coefficients : array, shape (parameters,)
+        rigid_body : array, shape (6,)
+            Not used without a rigid body.
+
+        Returns
+        -------
+        MovedProducts
+        """
+        B, weights = self.table.breakpoints, self._weights(rigid_body)[0]
+        cross, square = np.zeros((self.table.parameters, B + 1)), np.zeros((B + 1, B + 1))
+        dense = np.zeros((len(weights), B + 1))
+        breakpoints = padded_breakpoints(partitions)
+        for chunk, _ in self._chunks():
+            kernels.add_moved(self.table, breakpoints, chunk, self.scale, coefficients, weights, cross, dense, square)
+        square = square + square.T
+        square[np.diag_indices(B + 1)] *= 0.5
+        return MovedProducts(
+            np.vstack([dense[1:, :B], cross[:, :B]]), square[:B, :B], square[:B, B], float(square[B, B])
+        )
+
+    @cached_property
+    def _dense_products(self) -> Array:
+        """Products of torque and rigid-body columns, shape (labels, dense, dense)."""
+        columns = 1 + (RIGID if self.ready.rigid else 0)
+        total = np.zeros((self.labels, columns, columns))
+        for chunk, label in self._chunks():
+            dense = chunk.dense * self.scale[:, None]
+            for own in np.unique(label):
+                rows = dense[label == own].reshape(-1, columns)
+                total[own] += rows.T @ rows
+        return total
+
+    def _chunks(self) -> Iterator[tuple[Chunk, IntArray]]:
+        start = 0
+        for chunk in self.ready:
+            yield chunk, self.label[start : start + len(chunk.attitude)]
+            start += len(chunk.attitude)
+
+    def _weights(self, rigid_body: Array) -> Array:
+        return np.concatenate([[1.0], -rigid_body])[None] if self.ready.rigid else np.ones((1, 1))
+
+
+def _chunk(data: TorqueData, rigid: bool) -> Chunk:
+    columns = [data.torque[:, :, None], rigid_columns(data.motion)] if rigid else [data.torque[:, :, None]]
+    motion = data.motion
+    attitude, rate, acceleration = map(np.ascontiguousarray, (motion.attitude, motion.rate, motion.acceleration))
+    return Chunk(attitude, rate, acceleration, np.concatenate(columns, axis=2))

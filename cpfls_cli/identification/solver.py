@@ -1,0 +1,201 @@
+"""The linear parameters of a model for given partitions, with and without a rigid body underneath."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.identification.cross_validation import RidgeCurve, ridge_curve
+from cpfls_cli.identification.dense import decomposed
+from cpfls_cli.identification.fit import Fit
+from cpfls_cli.identification.least_squares import LeastSquares
+from cpfls_cli.identification.normal_equations import NormalEquations, Project, solve_normal
+from cpfls_cli.identification.rigid_columns import RIGID
+from cpfls_cli.identification.samples import Products, Samples
+from cpfls_cli.regressor.regressor import Breakpoints
+
+NO_RIGID_BODY = np.zeros(RIGID)
+LARGEST_SQUARE = 1e200
+
+
+@dataclass(frozen=True)
+class RidgeChoice:
+    """What chooses the ridge weight of a fuzzy part over a rigid body.
+
+    Attributes
+    ----------
+    judged : Samples
+        The whole training part, labelled by fold.
+    left_out : array of bool, shape (folds, labels)
+        Labels of the learned samples that do not train in each fold.
+    weights : array, shape (tried,)
+    """
+
+    judged: Samples
+    left_out: BoolArray
+    weights: Array
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Solves for fuzzy coefficients: all torque from them, the paper's; or over six free inertia parameters.
+
+    Attributes
+    ----------
+    learned : Samples
+        The samples that parameters are learned from.
+    ridge : RidgeChoice or None
+        With a rigid body underneath: how the ridge on the coefficients is chosen. Without: no ridge.
+    rank_tolerance : float
+    """
+
+    learned: Samples
+    ridge: RidgeChoice | None
+    rank_tolerance: float
+
+    def fit(self, partitions: Breakpoints) -> Fit | None:
+        """Solve for the linear parameters, with a ridge weight of their own.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+
+        Returns
+        -------
+        Fit or None
+            None where the regressor is not finite.
+        """
+        products = self.learned.products(partitions)
+        if not _usable(products):
+            return None
+        weight, error, size = 0.0, None, np.ones(self.learned.table.parameters)
+        if self.ridge is not None:
+            size = column_size(products.sum())
+            curve = self._curve(products, partitions, size)
+            weight, error = float(curve.weight[curve.chosen]), float(curve.error[curve.chosen])
+        return self._solved(products.sum(), partitions, weight, size, error)
+
+    def curve(self, partitions: Breakpoints) -> RidgeCurve | None:
+        """Cross-validate the ridge weight.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+
+        Returns
+        -------
+        RidgeCurve or None
+            None without a ridge.
+        """
+        products = self.learned.products(partitions)
+        return None if self.ridge is None else self._curve(products, partitions, column_size(products.sum()))
+
+    def equations(self, partitions: Breakpoints, weight: float, size: Array) -> NormalEquations:
+        """Set up the equations for a given ridge.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+        weight : float
+            Finite.
+        size : array, shape (parameters,)
+            What the columns of the fuzzy part are divided by.
+
+        Returns
+        -------
+        NormalEquations
+        """
+        return self._equations(self.learned.products(partitions).sum(), weight, size)
+
+    def parameters(self, solution: Array, size: Array) -> tuple[Array, Array]:
+        """Take apart a solution of the equations: fuzzy coefficients and rigid body."""
+        if self.ridge is None:
+            return solution / size, NO_RIGID_BODY
+        return solution[RIGID:] / size, solution[:RIGID]
+
+    def exact(self, partitions: Breakpoints, fit: Fit) -> tuple[Fit, LeastSquares]:
+        """Solve again by a singular value decomposition of all rows.
+
+        Parameters
+        ----------
+        partitions : sequence of array, shape (functions,)
+        fit : Fit
+            Gives the ridge.
+
+        Returns
+        -------
+        fit : Fit
+        unpenalised : LeastSquares
+            Of the parameters in use, without any penalty: what the data determine.
+        """
+        return decomposed(self.learned, partitions, fit, self.rank_tolerance)
+
+    def _curve(self, products: Products, partitions: Breakpoints, size: Array) -> RidgeCurve:
+        assert self.ridge is not None
+        judged = self.ridge.judged.products(partitions)
+        return ridge_curve(products, judged, self.ridge.left_out, self.ridge.weights, size)
+
+    def _solved(
+        self, products: Products, partitions: Breakpoints, weight: float, size: Array, error: float | None
+    ) -> Fit:
+        """Solve the equations; without a ridge the error is that of the solution itself."""
+        scale, divide = self.learned.scale, self._divide(size)
+
+        def project(parameters: Array, directions: Array) -> tuple[Array, Array]:
+            square, back = self.learned.projected(partitions, parameters / divide, directions / divide[:, None])
+            return square, back / divide
+
+        if np.isinf(weight):
+            rigid = NormalEquations(products.gram[0, :RIGID, :RIGID], products.moment[0, :RIGID], np.zeros(RIGID))
+            solution = solve_normal(rigid, self.rank_tolerance, _of_rigid_body(project, len(size)))
+            coefficients, rigid_body = np.zeros_like(size), solution.parameters
+        else:
+            equations = self._equations(products, weight, size)
+            solution = solve_normal(equations, self.rank_tolerance, project)
+            coefficients, rigid_body = self.parameters(solution.parameters, size)
+            if error is None:
+                error = float((products.square[0] - equations.moment @ solution.parameters) / products.rows[0])
+        return Fit(coefficients, rigid_body, weight, error or 0.0, solution.conditioning, scale, size)
+
+    def _equations(self, products: Products, weight: float, size: Array) -> NormalEquations:
+        divide = self._divide(size)
+        penalty = np.full(len(divide), weight * products.rows[0])
+        penalty[: len(divide) - len(size)] = 0.0
+        return NormalEquations(products.gram[0] / (divide * divide[:, None]), products.moment[0] / divide, penalty)
+
+    def _divide(self, size: Array) -> Array:
+        return size if self.ridge is None else np.concatenate([np.ones(RIGID), size])
+
+
+def column_size(products: Products) -> Array:
+    """Root mean square of the fuzzy columns; 1 for columns of zeros.
+
+    Parameters
+    ----------
+    products : Products
+        Of columns with a rigid body before them.
+
+    Returns
+    -------
+    array, shape (parameters,)
+    """
+    size = np.sqrt(np.diag(products.gram[0])[RIGID:] / products.rows[0])
+    return np.where(size > 0, size, 1.0)
+
+
+def _of_rigid_body(project: Project, parameters: int) -> Project:
+    """Restrict products to the columns of the rigid body, which come first."""
+
+    def projected(rigid_body: Array, directions: Array) -> tuple[Array, Array]:
+        below = np.zeros((parameters, directions.shape[1]))
+        square, back = project(np.append(rigid_body, below[:, 0]), np.vstack([directions, below]))
+        return square, back[:RIGID]
+
+    return projected
+
+
+def _usable(products: Products) -> bool:
+    """Tell whether a regressor is finite and no slope of a very narrow function beyond what squares can carry."""
+    return bool(np.isfinite(products.gram).all() and np.max(np.abs(products.gram)) <= LARGEST_SQUARE)

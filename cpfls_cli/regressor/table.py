@@ -1,0 +1,83 @@
+"""A model structure in the numbers that compiled loops read."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.regressor.kernels import Table
+from cpfls_cli.regressor.regressor import Breakpoints
+from cpfls_cli.regressor.structure import Block, ModelStructure, Partition
+
+
+def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRange]) -> Table:
+    """Write a model structure as a table.
+
+    Parameters
+    ----------
+    structure : ModelStructure
+    ranges : tuple of InputRange
+        Of roll and pitch over the training data.
+
+    Returns
+    -------
+    Table
+    """
+    settings = structure.settings
+    harmonic = settings.consequents == "harmonic"
+    active = sum(_active(structure, block) for block in structure.blocks)
+    inner = [max(partition.functions - 2, 0) for partition in structure.partitions]
+    first = np.cumsum([0, *inner[:-1]])
+    partitions = [
+        (partition.input, partition.functions, _firing(structure, partition), int(start))
+        for partition, start in zip(structure.partitions, first, strict=True)
+    ]
+    return Table(
+        blocks=np.array([_block(structure, block) for block in structure.blocks]),
+        partitions=np.array(partitions),
+        active=active + active % 2,
+        parameters=structure.parameters,
+        breakpoints=sum(inner),
+        circular=structure.circular,
+        data_range=settings.input_map == "data-range",
+        harmonic=harmonic,
+        tensor=settings.products == "tensor",
+        single=2 * settings.harmonic_order if harmonic else 1,
+        ranges=np.array([(data_range.minimum, data_range.width) for data_range in ranges]),
+    )
+
+
+def padded_breakpoints(partitions: Breakpoints) -> Array:
+    """Stack the breakpoints of all partitions.
+
+    Parameters
+    ----------
+    partitions : sequence of array, shape (functions,)
+
+    Returns
+    -------
+    array, shape (partitions, most functions)
+        Zero after the last breakpoint of a partition.
+    """
+    stacked = np.zeros((len(partitions), max(len(breakpoints) for breakpoints in partitions)))
+    for row, breakpoints in zip(stacked, partitions, strict=True):
+        row[: len(breakpoints)] = breakpoints
+    return stacked
+
+
+def _firing(structure: ModelStructure, partition: Partition) -> int:
+    """Rules that fire at a time: two joined into one, or one alone, always do."""
+    return 1 if partition.functions == 1 or (structure.circular and partition.functions == 2) else 2
+
+
+def _active(structure: ModelStructure, block: Block) -> int:
+    return block.features * int(np.prod([_firing(structure, structure.partitions[i]) for i in block.partitions]))
+
+
+def _block(structure: ModelStructure, block: Block) -> tuple[int, ...]:
+    first, second = (*block.partitions, 0, 0)[:2]
+    functions = structure.partitions[second].functions
+    rules = max(functions - 1, 1) if structure.circular else functions
+    place = block.function.row, block.function.column, len(block.partitions)
+    return (*place, first, second, block.features, block.columns.start, rules)
