@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-
-import numpy as np
+from dataclasses import replace
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.errors import SettingError
-from cpfls_cli.reduction.criteria import make_criterion
-from cpfls_cli.reduction.rank_start import rank_growing_start
+from cpfls_cli.reduction.criteria import EXCHANGE_INFORMATION, make_criterion
+from cpfls_cli.reduction.exchange import exchange_samples
+from cpfls_cli.reduction.limits import sample_limit, starting_samples, stop_reason
 from cpfls_cli.reduction.row_space import RowSpace, row_space
 from cpfls_cli.reduction.run import Run
-from cpfls_cli.reduction.selection import Selection, StopReason
-from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
+from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.reduction.settings import ReductionSettings
 
 Progress = Callable[[int, int], None]
 
 
 def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
-    """Choose samples one by one, each the best next one by the criterion.
+    """Choose samples one by one, each the best next one by the criterion, or all of them by exchanges.
 
     All criteria but the printed rule begin with the fewest samples that reach the full rank. Where all samples
-    together are rank deficient, the selection works in their row space.
+    together are rank deficient, the selection works in their row space. Samples chosen by exchanges are returned, and
+    traced, in the order in which the criterion D takes them.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | No
     SettingError
         See `reduce`.
     """
-    run, limit = _prepare(space, settings)
-    while not (reason := _stop_reason(run, settings, limit)):
-        run.step()
-        if progress is not None:
-            progress(len(run.indices), limit)
-    return run.selection(settings.criterion, reason)
+    limit = sample_limit(space, settings)
+    start = starting_samples(space, settings.criterion, limit)
+    if settings.criterion in EXCHANGE_INFORMATION:
+        return _exchanged(space, start, limit, settings, progress)
+    criterion = make_criterion(space, settings.criterion)
+    return _one_by_one(Run(space, criterion, start), limit, settings, progress)
 
 
 def check_space(space: RowSpace, settings: ReductionSettings) -> None:
@@ -105,44 +105,25 @@ def check_space(space: RowSpace, settings: ReductionSettings) -> None:
     SettingError
         See `reduce`.
     """
-    _prepare(space, settings)
+    starting_samples(space, settings.criterion, sample_limit(space, settings))
 
 
-def _prepare(space: RowSpace, settings: ReductionSettings) -> tuple[Run, int]:
-    """Set up a run and the most samples it may choose."""
-    limit = _sample_limit(space, settings)
-    start = _start(space, settings.criterion, limit)
-    return Run(space, make_criterion(space, settings.criterion), start), limit
+def _exchanged(
+    space: RowSpace, start: IntArray, limit: int, settings: ReductionSettings, progress: Progress | None
+) -> Selection:
+    """Exchange samples, then put those chosen in the D-optimal order, and stop there as for every criterion."""
+    information = EXCHANGE_INFORMATION[settings.criterion]
+    exchanged = exchange_samples(space, start, limit, information, settings.condition_number)
+    chosen = replace(space, rows=space.rows[exchanged.indices])
+    run = Run(chosen, make_criterion(chosen, "D"), starting_samples(chosen, "D", chosen.samples))
+    selection = _one_by_one(run, chosen.samples, settings, progress)
+    indices = exchanged.indices[selection.indices]
+    return replace(selection, indices=indices, exchanges=exchanged.exchanges)
 
 
-def _sample_limit(space: RowSpace, settings: ReductionSettings) -> int:
-    size = settings.size
-    if size is None:
-        return space.samples
-    if size > space.samples:
-        raise SettingError("size", f"the training set has only {space.samples} samples; keep fewer")
-    if size < space.smallest_samples:
-        raise _too_few(space, space.smallest_samples)
-    return size
-
-
-def _start(space: RowSpace, criterion: CriterionName, limit: int) -> IntArray:
-    if criterion == "paper-literal":
-        return np.zeros(0, dtype=np.int64)
-    start = rank_growing_start(space)
-    if len(start) > limit:
-        raise _too_few(space, len(start))
-    return start
-
-
-def _too_few(space: RowSpace, needed: int) -> SettingError:
-    return SettingError("size", f"the training set has rank {space.rank}, which takes {needed} samples or more")
-
-
-def _stop_reason(run: Run, settings: ReductionSettings, limit: int) -> StopReason | None:
-    target = settings.condition_number
-    if target is not None and run.indices and run.factor.condition_number <= target:
-        return "condition-number"
-    if len(run.indices) < limit:
-        return None
-    return "all-samples" if settings.size is None else "size"
+def _one_by_one(run: Run, limit: int, settings: ReductionSettings, progress: Progress | None) -> Selection:
+    while not (reason := stop_reason(run, settings, limit)):
+        run.step()
+        if progress is not None:
+            progress(len(run.indices), limit)
+    return run.selection(settings.criterion, reason)

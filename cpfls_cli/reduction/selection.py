@@ -60,6 +60,8 @@ class Selection(Subset):
         Numerical rank after each sample.
     stop_reason : {"size", "condition-number", "all-samples", "pool"}
         Which limit ended the selection; the pool where it, and not all samples, was used up.
+    exchanges : int
+        Samples that were replaced by others on the way.
     """
 
     condition_number_trace: Array
@@ -67,6 +69,7 @@ class Selection(Subset):
     singular_value_max_trace: Array
     rank_trace: IntArray
     stop_reason: StopReason
+    exchanges: int = 0
 
     @property
     def stalled(self) -> bool:

@@ -11,7 +11,7 @@ from typing_extensions import Doc
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
 
-CriterionName = Literal["sigma_min", "A", "D", "paper-literal"]
+CriterionName = Literal["KD-exchange", "K-exchange", "sigma_min", "A", "D", "paper-literal"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,10 +28,12 @@ class ReductionSettings(Settings):
     criterion: Annotated[
         CriterionName,
         Doc(
-            "what the next sample must improve most: sigma_min (smallest singular value), A (sum of the parameter "
-            "variances), D (their volume), paper-literal (the printed rule, which stalls below full rank)"
+            "KD-exchange (small condition number and much information, by exchanging samples), K-exchange (smallest "
+            "condition number, whatever is lost), or what the next sample must improve most: sigma_min (smallest "
+            "singular value), A (sum of the parameter variances), D (their volume), paper-literal (the printed rule, "
+            "which stalls below full rank)"
         ),
-    ] = "sigma_min"
+    ] = "KD-exchange"
     rank_tolerance: Annotated[
         float, Gt(0), Lt(1), Doc("singular values below this fraction of the largest one count as zero")
     ] = 1e-10

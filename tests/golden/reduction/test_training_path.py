@@ -29,6 +29,12 @@ def regressor():
     return Regressor(structure, motion, ranges).matrix(uniform_breakpoints(structure))
 
 
+def worst_prediction(regressor, indices):
+    """Largest standard deviation of a torque predicted anywhere on the path, per that of a torque measured."""
+    kept = regressor[indices].reshape(-1, 113)
+    return np.sqrt(np.einsum("nij,jk,nik->ni", regressor, np.linalg.inv(kept.T @ kept), regressor).max())
+
+
 @pytest.mark.parametrize(("criterion", "expected"), [("sigma_min", 3311), ("A", 3555), ("D", 5282)])
 def test_eighty_samples(regressor, criterion, expected):
     selection = reduce(regressor, ReductionSettings(criterion=criterion, size=80))
@@ -56,3 +62,24 @@ def test_printed_rule_stalls(regressor):
     selection = reduce(regressor, ReductionSettings(criterion="paper-literal", size=120))
     assert selection.stalled
     assert selection.rank < 60
+
+
+@pytest.mark.parametrize(("size", "share"), [(685, 0.45), (80, 0.50)])
+def test_exchanges_halve_the_condition_number(regressor, size, share):
+    """Measured 0.38 and 0.43."""
+    selection = reduce(regressor, ReductionSettings(criterion="KD-exchange", size=size))
+    assert selection.condition_number <= share * selection.condition_number_full
+    rows = regressor[selection.indices].reshape(-1, 113)
+    assert selection.condition_number == pytest.approx(np.linalg.cond(rows), rel=1e-6)
+
+
+def test_condition_number_alone_is_no_measure_of_a_training_set(regressor):
+    """Worst prediction measured: random 0.95, KD-exchange 0.92, K-exchange 26."""
+    chosen = {
+        name: reduce(regressor, ReductionSettings(criterion=name, size=685)) for name in ("KD-exchange", "K-exchange")
+    }
+    draws = [np.random.default_rng(seed).choice(5487, 685, replace=False) for seed in range(5)]
+    random = np.median([worst_prediction(regressor, draw) for draw in draws])
+    assert chosen["K-exchange"].condition_number < 0.3 * chosen["K-exchange"].condition_number_full
+    assert worst_prediction(regressor, chosen["K-exchange"].indices) > 5 * random
+    assert worst_prediction(regressor, chosen["KD-exchange"].indices) < 1.1 * random

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from cpfls_cli.reduction import ReductionSettings, reduce
 
 seeds = st.integers(0, 2**32 - 1)
-criteria = st.sampled_from(["sigma_min", "A", "D", "paper-literal"])
+criteria = st.sampled_from(["KD-exchange", "K-exchange", "sigma_min", "A", "D", "paper-literal"])
 
 
 def regressor(seed):

@@ -91,7 +91,7 @@ def test_long_selection_stays_exact_across_refreshes():
         assert chosen[step] == best
 
 
-@pytest.mark.parametrize("criterion", ["sigma_min", "A", "D", "paper-literal"])
+@pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "sigma_min", "A", "D", "paper-literal"])
 def test_trace_is_recomputed_condition_number(criterion):
     Q = problem(3)
     selection = reduce(Q, ReductionSettings(criterion=criterion, size=20))
@@ -117,16 +117,17 @@ def test_equal_samples_are_taken_lowest_index_first():
 
 def test_condition_number_stops_as_soon_as_it_is_reached():
     Q = problem(2)
-    trace = reduce(Q, ReductionSettings(size=40)).condition_number_trace
+    trace = reduce(Q, ReductionSettings(criterion="sigma_min", size=40)).condition_number_trace
     target = float(trace[12]) * 1.001
-    selection = reduce(Q, ReductionSettings(size=None, condition_number=target))
+    selection = reduce(Q, ReductionSettings(criterion="sigma_min", size=None, condition_number=target))
     assert selection.stop_reason == "condition-number"
     assert len(selection.indices) == np.flatnonzero(trace <= target)[0] + 1
 
 
-def test_unreachable_condition_number_takes_all_samples():
+@pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "sigma_min", "A", "D"])
+def test_unreachable_condition_number_takes_all_samples(criterion):
     Q = problem(2)
-    selection = reduce(Q, ReductionSettings(size=None, condition_number=1.01))
+    selection = reduce(Q, ReductionSettings(criterion=criterion, size=None, condition_number=1.01))
     assert selection.stop_reason == "all-samples"
     assert sorted(selection.indices) == list(range(40))
 
@@ -144,7 +145,7 @@ def test_nearly_equal_small_eigenvalues_do_not_hide_the_best_sample(seed):
     blocks[2:] *= 1.5
     faint = np.random.default_rng(seed).standard_normal((150, 3, columns)) * 1e-2
     Q = np.concatenate([blocks, faint * np.geomspace(1, 1e-3, 150)[:, None, None]])
-    chosen = reduce(Q, ReductionSettings(size=16)).indices.tolist()
+    chosen = reduce(Q, ReductionSettings(criterion="sigma_min", size=16)).indices.tolist()
     for step in range(10, 16):
         scores = {i: score("sigma_min", Q, chosen[:step], i) for i in range(160) if i not in chosen[:step]}
         assert scores[chosen[step]] >= max(scores.values()) * (1 - 1e-11)

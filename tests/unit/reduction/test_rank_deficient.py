@@ -18,7 +18,7 @@ def kept_condition_number(Q, indices, rank):
     return values[0] / values[rank - 1]
 
 
-@pytest.mark.parametrize("criterion", ["sigma_min", "A", "D"])
+@pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "sigma_min", "A", "D"])
 def test_works_in_the_row_space(criterion):
     Q = deficient()
     selection = reduce(Q, ReductionSettings(criterion=criterion, size=20))
@@ -32,7 +32,7 @@ def test_works_in_the_row_space(criterion):
 def test_same_choice_as_in_coordinates_of_full_rank():
     Q = deficient()
     reduced = Q @ np.linalg.svd(Q.reshape(-1, 16))[2][:7].T
-    for criterion in ("sigma_min", "A", "D"):
+    for criterion in ("KD-exchange", "sigma_min", "A", "D"):
         settings = ReductionSettings(criterion=criterion, size=20)
         assert reduce(Q, settings).indices.tolist() == reduce(reduced, settings).indices.tolist()
 
