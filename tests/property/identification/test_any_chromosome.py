@@ -1,0 +1,60 @@
+"""Whatever the genes, the objectives are all finite or all infinite, and refining never makes them worse."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.identification.chromosome import LARGEST_GENE, decode
+from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.settings import LocalSearchSettings
+from cpfls_cli.regressor import Motion
+from cpfls_cli.vehicle import newton_euler_torque
+
+SEESAW = {"consequents": "seesaw", "products": "additive"}
+MODELS = {
+    "paper": {**SEESAW, "base": "none", "input_map": "data-range", "membership_functions": 5},
+    "classic": {**SEESAW, "base": "none", "structure": "fls", "membership_functions": 5},
+    "over a rigid body": {**SEESAW, "base": "rigid-body", "membership_functions": 5},
+}
+GENES = 24
+
+any_gene = st.one_of(st.integers(0, LARGEST_GENE), st.sampled_from([0, 1, LARGEST_GENE - 1, LARGEST_GENE]))
+any_chromosome = st.lists(any_gene, min_size=GENES, max_size=GENES).map(np.array)
+
+
+@cache
+def evaluator(model, refining):
+    rng = np.random.default_rng(38)
+    motion = Motion(rng.uniform(-1.0, 1.0, (60, 3)), *rng.standard_normal((2, 60, 3)))
+    torque = newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, np.diag([0.6, 0.7, 1.2]))
+    torque[:, 1] += 0.1 * np.exp(motion.attitude[:, 0]) * motion.acceleration[:, 1]
+    data = TorqueData(0.02 * np.arange(60), motion, torque)
+    search = LocalSearchSettings(enabled=refining, evaluations=2)
+    return model_evaluator(data, data, IdentificationSettings(**MODELS[model], local_search=search))
+
+
+@pytest.mark.parametrize("model", MODELS)
+@settings(deadline=None, max_examples=40)
+@given(any_chromosome)
+@example(np.zeros(GENES, dtype=int))
+@example(np.ones(GENES, dtype=int))
+@example(np.full(GENES, LARGEST_GENE))
+@example(np.tile([LARGEST_GENE, 0], GENES // 2))
+@example(np.tile([0, LARGEST_GENE], GENES // 2))
+@example(np.tile([1, LARGEST_GENE, 1, 1], GENES // 4))
+@example(np.tile([0, 0, 0, LARGEST_GENE], GENES // 4))
+@example(np.tile([1, 0, 0, 0], GENES // 4))
+def test_objectives(model, chromosome):
+    plain, refining = evaluator(model, refining=False), evaluator(model, refining=True)
+    assert plain.structure.genes == GENES
+    found, refined = plain(chromosome[None]), refining(chromosome[None])
+    defined = all(np.isfinite(part).all() for part in decode(plain.structure, chromosome.astype(float)))
+    for objectives in (found.objectives[0], refined.objectives[0]):
+        assert np.isfinite(objectives).all() if defined else np.all(objectives == np.inf)
+        assert np.all(objectives >= 0)
+    assert refined.objectives[0, 0] <= found.objectives[0, 0]
+    assert np.all((refined.genes >= 0) & (refined.genes <= LARGEST_GENE))
