@@ -15,21 +15,21 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.shared.measure import in_turn, pin_threads, seconds, table
+from benchmarks.shared.measure import in_turn, pin_threads, ratio_of, seconds, table
 
 pin_threads()
 
 import numpy as np
 
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
-from cpfls_cli.identification.chromosome import LARGEST_GENE
+from cpfls_cli.identification.chromosome import LARGEST_GENE, encode
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.local_search import refine
 from cpfls_cli.identification.reference import ReferenceEvaluator
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 
-CHROMOSOMES = 200
+CHROMOSOMES = 80
 LARGEST_CONDITION = 1e6
 TIMED = 5
 
@@ -82,21 +82,18 @@ def local_search(training, learned, settings: IdentificationSettings) -> tuple[f
     fast, reference = model_evaluator(training, learned, settings), ReferenceEvaluator(training, learned, settings)
     plain = replace(fast, local_search=LocalSearchSettings(enabled=False))
     starts = well_conditioned(plain)
-    budget = settings.local_search.evaluations
-    timed = []
+    budget, times, ends = settings.local_search.evaluations, [], []
     for start in starts:
         weights, fit = start / LARGEST_GENE, fast.fit(start)
         assert fit is not None
-        timed.append(in_turn(partial(reference.refine, weights), partial(refine, fast.solver, weights, fit, budget), 5))
-    ratios = [one.ratio for one in timed]
-    ends = [
-        plain(fast(start[None]).genes).objectives[0, 0] / plain(reference(start[None]).genes).objectives[0, 0]
-        for start in starts
-    ]
-    text = f"{np.median(ratios):.3g} ({min(ratios):.3g} to {max(ratios):.3g})"
+        found: list[np.ndarray] = []
+        slow = seconds(lambda: found.append(reference.refine(weights)))  # noqa: B023
+        times.append((slow, seconds(lambda: found.append(refine(fast.solver, weights, fit, budget)))))  # noqa: B023
+        theirs, ours = plain(np.array([encode(end) for end in found])).objectives[:, 0]
+        ends.append(ours / theirs)
+    timed = ratio_of(times)
     quality = f"{np.median(ends):.3g} ({min(ends):.3g} to {max(ends):.3g})"
-    slow, quick = (1e3 * float(np.median([getattr(one, end) for one in timed])) for end in ("slow_s", "fast_s"))
-    return slow, quick, text, quality
+    return 1e3 * timed.slow_s, 1e3 * timed.fast_s, timed.range, quality
 
 
 def well_conditioned(plain: Evaluator) -> np.ndarray:

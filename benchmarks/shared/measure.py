@@ -30,10 +30,14 @@ class Ratio:
         return f"{self.ratio:.3g} ({self.lowest:.3g} to {self.highest:.3g})"
 
 
-def in_turn(slow: Callable[[], object], fast: Callable[[], object], repeats: int = 7) -> Ratio:
+def in_turn(slow: Callable[[], object], fast: Callable[[], object], repeats: int = 5) -> Ratio:
     """Time two things in turn, each once unmeasured before; medians, and the range of the ratio."""
     slow(), fast()
-    times = [(seconds(slow), seconds(fast)) for _ in range(repeats)]
+    return ratio_of([(seconds(slow), seconds(fast)) for _ in range(repeats)])
+
+
+def ratio_of(times: Sequence[tuple[float, float]]) -> Ratio:
+    """Compare pairs of times, the slow one first."""
     ratios = [one / other for one, other in times]
     both = (median(time[place] for time in times) for place in (0, 1))
     return Ratio(*both, median(ratios), min(ratios), max(ratios))

@@ -18,15 +18,34 @@ from cpfls_cli.arrays import Array, IntArray
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+def compiled(function: Function, **options: Any) -> Function:
+    """Compile at the first call on a machine; other threads run meanwhile, and dividing by zero gives infinity.
+
+    Parameters
+    ----------
+    function : callable
+    **options
+        Of `numba.njit`.
+
+    Returns
+    -------
+    callable
+        Compiled anew in each process where no folder can be written that would keep it.
+    """
+    options |= {"nogil": True, "error_model": "numpy"}
+    try:
+        return cast(Function, numba.njit(cache=True, **options)(function))
+    except RuntimeError:
+        return cast(Function, numba.njit(**options)(function))
+
+
 def _compiled(function: Function) -> Function:
-    """Compile at the first call on a machine; other threads run meanwhile, and dividing by zero gives infinity."""
-    return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    return compiled(function)
 
 
 def _compiled_sum(function: Function) -> Function:
     """Compile, and let the processor take the terms of a sum in the order that suits its registers."""
-    fast = {"reassoc", "contract"}
-    return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=fast)(function))
+    return compiled(function, fastmath={"reassoc", "contract"})
 
 
 class Table(NamedTuple):
@@ -110,6 +129,8 @@ class _Batch(NamedTuple):
         Columns that are not zero; the three axes of a sample stand side by side.
     output : shape (4, 3, batch)
         Of the rules of one block that fire: value, slope by roll, slope by pitch.
+    total : shape (3, batch)
+        Of one block: value, slope by roll, slope by pitch.
     step : shape (4, batch)
         Of the output of a block at a breakpoint; see `_step`.
     moved_column : shape (2 * partitions, batch)
@@ -135,6 +156,7 @@ class _Batch(NamedTuple):
     column: IntArray
     rows: Array
     output: Array
+    total: Array
     step: Array
     moved_column: IntArray
     moved: Array
@@ -166,6 +188,7 @@ def _new_batch(table: Table) -> _Batch:
         column=np.full((table.active, _BATCH), -1),
         rows=np.zeros((table.active, 3 * _BATCH)),
         output=np.zeros((4, 3, _BATCH)),
+        total=np.zeros((3, _BATCH)),
         step=np.zeros((4, _BATCH)),
         moved_column=np.full((2 * partitions, _BATCH), -1),
         moved=np.zeros((_even(2 * partitions + 1), 3 * _BATCH)),
@@ -521,31 +544,49 @@ def _outputs(table: Table, block: IntArray, coefficients: Array, count: int, at:
 
 
 @_compiled
+def _sum_one(block: IntArray, angle: int, slots: int, count: int, at: _Batch) -> None:
+    """Add up the rules of one input: value, slope by roll, slope by pitch."""
+    value, gradient = at.total[0], at.total[1 + angle]
+    for i in range(slots):
+        degree, degree_slope = at.degree[block[3], i], at.degree_slope[block[3], i]
+        output, slope = at.output[i, 0], at.output[i, 1 + angle]
+        for n in range(count):
+            value[n] += degree[n] * output[n]
+            gradient[n] += degree_slope[n] * output[n] + degree[n] * slope[n]
+
+
+@_compiled
+def _sum_two(block: IntArray, i: int, j: int, output: Array, count: int, at: _Batch) -> None:
+    """Add one rule of roll and pitch: value, slope by roll, slope by pitch."""
+    mu, mu_slope = at.degree[block[3], i], at.degree_slope[block[3], i]
+    nu, nu_slope = at.degree[block[4], j], at.degree_slope[block[4], j]
+    value, by_roll, by_pitch = at.total[0], at.total[1], at.total[2]
+    own, own_roll, own_pitch = output[0], output[1], output[2]
+    for n in range(count):
+        firing = mu[n] * nu[n]
+        value[n] += firing * own[n]
+        by_roll[n] += mu_slope[n] * nu[n] * own[n] + firing * own_roll[n]
+        by_pitch[n] += mu[n] * nu_slope[n] * own[n] + firing * own_pitch[n]
+
+
+@_compiled
 def _subtract(table: Table, block: IntArray, carried: Array, count: int, at: _Batch, residual: Array) -> None:
     """Subtract the torque of a block, whose rules have given their outputs, from a residual."""
-    index = block[3]
-    own, others = table.partitions[index, 0], table.partitions[block[4], 2]
-    for n in range(count):
-        value, roll, pitch = at.output[0, 0, n], 0.0, 0.0
-        if block[2] == 1:
-            value = gradient = 0.0
-            for i in range(table.partitions[index, 2]):
-                output, degree = at.output[i], at.degree[index, i, n]
-                value += degree * output[0, n]
-                gradient += degree * output[1 + own, n] + at.degree_slope[index, i, n] * output[0, n]
-            roll, pitch = (gradient, 0.0) if own == 0 else (0.0, gradient)
-        elif block[2] == 2:
-            value = 0.0
-            for i in range(table.partitions[index, 2]):
-                mu, mu_slope = at.degree[index, i, n], at.degree_slope[index, i, n]
-                for j in range(others):
-                    output, nu = at.output[i * others + j], at.degree[block[4], j, n]
-                    value += mu * nu * output[0, n]
-                    roll += mu_slope * nu * output[0, n] + mu * nu * output[1, n]
-                    pitch += mu * at.degree_slope[block[4], j, n] * output[0, n] + mu * nu * output[2, n]
-        for axis in range(3):
-            carry = carried[axis]
-            residual[3 * n + axis] -= carry[0, n] * value + carry[1, n] * roll + carry[2, n] * pitch
+    at.total[:, :count] = 0.0
+    if block[2] == 0:
+        at.total[0, :count] = at.output[0, 0, :count]
+    elif block[2] == 1:
+        _sum_one(block, table.partitions[block[3], 0], _slots(table, block), count, at)
+    else:
+        others = table.partitions[block[4], 2]
+        for i in range(table.partitions[block[3], 2]):
+            for j in range(others):
+                _sum_two(block, i, j, at.output[i * others + j], count, at)
+    value, roll, pitch = at.total[0], at.total[1], at.total[2]
+    for axis in range(3):
+        by_value, by_roll, by_pitch = carried[axis, 0], carried[axis, 1], carried[axis, 2]
+        for n in range(count):
+            residual[3 * n + axis] -= by_value[n] * value[n] + by_roll[n] * roll[n] + by_pitch[n] * pitch[n]
 
 
 @_compiled

@@ -148,3 +148,10 @@ def test_products_with_the_derivatives_by_breakpoints(case):
     assert_close(cross, flat(case.Q).T @ expected)
     assert_close(dense_cross, flat(case.dense).T @ expected)
     assert_close(mirrored(square), expected.T @ expected)
+
+
+def test_where_nothing_can_be_kept_a_loop_is_compiled_each_time():
+    """A function without a file has no folder for its compiled code: the same error as folders that are read-only."""
+    space = {}
+    exec("def twice(x):\n    return 2 * x", space)
+    assert kernels.compiled(space["twice"])(21) == 42

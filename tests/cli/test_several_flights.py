@@ -1,0 +1,120 @@
+"""Several flights at once, and flights too long to hold: the same numbers whatever way the samples come."""
+
+import h5py
+import numpy as np
+import pytest
+
+from cpfls_cli.stages import flight_source
+
+
+@pytest.fixture(scope="module")
+def second(cpfls, study, tmp_path_factory):
+    """Another flight of the tiny study, the other way round."""
+    folder = tmp_path_factory.mktemp("second")
+    turned = ("--set", "trajectory.yaw_turn_rad=-6.283185307179586", "--set", "trajectory.displacement_m=50.0")
+    for words in (
+        ("trajectory", study, *turned, "-o", folder / "trajectory.h5"),
+        ("simulate", study, folder / "trajectory.h5", "-o", folder / "second.h5"),
+    ):
+        assert cpfls(*words).exit_code == 0
+    return folder / "second.h5"
+
+
+def stored(path, *names):
+    with h5py.File(path) as file:
+        return [np.asarray(file[name][()]) for name in names]
+
+
+def run(cpfls, *words):
+    result = cpfls(*words)
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def test_two_flights_train_one_model(cpfls, study, pipeline, second, tmp_path):
+    model = tmp_path / "model.h5"
+    run(cpfls, "identify", study, pipeline.flight, second, "-o", model, "--seed", "3")
+    lengths = [len(stored(path, "time")[0]) for path in (pipeline.flight, second)]
+    (indices, samples) = stored(model, "training/indices", "judged/samples")
+    np.testing.assert_array_equal(indices, np.arange(sum(lengths)))
+    assert samples[0] == sum(lengths)
+    with h5py.File(model) as file:
+        assert {role: group.attrs["name"] for role, group in file["inputs"].items()} == {
+            "flight": pipeline.flight.name,
+            "flight-2": second.name,
+        }
+
+
+def test_a_selection_of_two_flights_counts_them_one_after_the_other(cpfls, study, pipeline, second, tmp_path):
+    selection, model = tmp_path / "selection.h5", tmp_path / "model.h5"
+    share = ("--set", "identification.training_share=0.6")
+    run(cpfls, "reduce", study, pipeline.flight, second, "-o", selection, *share)
+    (indices,) = stored(selection, "indices")
+    first = len(stored(pipeline.flight, "time")[0])
+    assert np.any(indices < first)
+    assert np.any(indices >= first)
+    # Of each flight only the leading part trains.
+    assert not np.any((indices >= round(0.6 * first)) & (indices < first))
+    run(cpfls, "identify", study, pipeline.flight, second, "--selection", selection, "-o", model, *share)
+    learned, parts = stored(model, "training/indices", "judged/parts")
+    np.testing.assert_array_equal(learned, np.sort(indices))
+    assert parts.tolist() == [
+        b"training",
+        f"held-out rest of {pipeline.flight.name}".encode(),
+        f"held-out rest of {second.name}".encode(),
+    ]
+
+
+def test_a_selection_must_be_of_the_same_flights(cpfls, refuse, study, pipeline, second, tmp_path):
+    selection = tmp_path / "selection.h5"
+    run(cpfls, "reduce", study, pipeline.flight, second, "-o", selection)
+    output = ("-o", tmp_path / "model.h5")
+    (message,) = refuse("identify", study, pipeline.flight, "--selection", selection, *output)
+    assert "was made from 2 flight(s), not from these 1" in message
+    (message,) = refuse("identify", study, second, pipeline.flight, "--selection", selection, *output)
+    assert "was made from another flight" in message
+
+
+def test_a_flight_trains_once(refuse, study, pipeline, tmp_path):
+    copy = tmp_path / "copy.h5"
+    copy.write_bytes(pipeline.flight.read_bytes())
+    (message,) = refuse("identify", study, pipeline.flight, copy, "-o", tmp_path / "model.h5")
+    assert "holds the same flight as" in message
+
+
+def test_a_flight_read_chunk_by_chunk_gives_the_same_bytes(cpfls, study, pipeline, second, tmp_path, monkeypatch):
+    words = (study, pipeline.flight, second, "--set", "identification.training_share=0.8")
+    for name, limit in (("held", None), ("streamed", 100)):
+        if limit:
+            monkeypatch.setattr(flight_source, "IN_MEMORY", limit)
+        run(cpfls, "reduce", *words, "-o", tmp_path / f"{name}-selection.h5")
+        run(cpfls, "identify", *words, "-o", tmp_path / f"{name}-model.h5")
+    for kind in ("selection", "model"):
+        assert (tmp_path / f"held-{kind}.h5").read_bytes() == (tmp_path / f"streamed-{kind}.h5").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("dataset", "value", "said"),
+    [("torque", np.nan, "torque: is not finite at index 7"), ("time", 0.0, "time: does not ascend at index 7")],
+)
+def test_a_long_flight_is_checked_too(refuse, study, pipeline, tmp_path, monkeypatch, dataset, value, said):
+    monkeypatch.setattr(flight_source, "IN_MEMORY", 100)
+    broken = tmp_path / "broken.h5"
+    broken.write_bytes(pipeline.flight.read_bytes())
+    with h5py.File(broken, "r+") as file:
+        file[dataset][7] = value
+    (message,) = refuse("identify", study, broken, "-o", tmp_path / "model.h5")
+    assert said in message
+
+
+def test_a_long_flight_without_torque_is_refused_where_it_is_needed(
+    cpfls, refuse, study, pipeline, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(flight_source, "IN_MEMORY", 100)
+    lacking = tmp_path / "lacking.h5"
+    lacking.write_bytes(pipeline.flight.read_bytes())
+    with h5py.File(lacking, "r+") as file:
+        del file["torque"]
+    run(cpfls, "reduce", study, lacking, "-o", tmp_path / "selection.h5")
+    (message,) = refuse("identify", study, lacking, "-o", tmp_path / "model.h5")
+    assert "lacks torque" in message
