@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.spec import BODY, EULER, NO_FRAME, WORLD, ArtifactSpec, DatasetSpec
+from cpfls_cli.artifacts.sweep_formats import SWEEP
 
 _TIME = DatasetSpec("time", ("time",), "s", NO_FRAME, "time from the first sample")
 _ATTITUDE = (
@@ -217,7 +218,7 @@ MODEL = ArtifactSpec(
 CHECKPOINT = ArtifactSpec(
     "cpfls/checkpoint",
     "a search that has not come to its end: all that its next generation depends on",
-    "identify",
+    "identify, sweep",
     (
         DatasetSpec("generation", (), "1", NO_FRAME, "generations bred; 0: initial population, -1: not even that"),
         DatasetSpec(
@@ -268,7 +269,7 @@ PREDICTION = ArtifactSpec(
     ("model", "flight"),
 )
 
-FORMATS = (TRAJECTORY, FLIGHT, SELECTION, MODEL, CHECKPOINT, PREDICTION, DISAGREEMENT, DIAGNOSIS, EXTENDED)
+FORMATS = (TRAJECTORY, FLIGHT, SELECTION, MODEL, CHECKPOINT, SWEEP, PREDICTION, DISAGREEMENT, DIAGNOSIS, EXTENDED)
 """Every artifact format, in the order of the pipeline."""
 
 

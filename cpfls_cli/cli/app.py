@@ -58,6 +58,10 @@ HeldOutOption = Annotated[
     list[Path] | None,
     typer.Option("--held-out", metavar="FLIGHT", help="Judge on this flight, learn nothing of it; may be repeated."),
 ]
+ValidateOption = Annotated[
+    list[Path] | None,
+    typer.Option("--validate", metavar="FLIGHT", help="Judge on another flight too; may be repeated."),
+]
 ResumeOption = Annotated[
     bool, typer.Option("--resume", help="Go on with a search that was stopped, from OUTPUT.checkpoint.")
 ]
@@ -196,10 +200,7 @@ def identify(
             "--selection", metavar="SELECTION", help="Learn from these samples only (made by `cpfls reduce`)."
         ),
     ] = None,
-    validate: Annotated[
-        list[Path] | None,
-        typer.Option("--validate", metavar="FLIGHT", help="Judge on another flight too; may be repeated."),
-    ] = None,
+    validate: ValidateOption = None,
     resume: ResumeOption = False,
     time_limit: TimeLimitOption = None,
     workers: WorkersOption = 1,
@@ -217,6 +218,31 @@ def identify(
         return stage.run(job, flights, selection, validate or [], options)
 
     _run("identify", config, output, common, call)
+
+
+@app.command()
+@with_common
+def sweep(
+    config: ConfigArgument,
+    flights: TrainingArgument,
+    output: OutputOption,
+    validate: ValidateOption = None,
+    resume: ResumeOption = False,
+    time_limit: TimeLimitOption = None,
+    workers: WorkersOption = 1,
+    scheduler: SchedulerOption = None,
+    *,
+    common: Common,
+) -> None:
+    """Identify with several settings, and with several seeds each."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.stages import sweep as stage
+        from cpfls_cli.stages.resumable import SearchOptions
+
+        return stage.run(job, flights, validate or [], SearchOptions(resume, time_limit, workers, scheduler))
+
+    _run("sweep", config, output, common, call)
 
 
 @app.command()

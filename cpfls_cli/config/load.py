@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-from pydantic_core import ErrorDetails
-
-from cpfls_cli.config.messages import describe_errors, without_unknown_keys
+from cpfls_cli.config.checked import checked
 from cpfls_cli.config.overrides import apply_override
-from cpfls_cli.config.study import SECTIONS, Study
+from cpfls_cli.config.study import Study
+from cpfls_cli.config.variants import setting_errors
 from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.errors import ConfigError
 
@@ -115,19 +112,8 @@ def validate(data: dict[str, Any], source: str) -> Study:
     ConfigError
         Listing every wrong key with its value, what is wrong, and the nearest valid key.
     """
-    # A section that is named but left empty means its defaults.
-    filled = {key: {} if value is None and key in SECTIONS else value for key, value in data.items()}
-    try:
-        return Study.model_validate_json(json.dumps(filled))
-    except ValidationError as error:
-        errors = [*error.errors(), *_hidden_errors(filled, error.errors())]
-        raise ConfigError("\n".join(describe_errors(errors, filled, source))) from None
-
-
-def _hidden_errors(data: dict[str, Any], found: list[ErrorDetails]) -> list[ErrorDetails]:
-    """Find what an unknown key hides: rules between the keys of a section run only where all its keys are known."""
-    try:
-        Study.model_validate_json(json.dumps(without_unknown_keys(data, found)))
-    except ValidationError as error:
-        return error.errors()
-    return []
+    study, errors = checked(data, source)
+    errors += setting_errors(data, source, errors)
+    if study is None or errors:
+        raise ConfigError("\n".join(errors))
+    return study

@@ -10,6 +10,7 @@ from typing_extensions import Doc
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.identification.sweep_settings import SweepSettings
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.report.settings import ReportSettings
 from cpfls_cli.simulation.settings import SimulationSettings
@@ -33,11 +34,12 @@ class Study(BaseModel):
     identification: Annotated[IdentificationSettings, Doc("what `cpfls identify` fits and how it searches")] = (
         IdentificationSettings()
     )
+    sweep: Annotated[SweepSettings, Doc("what `cpfls sweep` tries, and how often")] = SweepSettings()
     gap: Annotated[GapSettings, Doc("how `cpfls compare`, `diagnose`, `extend` and `gap` look for what is missing")] = (
         GapSettings()
     )
     report: Annotated[ReportSettings, Doc("what `cpfls report` shows")] = ReportSettings()
 
 
-SECTIONS = ("vehicle", "trajectory", "simulation", "import", "reduction", "identification", "gap", "report")
+SECTIONS = ("vehicle", "trajectory", "simulation", "import", "reduction", "identification", "sweep", "gap", "report")
 """The sections of a config, in the order of the pipeline."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.artifacts.records import InputFile
+from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, identify
@@ -20,7 +22,7 @@ from cpfls_cli.identification.search import NothingFoundError
 from cpfls_cli.identification.search_run import SearchRun, SearchStep
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.stages.flight_source import flight_source
-from cpfls_cli.stages.job import Job, Outcome, Started, finish
+from cpfls_cli.stages.job import Job, Outcome, finish
 from cpfls_cli.stages.model_file import model_data
 from cpfls_cli.stages.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.stages.stopped import stopped, without_model
@@ -48,9 +50,9 @@ def run(
     -------
     Outcome
     """
-    started, search = begin_search(job, _roles(flights, selection, validate), options)
+    started, search = begin_search(job, input_roles(flights, selection, validate), options)
     data = read_training(flights, selection, job.study)
-    held_out = _held_out(job, data, started, validate)
+    held_out = held_out_parts(job.study, data.rests, started.inputs, validate)
     if started.dry_run is not None:
         return started.dry_run
     clock = time.perf_counter()
@@ -67,7 +69,21 @@ def run(
     return stopped(outcome, result.stop_reason, watch.signal, job.output)
 
 
-def _roles(flights: Sequence[Path], selection: Path | None, validate: Sequence[Path]) -> dict[str, Path]:
+def input_roles(flights: Sequence[Path], selection: Path | None, validate: Sequence[Path]) -> dict[str, Path]:
+    """Give the inputs of an identification their roles.
+
+    Parameters
+    ----------
+    flights : sequence of Path
+        That train.
+    selection : Path or None
+    validate : sequence of Path
+        That judge.
+
+    Returns
+    -------
+    dict of str to Path
+    """
     roles = flight_roles(flights) | ({"selection": selection} if selection else {})
     return roles | {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
 
@@ -96,17 +112,41 @@ def _of(flights: Sequence[Path], error: ComputationError) -> ComputationError:
     return ComputationError(f"{' '.join(str(path) for path in flights)}: {error}")
 
 
-def _held_out(job: Job, data: TrainingData, started: Started, validate: Sequence[Path]) -> dict[str, TorqueSource]:
-    """Gather what is judged but not learned from, under names of their own."""
-    if job.study.identification.training_share < 1 and not data.rests:
+def held_out_parts(
+    study: Study, rests: Mapping[str, TorqueSource], inputs: Mapping[str, InputFile], validate: Sequence[Path]
+) -> dict[str, TorqueSource]:
+    """Gather what is judged but not learned from, under names of their own.
+
+    Parameters
+    ----------
+    study : Study
+    rests : mapping of str to TorqueSource
+        What of the flights that train is held out.
+    inputs : mapping of str to InputFile
+        By role, see `input_roles`.
+    validate : sequence of Path
+        Other flights.
+
+    Returns
+    -------
+    dict of str to TorqueSource
+
+    Raises
+    ------
+    ConfigError
+        If a part was to be held out, and nothing is left for it.
+    InputError
+        If one of the flights trains too.
+    """
+    if study.identification.training_share < 1 and not rests:
         raise ConfigError(
-            f"identification.embargo_s = {job.study.identification.embargo_s:g}: leaves nothing of the flight to be "
+            f"identification.embargo_s = {study.identification.embargo_s:g}: leaves nothing of the flight to be "
             "held out; lower it, or lower identification.training_share"
         )
-    parts = dict(data.rests)
-    learned = {file.sha256 for role, file in started.inputs.items() if role.startswith("flight")}
+    parts = dict(rests)
+    learned = {file.sha256 for role, file in inputs.items() if role.startswith("flight")}
     for number, path in enumerate(validate, start=1):
-        if started.inputs[f"validate-{number}"].sha256 in learned:
+        if inputs[f"validate-{number}"].sha256 in learned:
             raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
         parts[_free_name(path.name, {TRAINING, *parts})] = flight_source(path)
     return parts

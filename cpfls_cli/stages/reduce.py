@@ -47,7 +47,7 @@ def run(job: Job, flights: Sequence[Path]) -> Outcome:
     split = split_training(flights, job.study, torque=False)
     settings, rng = job.study.reduction, generator(job.study, "reduce")
     with _naming(flights), settings_of("reduction", job.study):
-        surveyed = survey(_regressor(split.training, job.study), settings.rank_tolerance)
+        surveyed = survey(uniform_regressor(split.training, job.study), settings.rank_tolerance)
         if started.dry_run is not None:
             check_streamed(surveyed, settings, rng)
             return started.dry_run
@@ -67,8 +67,20 @@ def _naming(flights: Sequence[Path]) -> Iterator[None]:
         raise ComputationError(f"{' '.join(str(path) for path in flights)}: {error}") from None
 
 
-def _regressor(training: TorqueSource, study: Study) -> Callable[[], Iterator[Array]]:
-    """Regressor of the parts of flights that train, at uniform partitions, block by block."""
+def uniform_regressor(training: TorqueSource, study: Study) -> Callable[[], Iterator[Array]]:
+    """Write out the regressor at uniform partitions, block by block.
+
+    Parameters
+    ----------
+    training : TorqueSource
+        The parts of flights that train.
+    study : Study
+
+    Returns
+    -------
+    callable
+        Gives the blocks in the order of the samples, as often as it is called.
+    """
     structure = model_structure(study.identification)
     partitions = uniform_breakpoints(structure)
     ranges = joined_ranges(data_ranges(structure, data.motion.attitude) for data in training.chunks())

@@ -43,6 +43,16 @@ class SearchOptions:
     workers: int = 1
     scheduler: str | None = None
 
+    def require_one_place(self) -> None:
+        """Refuse processes of this machine together with the workers of a scheduler.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.scheduler is not None and self.workers > 1:
+            raise InputError("--scheduler: knows its own workers; leave --workers out")
+
 
 class Watch:
     """Knows when a search has to stop: at an interrupt, or when its time is over.
@@ -171,8 +181,7 @@ def begin_search(job: Job, inputs: Mapping[str, Path], options: SearchOptions) -
     InputError
         As `begin`; also if there is a checkpoint that nothing is said of, or none that can be resumed.
     """
-    if options.scheduler is not None and options.workers > 1:
-        raise InputError("--scheduler: knows its own workers; leave --workers out")
+    options.require_one_place()
     files = take_inputs(job, inputs)
     header = header_of(job.study, files)
     search = resumable(job.output, header, resume=options.resume, force=job.force)

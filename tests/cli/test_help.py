@@ -15,6 +15,7 @@ COMMANDS = (
     "import",
     "reduce",
     "identify",
+    "sweep",
     "predict",
     "report",
     "compare",

@@ -1,0 +1,126 @@
+"""The settings of a sweep as studies of their own."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cpfls_cli.config.checked import checked
+from cpfls_cli.config.overrides import override_key
+from cpfls_cli.config.resolved import resolved
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import ConfigError, SettingError
+
+AS_CONFIGURED = "as configured"
+_SWEEP = "sweep"
+_ALLOWED = ("reduction", "identification")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One setting of a sweep.
+
+    Attributes
+    ----------
+    name : str
+    overrides : tuple of str
+        ``section.key=value`` each; as options of ``--set`` they make the same study of the same config.
+    study : Study
+        Without a sweep of its own.
+    reduced : bool
+        Whether it learns from a reduced set, not from all samples that train.
+    """
+
+    name: str
+    overrides: tuple[str, ...]
+    study: Study
+    reduced: bool
+
+
+def variants(study: Study) -> tuple[Variant, ...]:
+    """Make the studies of a sweep.
+
+    Parameters
+    ----------
+    study : Study
+
+    Returns
+    -------
+    tuple of Variant
+        In the order of the config; the study itself where it names no settings.
+
+    Raises
+    ------
+    ConfigError
+        If a setting is wrong; never for a study that was loaded from a config.
+    """
+    data = resolved(study)
+    if not study.sweep.settings:
+        return (_variant(data, AS_CONFIGURED, {}),)
+    return tuple(_variant(data, setting.name, setting.set) for setting in study.sweep.settings)
+
+
+def setting_errors(data: Mapping[str, Any], source: str, known: Sequence[str]) -> list[str]:
+    """Find what is wrong with the settings of a sweep, each in the place where it overrides the config.
+
+    Parameters
+    ----------
+    data : mapping
+        Plain data of a config.
+    source : str
+        Name of the file, for messages.
+    known : sequence of str
+        What is wrong without them; said once.
+
+    Returns
+    -------
+    list of str
+        One line for each wrong key of each setting.
+    """
+    found = []
+    for number, overrides in _well_formed(data):
+        place = f"{source}: {_SWEEP}.settings.{number}.set"
+        try:
+            errors = checked(_overridden(data, overrides)[0], source)[1]
+            found += [f"{place}: {line.removeprefix(f'{source}: ')}" for line in errors if line not in known]
+        except SettingError as error:
+            found.append(f"{place}: {error.key} = {json.dumps(overrides[error.key])}: {error}")
+    return found
+
+
+def _well_formed(data: Mapping[str, Any]) -> Iterator[tuple[int, Mapping[str, Any]]]:
+    """Pass over what is no list of settings; that is complained of elsewhere."""
+    sweep = data.get(_SWEEP)
+    settings = sweep.get("settings") if isinstance(sweep, Mapping) else None
+    for number, setting in enumerate(settings if isinstance(settings, list) else ()):
+        overrides = setting.get("set") if isinstance(setting, Mapping) else None
+        if isinstance(overrides, Mapping):
+            yield number, overrides
+
+
+def _variant(data: Mapping[str, Any], name: str, overrides: Mapping[str, Any]) -> Variant:
+    overridden, reduced = _overridden(data, overrides)
+    study, errors = checked(overridden, name)
+    if study is None:
+        raise ConfigError("\n".join(errors))
+    return Variant(name, tuple(f"{key}={json.dumps(value)}" for key, value in overrides.items()), study, reduced)
+
+
+def _overridden(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> tuple[dict[str, Any], bool]:
+    """Override keys of a config, and tell whether it is still reduced."""
+    result = copy.deepcopy({key: value for key, value in data.items() if key != _SWEEP})
+    for key, value in overrides.items():
+        if key.split(".")[0] not in _ALLOWED:
+            raise SettingError(key, f"a setting of a sweep overrides keys of {' and '.join(_ALLOWED)} only")
+        override_key(result, key, value)
+    reduction = result.get("reduction")
+    if not isinstance(reduction, dict) or reduction.get("size", 0) is not None or reduction.get("condition_number"):
+        return result, True
+    # A reduction that nothing stops is none; its size is not used.
+    if "reduction.size" in overrides or "reduction.condition_number" in overrides:
+        del reduction["size"]
+        return result, False
+    return result, True
