@@ -42,9 +42,11 @@ def decomposed(learned: Samples, partitions: Breakpoints, fit: Fit, rank_toleran
     unpenalised = triangle.solve(rank_tolerance)
     if off:
         return replace(fit, rigid_body=unpenalised.coefficients), unpenalised
-    if not rigid:
-        return replace(fit, coefficients=unpenalised.coefficients), unpenalised
     parameters, rows = learned.structure.parameters, 3 * len(learned.ready.source)
+    if not rigid:
+        # Sums of products leave only rounding of an error far below the torque.
+        error = triangle.square(unpenalised.coefficients) / rows
+        return replace(fit, coefficients=unpenalised.coefficients, mean_squared_error=error), unpenalised
     penalty = np.sqrt(fit.ridge_weight * rows) * np.eye(parameters, RIGID + parameters, RIGID)
     found = triangle.below(penalty).solve(rank_tolerance).coefficients
     return replace(fit, coefficients=found[RIGID:] / fit.column_size, rigid_body=found[:RIGID]), unpenalised

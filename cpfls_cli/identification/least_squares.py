@@ -87,6 +87,10 @@ class Triangle:
         """Add rows whose right-hand side is zero, such as those of a penalty, shape (rows, parameters)."""
         return Triangle(np.vstack([self.matrix, np.column_stack([rows, np.zeros(len(rows))])]))
 
+    def square(self, parameters: Array) -> float:
+        """Sum of the squared residuals of all rows."""
+        return float(np.sum((self.matrix[:, -1] - self.matrix[:, :-1] @ parameters) ** 2))
+
     def solve(self, rank_tolerance: float) -> LeastSquares:
         """Solve for the parameters of smallest norm.
 

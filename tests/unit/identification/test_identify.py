@@ -84,6 +84,7 @@ def test_a_structure_without_genes_needs_no_search():
     assert found.history.evaluations.tolist() == [1]
     assert found.model.coefficients.shape == (61,)
     assert found.scores["training"]["model"].max_error.max() < 1e-12
+    assert 0 <= found.fit.mean_squared_error < 1e-24
 
 
 def test_rigid_data_leave_the_model_no_worse_than_the_rigid_body():

@@ -197,6 +197,9 @@ def test_final_model_is_that_of_all_rows_at_once(monkeypatch, case, block):
     np.testing.assert_allclose(exact.rigid_body[:rigid], expected[:rigid], atol=1e-9)
     np.testing.assert_allclose(exact.coefficients, expected[rigid:] if held else 0.0, atol=1e-9)
     np.testing.assert_allclose(exact.coefficients, fit.coefficients, atol=1e-6)
+    if case == "none":
+        # The others carry what the cross-validation found.
+        assert exact.mean_squared_error == pytest.approx(np.mean((y - A @ expected) ** 2), rel=1e-9)
     divided = A / np.append(np.ones(rigid), fit.column_size[:held])
     singular_values = np.linalg.svd(divided, compute_uv=False)
     np.testing.assert_allclose(unpenalised.singular_values, singular_values, rtol=1e-9)
