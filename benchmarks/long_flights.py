@@ -89,7 +89,7 @@ def write_tiled(path: Path, samples: int) -> None:
         file["config"] = np.bytes_(config.encode())
         file["time"] = 0.01 * np.arange(samples)
         for name, values in signals.items():
-            dataset, scale = file.create_dataset(name, (samples, 3)), NOISE * values.std(axis=0)
+            dataset, scale = file.create_dataset(name, (samples, 3), dtype=float), NOISE * values.std(axis=0)
             for start in range(0, samples, len(flight)):
                 count = min(len(flight), samples - start)
                 dataset[start : start + count] = values[:count] + scale * rng.standard_normal((count, 3))
