@@ -19,10 +19,10 @@ _POWERS = (1.0, 4.0, 16.0)
 # Exchanges end when the criterion falls by less; 1e-3 is a thousandth of the condition number squared.
 _SMALLEST_FALL = 1e-3
 # Between two looks at all samples, exchanges are with the most promising of them, so many per chosen sample.
-_PROMISING = 3
+_PROMISING = 2
 _FEWEST_PROMISING = 200
 # Of so many samples each, one is exchanged for one, where several at once no longer help.
-_PAIRED = 6
+_PAIRED = 3
 # Looks at all samples with the last power.
 _LOOKS = 20
 # A Gram matrix squares the condition number; above this one it has lost too many digits.
