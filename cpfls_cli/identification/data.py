@@ -97,7 +97,17 @@ class Flights:
 
 
 def joined(flights: Sequence[TorqueSource]) -> TorqueSource:
-    """Take several flights as one source; a single one stays as it is."""
+    """Take several flights as one source.
+
+    Parameters
+    ----------
+    flights : sequence of TorqueSource
+
+    Returns
+    -------
+    TorqueSource
+        A single flight stays as it is.
+    """
     return flights[0] if len(flights) == 1 else Flights(tuple(flights))
 
 

@@ -38,7 +38,7 @@ def evaluator(model, refining):
 
 
 @pytest.mark.parametrize("model", MODELS)
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=25)
 @given(any_chromosome)
 @example(np.zeros(GENES, dtype=int))
 @example(np.ones(GENES, dtype=int))

@@ -71,7 +71,7 @@ def test_objectives_are_those_of_the_plain_evaluator(settings, every, learned):
 
 def test_more_dependent_columns_are_never_better():
     """Where columns are dependent, the fast evaluator counts no fewer of them, and no error below the smallest."""
-    data = cube_diagonal()[::3]
+    data = cube_diagonal()[::6]
     fast, plain = evaluators(data, data, membership_functions=5)
     genes = np.random.default_rng(34).integers(0, LARGEST_GENE + 1, (80, fast.structure.genes))
     found, expected = fast(genes).objectives, plain(genes).objectives
@@ -85,7 +85,7 @@ def test_more_dependent_columns_are_never_better():
     assert same.sum() > 40
     assert np.all(np.diff(found[same, 2][np.lexsort((expected[same, 2], dependent[same]))]) >= 0)
     assert np.all(found[:, 0] >= expected[:, 0] * (1 - 1e-6))
-    assert np.all(found[:, 0] < expected[:, 0] * 1.1)
+    np.testing.assert_allclose(found[same, :2], expected[same, :2], rtol=1e-6)
 
 
 def test_both_refuse_the_same_chromosomes():
@@ -111,7 +111,7 @@ def test_fit_is_that_of_the_plain_evaluator():
 
 def test_local_search_leaves_no_more_than_differences_through_the_whole_solve_do():
     """From the same starts, at the default budget; where a surface has many minima, no method is better from each."""
-    data = cube_diagonal()[::4]
+    data = cube_diagonal()[::8]
     fast, plain = evaluators(data, data, membership_functions=3, local_search=LocalSearchSettings())
     genes = np.random.default_rng(37).integers(0, LARGEST_GENE + 1, (12, fast.structure.genes))
     unrefined = evaluators(data, data, membership_functions=3)[0](genes).objectives[:, 0]
