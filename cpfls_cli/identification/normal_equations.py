@@ -41,7 +41,9 @@ class NormalEquations:
     @property
     def matrix(self) -> Array:
         """The matrix to invert, shape (parameters, parameters)."""
-        return self.gram + np.diag(self.penalty)
+        matrix = self.gram.copy()
+        matrix[np.diag_indices(len(matrix))] += self.penalty
+        return matrix
 
 
 @dataclass(frozen=True)
