@@ -10,8 +10,9 @@ from cpfls_cli.reduction.settings import CriterionName
 from cpfls_cli.reduction.smallest import SmallestSingularValue
 
 EXCHANGE_INFORMATION: dict[str, float] = {"K-exchange": 0.0, "KD-exchange": 2.0}
-"""Weight of the information kept, for the criteria that choose by exchange. With 2 the models trained are no worse than
-from random samples, where the condition number alone makes them several times worse; more buys little."""
+"""Weight of the information kept, for the criteria that choose by exchange. Without it models come out several times
+worse than from random samples; with 2 no worse; with 3 the condition number of 80 samples of the paper's path is no longer
+below half of the full set's."""
 
 
 def make_criterion(space: RowSpace, name: CriterionName) -> Criterion:
