@@ -11,8 +11,8 @@ from cpfls_cli.reduction.smallest import SmallestSingularValue
 
 EXCHANGE_INFORMATION: dict[str, float] = {"K-exchange": 0.0, "KD-exchange": 2.0}
 """Weight of the information kept, for the criteria that choose by exchange. Without it models come out several times
-worse than from random samples; with 2 no worse; with 3 the condition number of 80 samples of the paper's path is no longer
-below half of the full set's."""
+worse than from random samples; with 2 no worse; with 3, the condition number of 80 samples of the paper's path is not
+below half of the full set's any more."""
 
 
 def make_criterion(space: RowSpace, name: CriterionName) -> Criterion:
