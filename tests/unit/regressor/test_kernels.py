@@ -14,6 +14,7 @@ from cpfls_cli.regressor import (
     kernels,
     model_structure,
     torque_sensitivity,
+    uniform_breakpoints,
 )
 from cpfls_cli.regressor.table import padded_breakpoints, structure_table
 
@@ -122,6 +123,27 @@ def test_errors_by_label(case):
     by_label = [flat(residual[case.label == own]) for own in range(LABELS)]
     assert_close(square, [np.sum(rows**2, axis=0) for rows in by_label])
     assert_close(largest, [np.max(np.abs(rows), axis=0) for rows in by_label])
+
+
+def test_neighbours_that_fire_other_rules_are_told_apart():
+    """Pairs of samples whose intervals of roll and pitch differ by +1 and by -1 to -13, of 14."""
+    structure = model_structure(StructureSettings(**SEESAW, membership_functions=(1, 15, 1, 15, 1, 1)))
+    interval = np.array([place for down in range(1, 14) for place in ((0, down, 0), (1, 0, 0))])
+    motion = Motion(2 * np.pi * (interval + 0.4) / 14, *np.random.default_rng(49).standard_normal((2, 26, 3)))
+    regressor = Regressor(structure, motion, data_ranges(structure, motion.attitude))
+    partitions = uniform_breakpoints(structure)
+    gram, moment = np.zeros((1, structure.parameters, structure.parameters)), np.zeros((1, structure.parameters, 1))
+    kernels.add_gram(
+        structure_table(structure, regressor.ranges),
+        padded_breakpoints(partitions),
+        kernels.Chunk(motion.attitude, motion.rate, motion.acceleration, np.zeros((26, 3, 1))),
+        np.ones(3),
+        np.zeros(26, dtype=np.int64),
+        gram,
+        moment,
+    )
+    Q = flat(regressor.matrix(partitions))
+    assert_close(mirrored(gram[0]), Q.T @ Q)
 
 
 @pytest.mark.parametrize("models", [1, 4, 5])
