@@ -119,7 +119,8 @@ SELECTION = ArtifactSpec(
         DatasetSpec("condition_number", (), "1", NO_FRAME, "of the selection, over the kept rank", gaps=True),
         DatasetSpec("condition_number_full", (), "1", NO_FRAME, "of all candidates, over the kept rank"),
         DatasetSpec("candidates", (), "1", NO_FRAME, "number of samples that could be selected"),
-        DatasetSpec("criterion", (), "text", NO_FRAME, "sigma_min, A, D or paper-literal"),
+        DatasetSpec("criterion", (), "text", NO_FRAME, "the rule, as in reduction.criterion"),
+        DatasetSpec("exchanges", (), "1", NO_FRAME, "samples that were replaced by others on the way", required=False),
         DatasetSpec("stop_reason", (), "text", NO_FRAME, "why the selection ended"),
         DatasetSpec(
             "random/condition_number", ("draw",), "1", NO_FRAME, "of random selections of equal size", gaps=True

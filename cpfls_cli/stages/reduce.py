@@ -105,6 +105,7 @@ def _data(selection: Selection, candidates: int, random: Array) -> dict[str, Any
         "condition_number_full": selection.condition_number_full,
         "candidates": candidates,
         "criterion": np.array(selection.criterion),
+        "exchanges": selection.exchanges,
         "stop_reason": np.array(selection.stop_reason),
         "random/condition_number": random,
     }
@@ -120,6 +121,7 @@ def _outcome(selection: Selection, candidates: int, random: Array, target: float
         "condition_number": selection.condition_number,
         "condition_number_full": selection.condition_number_full,
         "condition_number_random": float(np.median(random)),
+        "exchanges": selection.exchanges,
         "stop_reason": selection.stop_reason,
         "stalled": selection.stalled,
     }
@@ -134,10 +136,13 @@ def _outcome(selection: Selection, candidates: int, random: Array, target: float
 
 def _warnings(selection: Selection, candidates: int, target: float | None) -> Iterator[str]:
     if selection.stalled:
-        yield "the rule stalled below full rank: do not train on this selection; use sigma_min, A or D"
+        yield "the rule stalled below full rank: do not train on this selection; use another reduction.criterion"
     if target is not None and selection.condition_number > target:
-        all_in = len(selection.indices) == candidates
-        limit = "all samples are in" if all_in else "reduction.size stopped the selection; raise it or set it to null"
+        limit = "reduction.size stopped the selection; raise it or set it to null"
+        if selection.stop_reason == "pool":
+            limit = "all samples of the pool are in; raise reduction.pool"
+        elif len(selection.indices) == candidates:
+            limit = "all samples are in"
         yield (
             f"the target reduction.condition_number = {target:g} is not reached, the selection has"
             f" {selection.condition_number:.5g}: {limit}"

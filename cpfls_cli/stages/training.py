@@ -85,7 +85,16 @@ class TrainingData:
 
 
 def flight_roles(flights: Sequence[Path]) -> dict[str, Path]:
-    """Give the flights that train their roles as inputs: ``flight``, ``flight-2`` and so on."""
+    """Give the flights that train their roles as inputs: ``flight``, ``flight-2`` and so on.
+
+    Parameters
+    ----------
+    flights : sequence of Path
+
+    Returns
+    -------
+    dict of str to Path
+    """
     return {"flight" if number == 1 else f"flight-{number}": path for number, path in enumerate(flights, start=1)}
 
 

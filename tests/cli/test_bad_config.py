@@ -26,7 +26,7 @@ def test_all_unknown_keys_are_listed_with_the_nearest_valid_name(wrong):
         "FILE: trajectory.mass_kg = 3: unknown key (did you mean 'vehicle.mass_kg'?)",
         "FILE: identificaton: unknown key (did you mean 'identification'?)",
         "FILE: import.signals.attitude.units = \"rad\": unknown key (did you mean 'unit'?)",
-        "FILE: reduction.xyzzy = 1: unknown key (valid here: size, condition_number, criterion, rank_tolerance)",
+        "FILE: reduction.xyzzy = 1: unknown key (valid here: size, condition_number, criterion, rank_tolerance, pool)",
     }
 
 
