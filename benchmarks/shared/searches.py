@@ -1,14 +1,15 @@
 """Searches for good partitions that spend their evaluations on the same evaluator, each with its own operators.
 
-Weights lie on [0, 1]; where an algorithm can take it, the weights that a local search found replace those that it
-was given (Lamarckian), as in our genetic algorithm.
+All but the paper's start with the equidistant partitions among random ones. Weights lie on [0, 1]; where an algorithm
+can take it, the weights that a local search found replace those that it was given (Lamarckian), as in our genetic
+algorithm. That is all of them but scipy's differential evolution, which lets nobody change its individuals.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import cma
 import numpy as np
@@ -17,9 +18,10 @@ from pymoo.core.problem import Problem
 from scipy.optimize import differential_evolution
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.evolution import Evaluation, EvolutionSettings, start, step
+from cpfls_cli.evolution import Evaluation, start, step
 from cpfls_cli.identification.chromosome import LARGEST_GENE, encode, uniform_chromosome
 from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.settings import IdentificationSettings
 
 # In place of an objective that has no value.
 WORST = 1e30
@@ -50,7 +52,8 @@ class Course:
     def __call__(self, genes: IntArray) -> Evaluation:
         """Evaluate chromosomes one after the other."""
         parts = [self._one(chromosome) for chromosome in genes]
-        return Evaluation(*(np.concatenate(arrays) for arrays in zip(*((p.genes, p.objectives) for p in parts))))
+        refined, objectives = ([getattr(part, name) for part in parts] for name in ("genes", "objectives"))
+        return Evaluation(np.concatenate(refined), np.concatenate(objectives))
 
     def refined(self, weights: Array) -> tuple[Array, Array]:
         """Evaluate weights, shape (n, genes); also give what they were refined to."""
@@ -77,12 +80,20 @@ class Course:
 Search = Callable[[Course, int], None]
 
 
-def genetic(settings: EvolutionSettings, with_uniform: bool) -> Search:
+def with_uniform(course: Course, rng: np.random.Generator, count: int) -> Array:
+    """Draw weights to start with, shape (count, genes), the first those of the equidistant partitions."""
+    weights = rng.random((count, course.genes))
+    weights[0] = 0.5
+    return weights
+
+
+def genetic(settings: IdentificationSettings) -> Search:
     """Search by our genetic algorithm."""
 
     def search(course: Course, seed: int) -> None:
-        initial = uniform_chromosome(course.evaluator.structure)[np.newaxis] if with_uniform else None
-        state = start(course, course.genes, settings, np.random.default_rng(seed), initial)
+        initial = uniform_chromosome(course.evaluator.structure)[np.newaxis]
+        first = initial if settings.start == "with-uniform" else None
+        state = start(course, course.genes, settings, np.random.default_rng(seed), first)
         while True:
             state = step(state, course, settings)
 
@@ -90,7 +101,8 @@ def genetic(settings: EvolutionSettings, with_uniform: bool) -> Search:
 
 
 def nsga2(course: Course, seed: int) -> None:
-    algorithm = NSGA2(pop_size=75)
+    first = with_uniform(course, np.random.default_rng(seed), 75)
+    algorithm = NSGA2(pop_size=75, sampling=first)
     problem = Problem(n_var=course.genes, n_obj=3, xl=0.0, xu=1.0)
     algorithm.setup(problem, termination=("n_gen", 10**6), seed=seed, verbose=False)
     while True:
@@ -103,20 +115,17 @@ def nsga2(course: Course, seed: int) -> None:
         algorithm.tell(infills=offspring)
 
 
-def evolution_strategy(written_back: bool) -> Search:
+def evolution_strategy(course: Course, seed: int) -> None:
     """Search by CMA-ES on the logarithm of the mean squared error, started anew where it has converged."""
-
-    def search(course: Course, seed: int) -> None:
-        rng, space = np.random.default_rng(seed), {"bounds": [0, 1], "verbose": -9}
-        while True:
-            options = space | {"seed": int(rng.integers(1, 2**31))}
-            strategy = cma.CMAEvolutionStrategy(rng.random(course.genes), 0.3, options)
-            while not strategy.stop():
-                asked = np.array(strategy.ask())
-                weights, objectives = course.refined(asked)
-                strategy.tell(list(weights if written_back else asked), np.log(objectives[:, 0]).tolist())
-
-    return search
+    rng = np.random.default_rng(seed)
+    first = with_uniform(course, rng, 1)[0]
+    while True:
+        options = {"bounds": [0, 1], "verbose": -9, "seed": int(rng.integers(1, 2**31))}
+        strategy = cma.CMAEvolutionStrategy(first, 0.3, options)
+        while not strategy.stop():
+            weights, objectives = course.refined(np.array(strategy.ask()))
+            strategy.tell(list(weights), np.log(objectives[:, 0]).tolist())
+        first = rng.random(course.genes)
 
 
 def differential(course: Course, seed: int) -> None:
@@ -124,24 +133,25 @@ def differential(course: Course, seed: int) -> None:
         return float(course.refined(weights[np.newaxis])[1][0, 0])
 
     bounds = [(0.0, 1.0)] * course.genes
-    # Three times as many individuals as weights: 72, near the others' 75; the default of 15 times breeds but once.
-    differential_evolution(mean_squared_error, bounds, rng=seed, popsize=3, maxiter=10**6, tol=0, polish=False)
+    # scipy's default of 15 individuals for each weight would breed but twice in the budget.
+    first = with_uniform(course, np.random.default_rng(seed), 75)
+    differential_evolution(mean_squared_error, bounds, rng=seed, init=first, maxiter=10**6, tol=0, polish=False)
 
 
 def multi_start(course: Course, seed: int) -> None:
     rng = np.random.default_rng(seed)
+    course.refined(with_uniform(course, rng, 1))
     while True:
-        course(rng.integers(0, LARGEST_GENE + 1, (1, course.genes)))
+        course.refined(rng.random((1, course.genes)))
 
 
-def searches(paper: EvolutionSettings, default: EvolutionSettings) -> dict[str, Search]:
+def searches(paper: IdentificationSettings, default: IdentificationSettings) -> dict[str, Search]:
     """List the searches by the names that tables and plots give them."""
     return {
-        "ours, default": genetic(default, with_uniform=True),
-        "ours, preset paper": genetic(replace(paper), with_uniform=False),
+        "ours, default": genetic(default),
+        "ours, preset paper": genetic(paper),
         "NSGA-II (pymoo)": nsga2,
-        "CMA-ES (cma), written back": evolution_strategy(written_back=True),
-        "CMA-ES (cma)": evolution_strategy(written_back=False),
+        "CMA-ES (cma)": evolution_strategy,
         "differential evolution (scipy)": differential,
         "random multi-start": multi_start,
     }

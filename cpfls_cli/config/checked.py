@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from cpfls_cli.config.messages import describe_errors, without_unknown_keys
+from cpfls_cli.config.preset import with_preset
 from cpfls_cli.config.study import SECTIONS, Study
 
 
@@ -29,7 +30,7 @@ def checked(data: dict[str, Any], source: str) -> tuple[Study | None, list[str]]
         One line for each wrong key.
     """
     # A section that is named but left empty means its defaults.
-    filled = {key: {} if value is None and key in SECTIONS else value for key, value in data.items()}
+    filled = with_preset({key: {} if value is None and key in SECTIONS else value for key, value in data.items()})
     try:
         return Study.model_validate_json(json.dumps(filled)), []
     except ValidationError as error:

@@ -13,7 +13,7 @@ from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
 from cpfls_cli.evolution.coding import BITS_PER_GENE, gray_decode, gray_encode
 from cpfls_cli.evolution.history import History
 from cpfls_cli.evolution.migration import migrate
-from cpfls_cli.evolution.operators import mutate, single_point_crossover
+from cpfls_cli.evolution.operators import intermediate_recombination, mutate, single_point_crossover
 from cpfls_cli.evolution.ranking import rank
 from cpfls_cli.evolution.reinsertion import reinsert
 from cpfls_cli.evolution.selection import linear_ranking_fitness, stochastic_universal_sampling
@@ -102,8 +102,9 @@ def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings)
     offspring = state.archive.evaluate(offspring_genes, _checked(evaluate))
     genes = np.concatenate([state.genes, offspring.genes])
     objectives = np.concatenate([state.objectives, offspring.objectives])
-    ranks = rank(objectives, settings.ranking)
+    ranks = rank(objectives, settings.ranking, settings.first_objective_weight)
     kept = reinsert(
+        genes,
         ranks,
         state.subpopulations,
         offspring_labels,
@@ -119,7 +120,7 @@ def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings)
 
 
 def _breed(state: EvolutionState, settings: EvolutionSettings) -> tuple[IntArray, IntArray]:
-    ranks = rank(state.objectives, settings.ranking)
+    ranks = rank(state.objectives, settings.ranking, settings.first_objective_weight)
     broods = [_brood(group, ranks, state, settings) for group in members(state.subpopulations)]
     genes = np.concatenate(broods)
     labels = np.repeat(np.arange(len(broods)), [len(brood) for brood in broods])
@@ -131,8 +132,14 @@ def _brood(group: IntArray, ranks: IntArray, state: EvolutionState, settings: Ev
     count = max(int(settings.generation_gap * len(group) + 0.5), 2)
     fitness = linear_ranking_fitness(ranks[group], settings.selective_pressure)
     parents = group[stochastic_universal_sampling(fitness, count, state.rng)]
-    bits = single_point_crossover(gray_encode(state.genes[parents]), settings.crossover_rate, state.rng)
+    bits = gray_encode(_recombined(state.genes[parents], settings, state.rng))
     return gray_decode(mutate(bits, settings.mutated_individuals, settings.mutated_bits, state.rng))
+
+
+def _recombined(genes: IntArray, settings: EvolutionSettings, rng: np.random.Generator) -> IntArray:
+    if settings.recombination == "intermediate":
+        return intermediate_recombination(genes, settings.crossover_rate, 2**BITS_PER_GENE - 1, rng)
+    return gray_decode(single_point_crossover(gray_encode(genes), settings.crossover_rate, rng))
 
 
 def _checked(evaluate: Evaluate) -> Evaluate:

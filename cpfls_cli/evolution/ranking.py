@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import rankdata
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.dominance import dominance_matrix, worst_where_not_finite
+from cpfls_cli.evolution.positions import positions
 from cpfls_cli.evolution.settings import Ranking
 
 
-def rank(objectives: Array, method: Ranking) -> IntArray:
+def rank(objectives: Array, method: Ranking, first_weight: int = 1) -> IntArray:
     """Rank individuals by the method of this name.
 
     Parameters
@@ -18,6 +18,8 @@ def rank(objectives: Array, method: Ranking) -> IntArray:
     objectives : array, shape (individuals, objectives)
         To be minimised. An objective that is not finite counts as worse than every finite one.
     method : {"quantity-dominance", "pareto-count", "pareto-fronts"}
+    first_weight : int, optional
+        How often the first objective counts in quantity-dominance; the Pareto rankings know no weights.
 
     Returns
     -------
@@ -28,23 +30,22 @@ def rank(objectives: Array, method: Ranking) -> IntArray:
     ----------
     Paper, section 6; method.md section 7.
     """
-    methods = {
-        "quantity-dominance": quantity_dominance_ranks,
-        "pareto-count": pareto_count_ranks,
-        "pareto-fronts": pareto_front_ranks,
-    }
-    return methods[method](objectives)
+    if method == "quantity-dominance":
+        return quantity_dominance_ranks(objectives, first_weight)
+    return pareto_count_ranks(objectives) if method == "pareto-count" else pareto_front_ranks(objectives)
 
 
-def quantity_dominance_ranks(objectives: Array) -> IntArray:
+def quantity_dominance_ranks(objectives: Array, first_weight: int = 1) -> IntArray:
     """Sum, over the population, the components in which others are better minus those in which they are worse.
 
-    ``rank_i = sum_j sum_k sign(f_ik - f_jk)``, a Borda count: in each objective the individual's position
-    among the sorted population tells both numbers, so the cost is n log n.
+    ``rank_i = sum_j sum_k w_k sign(f_ik - f_jk)``, a Borda count: in each objective the individual's position
+    among the sorted population tells both numbers, so the cost is n log n. In the paper all weights are 1.
 
     Parameters
     ----------
     objectives : array, shape (individuals, objectives)
+    first_weight : int, optional
+        Weight of the first objective, positive; that of the others is 1.
 
     Returns
     -------
@@ -57,8 +58,9 @@ def quantity_dominance_ranks(objectives: Array) -> IntArray:
     """
     costs = worst_where_not_finite(objectives)
     # With ties averaged, position p of n has (smaller - larger) = 2 p - (n + 1), a whole number.
-    signs = 2.0 * rankdata(costs, method="average", axis=0) - (len(costs) + 1)
-    ranks: IntArray = signs.sum(axis=1).astype(np.int64)
+    signs = np.column_stack([2.0 * positions(cost) - (len(costs) + 1) for cost in costs.T]).astype(np.int64)
+    signs[:, 0] *= first_weight
+    ranks: IntArray = signs.sum(axis=1)
     return ranks
 
 

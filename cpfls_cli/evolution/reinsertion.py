@@ -10,6 +10,7 @@ from cpfls_cli.evolution.subpopulations import members
 
 
 def reinsert(
+    genes: IntArray,
     ranks: IntArray,
     parent_labels: IntArray,
     offspring_labels: IntArray,
@@ -21,15 +22,17 @@ def reinsert(
 
     Parameters
     ----------
+    genes : array of int, shape (parents + offspring, genes)
+        Chromosomes of parents, then offspring.
     ranks : array of int, shape (parents + offspring,)
-        Ranks of parents, then offspring, found together; smaller is better.
+        Their ranks, found together; smaller is better.
     parent_labels, offspring_labels : array of int, shape (parents,) and (offspring,)
         Subpopulation of each; both hold the same labels.
     rate : float
         Share of the offspring that is inserted, one at least and no more than there are parents.
-    method : {"uniform", "fitness"}
-        Replace parents drawn at random, so that even the best may be lost, or the least fit.
-    rng : numpy.random.Generator
+    method : {"uniform", "fitness", "elitist"}
+        Replace parents drawn at random, so that even the best may be lost, or the least fit. Elitist: the fittest of
+        parents and these offspring stay, and of equal chromosomes only one, as long as there are others.
 
     Returns
     -------
@@ -40,8 +43,11 @@ def reinsert(
     source = np.arange(parents, dtype=np.int64)
     for old, new in zip(members(parent_labels), members(offspring_labels), strict=True):
         count = min(max(int(rate * len(new) + 0.5), 1), len(old))
-        fittest = new[np.argsort(ranks[parents + new], kind="stable")][:count]
-        source[_replaced(old, ranks, method, rng)[:count]] = parents + fittest
+        entering = parents + new[np.argsort(ranks[parents + new], kind="stable")][:count]
+        if method == "elitist":
+            source[old] = _fittest(np.append(old, entering), genes, ranks)[: len(old)]
+        else:
+            source[_replaced(old, ranks, method, rng)[:count]] = entering
     return source
 
 
@@ -50,3 +56,10 @@ def _replaced(old: IntArray, ranks: IntArray, method: Reinsertion, rng: np.rando
     if method == "uniform":
         return shuffled
     return shuffled[np.argsort(-ranks[shuffled], kind="stable")]
+
+
+def _fittest(candidates: IntArray, genes: IntArray, ranks: IntArray) -> IntArray:
+    """Sort by rank, the first come first where it is equal, and copies of others behind all."""
+    copied = np.ones(len(candidates), dtype=np.bool_)
+    copied[np.unique(genes[candidates], axis=0, return_index=True)[1]] = False
+    return candidates[np.lexsort((ranks[candidates], copied))]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import rankdata
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.evolution.positions import positions
 
 
 def linear_ranking_fitness(ranks: IntArray, selective_pressure: float) -> Array:
@@ -25,9 +25,8 @@ def linear_ranking_fitness(ranks: IntArray, selective_pressure: float) -> Array:
     array, shape (individuals,)
         With mean 1; individuals of equal rank share the mean of their positions.
     """
-    position = rankdata(-ranks, method="average")
     slope = 2.0 * (selective_pressure - 1.0) / (len(ranks) - 1)
-    fitness: Array = 2.0 - selective_pressure + slope * (position - 1.0)
+    fitness: Array = 2.0 - selective_pressure + slope * (positions(-ranks) - 1.0)
     return fitness
 
 

@@ -10,6 +10,7 @@ from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.evolution.settings import EvolutionSettings
+from cpfls_cli.identification.presets import Preset
 from cpfls_cli.regressor.structure import StructureSettings
 from cpfls_cli.settings import Settings
 
@@ -47,9 +48,18 @@ class LocalSearchSettings(Settings):
 class IdentificationSettings(StructureSettings, EvolutionSettings):
     """Structure of the model, search for its partitions, and how it is judged."""
 
+    preset: Annotated[
+        Preset, Doc("what keys of the search that are left out are: fast (the defaults), or the paper's operators")
+    ] = "fast"
     base: Annotated[
         Base, Doc("none: fuzzy part only, the paper; rigid-body: six inertia parameters under a ridge-held fuzzy part")
     ] = "rigid-body"
+    first_objective_weight: Annotated[
+        int,
+        Ge(1),
+        Le(1000),
+        Doc("how often the mean squared error counts in quantity-dominance; the other objectives count once"),
+    ] = 10
     choice: Annotated[Choice, Doc("which member of the Pareto front becomes the model")] = "mse-below-median-condition"
     start: Annotated[
         Literal["random", "with-uniform"],

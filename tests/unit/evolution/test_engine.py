@@ -1,4 +1,5 @@
 import copy
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,7 +8,21 @@ import pytest
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, best, evolve, start, step
 
-SETTINGS = EvolutionSettings(population=23, generations=12, subpopulations=4)
+# The operators of the paper, after the Sheffield toolbox.
+PAPER = EvolutionSettings(
+    population=75,
+    generations=25,
+    subpopulations=5,
+    generation_gap=0.8,
+    crossover_rate=0.8,
+    recombination="single-point",
+    insertion_rate=0.8,
+    selective_pressure=1.5,
+    mutated_individuals=0.04,
+    mutated_bits=0.01,
+    reinsertion="uniform",
+)
+SETTINGS = replace(PAPER, population=23, generations=12, subpopulations=4)
 
 
 def zdt1(genes):
@@ -50,11 +65,15 @@ def test_hypervolume_of_the_test_is_that_of_three_steps():
     assert hypervolume([(1, 3), (2, 2), (3, 1), (3, 3)], (4, 4)) == 1 * 1 + 2 * 1 + 3 * 1
 
 
-@pytest.mark.parametrize("reinsertion", ["uniform", "fitness"])
+@pytest.mark.parametrize(
+    "operators",
+    [PAPER, replace(PAPER, reinsertion="fitness"), EvolutionSettings()],
+    ids=["uniform", "fitness", "default"],
+)
 @pytest.mark.parametrize("ranking", ["quantity-dominance", "pareto-count", "pareto-fronts"])
 @pytest.mark.parametrize(("problem", "reference"), [(zdt1, (1.1, 6.0)), (dtlz2, (2.0, 2.0))])
-def test_evolution_beats_random_search_at_equal_evaluations(problem, reference, ranking, reinsertion):
-    settings = EvolutionSettings(population=60, generations=30, ranking=ranking, reinsertion=reinsertion)
+def test_evolution_beats_random_search_at_equal_evaluations(problem, reference, ranking, operators):
+    settings = replace(operators, population=60, generations=30, ranking=ranking)
     gained, random = [], []
     for seed in range(3):
         last = run(problem, seed, settings, gene_count=12)[-1]
@@ -87,7 +106,7 @@ def test_generations_report_the_population_and_all_that_was_evaluated():
 
 def test_no_chromosome_is_evaluated_twice():
     recorder = Recorder(zdt1)
-    settings = EvolutionSettings(population=40, generations=30, mutated_individuals=0.0)
+    settings = replace(PAPER, population=40, generations=30, mutated_individuals=0.0)
     # Two genes of one bit each, and no mutation: there are far fewer chromosomes than offspring.
     initial = np.random.default_rng(3).integers(0, 2, (40, 2)) * 65535
     last = run(recorder, settings=settings, gene_count=2, initial=initial)[-1]
@@ -113,8 +132,8 @@ def test_refined_chromosomes_replace_the_offspring_and_are_known():
 
 
 def test_rates_set_the_numbers_of_offspring_bred_and_inserted():
-    settings = EvolutionSettings(
-        population=30, subpopulations=2, crossover_rate=0.0, mutated_individuals=1.0, mutated_bits=0.5
+    settings = replace(
+        PAPER, population=30, subpopulations=2, crossover_rate=0.0, mutated_individuals=1.0, mutated_bits=0.5
     )
     first = start(zdt1, 6, settings, np.random.default_rng(6))
     second = step(first, zdt1, settings)
@@ -125,7 +144,7 @@ def test_rates_set_the_numbers_of_offspring_bred_and_inserted():
 
 def test_migration_waits_for_its_interval_and_subpopulations_stay_apart_before():
     # Every gene tells its subpopulation; without mutation only migration brings another value.
-    settings = EvolutionSettings(population=20, generations=5, subpopulations=4, mutated_individuals=0.0)
+    settings = replace(PAPER, population=20, generations=5, subpopulations=4, mutated_individuals=0.0)
     labels = np.repeat(np.arange(4), 5)
     generations = run(zdt1, settings=settings, initial=np.repeat(labels[:, np.newaxis] * 1000, 6, axis=1))
     for generation in generations[:5]:
@@ -135,7 +154,7 @@ def test_migration_waits_for_its_interval_and_subpopulations_stay_apart_before()
 
 
 def test_without_elitism_the_population_may_lose_its_best_but_the_archive_does_not():
-    settings = EvolutionSettings(population=20, generations=40, subpopulations=2, mutated_individuals=1.0)
+    settings = replace(PAPER, population=20, generations=40, subpopulations=2, mutated_individuals=1.0)
     generations = run(zdt1, settings=settings)
     populations = [generation.objectives.min(axis=0) for generation in generations]
     assert any(np.any(later > earlier) for earlier, later in pairwise(populations))
@@ -148,7 +167,7 @@ def test_failed_models_never_stay_while_there_are_others():
         evaluation.objectives[genes[:, 0] > 30000] = np.nan
         return evaluation
 
-    settings = EvolutionSettings(population=40, generations=20, reinsertion="fitness")
+    settings = replace(PAPER, population=40, generations=20, reinsertion="fitness")
     last = run(failing, settings=settings)[-1]
     assert np.all(np.isfinite(last.objectives))
     assert np.all(np.isfinite(best(last)))

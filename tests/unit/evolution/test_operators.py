@@ -1,6 +1,6 @@
 import numpy as np
 
-from cpfls_cli.evolution.operators import mutate, single_point_crossover
+from cpfls_cli.evolution.operators import intermediate_recombination, mutate, single_point_crossover
 
 
 def alternating(individuals, length):
@@ -49,3 +49,37 @@ def test_mutation_shares_are_those_asked_for():
 def test_mutation_of_every_bit_is_the_complement():
     bits = np.random.default_rng(9).random((5, 7)) < 0.5
     np.testing.assert_array_equal(mutate(bits, 1.0, 1.0, np.random.default_rng(10)), ~bits)
+
+
+def test_intermediate_offspring_lie_uniformly_between_their_parents_and_a_quarter_beyond():
+    genes = np.tile([[20000], [40000]], (5000, 3))
+    offspring = intermediate_recombination(genes, 1.0, 65535, np.random.default_rng(8))
+    assert offspring.min() >= 15000
+    assert offspring.max() <= 45000
+    shares = np.histogram(offspring, bins=6, range=(15000, 45000))[0] / offspring.size
+    # 30000 draws, a sixth in each bin: standard deviation 0.002.
+    np.testing.assert_allclose(shares, 1 / 6, atol=0.012)
+
+
+def test_intermediate_offspring_of_a_pair_are_drawn_gene_by_gene_and_apart():
+    genes = np.tile([[10000], [50000]], (1000, 2))
+    offspring = intermediate_recombination(genes, 1.0, 65535, np.random.default_rng(9))
+    first, second = offspring[::2], offspring[1::2]
+    assert abs(np.corrcoef(first[:, 0], first[:, 1])[0, 1]) < 0.15
+    assert abs(np.corrcoef(first[:, 0], second[:, 0])[0, 1]) < 0.15
+
+
+def test_intermediate_recombination_stays_in_range_and_takes_its_share_of_the_pairs():
+    genes = np.tile([[0], [65535]], (10001, 1))[:20001]
+    offspring = intermediate_recombination(genes, 0.8, 65535, np.random.default_rng(10))
+    assert offspring.min() == 0
+    assert offspring.max() == 65535
+    changed = (offspring != genes)[:20000, 0].reshape(-1, 2)
+    # An end of the range stays where it is clipped to it: a sixth of the draws.
+    assert abs(changed.any(axis=1).mean() - 0.8 * (1 - 1 / 36)) < 0.02
+    assert offspring[20000] == genes[20000]
+
+
+def test_equal_parents_have_equal_offspring():
+    genes = np.tile(np.arange(7), (4, 1))
+    np.testing.assert_array_equal(intermediate_recombination(genes, 1.0, 65535, np.random.default_rng(11)), genes)

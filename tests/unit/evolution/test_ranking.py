@@ -26,3 +26,13 @@ def test_a_failed_individual_ranks_last_and_failures_tie(method):
     ranks = rank(np.vstack([HAND_WORKED, failed]), method)
     assert len(set(ranks[5:].tolist())) == 1
     assert ranks[5] > ranks[:5].max()
+
+
+def test_a_weight_counts_the_first_objective_so_many_times():
+    # first objective: smaller minus larger is -4 -2 3 0 3, ten times; second: 3 -2 -4 0 3
+    assert rank(HAND_WORKED, "quantity-dominance", 10).tolist() == [-37, -22, 26, 0, 33]
+
+
+@pytest.mark.parametrize("method", ["pareto-count", "pareto-fronts"])
+def test_pareto_rankings_know_no_weight(method):
+    np.testing.assert_array_equal(rank(HAND_WORKED, method, 10), rank(HAND_WORKED, method))
