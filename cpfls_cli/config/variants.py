@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from cpfls_cli.errors import ConfigError, SettingError
 AS_CONFIGURED = "as configured"
 _SWEEP = "sweep"
 _ALLOWED = ("reduction", "identification")
+_PRESET = "identification.preset"
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,10 @@ def variants(study: Study) -> tuple[Variant, ...]:
     ConfigError
         If a setting is wrong; never for a study that was loaded from a config.
     """
-    data = resolved(study)
+    data, common = resolved(study), study.sweep.set
     if not study.sweep.settings:
-        return (_variant(data, AS_CONFIGURED, {}),)
-    return tuple(_variant(data, setting.name, setting.set) for setting in study.sweep.settings)
+        return (_variant(data, AS_CONFIGURED, common),)
+    return tuple(_variant(data, setting.name, common | setting.set) for setting in study.sweep.settings)
 
 
 def setting_errors(data: Mapping[str, Any], source: str, known: Sequence[str]) -> list[str]:
@@ -80,25 +81,29 @@ def setting_errors(data: Mapping[str, Any], source: str, known: Sequence[str]) -
     list of str
         One line for each wrong key of each setting.
     """
-    found = []
-    for number, overrides in _well_formed(data):
-        place = f"{source}: {_SWEEP}.settings.{number}.set"
-        try:
-            errors = checked(_overridden(data, overrides)[0], source)[1]
-            found += [f"{place}: {line.removeprefix(f'{source}: ')}" for line in errors if line not in known]
-        except SettingError as error:
-            found.append(f"{place}: {error.key} = {json.dumps(overrides[error.key])}: {error}")
-    return found
-
-
-def _well_formed(data: Mapping[str, Any]) -> Iterator[tuple[int, Mapping[str, Any]]]:
-    """Pass over what is no list of settings; that is complained of elsewhere."""
     sweep = data.get(_SWEEP)
-    settings = sweep.get("settings") if isinstance(sweep, Mapping) else None
+    common = _mapping(_mapping(sweep).get("set"))
+    settings = _mapping(sweep).get("settings")
+    everywhere = _wrong(data, source, common)
+    found = {} if settings else {f"{_SWEEP}.set: {line}": None for line in everywhere}
     for number, setting in enumerate(settings if isinstance(settings, list) else ()):
-        overrides = setting.get("set") if isinstance(setting, Mapping) else None
-        if isinstance(overrides, Mapping):
-            yield number, overrides
+        for line in _wrong(data, source, common | _mapping(_mapping(setting).get("set"))):
+            found[f"{_SWEEP}.{'' if line in everywhere else f'settings.{number}.'}set: {line}"] = None
+    said = {line.removeprefix(f"{source}: ") for line in known}
+    return [f"{source}: {line}" for line in found if line.split(": ", 1)[1] not in said]
+
+
+def _mapping(data: Any) -> dict[str, Any]:
+    """Pass over what is no mapping; that is complained of elsewhere."""
+    return data if isinstance(data, dict) else {}
+
+
+def _wrong(data: Mapping[str, Any], source: str, overrides: Mapping[str, Any]) -> list[str]:
+    """Say what is wrong with a config whose keys are overridden."""
+    try:
+        return [line.removeprefix(f"{source}: ") for line in checked(_overridden(data, overrides)[0], source)[1]]
+    except SettingError as error:
+        return [f"{error.key} = {json.dumps(overrides[error.key])}: {error}"]
 
 
 def _variant(data: Mapping[str, Any], name: str, overrides: Mapping[str, Any]) -> Variant:
@@ -115,6 +120,8 @@ def _overridden(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> tuple[
     for key, value in overrides.items():
         if key.split(".")[0] not in _ALLOWED:
             raise SettingError(key, f"a setting of a sweep overrides keys of {' and '.join(_ALLOWED)} only")
+        if key == _PRESET:
+            raise SettingError(key, "speaks for keys that the config leaves out; name the keys that differ")
         override_key(result, key, value)
     reduction = result.get("reduction")
     if not isinstance(reduction, dict) or reduction.get("size", 0) is not None or reduction.get("condition_number"):

@@ -29,6 +29,9 @@ class SweepSettings(Settings):
     """What `cpfls sweep` runs: every setting with every seed."""
 
     seeds: Annotated[int, Ge(1), Le(10_000), Doc("runs of each setting, with seed, seed + 1, seed + 2 and so on")] = 10
+    set: Annotated[dict[str, Any], Doc("keys of every setting that does not set them itself")] = field(
+        default_factory=dict
+    )
     settings: Annotated[
         tuple[SweepSetting, ...], Doc("what is tried, by name; empty: the study as it is, once for each seed")
     ] = ()

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION, SELECTION, TRAJECTORY
 from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.spec import ArtifactSpec
+from cpfls_cli.artifacts.sweep_formats import SWEEP
 from cpfls_cli.report.gap_words import titles_of
 from cpfls_cli.report.source import Sources
 
@@ -25,6 +26,7 @@ _LACKS: tuple[tuple[ArtifactSpec, str, str], ...] = (
         "cpfls predict CONFIG model.h5 flight.h5 -o prediction.h5",
     ),
 )
+_SWEEP = (SWEEP, "Table 5 with its means over several seeds", "cpfls sweep CONFIG flight.h5 -o sweep.h5")
 _SHOWN = {"extended": "extended model"}
 _GAP_LACKS: tuple[tuple[ArtifactSpec, str, str], ...] = (
     (DISAGREEMENT, "where and when model and flights disagree", "cpfls compare CONFIG FLIGHT... -o disagreement.h5"),
@@ -59,6 +61,8 @@ def _wanted(sources: Sources) -> Iterator[tuple[ArtifactSpec, str, str]]:
     """List what a report of these artifacts could show: nobody who looks for a gap wants a training path."""
     if not sources.only_gap:
         yield from _LACKS
+    if sources.settings.paper:
+        yield _SWEEP
     if sources.gap:
         yield from _GAP_LACKS[:2]
         if any(len(titles_of(diagnosis)) for diagnosis in sources.diagnoses):

@@ -20,6 +20,7 @@ from cpfls_cli.report.sections.path import path_section
 from cpfls_cli.report.sections.prediction import prediction_section
 from cpfls_cli.report.sections.provenance import provenance_section
 from cpfls_cli.report.sections.reduction import reduction_section
+from cpfls_cli.report.sections.replicates import replicates_section
 from cpfls_cli.report.sections.rules import rules_section
 from cpfls_cli.report.sections.search import search_section
 from cpfls_cli.report.sections.sensors import sensors_section
@@ -40,6 +41,7 @@ _SECTIONS = (
     flight_section,
     reduction_section,
     identification_section,
+    replicates_section,
     search_section,
     partitions_section,
     prediction_section,

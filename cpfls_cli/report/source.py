@@ -11,6 +11,7 @@ from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION, SELECTION, TR
 from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.spec import ArtifactSpec
+from cpfls_cli.artifacts.sweep_formats import SWEEP
 from cpfls_cli.report.settings import ReportSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -101,6 +102,11 @@ class Sources:
     def models(self) -> list[Source]:
         """Identified models."""
         return self._of(MODEL)
+
+    @property
+    def sweeps(self) -> list[Source]:
+        """Replicates of searches."""
+        return self._of(SWEEP)
 
     @property
     def predictions(self) -> list[Source]:

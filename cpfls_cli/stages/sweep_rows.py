@@ -35,7 +35,16 @@ def sweep_data(plan: SweepPlan, rows: Rows) -> dict[str, Any]:
 
 
 def no_rows(plan: SweepPlan) -> Rows:
-    """Begin a sweep of which no run is finished; the parameter is its plan."""
+    """Begin a sweep of which no run is finished.
+
+    Parameters
+    ----------
+    plan : SweepPlan
+
+    Returns
+    -------
+    dict of str to array
+    """
     return {path: values[None][:0] for path, values in run_row(plan, 0, None).items()}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -65,6 +65,10 @@ class SweepSamples:
             self._data[key] = self._reduced(split, study, variant.name)
         return self._data[key]
 
+    def _shown(self, name: str) -> Callable[[int, int], None]:
+        """Show how many samples are chosen; the bar is for the searches."""
+        return lambda done, most: self._job.progress(0, 1, f"choosing samples: {name}, {done} of {most}")
+
     def _reduced(self, split: SplitFlights, study: Study, name: str) -> TrainingData:
         training, settings, rng = split.training, study.reduction, generator(study, "reduce")
         with settings_of("reduction", study):
@@ -72,6 +76,5 @@ class SweepSamples:
             if self._job.dry_run:
                 check_streamed(surveyed, settings, rng)
                 return TrainingData(training, training, split.rests, split.training_indices)
-            self._job.progress(0, 1, f"choosing samples: {name}")
-            chosen = np.sort(reduce_streamed(surveyed, settings, rng).indices)
+            chosen = np.sort(reduce_streamed(surveyed, settings, rng, self._shown(name)).indices)
         return TrainingData(training, gathered(training, chosen), split.rests, split.training_indices[chosen])

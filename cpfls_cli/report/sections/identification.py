@@ -10,6 +10,7 @@ from cpfls_cli.report.content import Block, Cell, Heading, Section, Table, Text
 from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, TRAINING, Judged, judged
 from cpfls_cli.report.numbers import UNKNOWN, count, number, percent, r_squared
 from cpfls_cli.report.source import Source, Sources
+from cpfls_cli.report.table_5 import PRINTED, RELATIVE_ERROR, SMALLEST_MAX_ERROR, PrintedColumn
 
 # Units are not torn apart at the end of a line.
 TORQUE, SQUARED = "N\N{NO-BREAK SPACE}m", "(N\N{NO-BREAK SPACE}m)²"
@@ -24,15 +25,6 @@ _ROWS = (
     "its condition number",
     "relative error",
 )
-_PAPER = (
-    ("FLS [14]", "5487", "500", "200", UNKNOWN, "0.0007", "0.1531", "2707.1", "< 10 %"),
-    ("cpFLS", "5487", "500", "200", UNKNOWN, "0.0008", "0.1771", "5506.4", "< 10 %"),
-    ("cpFLS", "2743", "500", "200", UNKNOWN, "0.0009", "0.1786", "3399.4", "< 10 %"),
-    ("cpFLS", "1170", "500", "200", UNKNOWN, "0.0009", "0.1648", "4145.9", "< 10 %"),
-    ("cpFLS", "685", "500", "200", UNKNOWN, "0.0008", "0.1952", "4262.2", "< 10 %"),
-    ("cpFLS", "685", "75", "25", UNKNOWN, "0.0008", "0.2080", "3032.0", "< 10 %"),
-)
-_SMALLEST_MAX_ERROR = 0.1531
 _RELATIVE_BOUND = 0.1
 _MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("mse", f"MSE, {SQUARED}", lambda value: number(value, 3)),
@@ -72,15 +64,16 @@ def identification_section(sources: Sources) -> Section | None:
 def _table(sources: Sources) -> Table:
     columns = [_column(model) for model in sources.models]
     header = ["Quantity", *(model.label for model in sources.models)]
-    if sources.settings.paper:
-        columns += [list(printed) for printed in _PAPER]
-        header += ["Paper"] * len(_PAPER)
+    if sources.settings.paper and not sources.sweeps:
+        columns += [_printed(column) for column in PRINTED]
+        header += ["Paper"] * len(PRINTED)
     rows = [[name, *(column[place] for column in columns)] for place, name in enumerate(_ROWS)]
     caption = (
-        "Table 5. Results of the identification on the whole training part: mean squared error over the axes, largest "
-        "error and condition number of the selected model, and its largest error over the largest torque (worst axis)."
+        "Results of the identification on the whole training part: mean squared error over the axes, largest error and "
+        "condition number of the selected model, and its largest error over the largest torque (worst axis)."
     )
-    return Table("table-5-identification", caption, header, rows)
+    numbered = caption if sources.sweeps else f"Table 5. {caption}"
+    return Table("table-5-identification", numbered, header, rows)
 
 
 def _column(model: Source) -> list[str]:
@@ -99,13 +92,18 @@ def _column(model: Source) -> list[str]:
     ]
 
 
+def _printed(column: PrintedColumn) -> list[str]:
+    size = [str(value) for value in (column.samples, column.population, column.generations)]
+    return [column.system, *size, UNKNOWN, column.mse, column.max_error, column.condition_number, RELATIVE_ERROR]
+
+
 def _scale_sentence(sources: Sources) -> str:
     """Compare the size of the torques: the paper prints absolute errors, and its torques must have been larger."""
     ours = max(_largest_torque(judged(model)) for model in sources.models)
-    theirs = _SMALLEST_MAX_ERROR / _RELATIVE_BOUND
+    theirs = SMALLEST_MAX_ERROR / _RELATIVE_BOUND
     return (
         f"Compare the relative errors, not MSE and largest error: the largest torque here is {number(ours, 2)} N m, "
-        f"whereas an error of {_SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in "
+        f"whereas an error of {SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in "
         "the paper. Its condition numbers belong to its own training path, which it does not define in full."
     )
 

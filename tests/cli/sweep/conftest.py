@@ -1,0 +1,90 @@
+"""A sweep of three small settings with two seeds each."""
+
+import itertools
+import os
+import signal
+
+import pytest
+
+from cpfls_cli.workers import employ
+
+SWEEP = """\
+seed: 5
+trajectory: {sample_time_s: 0.2}
+reduction: {size: 60, criterion: D}
+identification:
+  consequents: seesaw
+  products: additive
+  membership_functions: 3
+  base: none
+  population: 10
+  generations: 2
+  subpopulations: 2
+  local_search: {enabled: false}
+sweep:
+  seeds: 2
+  set: {identification.population: 8}
+  settings:
+    - {name: "classic, all samples", set: {identification.structure: fls, reduction.size: null}}
+    - {name: "fewer samples", set: {reduction.size: 40}}
+    - {name: "more functions", set: {identification.membership_functions: 4, identification.population: 12}}
+"""
+
+
+@pytest.fixture(scope="session")
+def sweep(tmp_path_factory):
+    path = tmp_path_factory.mktemp("sweep") / "sweep.yaml"
+    path.write_text(SWEEP)
+    return path
+
+
+@pytest.fixture(scope="session")
+def flight(cpfls, sweep):
+    """A flight of the study."""
+    trajectory, flight = sweep.with_name("trajectory.h5"), sweep.with_name("flight.h5")
+    assert cpfls("trajectory", sweep, "-o", trajectory).exit_code == 0
+    assert cpfls("simulate", sweep, trajectory, "-o", flight).exit_code == 0
+    return flight
+
+
+@pytest.fixture(scope="session")
+def words(sweep, flight):
+    """The command, without its output."""
+    return ("sweep", sweep, flight)
+
+
+@pytest.fixture(scope="session")
+def whole(cpfls, words, tmp_path_factory):
+    """A sweep that nobody stopped."""
+    output = tmp_path_factory.mktemp("whole") / "sweep.h5"
+    result = cpfls(*words, "-o", output)
+    assert result.exit_code == 0, result.stderr
+    assert [path.name for path in output.parent.iterdir()] == ["sweep.h5"]
+    return output
+
+
+@pytest.fixture
+def at_evaluation(monkeypatch):
+    """Do something when so many chromosomes are evaluated, over all runs."""
+
+    def arrange(number, action):
+        count = itertools.count(1)
+
+        def counting(evaluate, **options):
+            def evaluate_and_count(genes):
+                evaluation = evaluate(genes)
+                if next(count) == number:
+                    action()
+                return evaluation
+
+            return employ(evaluate_and_count, **options)
+
+        monkeypatch.setattr("cpfls_cli.stages.resumable.employ", counting)
+
+    return arrange
+
+
+@pytest.fixture
+def interrupt_at(at_evaluation):
+    """Send this very process an interrupt when so many chromosomes are evaluated."""
+    return lambda number: at_evaluation(number, lambda: os.kill(os.getpid(), signal.SIGINT))

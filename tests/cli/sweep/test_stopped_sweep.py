@@ -1,0 +1,158 @@
+"""A sweep that is stopped anywhere keeps what is finished, and goes on to the same bytes."""
+
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts import check_artifact, read_artifact
+
+PARTIAL, CHECKPOINT = "sweep.h5.partial", "sweep.h5.checkpoint"
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def finished(path):
+    with h5py.File(path) as file:
+        return len(file["run/seed"])
+
+
+def start(words, output, *options):
+    called = [sys.executable, "-m", "cpfls_cli", *map(str, words), "-o", str(output), *options]
+    return subprocess.Popen(called, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def wait_for_change(process, path):
+    """Wait until a file is replaced, or the process has ended."""
+
+    def identity():
+        return (path.stat().st_ino, path.stat().st_mtime_ns) if path.exists() else None
+
+    before = identity()
+    while process.poll() is None and identity() in (before, None):
+        time.sleep(0.001)
+
+
+def test_killed_in_processes_of_its_own_it_ends_the_same(words, whole, tmp_path):
+    output, moments, options, kills = tmp_path / "sweep.h5", random.Random(3), (), 0
+    for watched in (PARTIAL, CHECKPOINT, None):
+        process = start(words, output, *options)
+        if watched is not None:
+            wait_for_change(process, tmp_path / watched)
+            time.sleep(moments.uniform(0.0, 0.03))
+            process.kill()
+        process.wait()
+        kills += process.poll() == -signal.SIGKILL
+        options = ("--resume",)
+    assert kills > 0
+    assert process.poll() == 0
+    assert output.read_bytes() == whole.read_bytes()
+    assert names(tmp_path) == ["sweep.h5"]
+
+
+class Killed(BaseException):
+    """What a process that is killed does not live to see."""
+
+
+@pytest.mark.parametrize("moment", ["before", "after"])
+@pytest.mark.parametrize("call", range(1, 9))
+def test_stopped_dead_at_any_file_it_writes_it_ends_the_same(cpfls, words, whole, tmp_path, monkeypatch, call, moment):
+    """The first writes: no run yet, three generations, the first run, the next run's generations."""
+    from cpfls_cli.artifacts import writing
+
+    output, calls, replace = tmp_path / "sweep.h5", [], writing.os.replace
+
+    def stopping(*paths):
+        calls.append(paths)
+        if len(calls) == call and moment == "before":
+            raise Killed
+        replace(*paths)
+        if len(calls) == call:
+            raise Killed
+
+    monkeypatch.setattr(writing.os, "replace", stopping)
+    with pytest.raises(Killed):
+        cpfls(*words, "-o", output)
+    monkeypatch.undo()
+    assert not output.exists()
+    result = cpfls(*words, "-o", output, *(["--resume"] if (tmp_path / PARTIAL).exists() else []))
+    assert result.exit_code == 0, result.stderr
+    assert output.read_bytes() == whole.read_bytes()
+    assert names(tmp_path) == ["sweep.h5"]
+
+
+@pytest.mark.parametrize("evaluations", [1, 40, 70])
+def test_interrupted_it_keeps_what_is_finished_and_goes_on(
+    cpfls, words, whole, tmp_path, interrupt_at, monkeypatch, evaluations
+):
+    output = tmp_path / "sweep.h5"
+    interrupt_at(evaluations)
+    result = cpfls(*words, "-o", output)
+    assert result.exit_code == 130
+    assert result.stderr.splitlines()[-1] == (
+        f"cpfls: note: {output}: is incomplete, because the search was interrupted; "
+        "the same command with --resume goes on"
+    )
+    assert names(tmp_path) == ["sweep.h5", CHECKPOINT, PARTIAL]
+    incomplete = read_artifact(output)
+    assert check_artifact(incomplete) == []
+    assert incomplete.number("complete") == 0
+    assert finished(output) == finished(tmp_path / PARTIAL) < 6
+    assert (finished(output) > 0) == (evaluations > 1)
+    whole_mse = read_artifact(whole).array("run/mse")
+    assert np.array_equal(incomplete.array("run/mse"), whole_mse[: finished(output)])
+    monkeypatch.undo()
+    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    assert output.read_bytes() == whole.read_bytes()
+    assert names(tmp_path) == ["sweep.h5"]
+
+
+def test_what_is_finished_or_evaluated_is_not_searched_again(
+    cpfls, words, whole, tmp_path, interrupt_at, at_evaluation
+):
+    output, evaluated = tmp_path / "sweep.h5", []
+    interrupt_at(50)
+    assert cpfls(*words, "-o", output).exit_code == 130
+    total = int(read_artifact(whole).array("run/evaluations").sum())
+    at_evaluation(total - 50, lambda: evaluated.append("last"))
+    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    assert evaluated == ["last"]
+    assert output.read_bytes() == whole.read_bytes()
+
+
+def test_time_limit_is_for_all_runs_together(cpfls, words, whole, tmp_path, at_evaluation, monkeypatch):
+    output, clock = tmp_path / "sweep.h5", [100.0]
+    monkeypatch.setattr("cpfls_cli.stages.resumable.time.monotonic", lambda: clock[0])
+    at_evaluation(40, lambda: clock.__setitem__(0, 200.0))
+    assert cpfls(*words, "-o", output, "--time-limit", "90s").exit_code == 0
+    assert read_artifact(output).number("complete") == 0
+    monkeypatch.undo()
+    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    assert output.read_bytes() == whole.read_bytes()
+
+
+def test_damaged_checkpoint_costs_its_run_only(cpfls, words, whole, tmp_path, interrupt_at, monkeypatch):
+    output = tmp_path / "sweep.h5"
+    interrupt_at(60)
+    assert cpfls(*words, "-o", output).exit_code == 130
+    monkeypatch.undo()
+    checkpoint = tmp_path / CHECKPOINT
+    checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
+    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    assert output.read_bytes() == whole.read_bytes()
+
+
+def test_more_seeds_go_on_from_fewer(cpfls, words, whole, tmp_path, interrupt_at, monkeypatch):
+    output = tmp_path / "sweep.h5"
+    interrupt_at(40)
+    assert cpfls(*words, "-o", output, "--set", "sweep.seeds=1").exit_code == 130
+    monkeypatch.undo()
+    assert cpfls(*words, "-o", output, "--resume").exit_code == 0
+    assert output.read_bytes() == whole.read_bytes()
