@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,6 +105,20 @@ def printed_beside(settings: list[SweptSetting]) -> list[PrintedColumn | None]:
             if place not in found and (column := next(free, None)) is not None:
                 found[place] = column
     return [found.get(place) for place in range(len(settings))]
+
+
+def repeats_table_5(sweeps: Sequence[Source]) -> bool:
+    """Tell whether sweeps repeat any column of the paper.
+
+    Parameters
+    ----------
+    sweeps : sequence of Source
+
+    Returns
+    -------
+    bool
+    """
+    return any(column for sweep in sweeps for column in printed_beside(swept_settings(sweep)))
 
 
 def _fits(setting: SweptSetting, column: PrintedColumn, exact: bool) -> bool:

@@ -7,14 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.spread import spread
-from cpfls_cli.report.canvas import plot, style_of
+from cpfls_cli.report.canvas import plain_ticks, plot, style_of
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.swept import SweptSetting
 
 _DECADE = 10.0
+_TICKS = 4
 
 
 def replicates_figure(name: str, label: str, settings: Sequence[SweptSetting]) -> Plot:
@@ -59,7 +61,7 @@ def _dots(axes: Axes, row: int, values: Array) -> None:
     axes.plot(values, row + offsets, "o", markersize=4.5, markerfacecolor="none", color=style_of(0)["color"])
     mean = spread(values).mean
     if np.isfinite(mean):
-        axes.vlines(mean, row - 0.34, row + 0.34, color="black", linewidth=2.2)
+        axes.vlines(mean, row - 0.34, row + 0.34, color="black", linewidth=2.2, zorder=1)
 
 
 def _scale(axes: Axes) -> None:
@@ -68,3 +70,6 @@ def _scale(axes: Axes) -> None:
     known = values[np.isfinite(values) & (values > 0)]
     if len(known) and known.max() > _DECADE * known.min():
         axes.set_xscale("log")
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(_TICKS))
+        plain_ticks(axes.xaxis)

@@ -10,6 +10,7 @@ from cpfls_cli.report.content import Block, Cell, Heading, Section, Table, Text
 from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, TRAINING, Judged, judged
 from cpfls_cli.report.numbers import UNKNOWN, count, number, percent, r_squared
 from cpfls_cli.report.source import Source, Sources
+from cpfls_cli.report.swept import repeats_table_5
 from cpfls_cli.report.table_5 import PRINTED, RELATIVE_ERROR, SMALLEST_MAX_ERROR, PrintedColumn
 
 # Units are not torn apart at the end of a line.
@@ -64,7 +65,8 @@ def identification_section(sources: Sources) -> Section | None:
 def _table(sources: Sources) -> Table:
     columns = [_column(model) for model in sources.models]
     header = ["Quantity", *(model.label for model in sources.models)]
-    if sources.settings.paper and not sources.sweeps:
+    elsewhere = repeats_table_5(sources.sweeps)
+    if sources.settings.paper and not elsewhere:
         columns += [_printed(column) for column in PRINTED]
         header += ["Paper"] * len(PRINTED)
     rows = [[name, *(column[place] for column in columns)] for place, name in enumerate(_ROWS)]
@@ -72,7 +74,7 @@ def _table(sources: Sources) -> Table:
         "Results of the identification on the whole training part: mean squared error over the axes, largest error and "
         "condition number of the selected model, and its largest error over the largest torque (worst axis)."
     )
-    numbered = caption if sources.sweeps else f"Table 5. {caption}"
+    numbered = caption if elsewhere else f"Table 5. {caption}"
     return Table("table-5-identification", numbered, header, rows)
 
 

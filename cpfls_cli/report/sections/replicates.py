@@ -13,11 +13,12 @@ from cpfls_cli.report.figures.replicates import replicates_figure
 from cpfls_cli.report.numbers import UNKNOWN, number, percent
 from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
-from cpfls_cli.report.swept import SweptSetting, printed_beside, swept_settings
+from cpfls_cli.report.swept import SweptSetting, printed_beside, repeats_table_5, swept_settings
 from cpfls_cli.report.table_5 import RELATIVE_ERROR, PrintedColumn
 
 # Units are not torn apart at the end of a line.
 TORQUE, SQUARED = "N\N{NO-BREAK SPACE}m", "(N\N{NO-BREAK SPACE}m)²"
+_DEVIATION = "its standard deviation"
 _Row = tuple[str, Callable[[SweptSetting], str], Callable[[PrintedColumn], str] | None]
 
 
@@ -55,7 +56,7 @@ def _sweep(sweep: Source, index: int, paper: bool) -> Iterator[Block]:
             "warning",
         )
     yield _table(sweep, index, settings, paper)
-    if paper:
+    if paper and repeats_table_5([sweep]):
         yield Text(_PAPER_NOTE, "note")
     yield replicates_figure(f"replicates-{index}", sweep.label, settings)
     yield from _held_out(sweep, index, settings)
@@ -80,29 +81,29 @@ def _table(sweep: Source, index: int, settings: list[SweptSetting], paper: bool)
         rows.append([title, *(ours(setting) for setting in settings)])
         if theirs is not None and any(printed):
             rows.append(["· paper", *(theirs(column) if column else UNKNOWN for column in printed)])
+    numbered = "Table 5. " if repeats_table_5([sweep]) else ""
     caption = (
-        f"Table 5. Results of {sweep.label} on the whole training part. The best run of a setting is that of the "
+        f"{numbered}Results of {sweep.label} on the whole training part. The best run of a setting is that of the "
         "smallest mean squared error; mean and standard deviation are over its seeds."
     )
-    name = "table-5" if index == 1 else f"table-5-{index}"
-    return Table(name, caption, ["Quantity", *(setting.name for setting in settings)], rows)
+    return Table(f"table-5-replicates-{index}", caption, ["Quantity", *(setting.name for setting in settings)], rows)
 
 
 def _rows() -> Iterator[_Row]:
     yield "system", lambda s: {"cpfls": "cpFLS", "fls": "FLS"}[s.structure], lambda p: p.system
-    yield "training points", lambda s: str(s.samples), None
+    yield "training points", lambda s: str(s.samples), lambda p: str(p.samples)
     yield "population × generations", lambda s: f"{s.population} × {s.generations}", _size
     yield "runs", lambda s: str(s.runs), lambda _: "10"
-    yield f"MSE, best run, {SQUARED}", lambda s: number(s.best_of(s.mse[:, 0]), 3), lambda p: p.mse
-    yield f"largest error, best run, {TORQUE}", _best_max_error, lambda p: p.max_error
-    yield "condition number, best run", _best_condition_number, lambda p: p.condition_number
-    yield f"MSE, mean, {SQUARED}", lambda s: _mean(s.mse[:, 0], 3), lambda p: p.mse_of_runs[0]
-    yield "its standard deviation", lambda s: _deviation(s.mse[:, 0]), lambda p: p.mse_of_runs[1]
-    yield f"largest error, mean, {TORQUE}", lambda s: _mean(s.max_error[:, 0], 3), lambda p: p.max_error_of_runs[0]
-    yield "its standard deviation", lambda s: _deviation(s.max_error[:, 0]), lambda p: p.max_error_of_runs[1]
-    yield "condition number, mean", lambda s: _mean(s.condition_number, 5), lambda p: p.condition_number_of_runs[0]
-    yield "its standard deviation", lambda s: _deviation(s.condition_number), lambda p: p.condition_number_of_runs[1]
-    yield "relative error, mean", lambda s: percent(spread(s.relative_error[:, 0]).mean), lambda _: RELATIVE_ERROR
+    yield f"best run: MSE, {SQUARED}", lambda s: number(s.best_of(s.mse[:, 0]), 2), lambda p: p.mse
+    yield f"largest error, {TORQUE}", _best_max_error, lambda p: p.max_error
+    yield "condition number", _best_condition_number, lambda p: p.condition_number
+    yield f"mean MSE, {SQUARED}", lambda s: _mean(s.mse[:, 0], 2), lambda p: p.mse_of_runs[0]
+    yield _DEVIATION, lambda s: _deviation(s.mse[:, 0]), lambda p: p.mse_of_runs[1]
+    yield f"mean largest error, {TORQUE}", lambda s: _mean(s.max_error[:, 0], 3), lambda p: p.max_error_of_runs[0]
+    yield _DEVIATION, lambda s: _deviation(s.max_error[:, 0]), lambda p: p.max_error_of_runs[1]
+    yield "mean condition number", lambda s: _mean(s.condition_number, 3), lambda p: p.condition_number_of_runs[0]
+    yield _DEVIATION, lambda s: _deviation(s.condition_number), lambda p: p.condition_number_of_runs[1]
+    yield "mean relative error", lambda s: percent(spread(s.relative_error[:, 0]).mean), lambda _: RELATIVE_ERROR
 
 
 def _size(column: PrintedColumn) -> str:
@@ -114,7 +115,7 @@ def _best_max_error(setting: SweptSetting) -> str:
 
 
 def _best_condition_number(setting: SweptSetting) -> str:
-    return number(setting.best_of(setting.condition_number), 5)
+    return number(setting.best_of(setting.condition_number), 3)
 
 
 def _mean(values: Array, digits: int) -> str:

@@ -36,8 +36,8 @@ report: {title: "<script>alert(1)</script> & a study", paper: true}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
-    "summary", "vehicle", "path", "flights", "reduction", "identification", "search", "partitions", "prediction",
-    "rules", "provenance",
+    "summary", "vehicle", "path", "flights", "reduction", "identification", "replicates", "search", "partitions",
+    "prediction", "rules", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -80,7 +80,7 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     config = folder / "study.yaml"
     config.write_text(CONFIG)
-    names = ("trajectory", "flight", "selection", "model", "ridge", "prediction", "noisy")
+    names = ("trajectory", "flight", "selection", "model", "ridge", "prediction", "noisy", "sweep")
     files = SimpleNamespace(folder=folder, config=config, **{name: folder / f"{name}.h5" for name in names})
     cpfls("trajectory", config, "-o", files.trajectory)
     cpfls("simulate", config, files.trajectory, "-o", files.flight)
@@ -90,12 +90,23 @@ def study(tmp_path_factory):
     based = ("--set", "identification.base=rigid-body", "--set", "identification.ridge.count=3")
     cpfls("identify", config, files.noisy, "-o", files.ridge, *based)
     cpfls("predict", config, files.model, files.flight, "-o", files.prediction)
+    settings = "sweep.settings=[{name: <b>small</b>}, {name: all, set: {reduction.size: null}}]"
+    cpfls("sweep", config, files.flight, "-o", files.sweep, "--set", settings, "--set", "sweep.seeds=2")
     return files
 
 
 @pytest.fixture(scope="module")
 def full(study):
-    given = (study.trajectory, study.flight, study.noisy, study.selection, study.model, study.ridge, study.prediction)
+    given = (
+        study.trajectory,
+        study.flight,
+        study.noisy,
+        study.selection,
+        study.model,
+        study.ridge,
+        study.prediction,
+        study.sweep,
+    )
     output = study.folder / "report.html"
     summary = json.loads(cpfls("report", study.config, *given, "-o", output, "--json").stdout)
     html = output.read_text(encoding="utf-8")
@@ -118,6 +129,7 @@ def test_everything_given_everything_shown(full):
     assert kinds == {
         "figure-2-derivatives", "figure-3-attitude", "figure-4-torque", "figure-5-reduction", "convergence",
         "pareto-front", "ridge-curve", "figure-6-partitions", "figure-7-error", "torques", "inertia-matrix",
+        "replicates",
     }  # fmt: skip
 
 
@@ -130,7 +142,7 @@ def test_no_id_stands_twice_and_every_element_is_closed(full):
 def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_path):
     summary, html, _ = report(study, tmp_path, study.noisy)
     assert summary["sections"] == ["summary", "vehicle", "flights", "provenance"]
-    assert summary["missing"] == ["trajectory", "selection", "model", "prediction"]
+    assert summary["missing"] == ["trajectory", "selection", "model", "prediction", "sweep"]
     for command in ("trajectory CONFIG", "reduce CONFIG", "identify CONFIG", "predict CONFIG"):
         assert f"cpfls {command}" in html
     assert "cpfls simulate" not in html

@@ -1,0 +1,35 @@
+"""Which column of the paper a setting stands beside, and which run is the best."""
+
+import numpy as np
+
+from cpfls_cli.report.swept import SweptSetting, printed_beside
+from cpfls_cli.report.table_5 import PRINTED
+
+
+def setting(structure="cpfls", samples=685, population=500, generations=200, mse=(1.0,)):
+    errors = np.array(mse)[:, None]
+    return SweptSetting("x", structure, samples, population, generations, errors, errors, errors, np.arange(len(mse)))
+
+
+def test_the_papers_own_settings_find_their_columns():
+    own = [setting(c.structure, c.samples, c.population, c.generations) for c in PRINTED]
+    assert printed_beside(own) == list(PRINTED)
+    assert printed_beside(own[::-1]) == list(PRINTED)[::-1]
+
+
+def test_smaller_searches_take_the_columns_in_order_but_leave_exact_ones():
+    small, exact = setting(population=20, generations=5), setting(population=75, generations=25)
+    assert printed_beside([small, exact]) == [PRINTED[4], PRINTED[5]]
+    assert printed_beside([exact, small]) == [PRINTED[5], PRINTED[4]]
+    assert printed_beside([small, exact, small]) == [PRINTED[4], PRINTED[5], None]
+
+
+def test_other_settings_have_none():
+    assert printed_beside([setting(samples=80), setting("fls", 685)]) == [None, None]
+
+
+def test_best_run():
+    assert setting(mse=(3.0, np.nan, 1.0)).best == 2
+    assert setting(mse=(3.0, np.nan, 1.0)).best_of(np.array([7.0, 8.0, 9.0])) == 9.0
+    assert setting(mse=(np.nan,)).best is None
+    assert np.isnan(setting(mse=(np.nan,)).best_of(np.array([7.0])))
