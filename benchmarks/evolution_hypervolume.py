@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import numpy as np
@@ -20,6 +20,7 @@ from pymoo.optimize import minimize
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, pareto_front, start, step
+from cpfls_cli.identification.presets import PRESETS
 
 EVALUATIONS = 5000
 SEEDS = range(5)
@@ -93,15 +94,23 @@ def hypervolume_share(problem: TestProblem, objectives: Array) -> float:
 
 
 def algorithms() -> dict[str, Callable[[TestProblem, int], Array]]:
+    keys = {field.name for field in fields(EvolutionSettings)}
+    paper = EvolutionSettings(**{key: value for key, value in PRESETS["paper"].items() if key in keys})
     rankings = ("quantity-dominance", "pareto-count", "pareto-fronts")
     variants = {
-        f"{ranking}, {reinsertion}, population {population}": partial(
+        f"paper, {ranking}, {reinsertion}, population {population}": partial(
             evolution,
-            settings=EvolutionSettings(population=population, ranking=ranking, reinsertion=reinsertion),
+            settings=replace(paper, population=population, ranking=ranking, reinsertion=reinsertion),
         )
         for population, ranking, reinsertion in itertools.product((75, 200), rankings, ("uniform", "fitness"))
     }
-    return variants | {"NSGA-II (pymoo), population 100": nsga2, "random search": random_search}
+    defaults = {
+        f"default, {ranking}, population {population}": partial(
+            evolution, settings=EvolutionSettings(population=population, ranking=ranking)
+        )
+        for population, ranking in itertools.product((30, 75), rankings)
+    }
+    return variants | defaults | {"NSGA-II (pymoo), population 100": nsga2, "random search": random_search}
 
 
 def main() -> None:
