@@ -11,11 +11,13 @@ export OPENBLAS_NUM_THREADS := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce quick hexarotor crazyflie gap-example test lint bench blind-study clean FORCE
+.PHONY: help reproduce quick sweep table-5 hexarotor crazyflie gap-example test lint bench blind-study clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
 	@echo "  make quick       the same study with a small search, in a minute"
+	@echo "  make sweep       Table 5 from three small searches of each setting, in minutes"
+	@echo "  make table-5     Table 5 from ten searches of the paper's size each, most of a day on one core"
 	@echo "  make hexarotor   a six-rotor study with a rigid body under the fuzzy part"
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
 	@echo "  make gap-example [HIDDEN=NAME=VALUES]   a flight with a hidden effect, and what the gap workflow makes of it"
@@ -29,6 +31,12 @@ reproduce: data/paper/report.html
 
 quick: data/quick/report.html
 	@echo "open data/quick/report.html"
+
+sweep: data/paper/sweep.html
+	@echo "open data/paper/sweep.html"
+
+table-5: data/paper/table-5.html
+	@echo "open data/paper/table-5.html"
 
 hexarotor: data/hexarotor/report.html
 	@echo "open data/hexarotor/report.html"
@@ -58,6 +66,7 @@ PART_simulate := vehicle simulation
 PART_import := import vehicle identification.training_share
 PART_reduce := reduction $(addprefix identification.,$(STRUCTURE))
 PART_identify := identification
+PART_sweep := reduction identification sweep
 PART_report := vehicle report
 
 define part
@@ -66,7 +75,7 @@ data/%/.part/$(1).yaml: configs/%.yaml FORCE | $(INSTALLED)
 	@{ echo "# $$$$($(CPFLS) --version)"; $(CPFLS) config $$< $(foreach key,$(PART_$(1)),--section $(key)); } > $$@.new
 	@if cmp --silent $$@.new $$@; then rm $$@.new; else mv $$@.new $$@; fi
 endef
-$(foreach stage,trajectory simulate import reduce identify report,$(eval $(call part,$(stage))))
+$(foreach stage,trajectory simulate import reduce identify sweep report,$(eval $(call part,$(stage))))
 
 data/%/trajectory.h5: data/%/.part/trajectory.yaml
 	$(CPFLS) trajectory configs/$*.yaml -o $@ --force
@@ -81,6 +90,21 @@ data/%/selection.h5: data/%/flight.h5 data/%/.part/reduce.yaml
 TABLE_4_SIZES := 1170 2743
 data/paper/selection-%.h5: data/paper/flight.h5 data/paper/.part/reduce.yaml
 	$(CPFLS) reduce configs/paper.yaml $< -o $@ --force --set reduction.size=$*
+
+# Table 5, small and in full. Stopped and started again they go on where they were.
+SMALL := --set sweep.seeds=3 --set "sweep.set={identification.population: 40, identification.generations: 10}"
+resumed = --force $(if $(wildcard $@.partial),--resume)
+data/%/sweep.h5: data/%/flight.h5 data/%/.part/sweep.yaml
+	$(CPFLS) sweep configs/$*.yaml $< -o $@ $(resumed) $(SMALL)
+
+data/%/table-5.h5: data/%/flight.h5 data/%/.part/sweep.yaml
+	$(CPFLS) sweep configs/$*.yaml $< -o $@ $(resumed)
+
+data/%/sweep.html: data/%/sweep.h5 data/%/.part/report.yaml
+	$(CPFLS) report configs/$*.yaml $< -o $@ --force
+
+data/%/table-5.html: data/%/table-5.h5 data/%/.part/report.yaml
+	$(CPFLS) report configs/$*.yaml $< -o $@ --force
 
 # A flight that the model never learns from: another direction, the other way round.
 UNSEEN := --set trajectory.path=straight --set "trajectory.direction=[1.0, -0.6, 0.2]" \
@@ -102,8 +126,10 @@ data/%/prediction-unseen.h5: data/%/model.h5 data/%/unseen.h5
 
 ARTIFACTS := trajectory flight unseen selection model prediction prediction-unseen
 
+# A sweep is shown where there is one, but not made for the page.
+SWEPT = $(firstword $(wildcard data/$*/table-5.h5 data/$*/sweep.h5))
 data/%/report.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
-	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) -o $@ --force
+	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) $(SWEPT) -o $@ --force
 
 # The real flight: its logs are in the folder LOGS.
 REAL := data/crazyflie
