@@ -120,6 +120,8 @@ def _overridden(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> tuple[
     for key, value in overrides.items():
         if key.split(".")[0] not in _ALLOWED:
             raise SettingError(key, f"a setting of a sweep overrides keys of {' and '.join(_ALLOWED)} only")
+        if key in _ALLOWED:
+            raise SettingError(key, f"is a section; name its keys one by one, with a dot: {key}.KEY")
         if key == _PRESET:
             raise SettingError(key, "speaks for keys that the config leaves out; name the keys that differ")
         override_key(result, key, value)

@@ -76,6 +76,10 @@ def test_without_settings_there_is_one():
             {"identification.preset": "paper"},
             'identification.preset = "paper": speaks for keys that the config leaves out; name the keys that differ',
         ),
+        (
+            {"reduction": {"size": 3}},
+            'reduction = {"size": 3}: is a section; name its keys one by one, with a dot: reduction.KEY',
+        ),
         ({"reduction..size": 3}, "reduction..size = 3: write section.key=value"),
         (
             {"identification.population.x": 3},
