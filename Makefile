@@ -195,6 +195,7 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python benchmarks/gap.py
 	$(MAKE) data/paper/selection.h5
 	$(BIN)/python benchmarks/judging.py configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
+	$(BIN)/python benchmarks/time_to_quality.py configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
 
 # Stopped and started again it goes on where it was. SIZE takes more options: `python -m tests.gap.study --help`.
 SEED := 2027
