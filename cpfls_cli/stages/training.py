@@ -166,7 +166,7 @@ def _selected(flights: Sequence[Path], selection: Path, candidates: IntArray) ->
         raise InputError(f"{selection}: indices is empty, negative or repeats itself; run `cpfls reduce` again")
     if not np.isin(indices, candidates).all():
         raise InputError(
-            f"{selection}: selects samples beyond the {len(candidates)} that train; "
+            f"{selection}: selects samples other than the {len(candidates)} that train; "
             "identification.training_share has changed since: run `cpfls reduce` again"
         )
     return indices

@@ -203,7 +203,7 @@ def test_selection_from_another_flight(refuse, cpfls, pipeline, study, tmp_path)
 def test_training_share_changed_between_reduce_and_identify(refuse, pipeline, study, tmp_path):
     words = ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", tmp_path / "out.h5")
     (line,) = refuse(*words, "--set", "identification.training_share=0.5")
-    assert line.startswith(f"{pipeline.selection}: selects samples beyond the first ")
+    assert line.startswith(f"{pipeline.selection}: selects samples other than the ")
     assert "identification.training_share has changed since" in line
 
 

@@ -29,7 +29,8 @@ def membership(x, peaks):
         return np.ones((len(x), 1))
 
     def falling(low, high):
-        u = np.clip((x - low) / (high - low), 0, 1)
+        # Equal peaks: the function between them is met nowhere.
+        u = np.clip((x - low) / (high - low), 0, 1) if high > low else np.where(x >= high, 1.0, 0.0)
         return np.where(u < 0.5, 1 - 2 * u**2, 2 * (1 - u) ** 2)
 
     degrees = []

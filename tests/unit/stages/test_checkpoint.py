@@ -122,7 +122,7 @@ def test_none_to_resume(tmp_path):
     ("now", "said"),
     [
         (header(seed=2), "seed = 1 there, 2 here"),
-        (header(mutated_bits=0.5), "identification.mutated_bits = 0.01 there, 0.5 here"),
+        (header(mutated_bits=0.5), "identification.mutated_bits = 0.003 there, 0.5 here"),
         (header(ridge={"folds": 7}), "identification.ridge.folds = 5 there, 7 here"),
         (header(generations=2), "identification.generations = 2, but it has come to generation 3"),
         (
