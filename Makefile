@@ -94,6 +94,8 @@ data/paper/selection-%.h5: data/paper/flight.h5 data/paper/.part/reduce.yaml
 # Table 5, small and in full. Stopped and started again they go on where they were.
 SMALL := --set sweep.seeds=3 --set "sweep.set={identification.population: 40, identification.generations: 10}"
 resumed = --force $(if $(wildcard $@.partial),--resume)
+# What an interrupt left is newer than its inputs all the same.
+$(foreach left,$(wildcard data/*/*.h5.partial),$(eval $(left:.partial=): FORCE))
 data/%/sweep.h5: data/%/flight.h5 data/%/.part/sweep.yaml
 	$(CPFLS) sweep configs/$*.yaml $< -o $@ $(resumed) $(SMALL)
 
