@@ -590,20 +590,40 @@ def _subtract(table: Table, block: IntArray, carried: Array, count: int, at: _Ba
 
 
 @_compiled
-def _residual(
-    table: Table, coefficients: Array, dense: Array, dense_weights: Array, scale: Array, at: _Batch, residual: Array
-) -> None:
-    """Set the residual ``dense D - Q c`` of the samples of a batch."""
-    count = len(dense)
-    for n in range(count):
+def _combine_dense(dense: Array, weights: Array, scale: Array, out: Array) -> None:
+    """Set a combination of the dense columns of samples."""
+    for n in range(len(dense)):
         for axis in range(3):
             total = 0.0
             for d in range(dense.shape[2]):
-                total += dense[n, axis, d] * dense_weights[d]
-            residual[3 * n + axis] = total * scale[axis]
+                total += dense[n, axis, d] * weights[d]
+            out[3 * n + axis] = total * scale[axis]
+
+
+@_compiled
+def _subtract_columns(
+    rows: Array, column: IntArray, coefficients: Array, start: int, stop: int, residual: Array
+) -> None:
+    """Subtract combinations of the columns of samples that fire alike, two columns at a time."""
+    for a in range(0, len(column), 2):
+        first, second = rows[a, start:stop], rows[a + 1, start:stop]
+        for k in range(len(coefficients)):
+            one = coefficients[k, column[a]]
+            other = coefficients[k, column[a + 1]] if column[a + 1] >= 0 else 0.0
+            total = residual[k, start:stop]
+            for r in range(len(total)):
+                total[r] -= one * first[r] + other * second[r]
+
+
+@_compiled
+def _residual(
+    table: Table, coefficients: Array, dense: Array, dense_weights: Array, scale: Array, at: _Batch, residual: Array
+) -> None:
+    """Set the residual ``dense D - Q c`` of the samples of a batch, whose columns need not be known."""
+    _combine_dense(dense, dense_weights, scale, residual)
     for b in range(len(table.blocks)):
-        _outputs(table, table.blocks[b], coefficients, count, at)
-        _subtract(table, table.blocks[b], at.carried[b], count, at, residual)
+        _outputs(table, table.blocks[b], coefficients, len(dense), at)
+        _subtract(table, table.blocks[b], at.carried[b], len(dense), at, residual)
 
 
 @_compiled
@@ -686,17 +706,19 @@ def add_combined(
         _fill(table, stop - start, at)
         _take_dense(chunk.dense[start:stop], scale, dense)
         for k in range(models):
-            _residual(table, coefficients[k], chunk.dense[start:stop], dense_weights[k], scale, at, residual[k])
+            _combine_dense(chunk.dense[start:stop], dense_weights[k], scale, residual[k])
+        first = 0
+        while first < stop - start:
+            last = _end_of_run(at.pattern, at.pattern[: stop - start], first)
+            column = at.column[:, first]
+            _subtract_columns(at.rows, column, coefficients, 3 * first, 3 * last, residual)
+            _multiply(at.rows, residual[:2], 3 * first, 3 * last, False, local)
+            _add(column, first_only, local, False, back)
+            first = last
         _multiply(residual, residual, 0, 3 * (stop - start), False, part)
         square += part[:models, :models]
         _multiply(dense, residual[:2], 0, 3 * (stop - start), False, local_dense)
         _add(every, first_only, local_dense, False, dense_back)
-        first = 0
-        while first < stop - start:
-            last = _end_of_run(at.pattern, at.pattern[: stop - start], first)
-            _multiply(at.rows, residual[:2], 3 * first, 3 * last, False, local)
-            _add(at.column[:, first], first_only, local, False, back)
-            first = last
 
 
 @_compiled
@@ -809,15 +831,19 @@ def add_moved(
         _fill(table, stop - start, at)
         _move_all(table, coefficients, stop - start, at)
         _take_dense(chunk.dense[start:stop], scale, dense)
-        _residual(table, coefficients, chunk.dense[start:stop], dense_weights, scale, at, moved[moves])
+        _combine_dense(chunk.dense[start:stop], dense_weights, scale, moved[moves])
         first = 0
         while first < stop - start:
             last = _end_of_run(at.pattern, at.pattern[: stop - start], first)
+            column = at.column[:, first]
+            _subtract_columns(
+                at.rows, column, coefficients.reshape(1, -1), 3 * first, 3 * last, moved[moves : moves + 1]
+            )
             _multiply(at.rows, moved, 3 * first, 3 * last, False, local)
             _multiply(dense, moved, 3 * first, 3 * last, False, local_dense)
             _multiply(moved, moved, 3 * first, 3 * last, True, local_square)
             places[:moves] = at.moved_column[:, first]
-            _add(at.column[:, first], places, local, False, cross)
+            _add(column, places, local, False, cross)
             _add(every, places, local_dense, False, dense_cross)
             _add(places, places, local_square, True, square)
             first = last
