@@ -158,7 +158,8 @@ def _free_name(name: str, taken: set[str]) -> str:
 
 
 def _shown(job: Job) -> Callable[[SearchStep], None]:
-    """Show the progress of a search on that of its job."""
+    """Show the progress of a search on that of its job; a new machine needs half a minute before the first step."""
+    job.progress(0.0, 1, "loads compiled loops; at the first use on a machine compiles them")
     return lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step))
 
 
