@@ -10,7 +10,6 @@ the machine counts little.
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +24,7 @@ import numpy as np
 from pymoo.indicators.hv import HV
 
 from benchmarks.shared.quality_plot import draw
-from benchmarks.shared.searches import BudgetSpentError, Course, Search, searches
+from benchmarks.shared.searches import Search, searches, spent
 from cpfls_cli.arrays import Array
 from cpfls_cli.config.load import load_study
 from cpfls_cli.evolution import pareto_front
@@ -110,13 +109,7 @@ def main(config: Path, flight: Path, selection: Path, seeds: int = 10) -> None:
 
 
 def run(search: Search, evaluator: Evaluator, seed: int) -> Run:
-    course = Course(evaluator, EVALUATIONS)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            search(course, seed)
-    except BudgetSpentError:
-        pass
+    course = spent(search, evaluator, seed, EVALUATIONS)
     seconds = np.array(course.seconds)
     return Run(seconds, np.array(course.objectives), 1.0 - course.inside / seconds[-1])
 

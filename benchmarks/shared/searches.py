@@ -7,7 +7,9 @@ algorithm. That is all of them but scipy's differential evolution, which lets no
 
 from __future__ import annotations
 
+import contextlib
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -78,6 +80,15 @@ class Course:
 
 
 Search = Callable[[Course, int], None]
+
+
+def spent(search: Search, evaluator: Evaluator, seed: int, budget: int) -> Course:
+    """Let a search spend its budget."""
+    course = Course(evaluator, budget)
+    with contextlib.suppress(BudgetSpentError), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        search(course, seed)
+    return course
 
 
 def with_uniform(course: Course, rng: np.random.Generator, count: int) -> Array:
