@@ -411,7 +411,7 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
         from cpfls_cli.stages.job import Job
 
         narration = Narration(title, common.verbose and not common.quiet)
-        study = common.study(config)
+        study = common.study(config, sweep=title == "sweep")
         narration.reads(config)
         with progress_bar(title, common) as progress:
             job = Job(study, output, common.force, common.dry_run, progress, narration.reads, deferred_interrupts)

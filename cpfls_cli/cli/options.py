@@ -42,11 +42,11 @@ class Common:
         bool, typer.Option("--dry-run", help="Check config, inputs and output; compute and write nothing.")
     ] = False
 
-    def study(self, config: Path) -> Study:
-        """Load a study with the overrides given on the command line."""
+    def study(self, config: Path, *, sweep: bool = False) -> Study:
+        """Load a study with the overrides given on the command line; check its sweep where one is to be run."""
         from cpfls_cli.config.load import load_study
 
-        return load_study(config, self.overrides or (), self.seed)
+        return load_study(config, self.overrides or (), self.seed, sweep=sweep)
 
 
 def with_common(command: Callable[..., None]) -> Callable[..., None]:

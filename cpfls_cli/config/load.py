@@ -14,7 +14,7 @@ from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.errors import ConfigError
 
 
-def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:
+def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = None, *, sweep: bool = False) -> Study:
     """Load and validate a study.
 
     Parameters
@@ -25,6 +25,8 @@ def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = Non
         ``section.key=value`` each; the value is read as YAML.
     seed : int, optional
         Takes the place of the config's seed.
+    sweep : bool
+        Check the settings of the sweep too.
 
     Returns
     -------
@@ -40,7 +42,7 @@ def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = Non
         apply_override(data, override)
     if seed is not None:
         data["seed"] = seed
-    return validate(data, str(path))
+    return validate(data, str(path), sweep=sweep)
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -94,7 +96,7 @@ def parse_config(text: str, source: str) -> dict[str, Any]:
     return data
 
 
-def validate(data: dict[str, Any], source: str) -> Study:
+def validate(data: dict[str, Any], source: str, *, sweep: bool = False) -> Study:
     """Validate plain data as a study.
 
     Parameters
@@ -102,6 +104,8 @@ def validate(data: dict[str, Any], source: str) -> Study:
     data : dict
     source : str
         Name of the file, for messages.
+    sweep : bool
+        Check the settings of the sweep too; only what sweeps needs them to fit the other keys.
 
     Returns
     -------
@@ -113,7 +117,8 @@ def validate(data: dict[str, Any], source: str) -> Study:
         Listing every wrong key with its value, what is wrong, and the nearest valid key.
     """
     study, errors = checked(data, source)
-    errors += setting_errors(data, source, errors)
+    if sweep:
+        errors += setting_errors(data, source, errors)
     if study is None or errors:
         raise ConfigError("\n".join(errors))
     return study

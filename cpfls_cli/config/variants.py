@@ -56,7 +56,7 @@ def variants(study: Study) -> tuple[Variant, ...]:
     Raises
     ------
     ConfigError
-        If a setting is wrong; never for a study that was loaded from a config.
+        If a setting is wrong; never for a study that was validated with its sweep.
     """
     data, common = resolved(study), study.sweep.set
     if not study.sweep.settings:

@@ -37,5 +37,5 @@ def show(path: Path | None, sections: Sequence[str], overrides: Sequence[str], s
         if sections or overrides or seed is not None:
             raise ConfigError("--section, --set and --seed need a CONFIG; without one the commented default is printed")
         return Outcome(resolved(validate({}, "default")), (commented_default().rstrip("\n"),))
-    study = load_study(path, overrides, seed)
+    study = load_study(path, overrides, seed, sweep=True)
     return Outcome(resolved(study, sections), (resolved_yaml(study, sections).rstrip("\n"),))

@@ -90,3 +90,21 @@ def test_samples_that_cannot_be_chosen_name_the_setting(refuse, words, tmp_path)
 def test_a_flight_that_trains_cannot_judge(refuse, words, flight, tmp_path):
     (line,) = refuse(*words, "-o", tmp_path / "x.h5", "--validate", flight)
     assert "is the flight that trains" in line
+
+
+MISFIT = ("--set", "identification.subpopulations=5")
+
+
+def test_a_setting_that_does_not_fit_stops_only_what_sweeps(cpfls, refuse, words, sweep, flight, tmp_path):
+    said = f"{sweep}: sweep.set: identification.population = 8: 8 individuals cannot fill 5 subpopulations"
+    assert refuse(*words, "-o", tmp_path / "x.h5", *MISFIT)[0].startswith(said)
+    assert refuse("config", sweep, *MISFIT)[0].startswith(said)
+    model, selection = tmp_path / "model.h5", tmp_path / "selection.h5"
+    for command in (
+        ("trajectory", sweep, "-o", tmp_path / "trajectory.h5"),
+        ("reduce", sweep, flight, "-o", selection),
+        ("identify", sweep, flight, "--selection", selection, "-o", model),
+        ("predict", sweep, model, flight, "-o", tmp_path / "prediction.h5"),
+    ):
+        result = cpfls(*command, *MISFIT)
+        assert result.exit_code == 0, result.stderr

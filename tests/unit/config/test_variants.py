@@ -14,7 +14,7 @@ def swept(settings, **sweep):
 
 def errors(data):
     with pytest.raises(ConfigError) as raised:
-        validate(data, "FILE")
+        validate(data, "FILE", sweep=True)
     return str(raised.value).splitlines()
 
 
