@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import linalg
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.fuzzy.partition import breakpoint_jacobian, breakpoints
@@ -47,25 +48,22 @@ def encode(weights: Array) -> IntArray:
     return np.clip(np.rint(weights * LARGEST_GENE), 1, LARGEST_GENE).astype(np.int64)
 
 
-def weight_jacobian(structure: ModelStructure, weights: Array, by_breakpoint: list[Array]) -> Array:
-    """Turn derivatives by breakpoints into derivatives by weights.
+def weight_jacobian(structure: ModelStructure, weights: Array) -> Array:
+    """Differentiate all inner breakpoints by all weights.
 
     Parameters
     ----------
     structure : ModelStructure
     weights : array, shape (genes,)
-    by_breakpoint : list of array, shape (samples, 3, functions - 2)
-        One per partition.
+        No partition all zero.
 
     Returns
     -------
-    array, shape (samples, 3, genes)
+    array, shape (inner breakpoints of all partitions, genes)
     """
-    parts = [
-        moved @ breakpoint_jacobian(weights[part])
-        for moved, part in zip(by_breakpoint, structure.weight_slices(), strict=True)
-    ]
-    return np.concatenate(parts, axis=2)
+    parts = (weights[part] for part in structure.weight_slices())
+    blocks = (breakpoint_jacobian(part) if len(part) > 1 else np.zeros((0, len(part))) for part in parts)
+    return np.asarray(linalg.block_diag(*blocks), dtype=float)
 
 
 def uniform_chromosome(structure: ModelStructure) -> IntArray:

@@ -9,12 +9,10 @@ from scipy import linalg
 from scipy.optimize import least_squares
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.partition import breakpoint_jacobian
-from cpfls_cli.identification.chromosome import decode
+from cpfls_cli.identification.chromosome import decode, weight_jacobian
 from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.normal_equations import quick_solution
 from cpfls_cli.identification.solver import Solver
-from cpfls_cli.regressor.structure import ModelStructure
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def _linearise(solver: Solver, weights: Array, start: Fit) -> _Linearised:
     solution, factor, scale = quick_solution(equations)
     coefficients, rigid_body = solver.parameters(solution, start.column_size)
     moved = solver.learned.moved(partitions, coefficients, rigid_body)
-    by_weight = _weight_jacobian(structure, weights)
+    by_weight = weight_jacobian(structure, weights)
     divide = np.ones(len(solution))
     divide[len(solution) - len(start.column_size) :] = start.column_size
     onto = (moved.columns @ by_weight) / divide[:, None]
@@ -112,12 +110,3 @@ def _turned(normal: Array, gradient: Array, square: float) -> _Linearised:
     rest = np.sqrt(max(square - float(along @ along), 0.0))
     jacobian = np.vstack([roots[:, None] * vectors.T, np.zeros(len(roots))])
     return _Linearised(np.append(along, rest), jacobian)
-
-
-def _weight_jacobian(structure: ModelStructure, weights: Array) -> Array:
-    """Differentiate all inner breakpoints by all weights, shape (breakpoints, genes)."""
-    return np.asarray(linalg.block_diag(*(_partition_jacobian(weights[part]) for part in structure.weight_slices())))
-
-
-def _partition_jacobian(weights: Array) -> Array:
-    return breakpoint_jacobian(weights) if len(weights) > 1 else np.zeros((0, len(weights)))

@@ -66,8 +66,11 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         Doc("initial population: all random, or random with the equidistant partitions among them"),
     ] = "with-uniform"
     rank_tolerance: Annotated[
-        float, Gt(0), Le(1e-2), Doc("singular values below this share of the largest count as zero")
-    ] = 1e-10
+        float,
+        Gt(0),
+        Le(1e-2),
+        Doc("singular values below this share of the largest count as zero; the search cannot tell less than 3e-7"),
+    ] = 3e-7
     training_share: Annotated[
         float, Gt(0), Le(1), Doc("leading share of the flight that trains; the rest is held out")
     ] = 1.0

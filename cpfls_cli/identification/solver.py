@@ -157,7 +157,7 @@ class Solver:
             coefficients, rigid_body = self.parameters(solution.parameters, size)
             if error is None:
                 error = float((products.square[0] - equations.moment @ solution.parameters) / products.rows[0])
-        return Fit(coefficients, rigid_body, weight, error or 0.0, solution.conditioning, scale, size)
+        return Fit(coefficients, rigid_body, weight, max(error or 0.0, 0.0), solution.conditioning, scale, size)
 
     def _equations(self, products: Products, weight: float, size: Array) -> NormalEquations:
         divide = self._divide(size)

@@ -101,8 +101,8 @@ _BATCH = 64
 """Samples worked on together: enough to spread the cost of a loop, few enough to stay in the fastest memory."""
 
 
-_MOST_INTERVALS = 15
-"""More than any partition has."""
+MOST_FUNCTIONS = 15
+"""Membership functions of a partition at most, so that its intervals are digits of a pattern."""
 
 
 class _Batch(NamedTuple):
@@ -282,7 +282,7 @@ def _fire(table: Table, index: int, breakpoints: Array, count: int, at: _Batch) 
     for n in range(count):
         last = table.circular and interval[n] + 2 == functions
         rule[n], next_rule[n] = interval[n], 0 if last else interval[n] + 1
-        pattern[n] = pattern[n] * _MOST_INTERVALS + interval[n]
+        pattern[n] = pattern[n] * MOST_FUNCTIONS + interval[n]
 
 
 @_compiled

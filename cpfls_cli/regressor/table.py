@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.regressor.kernels import Table
+from cpfls_cli.regressor.kernels import MOST_FUNCTIONS, Table
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.regressor.structure import Block, ModelStructure, Partition
 
@@ -25,6 +25,7 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
     Table
     """
     settings = structure.settings
+    assert all(partition.functions <= MOST_FUNCTIONS for partition in structure.partitions)
     harmonic = settings.consequents == "harmonic"
     active = sum(_active(structure, block) for block in structure.blocks)
     inner = [max(partition.functions - 2, 0) for partition in structure.partitions]

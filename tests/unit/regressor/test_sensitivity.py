@@ -49,7 +49,7 @@ def test_weight_jacobian(problem):
     regressor, weights, coefficients = problem
     structure = regressor.structure
     moved = torque_sensitivity(regressor, decode(structure, weights), coefficients)
-    jacobian = weight_jacobian(structure, weights, moved)
+    jacobian = np.concatenate(moved, axis=2) @ weight_jacobian(structure, weights)
     assert jacobian.shape == (60, 3, structure.genes)
     for gene in range(structure.genes):
         ahead, behind = (
