@@ -28,6 +28,7 @@ from cpfls_cli.stages.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.stages.stopped import stopped, without_model
 from cpfls_cli.stages.study import generator, settings_of
 from cpfls_cli.stages.training import TrainingData, flight_roles, read_training
+from cpfls_cli.workers.worker_error import WorkerError
 
 
 def run(
@@ -104,6 +105,9 @@ def _identify(
             )
     except NothingFoundError as error:
         return error
+    except WorkerError:
+        # Says where it evaluated; nothing is wrong with the flights.
+        raise
     except ComputationError as error:
         raise _of(flights, error) from None
 

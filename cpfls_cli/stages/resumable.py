@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from cpfls_cli.stages.checkpoint import Checkpoint
 from cpfls_cli.stages.job import Interrupted, Job, Started, dry_run, header_of, take_inputs
 from cpfls_cli.stages.state_file import StoppedSearch
 from cpfls_cli.workers.employ import employ
+from cpfls_cli.workers.worker_error import WorkerError
 from cpfls_cli.workers.workforce import Workforce
 
 
@@ -42,6 +43,15 @@ class SearchOptions:
     time_limit_s: float | None = None
     workers: int = 1
     scheduler: str | None = None
+
+    @property
+    def place(self) -> str:
+        """The option that says who evaluates."""
+        return f"--workers {self.workers}" if self.scheduler is None else f"--scheduler {self.scheduler}"
+
+    def employed(self, evaluate: Evaluate) -> AbstractContextManager[Workforce]:
+        """Employ who evaluates."""
+        return employ(evaluate, count=self.workers, scheduler=self.scheduler)
 
     def require_one_place(self) -> None:
         """Refuse processes of this machine together with the workers of a scheduler.
@@ -121,8 +131,11 @@ class Resumable:
 
         @contextmanager
         def workers(evaluate: Evaluate) -> Iterator[Workforce]:
-            with watch.deferring(), employ(evaluate, count=options.workers, scheduler=options.scheduler) as workforce:
-                yield workforce
+            try:
+                with watch.deferring(), options.employed(evaluate) as workforce:
+                    yield workforce
+            except WorkerError as error:
+                raise WorkerError(f"{options.place}: {error}") from None
 
         return SearchRun(
             resumed=self.stopped.state if self.stopped else None,

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from distributed import Client, Future, as_completed
 
 from cpfls_cli.arrays import IntArray
-from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Evaluate, Evaluation
 from cpfls_cli.workers.attempt import Failure, result_of
 from cpfls_cli.workers.chunks import chunks
@@ -20,6 +19,7 @@ from cpfls_cli.workers.cluster_errors import explained, require_workers
 from cpfls_cli.workers.cluster_worker import Shipped, evaluate_shipped
 from cpfls_cli.workers.quiet import quiet
 from cpfls_cli.workers.same_versions import require_same_versions
+from cpfls_cli.workers.worker_error import WorkerError
 from cpfls_cli.workers.workforce import Workforce
 
 _LONGEST_SILENCE_S = 1.0
@@ -97,7 +97,7 @@ def cluster(evaluate: Evaluate, address: str, *, patience_s: float = 10.0) -> It
 
     Raises
     ------
-    ComputationError
+    WorkerError
         If the scheduler does not answer, it has no workers, or they have other versions.
     """
     evaluator = pickle.dumps(evaluate, protocol=pickle.HIGHEST_PROTOCOL)
@@ -124,7 +124,7 @@ def _connected(address: str, patience_s: float) -> Iterator[Client]:
                 warnings.simplefilter("ignore")
                 client = Client(address, timeout=patience_s, set_as_default=False)
         except (OSError, ImportError) as error:
-            raise ComputationError(
+            raise WorkerError(
                 f"no Dask scheduler of a fitting version answers at {address} within {patience_s:g} s: start one with "
                 "`dask scheduler`, and give the address that it prints"
             ) from error

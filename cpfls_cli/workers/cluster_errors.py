@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from distributed import Client, KilledWorker
 
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.workers.worker_error import WorkerError
 
 
 def require_workers(client: Client, patience_s: float) -> None:
@@ -23,14 +24,14 @@ def require_workers(client: Client, patience_s: float) -> None:
 
     Raises
     ------
-    ComputationError
+    WorkerError
         If there is none, or none is left.
     """
     try:
         client.wait_for_workers(1, timeout=patience_s)
     except TimeoutError as error:
         address = client.scheduler.address
-        raise ComputationError(
+        raise WorkerError(
             f"the Dask scheduler at {address} has no workers: start some with `dask worker {address} --nthreads 1`; "
             "where they vanished because their machines ran out of memory, start fewer on each"
         ) from error
@@ -51,7 +52,7 @@ def explained(client: Client) -> Iterator[None]:
 
     Raises
     ------
-    ComputationError
+    WorkerError
         In place of whatever Dask raises.
     """
     try:
@@ -59,7 +60,7 @@ def explained(client: Client) -> Iterator[None]:
     except ComputationError:
         raise
     except Exception as error:
-        raise ComputationError(_words(error, client)) from error
+        raise WorkerError(_words(error, client)) from error
 
 
 def _words(error: Exception, client: Client) -> str:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 
-from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.workers.address import require_address
 from cpfls_cli.workers.processes import processes
 from cpfls_cli.workers.serial import Serial
+from cpfls_cli.workers.worker_error import WorkerError
 from cpfls_cli.workers.workforce import Workforce
 
 
@@ -33,9 +33,10 @@ def employ(evaluate: Evaluate, *, count: int = 1, scheduler: str | None = None) 
     ------
     InputError
         If the address of the scheduler is none.
+    WorkerError
+        If Dask is not installed; on entry, if the workers cannot be had; in use, if one vanishes or fails.
     ComputationError
-        If Dask is not installed; on entry, if the workers cannot be had; in use, if one vanishes or the evaluator
-        fails.
+        In use, if the evaluator refuses its data.
     """
     if scheduler is not None:
         return _cluster(evaluate, scheduler)
@@ -49,7 +50,7 @@ def _cluster(evaluate: Evaluate, address: str) -> AbstractContextManager[Workfor
     try:
         from cpfls_cli.workers.cluster import cluster
     except ModuleNotFoundError as error:
-        raise ComputationError(
+        raise WorkerError(
             f"a scheduler needs Dask, which is not installed here ({error}): pip install 'cpfls[dask]'"
         ) from error
     return cluster(evaluate, address)

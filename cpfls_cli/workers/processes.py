@@ -16,11 +16,11 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 
 from cpfls_cli.arrays import IntArray
-from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Evaluate, Evaluation
 from cpfls_cli.workers.attempt import Failure, result_of
 from cpfls_cli.workers.chunks import chunks
 from cpfls_cli.workers.process_worker import work
+from cpfls_cli.workers.worker_error import WorkerError
 from cpfls_cli.workers.workforce import Workforce
 
 _LONGEST_FAREWELL_S = 5.0
@@ -70,7 +70,7 @@ class _Process:
             yield
         except (EOFError, OSError) as error:
             self._process.join(_LONGEST_FAREWELL_S)
-            raise ComputationError(
+            raise WorkerError(
                 f"a worker process vanished ({_ending(self._process.exitcode)}); where the machine ran out of memory, "
                 "take fewer workers or less data, or add memory"
             ) from error
@@ -131,7 +131,7 @@ def processes(evaluate: Evaluate, count: int) -> Iterator[Processes]:
 
     Raises
     ------
-    ComputationError
+    WorkerError
         If the processes cannot be started.
     """
     evaluator = pickle.dumps(evaluate, protocol=pickle.HIGHEST_PROTOCOL)
@@ -152,7 +152,7 @@ def _start(started: list[_Process], count: int) -> None:
         for _ in range(count):
             started.append(_Process())  # noqa: PERF401 - kept one by one, to be ended when a later one fails
     except OSError as error:
-        raise ComputationError(f"worker {len(started) + 1} of {count} cannot start ({error}): take fewer") from error
+        raise WorkerError(f"worker {len(started) + 1} of {count} cannot start ({error}): take fewer") from error
 
 
 @contextmanager

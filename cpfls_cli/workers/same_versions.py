@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.workers.worker_error import WorkerError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -23,14 +23,14 @@ def require_same_versions(client: Client) -> None:
 
     Raises
     ------
-    ComputationError
+    WorkerError
         Naming the first worker and package that differ.
     """
     for package in _PACKAGES:
         here = version(package)
         for worker, answer in client.run(version, package, on_error="return").items():
             if answer != here:
-                raise ComputationError(
+                raise WorkerError(
                     f"the Dask worker {worker} has {_words(package, answer)}, and here is {package} {here}: "
                     "install the same versions everywhere"
                 )

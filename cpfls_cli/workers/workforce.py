@@ -38,8 +38,10 @@ class Workforce(ABC):
 
         Raises
         ------
+        WorkerError
+            If a worker vanishes or fails.
         ComputationError
-            If the evaluator fails, or a worker vanishes.
+            If the evaluator refuses its data.
         """
 
     def __call__(self, genes: IntArray) -> Evaluation:

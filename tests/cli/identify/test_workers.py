@@ -1,6 +1,7 @@
 """The model does not depend on who evaluates, and a worker that is lost leaves the checkpoint."""
 
 import multiprocessing
+import sys
 
 import pytest
 
@@ -50,9 +51,16 @@ def test_search_goes_on_with_other_workers_after_one_was_lost(cpfls, words, whol
     monkeypatch.undo()
     assert (result.exit_code, result.stdout) == (1, "")
     error, note = result.stderr.splitlines()
-    assert error.startswith("cpfls: error: ")
+    assert error.startswith("cpfls: error: --workers 2: a worker process vanished")
     assert "killed" in error
     assert note == f"cpfls: note: {output}.checkpoint: is intact; the same command with --resume goes on"
     assert [path.name for path in tmp_path.iterdir()] == ["model.h5.checkpoint"]
     assert cpfls(*words, "-o", output, "--resume").exit_code == 0
     assert output.read_bytes() == whole.read_bytes()
+
+
+def test_what_is_wrong_with_the_workers_is_not_said_of_the_flight(refuse, words, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cpfls_cli.workers.cluster", None)
+    address = "tcp://127.0.0.1:8786"
+    (line,) = refuse(*words, "-o", tmp_path / "model.h5", "--scheduler", address, code=1)
+    assert line.startswith(f"--scheduler {address}: a scheduler needs Dask")

@@ -4,6 +4,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.workers.attempt import attempt, result_of
+from cpfls_cli.workers.worker_error import WorkerError
 
 
 def failing(error):
@@ -23,15 +24,16 @@ def test_an_error_of_the_domain_keeps_its_message(kind):
         result_of(failing(kind("flight.h5: gravity_m_s2 = 0: take the Earth's")))
     assert str(caught.value) == "flight.h5: gravity_m_s2 = 0: take the Earth's"
     assert not hasattr(caught.value, "__notes__")
+    assert not isinstance(caught.value, WorkerError)
 
 
 def test_too_little_memory_has_a_remedy():
-    with pytest.raises(ComputationError, match="ran out of memory: take fewer workers"):
+    with pytest.raises(WorkerError, match="ran out of memory: take fewer workers"):
         result_of(failing(MemoryError()))
 
 
 def test_any_other_error_is_named_and_its_origin_is_a_note():
-    with pytest.raises(ComputationError, match="ZeroDivisionError: by nothing") as caught:
+    with pytest.raises(WorkerError, match="ZeroDivisionError: by nothing") as caught:
         result_of(failing(ZeroDivisionError("by nothing")))
     assert "test_attempt.py" in caught.value.__notes__[0]
 
