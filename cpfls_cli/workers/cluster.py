@@ -18,7 +18,7 @@ from cpfls_cli.workers.chunks import chunks
 from cpfls_cli.workers.cluster_errors import explained, require_workers
 from cpfls_cli.workers.cluster_worker import Shipped, evaluate_shipped
 from cpfls_cli.workers.quiet import quiet
-from cpfls_cli.workers.same_versions import require_same_versions
+from cpfls_cli.workers.same_versions import require_same_processor, require_same_versions
 from cpfls_cli.workers.worker_error import WorkerError
 from cpfls_cli.workers.workforce import Workforce
 
@@ -98,7 +98,7 @@ def cluster(evaluate: Evaluate, address: str, *, patience_s: float = 10.0) -> It
     Raises
     ------
     WorkerError
-        If the scheduler does not answer, it has no workers, or they have other versions.
+        If the scheduler does not answer, it has no workers, or they have other versions or processors.
     """
     evaluator = pickle.dumps(evaluate, protocol=pickle.HIGHEST_PROTOCOL)
     name = f"cpfls-{uuid.uuid4().hex}"
@@ -106,6 +106,7 @@ def cluster(evaluate: Evaluate, address: str, *, patience_s: float = 10.0) -> It
         with explained(client):
             require_workers(client, patience_s)
             require_same_versions(client)
+            require_same_processor(client)
             client.register_plugin(Shipped(evaluator), name=name)
         try:
             yield Cluster(client, name, patience_s)

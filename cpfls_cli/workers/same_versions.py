@@ -1,16 +1,18 @@
-"""The same software on all workers of a cluster, because other versions may give other digits."""
+"""The same software and processor for all workers of a cluster, because others may give other digits."""
 
 from __future__ import annotations
 
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
+from cpfls_cli.workers.processor import Processor, processor
 from cpfls_cli.workers.worker_error import WorkerError
 
 if TYPE_CHECKING:
     from distributed import Client
 
-_PACKAGES = ("cpfls", "numpy", "scipy")
+# llvmlite holds the compiler behind numba.
+_PACKAGES = ("cpfls", "numpy", "scipy", "numba", "llvmlite")
 
 
 def require_same_versions(client: Client) -> None:
@@ -36,7 +38,38 @@ def require_same_versions(client: Client) -> None:
                 )
 
 
+def require_same_processor(client: Client) -> None:
+    """Require that the compiler makes the same code for all workers as for this process.
+
+    Parameters
+    ----------
+    client : Client
+        Connection to a scheduler with workers of the same software.
+
+    Raises
+    ------
+    WorkerError
+        Naming the first worker that differs.
+    """
+    here = processor()
+    for worker, answer in client.run(processor, on_error="return").items():
+        if answer != here:
+            raise WorkerError(
+                f"the Dask worker {worker} runs on {_described(answer, here)}, and here is {here.name}: other "
+                "processors add numbers in another order, which gives other digits; start workers on machines with "
+                "this processor only, or start `cpfls` on one like theirs"
+            )
+
+
 def _words(package: str, answer: object) -> str:
     if isinstance(answer, PackageNotFoundError):
         return f"no {package}"
     return f"{package} {answer}"
+
+
+def _described(answer: object, here: Processor) -> str:
+    if not isinstance(answer, Processor):
+        return f"an unknown processor ({answer})"
+    if answer.name != here.name:
+        return answer.name
+    return f"{answer.name} with other instructions ({', '.join(sorted(answer.instructions ^ here.instructions))})"

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 
 import pytest
@@ -9,7 +10,8 @@ import pytest
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.workers import employ
 from cpfls_cli.workers.address import require_address
-from cpfls_cli.workers.same_versions import require_same_versions
+from cpfls_cli.workers.processor import Processor, processor
+from cpfls_cli.workers.same_versions import require_same_processor, require_same_versions
 
 
 class Client:
@@ -18,10 +20,11 @@ class Client:
     def __init__(self, package, answer):
         self.package, self.answer = package, answer
 
-    def run(self, function, package, on_error):
+    def run(self, function, *arguments, on_error):
         assert on_error == "return"
-        other = self.answer if package == self.package else function(package)
-        return {"tcp://10.0.0.1:40001": function(package), "tcp://10.0.0.2:40001": other}
+        own = function(*arguments)
+        other = self.answer if arguments == (self.package,)[: len(arguments)] else own
+        return {"tcp://10.0.0.1:40001": own, "tcp://10.0.0.2:40001": other}
 
 
 def test_equal_versions_pass():
@@ -34,11 +37,30 @@ def test_equal_versions_pass():
         ("cpfls", PackageNotFoundError("cpfls"), "has no cpfls, and here is cpfls"),
         ("numpy", "1.0.0", "has numpy 1.0.0, and here is numpy"),
         ("scipy", "1.0.0", "has scipy 1.0.0, and here is scipy"),
+        ("numba", "0.1.0", "has numba 0.1.0, and here is numba"),
+        ("llvmlite", "0.1.0", "has llvmlite 0.1.0, and here is llvmlite"),
     ],
 )
 def test_a_worker_with_other_software_is_named(package, answer, words):
     with pytest.raises(ComputationError, match=f"worker tcp://10.0.0.2:40001 {words}.*install the same"):
         require_same_versions(Client(package, answer))
+
+
+OWN = processor()
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (Processor("riscv64 u74", OWN.instructions), "runs on riscv64 u74, and here is"),
+        (replace(OWN, instructions=OWN.instructions | {"amx-8"}), r"with other instructions \(amx-8\), and here is"),
+        (OSError("no compiler"), r"runs on an unknown processor \(no compiler\)"),
+    ],
+)
+def test_a_worker_with_another_processor_is_named(answer, words):
+    require_same_processor(Client(None, OWN))
+    with pytest.raises(ComputationError, match=f"worker tcp://10.0.0.2:40001 .*{words}.*with this processor only"):
+        require_same_processor(Client(None, answer))
 
 
 def test_without_dask_the_message_says_what_to_install(monkeypatch):
@@ -62,5 +84,5 @@ def test_other_texts_are_refused(address):
 
 
 def test_dask_is_loaded_only_for_a_scheduler():
-    program = "import sys, cpfls_cli.workers; sys.exit('distributed' in sys.modules)"
+    program = "import sys, cpfls_cli.workers; sys.exit(not {'distributed', 'llvmlite'}.isdisjoint(sys.modules))"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
