@@ -190,14 +190,21 @@ lint: $(INSTALLED_DEV)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# Every table is also written to benchmarks/results, as JSON.
+STUDY := configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
 bench: $(INSTALLED_DEV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[bench]"
-	$(BIN)/python benchmarks/evolution_hypervolume.py
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[bench,dask]"
+	$(BIN)/python benchmarks/evaluation.py
+	$(BIN)/python benchmarks/whole_run.py
+	$(BIN)/python benchmarks/workers.py
+	$(BIN)/python benchmarks/long_flights.py
 	$(BIN)/python benchmarks/reduction.py
+	$(BIN)/python benchmarks/reduction_streamed.py --samples 100000
+	$(BIN)/python benchmarks/evolution_hypervolume.py
 	$(BIN)/python benchmarks/gap.py
 	$(MAKE) data/paper/selection.h5
-	$(BIN)/python benchmarks/judging.py configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
-	$(BIN)/python benchmarks/time_to_quality.py configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
+	$(BIN)/python benchmarks/judging.py $(STUDY)
+	$(BIN)/python benchmarks/time_to_quality.py $(STUDY)
 
 # Stopped and started again it goes on where it was. SIZE takes more options: `python -m tests.gap.study --help`.
 SEED := 2027

@@ -8,9 +8,13 @@ cent of the hypervolume of the true front.
 from __future__ import annotations
 
 import itertools
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 from pymoo.algorithms.moo.nsga2 import NSGA2
@@ -18,6 +22,7 @@ from pymoo.core.problem import Problem
 from pymoo.indicators.hv import HV
 from pymoo.optimize import minimize
 
+from benchmarks.shared.measure import table
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, pareto_front, start, step
 from cpfls_cli.identification.presets import PRESETS
@@ -114,14 +119,14 @@ def algorithms() -> dict[str, Callable[[TestProblem, int], Array]]:
 
 
 def main() -> None:
-    print("| algorithm | " + " | ".join(problem.name for problem in PROBLEMS) + " |")
-    print("|---|" + "---|" * len(PROBLEMS))
+    rows = []
     for name, run in algorithms().items():
-        cells = []
+        cells = [name]
         for problem in PROBLEMS:
             shares = [hypervolume_share(problem, run(problem, seed)) for seed in SEEDS]
             cells.append(f"{np.median(shares):.1f} ({min(shares):.1f} to {max(shares):.1f})")
-        print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
+        rows.append(cells)
+    table("evolution_hypervolume", ("algorithm", *(problem.name for problem in PROBLEMS)), rows)
 
 
 if __name__ == "__main__":

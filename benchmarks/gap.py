@@ -13,6 +13,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.shared.measure import table
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.gap.diagnose import diagnose
@@ -28,13 +29,12 @@ EFFECTS = ("com_offset", "rotor_drag")
 def main() -> None:
     rng = np.random.default_rng(1)
     case = make("timing", "pair", "sixkg", EFFECTS, rng)
-    print("| flights | seconds | ratio to the first |\n|---|---|---|")
-    first = None
+    rows, first = [], None
     for seconds in (30.0, 60.0, 120.0):
         recordings = fly(case, seconds, rng)
         spent = time(recordings, GapSettings())
         first = first or spent
-        print(f"| 6 of {seconds:.0f} s at 100 Hz, {len(EFFECTS)} effects hidden | {spent:.2f} | {spent / first:.2f} |")
+        rows.append((f"6 of {seconds:.0f} s at 100 Hz, {len(EFFECTS)} effects hidden", spent, spent / first))
     recordings = fly(case, 30.0, rng)
     whole = time(recordings, GapSettings())
     for what, settings in (
@@ -43,7 +43,8 @@ def main() -> None:
         ("torque alone", GapSettings(force=False)),
     ):
         spent = time(recordings, settings)
-        print(f"| 6 of 30 s, {what} | {spent:.2f} | {spent / whole:.2f} |", flush=True)
+        rows.append((f"6 of 30 s, {what}", spent, spent / whole))
+    table("gap", ("flights", "seconds", "ratio to the first"), rows)
 
 
 def time(recordings: list[Recording], settings: GapSettings) -> float:

@@ -11,6 +11,12 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
 import numpy as np
 
 from cpfls_cli.config.load import load_study
@@ -32,12 +38,13 @@ def main(config: Path, flight: Path, selection: Path) -> None:
     judge = whole.judge
     selected = Samples.of(Ready(data.learned, judge.ready.rigid), judge.structure, judge.ranges)
     evaluators = {"selected samples": replace(whole, judge=selected), "whole training part": whole}
-    print("| judged on | members of the front | with relative error above 100 % | relative error of the chosen one |")
-    print("|---|---|---|---|")
+    rows = []
     for name, evaluator in evaluators.items():
         front = search(evaluator, study.identification, generator(study, "identify")).front
         errors = np.array([relative_error(whole, chromosome) for chromosome in front.chromosomes])
-        print(f"| {name} | {len(errors)} | {np.sum(errors > 1)} | {errors[front.chosen]:.2%} |", flush=True)
+        rows.append((name, len(errors), int(np.sum(errors > 1)), f"{errors[front.chosen]:.2%}"))
+    worst, chosen = "with relative error above 100 %", "relative error of the chosen one"
+    table("judging", ("judged on", "members of the front", worst, chosen), rows)
 
 
 def relative_error(evaluator: Evaluator, chromosome) -> float:

@@ -71,7 +71,13 @@ def table(name: str, columns: Sequence[str], rows: Sequence[Sequence[Any]], **mo
 
 def machine() -> str:
     """Describe the machine in words."""
-    return f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
+    import numba
+    import numpy as np
+    from llvmlite.binding import get_host_cpu_name
+
+    versions = f"Python {platform.python_version()}, numpy {np.__version__}, numba {numba.__version__}"
+    gigabytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    return f"{os.cpu_count()} cores ({get_host_cpu_name()}), {gigabytes:.0f} GiB, {versions}"
 
 
 def _text(value: Any) -> str:
