@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.rows import check_rows, count_rows, read_rows
+from cpfls_cli.errors import InputError
 from cpfls_cli.identification.data import CHUNK, TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.stages.sources import read_with
@@ -51,21 +52,46 @@ class FlightFile:
         Datasets: time, motion and, where it is asked for, torque.
     start, stop : int
         First sample, and the one after the last.
+    size_bytes, rows : int
+        Of the file as it was opened; whoever reads it elsewhere, or later, must find the same.
     """
 
     path: Path
     names: tuple[str, ...]
     start: int
     stop: int
+    size_bytes: int
+    rows: int
 
     def __len__(self) -> int:
         """Count the samples."""
         return self.stop - self.start
 
     def chunks(self) -> Iterator[TorqueData]:
-        """Yield the samples, `CHUNK` at a time."""
+        """Yield the samples, `CHUNK` at a time.
+
+        Raises
+        ------
+        InputError
+            If another file, or none, lies where this one was.
+        """
+        self._require_same_file()
         for rows in read_rows(self.path, self.names, self.start, self.stop, CHUNK):
             yield _torque_data(rows)
+
+    def _require_same_file(self) -> None:
+        if not self.path.is_file():
+            found = "no such file"
+        elif (size := self.path.stat().st_size) != self.size_bytes:
+            found = f"another file, of {size} bytes instead of {self.size_bytes}"
+        elif (rows := count_rows(self.path, FLIGHT, self.names[0])) != self.rows:
+            found = f"another file, with {rows or 'no'} samples instead of {self.rows}"
+        else:
+            return
+        raise InputError(
+            f"{self.path}: {found}; a flight of more than {IN_MEMORY} samples is read from its file also by the "
+            "workers of a scheduler: put the same file there on each of their machines, and leave it alone"
+        )
 
 
 def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
@@ -92,7 +118,7 @@ def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
         flight = read_with(path, FLIGHT, *names)
         return _torque_data([flight.array(name) for name in names])
     check_rows(path, FLIGHT, names, CHUNK)
-    return FlightFile(path.resolve(), names, 0, samples)
+    return FlightFile(path.resolve(), names, 0, samples, path.stat().st_size, samples)
 
 
 def _torque_data(rows: Sequence[Array]) -> TorqueData:
