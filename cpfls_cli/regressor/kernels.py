@@ -48,6 +48,11 @@ def _compiled_sum(function: Function) -> Function:
     return compiled(function, fastmath={"reassoc", "contract"})
 
 
+# Columns of `Table.blocks` and of `Table.partitions`.
+_ROW, _COLUMN, _INPUTS, _FIRST, _SECOND, _FEATURES, _START, _OTHER_RULES = range(8)
+_ANGLE, _FUNCTIONS, _FIRING, _FIRST_INNER = range(4)
+
+
 class Table(NamedTuple):
     """A model structure in numbers.
 
@@ -256,7 +261,7 @@ def _locate(functions: int, breakpoints: Array, antecedent: Array, interval: Int
 @_compiled
 def _fire(table: Table, index: int, breakpoints: Array, count: int, at: _Batch) -> None:
     """Find the two functions of a partition that fire; see `cpfls_cli.fuzzy.membership.memberships`."""
-    axis, functions = table.partitions[index, 0], table.partitions[index, 1]
+    axis, functions = table.partitions[index, _ANGLE], table.partitions[index, _FUNCTIONS]
     antecedent, antecedent_slope, interval = at.antecedent[axis], at.antecedent_slope[axis], at.interval[index]
     position, width, input_slope, pattern = at.position[index], at.width[index], at.input_slope[index], at.pattern
     left, right, left_slope, right_slope = (
@@ -292,7 +297,7 @@ def _fire_all(table: Table, breakpoints: Array, attitude: Array, at: _Batch) -> 
     for axis in range(2):
         _see(table, axis, attitude, at)
     for index in range(len(table.partitions)):
-        if table.partitions[index, 2] == 2:
+        if table.partitions[index, _FIRING] == 2:
             _fire(table, index, breakpoints[index], len(attitude), at)
 
 
@@ -317,7 +322,7 @@ def _join(table: Table, count: int, at: _Batch) -> None:
 @_compiled
 def _carry(block: IntArray, rate: Array, acceleration: Array, scale: Array, carried: Array) -> None:
     """Find how an inertia function enters the torque; method.md section 2."""
-    row, column = block[0], block[1]
+    row, column = block[_ROW], block[_COLUMN]
     share = 0.5 if row == column else 1.0
     for axis in range(3):
         from_axis = column if axis == row else row
@@ -334,11 +339,11 @@ def _carry(block: IntArray, rate: Array, acceleration: Array, scale: Array, carr
 @_compiled
 def _put_one(block: IntArray, carried: Array, angle: int, i: int, f: int, a: int, count: int, at: _Batch) -> None:
     """Write one column of an inertia function of one angle."""
-    index, row, column = block[3], at.rows[a], at.column[a]
+    index, row, column = block[_FIRST], at.rows[a], at.column[a]
     degree, slope, rule = at.degree[index, i], at.degree_slope[index, i], at.rule[index, i]
     feature, feature_slope = at.feature[angle, f], at.feature_slope[angle, f]
     for n in range(count):
-        column[n] = block[6] + rule[n] * block[5] + f
+        column[n] = block[_START] + rule[n] * block[_FEATURES] + f
         value, gradient = degree[n] * feature[n], slope[n] * feature[n] + degree[n] * feature_slope[n]
         for axis in range(3):
             row[3 * n + axis] = carried[axis, 0, n] * value + carried[axis, 1 + angle, n] * gradient
@@ -347,12 +352,12 @@ def _put_one(block: IntArray, carried: Array, angle: int, i: int, f: int, a: int
 @_compiled
 def _put_two(block: IntArray, carried: Array, i: int, j: int, f: int, a: int, count: int, at: _Batch) -> None:
     """Write one column of an inertia function of roll and pitch."""
-    first, second, row, column = block[3], block[4], at.rows[a], at.column[a]
+    first, second, row, column = block[_FIRST], block[_SECOND], at.rows[a], at.column[a]
     mu, mu_slope, rule = at.degree[first, i], at.degree_slope[first, i], at.rule[first, i]
     nu, nu_slope, other_rule = at.degree[second, j], at.degree_slope[second, j], at.rule[second, j]
     value, by_roll, by_pitch = at.joint[0, f], at.joint[1, f], at.joint[2, f]
     for n in range(count):
-        column[n] = block[6] + (rule[n] * block[7] + other_rule[n]) * block[5] + f
+        column[n] = block[_START] + (rule[n] * block[_OTHER_RULES] + other_rule[n]) * block[_FEATURES] + f
         firing = mu[n] * nu[n]
         roll = mu_slope[n] * nu[n] * value[n] + firing * by_roll[n]
         pitch = mu[n] * nu_slope[n] * value[n] + firing * by_pitch[n]
@@ -363,7 +368,7 @@ def _put_two(block: IntArray, carried: Array, i: int, j: int, f: int, a: int, co
 
 @_compiled
 def _put_constant(block: IntArray, carried: Array, a: int, count: int, at: _Batch) -> None:
-    at.column[a, :count] = block[6]
+    at.column[a, :count] = block[_START]
     for n in range(count):
         for axis in range(3):
             at.rows[a, 3 * n + axis] = carried[axis, 0, n]
@@ -384,17 +389,17 @@ def _fill(table: Table, count: int, at: _Batch) -> None:
     a = 0
     for b in range(len(table.blocks)):
         block, carried = table.blocks[b], at.carried[b]
-        if block[2] == 0:
+        if block[_INPUTS] == 0:
             _put_constant(block, carried, a, count, at)
             a += 1
             continue
-        for i in range(table.partitions[block[3], 2]):
-            for j in range(table.partitions[block[4], 2] if block[2] == 2 else 1):
-                for f in range(block[5]):
-                    if block[2] == 2:
+        for i in range(table.partitions[block[_FIRST], _FIRING]):
+            for j in range(table.partitions[block[_SECOND], _FIRING] if block[_INPUTS] == 2 else 1):
+                for f in range(block[_FEATURES]):
+                    if block[_INPUTS] == 2:
                         _put_two(block, carried, i, j, f, a, count, at)
                     else:
-                        _put_one(block, carried, table.partitions[block[3], 0], i, f, a, count, at)
+                        _put_one(block, carried, table.partitions[block[_FIRST], _ANGLE], i, f, a, count, at)
                     a += 1
 
 
@@ -495,21 +500,21 @@ def add_gram(
 @_compiled
 def _slots(table: Table, block: IntArray) -> int:
     """Rules of a block that fire at a time."""
-    slots = table.partitions[block[3], 2] if block[2] > 0 else 1
-    return slots * table.partitions[block[4], 2] if block[2] == 2 else slots
+    slots = table.partitions[block[_FIRST], _FIRING] if block[_INPUTS] > 0 else 1
+    return slots * table.partitions[block[_SECOND], _FIRING] if block[_INPUTS] == 2 else slots
 
 
 @_compiled
 def _output_one(block: IntArray, angle: int, slots: int, coefficients: Array, count: int, at: _Batch) -> None:
     """Find the outputs of the rules of one input that fire."""
     for i in range(slots):
-        rule, value, slope = at.rule[block[3], i], at.output[i, 0], at.output[i, 1 + angle]
+        rule, value, slope = at.rule[block[_FIRST], i], at.output[i, 0], at.output[i, 1 + angle]
         value[:count], slope[:count] = 0.0, 0.0
         at.output[i, 2 - angle, :count] = 0.0
-        for f in range(block[5]):
+        for f in range(block[_FEATURES]):
             feature, feature_slope = at.feature[angle, f], at.feature_slope[angle, f]
             for n in range(count):
-                coefficient = coefficients[block[6] + rule[n] * block[5] + f]
+                coefficient = coefficients[block[_START] + rule[n] * block[_FEATURES] + f]
                 value[n] += coefficient * feature[n]
                 slope[n] += coefficient * feature_slope[n]
 
@@ -517,13 +522,15 @@ def _output_one(block: IntArray, angle: int, slots: int, coefficients: Array, co
 @_compiled
 def _output_two(block: IntArray, i: int, j: int, coefficients: Array, count: int, at: _Batch, out: Array) -> None:
     """Find the output of one rule of roll and pitch that fires."""
-    rule, other_rule = at.rule[block[3], i], at.rule[block[4], j]
+    rule, other_rule = at.rule[block[_FIRST], i], at.rule[block[_SECOND], j]
     value, by_roll, by_pitch = out[0], out[1], out[2]
     out[:, :count] = 0.0
-    for f in range(block[5]):
+    for f in range(block[_FEATURES]):
         joint, joint_roll, joint_pitch = at.joint[0, f], at.joint[1, f], at.joint[2, f]
         for n in range(count):
-            coefficient = coefficients[block[6] + (rule[n] * block[7] + other_rule[n]) * block[5] + f]
+            coefficient = coefficients[
+                block[_START] + (rule[n] * block[_OTHER_RULES] + other_rule[n]) * block[_FEATURES] + f
+            ]
             value[n] += coefficient * joint[n]
             by_roll[n] += coefficient * joint_roll[n]
             by_pitch[n] += coefficient * joint_pitch[n]
@@ -532,13 +539,13 @@ def _output_two(block: IntArray, i: int, j: int, coefficients: Array, count: int
 @_compiled
 def _outputs(table: Table, block: IntArray, coefficients: Array, count: int, at: _Batch) -> None:
     """Find the outputs of all rules of a block that fire: value, slope by roll, slope by pitch."""
-    if block[2] == 0:
-        at.output[0, 0, :count] = coefficients[block[6]]
-    elif block[2] == 1:
-        _output_one(block, table.partitions[block[3], 0], _slots(table, block), coefficients, count, at)
+    if block[_INPUTS] == 0:
+        at.output[0, 0, :count] = coefficients[block[_START]]
+    elif block[_INPUTS] == 1:
+        _output_one(block, table.partitions[block[_FIRST], _ANGLE], _slots(table, block), coefficients, count, at)
     else:
-        others = table.partitions[block[4], 2]
-        for i in range(table.partitions[block[3], 2]):
+        others = table.partitions[block[_SECOND], _FIRING]
+        for i in range(table.partitions[block[_FIRST], _FIRING]):
             for j in range(others):
                 _output_two(block, i, j, coefficients, count, at, at.output[i * others + j])
 
@@ -548,7 +555,7 @@ def _sum_one(block: IntArray, angle: int, slots: int, count: int, at: _Batch) ->
     """Add up the rules of one input: value, slope by roll, slope by pitch."""
     value, gradient = at.total[0], at.total[1 + angle]
     for i in range(slots):
-        degree, degree_slope = at.degree[block[3], i], at.degree_slope[block[3], i]
+        degree, degree_slope = at.degree[block[_FIRST], i], at.degree_slope[block[_FIRST], i]
         output, slope = at.output[i, 0], at.output[i, 1 + angle]
         for n in range(count):
             value[n] += degree[n] * output[n]
@@ -558,8 +565,8 @@ def _sum_one(block: IntArray, angle: int, slots: int, count: int, at: _Batch) ->
 @_compiled
 def _sum_two(block: IntArray, i: int, j: int, output: Array, count: int, at: _Batch) -> None:
     """Add one rule of roll and pitch: value, slope by roll, slope by pitch."""
-    mu, mu_slope = at.degree[block[3], i], at.degree_slope[block[3], i]
-    nu, nu_slope = at.degree[block[4], j], at.degree_slope[block[4], j]
+    mu, mu_slope = at.degree[block[_FIRST], i], at.degree_slope[block[_FIRST], i]
+    nu, nu_slope = at.degree[block[_SECOND], j], at.degree_slope[block[_SECOND], j]
     value, by_roll, by_pitch = at.total[0], at.total[1], at.total[2]
     own, own_roll, own_pitch = output[0], output[1], output[2]
     for n in range(count):
@@ -573,13 +580,13 @@ def _sum_two(block: IntArray, i: int, j: int, output: Array, count: int, at: _Ba
 def _subtract(table: Table, block: IntArray, carried: Array, count: int, at: _Batch, residual: Array) -> None:
     """Subtract the torque of a block, whose rules have given their outputs, from a residual."""
     at.total[:, :count] = 0.0
-    if block[2] == 0:
+    if block[_INPUTS] == 0:
         at.total[0, :count] = at.output[0, 0, :count]
-    elif block[2] == 1:
-        _sum_one(block, table.partitions[block[3], 0], _slots(table, block), count, at)
+    elif block[_INPUTS] == 1:
+        _sum_one(block, table.partitions[block[_FIRST], _ANGLE], _slots(table, block), count, at)
     else:
-        others = table.partitions[block[4], 2]
-        for i in range(table.partitions[block[3], 2]):
+        others = table.partitions[block[_SECOND], _FIRING]
+        for i in range(table.partitions[block[_FIRST], _FIRING]):
             for j in range(others):
                 _sum_two(block, i, j, at.output[i * others + j], count, at)
     value, roll, pitch = at.total[0], at.total[1], at.total[2]
@@ -735,13 +742,13 @@ def _step(table: Table, block: IntArray, place: int, count: int, at: _Batch) -> 
     """
     step = at.step
     step[:, :count] = 0.0
-    if block[2] == 1:
+    if block[_INPUTS] == 1:
         for k in range(3):
             for n in range(count):
                 step[k, n] = at.output[0, k, n] - at.output[1, k, n]
         return
-    other = block[4 - place]
-    others = table.partitions[other, 2]
+    other = block[_SECOND - place]
+    others = table.partitions[other, _FIRING]
     for o in range(others):
         left, right = (o, others + o) if place == 0 else (2 * o, 2 * o + 1)
         for k in range(3):
@@ -752,8 +759,12 @@ def _step(table: Table, block: IntArray, place: int, count: int, at: _Batch) -> 
 @_compiled
 def _move(table: Table, block: IntArray, carried: Array, place: int, count: int, at: _Batch) -> None:
     """Differentiate the torque of an inertia function by the breakpoints around one of its inputs."""
-    index = block[3 + place]
-    own, functions, first = table.partitions[index, 0], table.partitions[index, 1], table.partitions[index, 3]
+    index = block[_FIRST + place]
+    own, functions, first = (
+        table.partitions[index, _ANGLE],
+        table.partitions[index, _FUNCTIONS],
+        table.partitions[index, _FIRST_INNER],
+    )
     _step(table, block, place, count, at)
     value, by_own, by_other, beside = at.step[0], at.step[1 + own], at.step[2 - own], at.step[3]
     position, width = at.position[index], at.width[index]
@@ -783,8 +794,8 @@ def _move_all(table: Table, coefficients: Array, count: int, at: _Batch) -> None
     for b in range(len(table.blocks)):
         block = table.blocks[b]
         _outputs(table, block, coefficients, count, at)
-        for place in range(block[2]):
-            if table.partitions[block[3 + place], 1] > 2:
+        for place in range(block[_INPUTS]):
+            if table.partitions[block[_FIRST + place], _FUNCTIONS] > 2:
                 _move(table, block, at.carried[b], place, count, at)
 
 
