@@ -212,7 +212,8 @@ def _outcome(job: Job, result: Identification, learned: int, seconds: float) -> 
         "findings": list(result.findings),
         "seconds": round(seconds, 3),
     }
-    return Outcome(summary, tuple(_lines(result, learned)), result.findings)
+    stall = job.study.identification.stall_generations
+    return Outcome(summary, tuple(_lines(result, learned, stall)), result.findings)
 
 
 def _score_summary(score: Score) -> dict[str, Any]:
@@ -226,11 +227,23 @@ def _score_summary(score: Score) -> dict[str, Any]:
     }
 
 
-def _lines(result: Identification, learned: int) -> list[str]:
+def _ending(result: Identification, stall: int | None) -> list[str]:
+    """Say of a search that ended before its last generation why; one that was stopped has a note of its own."""
+    if result.stop_reason != "converged":
+        return []
+    generation = len(result.history.evaluations) - 1
+    return [
+        f"converged after generation {generation}: no objective improved enough "
+        f"(identification.stall_generations = {stall})"
+    ]
+
+
+def _lines(result: Identification, learned: int, stall: int | None) -> list[str]:
     system = result.system
     lines = [
         f"{system.parameters} parameters from {learned} samples; rank {system.rank}, "
-        f"condition number {system.condition_number:.5g}; {result.history.evaluations[-1]} evaluations"
+        f"condition number {system.condition_number:.5g}; {result.history.evaluations[-1]} evaluations",
+        *_ending(result, stall),
     ]
     moments = " ".join(f"{name} {value:.4g}" for name, value in zip(INERTIA_PARAMETERS, result.rigid_body, strict=True))
     lines.append(f"rigid body that fits best, kg m^2: {moments}")
