@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cpfls_cli.artifacts.formats import CHECKPOINT
+from cpfls_cli.artifacts.formats import CHECKPOINT, MODEL
 from cpfls_cli.artifacts.records import Artifact, Header
 from cpfls_cli.artifacts.writing import write_artifact
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.state import EvolutionState
 from cpfls_cli.identification.search_run import Unfinished
+from cpfls_cli.stages.resuming import nothing_to_resume
 from cpfls_cli.stages.sources import read_good
 from cpfls_cli.stages.state_file import StoppedSearch, nothing_data, state_data, stopped_search, with_unfinished
 
@@ -82,7 +83,7 @@ class Checkpoint:
             If there is none, if it is damaged, or if it is of another search.
         """
         if not self.path.exists():
-            raise InputError(f"{self.path}: no such checkpoint, so nothing to resume; start without --resume")
+            raise nothing_to_resume(self.path, self.output, MODEL)
         try:
             artifact = read_good(self.path, CHECKPOINT)
             stopped = stopped_search(artifact)

@@ -19,6 +19,7 @@ from cpfls_cli.artifacts.sweep_formats import SWEEP
 from cpfls_cli.artifacts.writing import write_artifact
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
+from cpfls_cli.stages.resuming import nothing_to_resume
 from cpfls_cli.stages.sources import read_good
 from cpfls_cli.stages.sweep_plan import SweepPlan
 from cpfls_cli.stages.sweep_rows import COMPLETE, RUN, Rows, no_rows, sweep_data
@@ -137,7 +138,7 @@ class PartialSweep:
 
     def _read(self) -> Artifact:
         if not self.path.exists():
-            raise InputError(f"{self.path}: no such file, so nothing to resume; start without --resume")
+            raise nothing_to_resume(self.path, self.output, SWEEP)
         try:
             left = read_good(self.path, SWEEP)
         except InputError as error:

@@ -15,9 +15,16 @@ def stopped(cpfls, words, tmp_path, interrupt_at, monkeypatch):
 
 def test_nothing_to_resume(refuse, words, tmp_path):
     (line,) = refuse(*words, "-o", tmp_path / "model.h5", "--resume")
-    assert (
-        line == f"{tmp_path / 'model.h5'}.checkpoint: no such checkpoint, so nothing to resume; start without --resume"
-    )
+    assert line == f"{tmp_path / 'model.h5'}.checkpoint: no such file, so nothing to resume; start without --resume"
+
+
+def test_finished_search_has_nothing_to_resume(refuse, words, whole, stopped):
+    checkpoint, incomplete = stopped.with_name("model.h5.checkpoint"), stopped.read_bytes()
+    checkpoint.unlink()
+    (line,) = refuse(*words, "-o", stopped, "--resume")
+    assert line.startswith(f"{checkpoint}: no such file")
+    assert incomplete != whole.read_bytes()
+    assert refuse(*words, "-o", whole, "--resume") == [f"{whole}: is complete; nothing to resume"]
 
 
 @pytest.mark.parametrize("option", [(), ("--dry-run",)])

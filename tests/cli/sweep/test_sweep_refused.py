@@ -17,6 +17,10 @@ def test_nothing_to_resume(refuse, words, tmp_path):
     assert line == f"{tmp_path / 'sweep.h5'}.partial: no such file, so nothing to resume; start without --resume"
 
 
+def test_finished_sweep_has_nothing_to_resume(refuse, words, whole):
+    assert refuse(*words, "-o", whole, "--resume") == [f"{whole}: is complete; nothing to resume"]
+
+
 def test_finished_runs_of_which_nothing_is_said(refuse, words, stopped):
     (line,) = refuse(*words, "-o", stopped)
     assert line == (

@@ -114,7 +114,7 @@ def test_it_is_a_good_artifact_and_equal_states_are_equal_files(checkpoint, tmp_
 
 
 def test_none_to_resume(tmp_path):
-    with pytest.raises(InputError, match=r"m\.h5\.checkpoint: no such checkpoint, .*start without --resume"):
+    with pytest.raises(InputError, match=r"m\.h5\.checkpoint: no such file, .*start without --resume"):
         Checkpoint.beside(tmp_path / "m.h5", header()).read()
 
 
