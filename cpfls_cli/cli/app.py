@@ -74,6 +74,19 @@ TimeLimitOption = Annotated[
         help="Stop the search after TIME (90, 90s, 10m, 2h) and write the best so far; --resume goes on.",
     ),
 ]
+ResumeSweepOption = Annotated[
+    bool,
+    typer.Option("--resume", help="Go on with a sweep that was stopped, from OUTPUT.partial and OUTPUT.checkpoint."),
+]
+SweepTimeLimitOption = Annotated[
+    float | None,
+    typer.Option(
+        "--time-limit",
+        metavar="TIME",
+        parser=seconds,
+        help="Stop all runs together after TIME (90, 90s, 10m, 2h) and write the finished ones; --resume goes on.",
+    ),
+]
 WorkersOption = Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that evaluate.")]
 SchedulerOption = Annotated[
     str | None,
@@ -208,7 +221,7 @@ def identify(
     *,
     common: Common,
 ) -> None:
-    """Identify a model from a flight and judge it beside its baselines."""
+    """Identify a model from one or more flights and judge it beside its baselines."""
 
     def call(job: Job) -> Outcome:
         from cpfls_cli.stages import identify as stage
@@ -227,8 +240,8 @@ def sweep(
     flights: TrainingArgument,
     output: OutputOption,
     validate: ValidateOption = None,
-    resume: ResumeOption = False,
-    time_limit: TimeLimitOption = None,
+    resume: ResumeSweepOption = False,
+    time_limit: SweepTimeLimitOption = None,
     workers: WorkersOption = 1,
     scheduler: SchedulerOption = None,
     *,

@@ -72,3 +72,11 @@ def test_wrong_usage(cpfls, words, message):
     assert result.exit_code == 2
     assert result.stdout == ""
     assert message in result.stderr
+
+
+def test_help_of_a_sweep_names_what_a_sweep_leaves(cpfls):
+    said = {name: " ".join(cpfls(name, "--help").stdout.split()) for name in ("identify", "sweep")}
+    assert "a search that was stopped, from OUTPUT.checkpoint" in said["identify"]
+    assert "from one or more flights" in said["identify"]
+    assert "from OUTPUT.partial and OUTPUT.checkpoint" in said["sweep"]
+    assert "Stop all runs together after TIME" in said["sweep"]
