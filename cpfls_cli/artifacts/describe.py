@@ -21,9 +21,8 @@ def format_tables() -> str:
 
 def _section(spec: ArtifactSpec) -> str:
     inputs = ", ".join(f"`/inputs/{role}`" for role in spec.inputs) or "none"
-    makers = " or ".join(f"`cpfls {command.strip()}`" for command in spec.made_by.split(","))
     rows = "\n".join(_row(dataset) for dataset in spec.datasets)
-    return f"### `{spec.format}`\n\nMade by {makers}: {spec.description}. Inputs: {inputs}.\n\n{_HEAD}\n{rows}\n"
+    return f"### `{spec.format}`\n\nMade by {spec.makers}: {spec.description}. Inputs: {inputs}.\n\n{_HEAD}\n{rows}\n"
 
 
 def _row(dataset: DatasetSpec) -> str:

@@ -39,7 +39,7 @@ def read_artifact(path: Path, *wanted: ArtifactSpec) -> Artifact:
         try:
             spec = _identify(path, file)
             if wanted and spec not in wanted:
-                asked = " or ".join(f"{w.format} (made by `cpfls {w.made_by}`)" for w in wanted)
+                asked = " or ".join(f"{w.format} (made by {w.makers})" for w in wanted)
                 raise InputError(f"{path}: is a {spec.format}; this command needs a {asked}")
             missing = [d.path for d in spec.datasets if d.required and d.path not in file]
             if missing:

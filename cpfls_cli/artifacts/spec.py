@@ -70,6 +70,11 @@ class ArtifactSpec:
     datasets: tuple[DatasetSpec, ...]
     inputs: tuple[str, ...] = field(default=())
 
+    @property
+    def makers(self) -> str:
+        """Name the commands that write it, as they are typed."""
+        return " or ".join(f"`cpfls {command.strip()}`" for command in self.made_by.split(","))
+
     def dataset(self, path: str) -> DatasetSpec | None:
         """Look up a dataset by its path."""
         return next((spec for spec in self.datasets if spec.path == path), None)

@@ -19,6 +19,7 @@ from cpfls_cli.stages.flight_source import flight_source, part_of
 from cpfls_cli.stages.sources import read_good
 
 REST = "held-out rest"
+_FLIGHTS, _ARE = ("flight", "flights"), ("is", "are")
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,8 @@ def _require_made_from(flights: Sequence[Path], selection: Path, artifact: Artif
     names = " ".join(str(path) for path in flights)
     if len(sources) != len(roles):
         raise InputError(
-            f"{selection}: was made from {len(sources)} flight(s), not from these {len(roles)}; "
+            f"{selection}: was made from {len(sources)} {_FLIGHTS[len(sources) > 1]}, and {len(roles)} "
+            f"{_ARE[len(roles) > 1]} given; "
             f"run `cpfls reduce` on {names}"
         )
     for role, path in roles.items():

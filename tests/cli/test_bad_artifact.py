@@ -77,8 +77,8 @@ def test_missing_file_and_folder(refuse, study, tmp_path):
     ("command", "given", "needed"),
     [
         ("simulate", ["flight"], "cpfls/trajectory (made by `cpfls trajectory`)"),
-        ("reduce", ["trajectory"], "cpfls/flight (made by `cpfls simulate, import`)"),
-        ("identify", ["model"], "cpfls/flight (made by `cpfls simulate, import`)"),
+        ("reduce", ["trajectory"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
+        ("identify", ["model"], "cpfls/flight (made by `cpfls simulate` or `cpfls import`)"),
         ("predict", ["flight", "flight"], "cpfls/model (made by `cpfls identify`)"),
     ],
 )

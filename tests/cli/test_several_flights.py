@@ -70,7 +70,7 @@ def test_a_selection_must_be_of_the_same_flights(cpfls, refuse, study, pipeline,
     run(cpfls, "reduce", study, pipeline.flight, second, "-o", selection)
     output = ("-o", tmp_path / "model.h5")
     (message,) = refuse("identify", study, pipeline.flight, "--selection", selection, *output)
-    assert "was made from 2 flight(s), not from these 1" in message
+    assert "was made from 2 flights, and 1 is given; " in message
     (message,) = refuse("identify", study, second, pipeline.flight, "--selection", selection, *output)
     assert "was made from another flight" in message
 
