@@ -18,7 +18,8 @@ from cpfls_cli.report.table_5 import RELATIVE_ERROR, PrintedColumn
 
 # Units are not torn apart at the end of a line.
 TORQUE, SQUARED = "N\N{NO-BREAK SPACE}m", "(N\N{NO-BREAK SPACE}m)²"
-_DEVIATION = "its standard deviation"
+_DIGITS = 3
+_DEVIATION = "standard deviation of the"
 _Row = tuple[str, Callable[[SweptSetting], str], Callable[[PrintedColumn], str] | None]
 
 
@@ -84,7 +85,8 @@ def _table(sweep: Source, index: int, settings: list[SweptSetting], paper: bool)
     numbered = "Table 5. " if repeats_table_5([sweep]) else ""
     caption = (
         f"{numbered}Results of {sweep.label} on the whole training part. The best run of a setting is that of the "
-        "smallest mean squared error; mean and standard deviation are over its seeds."
+        "smallest mean squared error; mean and standard deviation are over its seeds; the "
+        "variance is the square of the standard deviation shown."
     )
     return Table(f"table-5-replicates-{index}", caption, ["Quantity", *(setting.name for setting in settings)], rows)
 
@@ -94,15 +96,23 @@ def _rows() -> Iterator[_Row]:
     yield "training points", lambda s: str(s.samples), lambda p: str(p.samples)
     yield "population × generations", lambda s: f"{s.population} × {s.generations}", _size
     yield "runs", lambda s: str(s.runs), lambda _: "10"
-    yield f"best run: MSE, {SQUARED}", lambda s: number(s.best_of(s.mse[:, 0]), 2), lambda p: p.mse
-    yield f"largest error, {TORQUE}", _best_max_error, lambda p: p.max_error
-    yield "condition number", _best_condition_number, lambda p: p.condition_number
-    yield f"mean MSE, {SQUARED}", lambda s: _mean(s.mse[:, 0], 2), lambda p: p.mse_of_runs[0]
-    yield _DEVIATION, lambda s: _deviation(s.mse[:, 0]), lambda p: p.mse_of_runs[1]
-    yield f"mean largest error, {TORQUE}", lambda s: _mean(s.max_error[:, 0], 3), lambda p: p.max_error_of_runs[0]
-    yield _DEVIATION, lambda s: _deviation(s.max_error[:, 0]), lambda p: p.max_error_of_runs[1]
-    yield "mean condition number", lambda s: _mean(s.condition_number, 3), lambda p: p.condition_number_of_runs[0]
-    yield _DEVIATION, lambda s: _deviation(s.condition_number), lambda p: p.condition_number_of_runs[1]
+    yield f"best run: MSE, {SQUARED}", lambda s: _best(s, s.mse[:, 0]), lambda p: p.mse
+    yield f"best run: largest error, {TORQUE}", lambda s: _best(s, s.max_error[:, 0]), lambda p: p.max_error
+    yield "best run: condition number", lambda s: _best(s, s.condition_number), lambda p: p.condition_number
+    yield f"mean MSE, {SQUARED}", lambda s: _mean(s.mse[:, 0]), lambda p: p.mse_of_runs[0]
+    yield f"{_DEVIATION} MSE, {SQUARED}", lambda s: _deviation(s.mse[:, 0]), lambda p: p.mse_of_runs[1]
+    yield f"mean largest error, {TORQUE}", lambda s: _mean(s.max_error[:, 0]), lambda p: p.max_error_of_runs[0]
+    yield (
+        f"{_DEVIATION} largest error, {TORQUE}",
+        lambda s: _deviation(s.max_error[:, 0]),
+        lambda p: p.max_error_of_runs[1],
+    )
+    yield "mean condition number", lambda s: _mean(s.condition_number), lambda p: p.condition_number_of_runs[0]
+    yield (
+        f"{_DEVIATION} condition number",
+        lambda s: _deviation(s.condition_number),
+        lambda p: p.condition_number_of_runs[1],
+    )
     yield "mean relative error", lambda s: percent(spread(s.relative_error[:, 0]).mean), lambda _: RELATIVE_ERROR
 
 
@@ -110,16 +120,12 @@ def _size(column: PrintedColumn) -> str:
     return f"{column.population} × {column.generations}"
 
 
-def _best_max_error(setting: SweptSetting) -> str:
-    return number(setting.best_of(setting.max_error[:, 0]), 3)
+def _best(setting: SweptSetting, values: Array) -> str:
+    return number(setting.best_of(values), _DIGITS)
 
 
-def _best_condition_number(setting: SweptSetting) -> str:
-    return number(setting.best_of(setting.condition_number), 3)
-
-
-def _mean(values: Array, digits: int) -> str:
-    return number(spread(values).mean, digits)
+def _mean(values: Array) -> str:
+    return number(spread(values).mean, _DIGITS)
 
 
 def _deviation(values: Array) -> str:
@@ -129,9 +135,9 @@ def _deviation(values: Array) -> str:
 def _held_out(sweep: Source, index: int, settings: list[SweptSetting]) -> Iterator[Block]:
     """Show what the models are worth on what they were not learned from."""
     for place, part in enumerate(sweep.artifact.texts("part")[1:], start=1):
-        measures = (("mse", 3), ("max_error", 3), ("relative_error", 3))
+        measures = ("mse", "max_error", "relative_error")
         rows = [
-            [setting.name, str(setting.runs), *(_both(getattr(setting, key)[:, place], n) for key, n in measures)]
+            [setting.name, str(setting.runs), *(_both(getattr(setting, key)[:, place]) for key in measures)]
             for setting in settings
         ]
         header = ("Setting", "Runs", f"MSE, {SQUARED}", f"Largest error, {TORQUE}", "Relative error")
@@ -139,8 +145,8 @@ def _held_out(sweep: Source, index: int, settings: list[SweptSetting]) -> Iterat
         yield Table(f"held-out-{index}-{place}", caption, header, rows)
 
 
-def _both(values: Array, digits: int) -> str:
+def _both(values: Array) -> str:
     found = spread(values)
     if np.isnan(found.variance):
-        return number(found.mean, digits)
-    return f"{number(found.mean, digits)} ± {number(found.deviation, 2)}"
+        return number(found.mean, _DIGITS)
+    return f"{number(found.mean, _DIGITS)} ± {number(found.deviation, 2)}"

@@ -70,11 +70,14 @@ def test_table_shows_means_and_deviations_of_the_runs(cpfls, study):
     shown = {row[0].replace("\N{NO-BREAK SPACE}", " "): row[1:] for row in rows}
     groups = [mse[setting == place] for place in range(2)]
     assert shown["runs"] == ["3", "3"]
-    assert shown["best run: MSE, (N m)²"] == [number(min(group), 2) for group in groups]
-    assert shown["mean MSE, (N m)²"] == [number(sum(group) / 3, 2) for group in groups]
+    assert shown["best run: MSE, (N m)²"] == [number(min(group), 3) for group in groups]
+    assert shown["mean MSE, (N m)²"] == [number(sum(group) / 3, 3) for group in groups]
     after = rows[[row[0].startswith("mean MSE") for row in rows].index(True) + 1]
-    assert after == ["its standard deviation", *(number(float(np.std(group, ddof=1)), 2) for group in groups)]
+    assert after[0].replace("\N{NO-BREAK SPACE}", " ") == "standard deviation of the MSE, (N m)²"
+    assert after[1:] == [number(float(np.std(group, ddof=1)), 2) for group in groups]
     assert "· paper" not in shown
+    assert len(shown) == len(rows)
+    assert "the variance is the square of the standard deviation shown" in " ".join(html.split())
 
 
 def with_settings(study, name, **values):
@@ -91,7 +94,7 @@ def test_paper_stands_beside_settings_of_equal_structure_and_samples(cpfls, stud
     rows = table(html, "table-5-replicates-1")
     places = {row[0].replace("\N{NO-BREAK SPACE}", " "): place for place, row in enumerate(rows)}
     assert rows[places["best run: MSE, (N m)²"] + 1] == ["· paper", "0.0008", "0.0007"]
-    assert rows[places["largest error, N m"] + 1] == ["· paper", "0.1952", "0.1531"]
+    assert rows[places["best run: largest error, N m"] + 1] == ["· paper", "0.1952", "0.1531"]
     assert rows[places["mean condition number"] + 1] == ["· paper", "5368.1", "3815.5"]
     assert rows[places["mean condition number"] + 3] == ["· paper", "2434.5", "1701.2"]
     assert "Table 5. Results of paper.h5" in html
