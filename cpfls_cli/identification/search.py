@@ -19,7 +19,7 @@ from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator
 from cpfls_cli.identification.results import Front
 from cpfls_cli.identification.search_run import UNWATCHED, SearchRun, SearchStep, Stop, StopReason, Unfinished
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.workers.workforce import Workforce
+from cpfls_cli.workers.workforce import Workforce, gathered
 
 
 @dataclass(frozen=True)
@@ -137,9 +137,9 @@ def _watched(
             done += len(part)
             run.progress(SearchStep(generation, settings.generations, done / len(genes), best))
             if done < len(genes) and (reason := run.should_stop()) is not None:
-                rows, gathered = _gathered(ready)
-                raise _StoppedError(reason, Unfinished(genes[rows], gathered))
-        return _gathered(ready)[1]
+                rows, evaluated = gathered(ready)
+                raise _StoppedError(reason, Unfinished(genes[rows], evaluated))
+        return gathered(ready)[1]
 
     return evaluate
 
@@ -153,15 +153,6 @@ def _recalled(genes: IntArray, unfinished: Unfinished | None) -> tuple[list[tupl
     known, evaluation = found[found >= 0], unfinished.evaluation
     recalled = Evaluation(evaluation.genes[known], evaluation.objectives[known])
     return [(np.flatnonzero(found >= 0), recalled)], np.flatnonzero(found < 0)
-
-
-def _gathered(ready: list[tuple[IntArray, Evaluation]]) -> tuple[IntArray, Evaluation]:
-    """Put evaluations in the order of their rows, whatever the order they came in."""
-    rows = np.concatenate([rows for rows, _ in ready])
-    order = np.argsort(rows)
-    genes = np.concatenate([evaluation.genes for _, evaluation in ready])
-    objectives = np.concatenate([evaluation.objectives for _, evaluation in ready])
-    return rows[order], Evaluation(genes[order], objectives[order])
 
 
 def _result(archive: Archive, history: History, reason: StopReason, settings: IdentificationSettings) -> SearchResult:

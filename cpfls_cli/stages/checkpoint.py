@@ -15,7 +15,7 @@ from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.state import EvolutionState
 from cpfls_cli.identification.search_run import Unfinished
-from cpfls_cli.stages.resuming import nothing_to_resume
+from cpfls_cli.stages.resuming import differences, nothing_to_resume, require_same
 from cpfls_cli.stages.sources import read_good
 from cpfls_cli.stages.state_file import StoppedSearch, nothing_data, state_data, stopped_search, with_unfinished
 
@@ -105,38 +105,18 @@ class Checkpoint:
                 part.unlink(missing_ok=True)
 
     def _require_same_search(self, then: Header, generation: int) -> None:
-        differing = [*_differences(then, self.header)]
+        old, new = ({key: value for key, value in _keys(h).items() if key != _GENERATIONS} for h in (then, self.header))
+        differing = [*differences(then, self.header, old, new, unimportant="validate")]
         generations = _keys(self.header)[_GENERATIONS]
         if generation > generations:
             differing.append(f"{_GENERATIONS} = {generations}, but it has come to generation {generation}")
-        if differing:
-            raise InputError(
-                f"{self.path}: is of another search: {'; '.join(differing)}. Repeat the command as it was, with "
-                "--resume, or start again with --force alone"
-            )
-
-
-def _differences(then: Header, now: Header) -> Iterator[str]:
-    """Name what changes the result of a search."""
-    if then.version != now.version:
-        yield f"written by cpfls {then.version}, this is {now.version}"
-    if then.seed != now.seed:
-        yield f"seed = {then.seed} there, {now.seed} here"
-    old, new = _keys(then), _keys(now)
-    for key in sorted((old.keys() | new.keys()) - {_GENERATIONS}):
-        if old.get(key) != new.get(key):
-            yield f"{key} = {old.get(key)} there, {new.get(key)} here"
-    for role in sorted(role for role in then.inputs.keys() | now.inputs.keys() if not role.startswith("validate")):
-        files = [header.inputs.get(role) for header in (then, now)]
-        first, second = (file.sha256 if file else None for file in files)
-        if first != second:
-            names = [f"{file.name} ({file.sha256[:12]})" if file else "none" for file in files]
-            yield f"{role} = {names[0]} there, {names[1]} here"
+        require_same(self.path, "search", differing)
 
 
 def _keys(header: Header) -> dict[str, Any]:
     """List the keys that a search depends on, with dots."""
-    return dict(_flat(_SECTION, parse_config(header.config, "/config")[_SECTION]))
+    config = parse_config(header.config, "/config")
+    return {"seed": header.seed, **dict(_flat(_SECTION, config[_SECTION]))}
 
 
 def _flat(prefix: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import glob
-import json
-import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,14 +17,13 @@ from cpfls_cli.artifacts.sweep_formats import SWEEP
 from cpfls_cli.artifacts.writing import write_artifact
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
-from cpfls_cli.stages.resuming import nothing_to_resume
+from cpfls_cli.stages.resuming import differences, nothing_to_resume, require_same
 from cpfls_cli.stages.sources import read_good
 from cpfls_cli.stages.sweep_plan import SweepPlan
 from cpfls_cli.stages.sweep_rows import COMPLETE, RUN, Rows, no_rows, sweep_data
 
 _SECTIONS = ("reduction", "identification", "sweep")
 _SEEDS = "sweep.seeds"
-_LONGEST = 120
 
 
 @dataclass(frozen=True)
@@ -143,7 +140,8 @@ class PartialSweep:
             left = read_good(self.path, SWEEP)
         except InputError as error:
             raise InputError(f"{error}; --force without --resume starts again") from None
-        self._refuse(_differences(left.header, self.header))
+        old, new = _keys(left.header), _keys(self.header)
+        require_same(self.path, "sweep", differences(left.header, self.header, old, new))
         return left
 
     def _require_same_plan(self, plan: SweepPlan, left: Artifact) -> None:
@@ -152,41 +150,15 @@ class PartialSweep:
         found = [f"{path} differs" for path, values in now.items() if not np.array_equal(left.data[path], values)]
         if done > plan.runs:
             found.append(f"{_SEEDS} = {len(plan.seeds)}, but {done} runs are finished")
-        self._refuse(found)
-
-    def _refuse(self, differing: Iterator[str] | list[str]) -> None:
-        found = list(differing)
-        if found:
-            raise InputError(
-                f"{self.path}: is of another sweep: {'; '.join(found)}. Repeat the command as it was, with --resume, "
-                "or start again with --force alone"
-            )
-
-
-def _differences(then: Header, now: Header) -> Iterator[str]:
-    """Name what changes the result of a sweep; more seeds only add to it."""
-    if then.version != now.version:
-        yield f"written by cpfls {then.version}, this is {now.version}"
-    old, new = _keys(then), _keys(now)
-    for key in sorted((old.keys() | new.keys()) - {_SEEDS}):
-        if old.get(key) != new.get(key):
-            yield f"{key} = {_short(old.get(key))} there, {_short(new.get(key))} here"
-    for role in sorted(then.inputs.keys() | now.inputs.keys()):
-        files = [header.inputs.get(role) for header in (then, now)]
-        first, second = (file.sha256 if file else None for file in files)
-        if first != second:
-            names = [f"{file.name} ({file.sha256[:12]})" if file else "none" for file in files]
-            yield f"{role} = {names[0]} there, {names[1]} here"
+        require_same(self.path, "sweep", found)
 
 
 def _keys(header: Header) -> dict[str, Any]:
-    """List the keys that a sweep depends on, with dots."""
+    """List the keys that a sweep depends on, with dots; more seeds only add to it."""
     config = parse_config(header.config, "/config")
     return {"seed": config["seed"]} | {
-        f"{section}.{key}": value for section in _SECTIONS for key, value in config.get(section, {}).items()
+        f"{section}.{key}": value
+        for section in _SECTIONS
+        for key, value in config.get(section, {}).items()
+        if f"{section}.{key}" != _SEEDS
     }
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value, ensure_ascii=False) if isinstance(value, Mapping | list) else str(value)
-    return textwrap.shorten(text, _LONGEST, placeholder=" ...")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -46,8 +46,26 @@ class Workforce(ABC):
 
     def __call__(self, genes: IntArray) -> Evaluation:
         """Evaluate chromosomes and wait for all of them; the interface of an evaluator."""
-        rows, parts = zip(*self.stream(genes), strict=True)
-        order = np.argsort(np.concatenate(rows))
-        refined = np.concatenate([part.genes for part in parts])
-        objectives = np.concatenate([part.objectives for part in parts])
-        return Evaluation(refined[order], objectives[order])
+        return gathered(list(self.stream(genes)))[1]
+
+
+def gathered(parts: Sequence[tuple[IntArray, Evaluation]]) -> tuple[IntArray, Evaluation]:
+    """Put evaluations in the order of their rows, whatever the order they came in.
+
+    Parameters
+    ----------
+    parts : sequence of (array of int, Evaluation)
+        Rows and their evaluation, at least one part; no row twice.
+
+    Returns
+    -------
+    rows : array of int, shape (evaluations,)
+        Ascending.
+    evaluation : Evaluation
+        In their order.
+    """
+    rows = np.concatenate([rows for rows, _ in parts])
+    order = np.argsort(rows)
+    genes = np.concatenate([evaluation.genes for _, evaluation in parts])
+    objectives = np.concatenate([evaluation.objectives for _, evaluation in parts])
+    return rows[order], Evaluation(genes[order], objectives[order])
