@@ -52,7 +52,7 @@ def run(
     Outcome
     """
     started, search = begin_search(job, input_roles(flights, selection, validate), options)
-    data = read_training(flights, selection, job.study)
+    data = read_training(flights, selection, job.study, started.inputs)
     held_out = held_out_parts(job.study, data.rests, started.inputs, validate)
     if started.dry_run is not None:
         return started.dry_run

@@ -44,7 +44,7 @@ def run(job: Job, flights: Sequence[Path]) -> Outcome:
     Outcome
     """
     started = begin(job, flight_roles(flights))
-    split = split_training(flights, job.study, torque=False)
+    split = split_training(flights, job.study, started.inputs, torque=False)
     settings, rng = job.study.reduction, generator(job.study, "reduce")
     with _naming(flights), settings_of("reduction", job.study):
         surveyed = survey(uniform_regressor(split.training, job.study), settings.rank_tolerance)

@@ -128,7 +128,7 @@ def sweep_plan(
     InputError, ConfigError, ComputationError
         If a flight is not good, or samples of a setting cannot be chosen.
     """
-    samples, settings = SweepSamples(job, flights), []
+    samples, settings = SweepSamples(job, flights, inputs), []
     for variant in variants(job.study):
         with naming(f"sweep setting '{variant.name}'"):
             data = samples.of(variant)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cpfls_cli.artifacts.records import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.variants import Variant
 from cpfls_cli.identification.data import gathered
@@ -29,10 +30,12 @@ class SweepSamples:
     job : Job
         A dry run only checks that samples could be chosen.
     flights : sequence of Path
+    inputs : mapping of str to InputFile
+        By role; the flights among them.
     """
 
-    def __init__(self, job: Job, flights: Sequence[Path]) -> None:
-        self._job, self._flights = job, flights
+    def __init__(self, job: Job, flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> None:
+        self._job, self._flights, self._inputs = job, flights, inputs
         self._splits: dict[Any, SplitFlights] = {}
         self._data: dict[Any, TrainingData] = {}
 
@@ -55,7 +58,7 @@ class SweepSamples:
         study = variant.study
         cut = (study.identification.training_share, study.identification.embargo_s)
         if cut not in self._splits:
-            self._splits[cut] = split_training(self._flights, study)
+            self._splits[cut] = split_training(self._flights, study, self._inputs)
         split = self._splits[cut]
         if not variant.reduced:
             training = split.training

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.artifacts.formats import SELECTION
 from cpfls_cli.artifacts.hashing import file_sha256
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.records import Artifact, InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.identification.data import Split, TorqueSource, gathered, joined, sample_times, split_flight
@@ -99,13 +99,17 @@ def flight_roles(flights: Sequence[Path]) -> dict[str, Path]:
     return {"flight" if number == 1 else f"flight-{number}": path for number, path in enumerate(flights, start=1)}
 
 
-def split_training(flights: Sequence[Path], study: Study, *, torque: bool = True) -> SplitFlights:
+def split_training(
+    flights: Sequence[Path], study: Study, inputs: Mapping[str, InputFile] | None = None, *, torque: bool = True
+) -> SplitFlights:
     """Open flights and split each as the study says.
 
     Parameters
     ----------
     flights : sequence of Path
     study : Study
+    inputs : mapping of str to InputFile, optional
+        The flights by role, where they are hashed already.
     torque : bool
         Whether their torque is needed.
 
@@ -118,13 +122,15 @@ def split_training(flights: Sequence[Path], study: Study, *, torque: bool = True
     InputError
         If one is no good flight, or is given twice.
     """
-    _refuse_twice(flights)
+    _refuse_twice(flights, inputs)
     settings, sources = study.identification, [flight_source(path, torque=torque) for path in flights]
     splits = [split_flight(sample_times(source), settings.training_share, settings.embargo_s) for source in sources]
     return SplitFlights(tuple(flights), tuple(sources), tuple(splits))
 
 
-def read_training(flights: Sequence[Path], selection: Path | None, study: Study) -> TrainingData:
+def read_training(
+    flights: Sequence[Path], selection: Path | None, study: Study, inputs: Mapping[str, InputFile] | None = None
+) -> TrainingData:
     """Open flights and find what of them trains.
 
     Parameters
@@ -133,6 +139,8 @@ def read_training(flights: Sequence[Path], selection: Path | None, study: Study)
     selection : Path, optional
         Made from these very flights.
     study : Study
+    inputs : mapping of str to InputFile, optional
+        The flights by role, where they are hashed already.
 
     Returns
     -------
@@ -143,23 +151,29 @@ def read_training(flights: Sequence[Path], selection: Path | None, study: Study)
     InputError
         If the selection was made from other flights, or holds samples of a held-out part.
     """
-    split = split_training(flights, study)
+    split = split_training(flights, study, inputs)
     training, candidates = split.training, split.training_indices
     if selection is None:
         return TrainingData(training, training, split.rests, candidates)
-    indices = _selected(flights, selection, candidates)
+    indices = _selected(_hashed(flights, inputs), selection, candidates)
     learned = gathered(training, np.searchsorted(candidates, indices))
     return TrainingData(training, learned, split.rests, indices)
 
 
-def _refuse_twice(flights: Sequence[Path]) -> None:
+def _hashed(flights: Sequence[Path], inputs: Mapping[str, InputFile] | None) -> dict[Path, str]:
+    roles = flight_roles(flights)
+    return {path: inputs[role].sha256 if inputs else file_sha256(path) for role, path in roles.items()}
+
+
+def _refuse_twice(flights: Sequence[Path], inputs: Mapping[str, InputFile] | None) -> None:
     known: dict[str, Path] = {}
-    for path in flights if len(flights) > 1 else ():
-        if path.is_file() and known.setdefault(file_sha256(path), path) is not path:
-            raise InputError(f"{path}: holds the same flight as {known[file_sha256(path)]}; give each flight once")
+    hashes = _hashed(flights, inputs) if len(flights) > 1 else {}
+    for path in flights if hashes else ():
+        if known.setdefault(hashes[path], path) is not path:
+            raise InputError(f"{path}: holds the same flight as {known[hashes[path]]}; give each flight once")
 
 
-def _selected(flights: Sequence[Path], selection: Path, candidates: IntArray) -> IntArray:
+def _selected(flights: Mapping[Path, str], selection: Path, candidates: IntArray) -> IntArray:
     artifact = read_good(selection, SELECTION)
     _require_made_from(flights, selection, artifact)
     indices = np.unique(artifact.array("indices").astype(np.int64))
@@ -173,9 +187,9 @@ def _selected(flights: Sequence[Path], selection: Path, candidates: IntArray) ->
     return indices
 
 
-def _require_made_from(flights: Sequence[Path], selection: Path, artifact: Artifact) -> None:
+def _require_made_from(flights: Mapping[Path, str], selection: Path, artifact: Artifact) -> None:
     sources = {role: source for role, source in artifact.header.inputs.items() if role.startswith("flight")}
-    roles = flight_roles(flights)
+    roles = flight_roles(list(flights))
     names = " ".join(str(path) for path in flights)
     if len(sources) != len(roles):
         raise InputError(
@@ -185,7 +199,7 @@ def _require_made_from(flights: Sequence[Path], selection: Path, artifact: Artif
         )
     for role, path in roles.items():
         source = sources.get(role)
-        if source is None or source.sha256 != file_sha256(path):
+        if source is None or source.sha256 != flights[path]:
             name = source.name if source else "an unknown flight"
             raise InputError(
                 f"{selection}: was made from another flight ({name}, sha256 differs from {path}); "

@@ -4,7 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.stages import flight_source
+from cpfls_cli.artifacts.hashing import file_sha256
+from cpfls_cli.stages import flight_source, job, training
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +74,23 @@ def test_a_selection_must_be_of_the_same_flights(cpfls, refuse, study, pipeline,
     assert "was made from 2 flights, and 1 is given; " in message
     (message,) = refuse("identify", study, second, pipeline.flight, "--selection", selection, *output)
     assert "was made from another flight" in message
+
+
+def test_each_file_is_hashed_once(cpfls, study, pipeline, second, tmp_path, monkeypatch):
+    hashed = []
+
+    def counting(path):
+        hashed.append(path)
+        return file_sha256(path)
+
+    for stage in (job, training):
+        monkeypatch.setattr(stage, "file_sha256", counting)
+    selection, flights = tmp_path / "selection.h5", [pipeline.flight, second]
+    run(cpfls, "reduce", study, *flights, "-o", selection)
+    assert sorted(hashed) == sorted(flights)
+    hashed.clear()
+    run(cpfls, "identify", study, *flights, "--selection", selection, "-o", tmp_path / "model.h5")
+    assert sorted(hashed) == sorted([*flights, selection])
 
 
 def test_a_flight_trains_once(refuse, study, pipeline, tmp_path):
