@@ -85,6 +85,10 @@ class Ready:
     source: TorqueSource
     rigid: bool
 
+    def __reduce__(self) -> tuple[type[Ready], tuple[TorqueSource, bool]]:
+        """Send the source alone to workers, who make it ready themselves."""
+        return type(self), (self.source, self.rigid)
+
     def __iter__(self) -> Iterator[Chunk]:
         """Make one chunk ready after the other, or take those that are kept."""
         return iter(self._kept) if len(self.source) <= _KEPT else self._made()

@@ -54,6 +54,7 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
     base: Annotated[
         Base, Doc("none: fuzzy part only, the paper; rigid-body: six inertia parameters under a ridge-held fuzzy part")
     ] = "rigid-body"
+    # The general algorithm knows no objective that matters more; here the error does (docs/evolution.md).
     first_objective_weight: Annotated[
         int,
         Ge(1),

@@ -1,5 +1,6 @@
 """Sums over samples against the rows written out: with and without a rigid body, scaled by axis, by label."""
 
+import pickle
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -150,3 +151,13 @@ def test_ridge_curve_is_that_of_refits_to_the_rows(every):
     np.testing.assert_allclose(fit.row_scale, scale, rtol=1e-12)
     assert fit.mean_squared_error == curve.error[curve.chosen]
     assert fit.ridge_weight == curve.weight[curve.chosen]
+
+
+def test_workers_are_sent_the_same_whether_or_not_samples_were_made_ready():
+    """What is kept for the compiled loops is made again where it is used."""
+    ready = Ready(flight(), rigid=True)
+    before = pickle.dumps(ready)
+    kept = list(ready)
+    assert pickle.dumps(ready) == before
+    (again,) = pickle.loads(before)
+    np.testing.assert_array_equal(again.dense, kept[0].dense)
