@@ -205,6 +205,7 @@ bench: $(INSTALLED_DEV)
 	$(MAKE) data/paper/selection.h5
 	$(BIN)/python benchmarks/judging.py $(STUDY)
 	$(BIN)/python benchmarks/time_to_quality.py $(STUDY)
+	$(BIN)/python benchmarks/quality_elsewhere.py
 
 # Stopped and started again it goes on where it was. SIZE takes more options: `python -m tests.gap.study --help`.
 SEED := 2027

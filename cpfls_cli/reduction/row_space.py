@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.reduction.survey import Survey, survey
+from cpfls_cli.reduction.survey import Spectrum, Survey, survey
 
 
 @dataclass(frozen=True)
-class RowSpace:
+class RowSpace(Spectrum):
     """Samples of a regressor, expressed in an orthonormal basis of the row space of all its samples.
 
     Attributes
@@ -35,16 +35,6 @@ class RowSpace:
     def samples(self) -> int:
         """Number of samples."""
         return len(self.rows)
-
-    @property
-    def rank(self) -> int:
-        """Numerical rank of all samples."""
-        return len(self.singular_values)
-
-    @property
-    def condition_number(self) -> float:
-        """Condition number of all samples over the kept singular values."""
-        return float(self.singular_values[0] / self.singular_values[-1])
 
     @property
     def smallest_samples(self) -> int:

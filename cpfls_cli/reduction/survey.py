@@ -19,8 +19,24 @@ Chunks = Callable[[], Iterable[Array]]
 BLOCK = 1024
 
 
+class Spectrum:
+    """What the kept singular values of a regressor tell of it."""
+
+    singular_values: Array
+
+    @property
+    def rank(self) -> int:
+        """Numerical rank of all samples."""
+        return len(self.singular_values)
+
+    @property
+    def condition_number(self) -> float:
+        """Condition number of all samples over the kept singular values."""
+        return float(self.singular_values[0] / self.singular_values[-1])
+
+
 @dataclass(frozen=True)
-class Survey:
+class Survey(Spectrum):
     """What one pass over a regressor tells.
 
     Attributes
@@ -45,16 +61,6 @@ class Survey:
     basis: Array
     singular_values: Array
     rank_tolerance: float
-
-    @property
-    def rank(self) -> int:
-        """Numerical rank of all samples."""
-        return len(self.singular_values)
-
-    @property
-    def condition_number(self) -> float:
-        """Condition number of all samples over the kept singular values."""
-        return float(self.singular_values[0] / self.singular_values[-1])
 
     def projected(self) -> Iterator[Array]:
         """Yield all samples in coordinates of the row space, in blocks of shape (samples, 3, rank)."""

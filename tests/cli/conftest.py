@@ -1,6 +1,9 @@
 """The command line as a function, and a tiny study taken through every stage once."""
 
+import itertools
 import json
+import os
+import signal
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from cpfls_cli.cli.app import app
+from cpfls_cli.workers import employ
 
 TINY = """\
 seed: 1
@@ -97,3 +101,30 @@ def configs():
     found = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
     assert found
     return found
+
+
+@pytest.fixture
+def at_evaluation(monkeypatch):
+    """Do something when so many chromosomes are evaluated, over all searches of a command."""
+
+    def arrange(number, action):
+        count = itertools.count(1)
+
+        def counting(evaluate, **options):
+            def evaluate_and_count(genes):
+                evaluation = evaluate(genes)
+                if next(count) == number:
+                    action()
+                return evaluation
+
+            return employ(evaluate_and_count, **options)
+
+        monkeypatch.setattr("cpfls_cli.stages.resumable.employ", counting)
+
+    return arrange
+
+
+@pytest.fixture
+def interrupt_at(at_evaluation):
+    """Send this very process an interrupt when so many chromosomes are evaluated."""
+    return lambda number: at_evaluation(number, lambda: os.kill(os.getpid(), signal.SIGINT))

@@ -1,12 +1,6 @@
 """A sweep of three small settings with two seeds each."""
 
-import itertools
-import os
-import signal
-
 import pytest
-
-from cpfls_cli.workers import employ
 
 SWEEP = """\
 seed: 5
@@ -61,30 +55,3 @@ def whole(cpfls, words, tmp_path_factory):
     assert result.exit_code == 0, result.stderr
     assert [path.name for path in output.parent.iterdir()] == ["sweep.h5"]
     return output
-
-
-@pytest.fixture
-def at_evaluation(monkeypatch):
-    """Do something when so many chromosomes are evaluated, over all runs."""
-
-    def arrange(number, action):
-        count = itertools.count(1)
-
-        def counting(evaluate, **options):
-            def evaluate_and_count(genes):
-                evaluation = evaluate(genes)
-                if next(count) == number:
-                    action()
-                return evaluation
-
-            return employ(evaluate_and_count, **options)
-
-        monkeypatch.setattr("cpfls_cli.stages.resumable.employ", counting)
-
-    return arrange
-
-
-@pytest.fixture
-def interrupt_at(at_evaluation):
-    """Send this very process an interrupt when so many chromosomes are evaluated."""
-    return lambda number: at_evaluation(number, lambda: os.kill(os.getpid(), signal.SIGINT))
