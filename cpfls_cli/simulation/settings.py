@@ -16,6 +16,7 @@ NoisySignal = Literal[
     "attitude_rate",
     "attitude_acceleration",
     "torque",
+    "body_torque",
     "position",
     "velocity",
     "acceleration",
@@ -87,13 +88,19 @@ class SimulationSettings(Settings):
         Raises
         ------
         SettingError
-            If effects, or noise of sensors that it lacks, are asked of the mode inverse.
+            If effects, or noise of sensors that it lacks, are asked of a mode, or noise both of body and of
+            generalised torque, of which one follows from the other.
         """
-        if self.mode == "closed-loop":
-            return
-        if self.closed_loop.effects:
-            raise SettingError("closed_loop.effects", "effects are flown in closed loop only; add --mode closed-loop")
         for key in ("noise", "relative_noise"):
-            extra = sorted(_MEASURED_ONLY & set(getattr(self, key)))
-            if extra:
-                raise SettingError(key, f"{', '.join(extra)}: only a flight in mode closed-loop has such a sensor")
+            self._check_noise(key, {str(name) for name in getattr(self, key)})
+        if self.mode == "inverse" and self.closed_loop.effects:
+            raise SettingError("closed_loop.effects", "effects are flown in closed loop only; add --mode closed-loop")
+
+    def _check_noise(self, key: str, signals: set[str]) -> None:
+        if "body_torque" in signals and "torque" in {*self.noise, *self.relative_noise}:
+            raise SettingError(key, "body_torque: torque has noise too, and one follows from the other; drop one")
+        if self.mode == "closed-loop" and "body_torque" in signals:
+            raise SettingError(key, "body_torque: in mode closed-loop it follows from torque; give torque the noise")
+        extra = sorted(_MEASURED_ONLY & signals)
+        if self.mode == "inverse" and extra:
+            raise SettingError(key, f"{', '.join(extra)}: only a flight in mode closed-loop has such a sensor")

@@ -9,9 +9,10 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.simulation.collective import collective_thrust
 from cpfls_cli.simulation.noise import noisy
 from cpfls_cli.simulation.settings import SimulationSettings
-from cpfls_cli.vehicle.rigid_body import inertia_tensor, torque
+from cpfls_cli.vehicle.rigid_body import body_torque, inertia_tensor, torque
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.violations import RotorViolation
@@ -45,7 +46,7 @@ def simulate(
     ----------
     planned : mapping of str to array
         `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
-        (time, 3) each.
+        (time, 3) each; without the last three the vehicle is held at its centre of mass and only turns.
     vehicle : VehicleSettings
     settings : SimulationSettings
     rng : numpy.random.Generator
@@ -60,11 +61,21 @@ def simulate(
     Equations (1) and (2); method.md sections 1 and 2.
     """
     q, qd, qdd = (planned[name] for name in ("attitude", "attitude_rate", "attitude_acceleration"))
-    tau = torque(q, qd, qdd, inertia_tensor(vehicle))
-    thrust = vehicle.mass_kg * np.linalg.norm(planned["acceleration"] + [0.0, 0.0, vehicle.gravity_m_s2], axis=1)
-    demand = rotor_demand(vehicle, thrust, rotations.body_torque(q, tau))
-    exact = {**planned, "torque": tau, "rotor_speed": demand.speed}
+    inertia = inertia_tensor(vehicle)
+    about_body = body_torque(q, qd, qdd, inertia)
+    thrust = collective_thrust(vehicle, about_body, planned.get("acceleration"))
+    demand = rotor_demand(vehicle, thrust, about_body)
+    exact = {**planned, "torque": torque(q, qd, qdd, inertia), "body_torque": about_body, "rotor_speed": demand.speed}
     signals, noise_std = noisy(exact, settings, rng)
-    signals["body_torque"] = rotations.body_torque(signals["attitude"], signals["torque"])
+    signals["torque"], signals["body_torque"] = _torques(signals, frozenset(noise_std))
     signals["body_rate"] = rotations.body_rate(signals["attitude"], signals["attitude_rate"])
     return SimulatedFlight(signals, demand.violations, noise_std)
+
+
+def _torques(signals: Mapping[str, Array], noised: frozenset[str]) -> tuple[Array, Array]:
+    """Generalised and body torque; whichever has no noise of its own follows from the other and the noisy attitude."""
+    if "body_torque" in noised:
+        return rotations.generalised_torque(signals["attitude"], signals["body_torque"]), signals["body_torque"]
+    if noised & {"torque", "attitude"}:
+        return signals["torque"], rotations.body_torque(signals["attitude"], signals["torque"])
+    return signals["torque"], signals["body_torque"]

@@ -1,6 +1,7 @@
 """The multirotor: its rigid-body rotation and its rotors."""
 
 from cpfls_cli.vehicle.rigid_body import (
+    body_torque,
     inertia_matrix,
     inertia_matrix_gradient,
     inertia_tensor,
@@ -19,6 +20,7 @@ __all__ = [
     "RotorViolation",
     "VehicleSettings",
     "allocation_matrix",
+    "body_torque",
     "body_wrench",
     "inertia_matrix",
     "inertia_matrix_gradient",

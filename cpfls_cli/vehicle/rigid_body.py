@@ -114,10 +114,32 @@ def newton_euler_torque(attitude: Array, attitude_rate: Array, attitude_accelera
     ----------
     method.md section 2.
     """
+    body = body_torque(attitude, attitude_rate, attitude_acceleration, inertia)
+    return rotations.generalised_torque(attitude, body)
+
+
+def body_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
+    """Compute the torque about the body axes, ``I omegad + omega x I omega``.
+
+    Parameters
+    ----------
+    attitude : array, shape (time, 3), rad
+    attitude_rate : array, shape (time, 3), rad/s
+    attitude_acceleration : array, shape (time, 3), rad/s^2
+    inertia : array, shape (3, 3), kg m^2, body frame
+
+    Returns
+    -------
+    array, shape (time, 3), N m, body frame
+        Finite at every attitude, also where the pitch is +-90 degrees and J(q) is singular.
+
+    References
+    ----------
+    method.md section 2.
+    """
     omega = rotations.body_rate(attitude, attitude_rate)
     alpha = rotations.body_acceleration(attitude, attitude_rate, attitude_acceleration)
-    body_torque = alpha @ inertia.T + np.cross(omega, omega @ inertia.T)
-    return rotations.generalised_torque(attitude, body_torque)
+    return np.asarray(alpha @ inertia.T + np.cross(omega, omega @ inertia.T))
 
 
 def rigid_body_regressor(attitude: Array, attitude_rate: Array, attitude_acceleration: Array) -> Array:
