@@ -62,6 +62,14 @@ ValidateOption = Annotated[
     list[Path] | None,
     typer.Option("--validate", metavar="FLIGHT", help="Judge on another flight too; may be repeated."),
 ]
+ChooseOnOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--choose-on",
+        metavar="FLIGHT",
+        help="Choose the model on this flight (identification.choice: held-out); may be repeated.",
+    ),
+]
 ResumeOption = Annotated[
     bool, typer.Option("--resume", help="Go on with a search that was stopped, from OUTPUT.checkpoint.")
 ]
@@ -214,6 +222,7 @@ def identify(
         ),
     ] = None,
     validate: ValidateOption = None,
+    choose_on: ChooseOnOption = None,
     resume: ResumeOption = False,
     time_limit: TimeLimitOption = None,
     workers: WorkersOption = 1,
@@ -228,7 +237,7 @@ def identify(
         from cpfls_cli.stages.resumable import SearchOptions
 
         options = SearchOptions(resume, time_limit, workers, scheduler)
-        return stage.run(job, flights, selection, validate or [], options)
+        return stage.run(job, flights, selection, validate or [], options, choose_on or [])
 
     _run("identify", config, output, common, call)
 
@@ -240,6 +249,7 @@ def sweep(
     flights: TrainingArgument,
     output: OutputOption,
     validate: ValidateOption = None,
+    choose_on: ChooseOnOption = None,
     resume: ResumeSweepOption = False,
     time_limit: SweepTimeLimitOption = None,
     workers: WorkersOption = 1,
@@ -253,7 +263,8 @@ def sweep(
         from cpfls_cli.stages import sweep as stage
         from cpfls_cli.stages.resumable import SearchOptions
 
-        return stage.run(job, flights, validate or [], SearchOptions(resume, time_limit, workers, scheduler))
+        options = SearchOptions(resume, time_limit, workers, scheduler)
+        return stage.run(job, flights, validate or [], options, choose_on or [])
 
     _run("sweep", config, output, common, call)
 

@@ -44,6 +44,7 @@ def identify(
     rng: np.random.Generator,
     run: SearchRun = UNWATCHED,
     stated_inertia: Array | None = None,
+    kept: TorqueSource | None = None,
 ) -> Identification:
     """Identify a model and judge it beside its baselines.
 
@@ -61,6 +62,9 @@ def identify(
         How the search is run; by default from the start to its end, without being watched.
     stated_inertia : array, shape (6,), kg m^2, optional
         Inertia stated for the vehicle, to compare with what the flight says.
+    kept : TorqueSource, optional
+        Data to choose on among the members of the Pareto front, for the choice `held-out`; neither learned from nor
+        judged in the end.
 
     Returns
     -------
@@ -71,14 +75,14 @@ def identify(
     ComputationError
         If no chromosome gives a finite model.
     SettingError
-        If the settings ask for more than the samples give.
+        If the settings ask for more than the samples give, or for a choice that the data do not allow.
 
     References
     ----------
     Paper section 9; method.md sections 4, 5, 7 and 8.
     """
     evaluator = model_evaluator(training, learned, settings)
-    found = search(evaluator, settings, rng, run)
+    found = search(evaluator, settings, rng, run, kept)
     solved = _solve(evaluator, found.front.chromosomes[found.front.chosen])
     if solved is None:
         raise ComputationError("no chromosome gave a finite model; the data may not move at all")

@@ -23,11 +23,14 @@ class Front:
     objectives : array, shape (members, 3)
     chosen : int
         The member that became the model.
+    held_out : array, shape (members,), or None
+        Mean squared errors on flights kept for the choice; None where the objectives alone decided.
     """
 
     chromosomes: IntArray
     objectives: Array
     chosen: int
+    held_out: Array | None = None
 
 
 @dataclass(frozen=True)

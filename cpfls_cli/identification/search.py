@@ -13,9 +13,11 @@ from cpfls_cli.evolution.engine import start, step
 from cpfls_cli.evolution.history import History
 from cpfls_cli.evolution.state import EvolutionState
 from cpfls_cli.evolution.stopping import ended
-from cpfls_cli.identification.choice import choose
+from cpfls_cli.identification.choice import choose, require_flights
 from cpfls_cli.identification.chromosome import uniform_chromosome
+from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator
+from cpfls_cli.identification.held_out import held_out_errors
 from cpfls_cli.identification.results import Front
 from cpfls_cli.identification.search_run import UNWATCHED, SearchRun, SearchStep, Stop, StopReason, Unfinished
 from cpfls_cli.identification.settings import IdentificationSettings
@@ -67,6 +69,7 @@ def search(
     settings: IdentificationSettings,
     rng: np.random.Generator,
     run: SearchRun = UNWATCHED,
+    kept: TorqueSource | None = None,
 ) -> SearchResult:
     """Search for non-dominated partitions.
 
@@ -77,6 +80,8 @@ def search(
     rng : numpy.random.Generator
         Not used by a search that goes on, which has its own.
     run : SearchRun
+    kept : TorqueSource, optional
+        Flights to choose on, for the choice `held-out`.
 
     Returns
     -------
@@ -86,13 +91,23 @@ def search(
     ------
     NothingFoundError
         If no chromosome gives a finite model.
+    SettingError
+        If the choice and the flights to choose on do not go together.
     """
+    require_flights(settings.choice, given=kept is not None)
+    archive, history, reason = _searched(evaluator, settings, rng, run)
+    return SearchResult(_front(archive, evaluator, kept, settings, reason), history, reason)
+
+
+def _searched(
+    evaluator: Evaluator, settings: IdentificationSettings, rng: np.random.Generator, run: SearchRun
+) -> tuple[Archive, History, StopReason]:
     if evaluator.structure.genes == 0:
         only = evaluator(uniform_chromosome(evaluator.structure)[None])
         archive = Archive.of(only.genes, only)
-        return _result(archive, History.empty(OBJECTIVES).extended(archive), "generations", settings)
+        return archive, History.empty(OBJECTIVES).extended(archive), "generations"
     with run.workers(evaluator) as workers:
-        return _result(*_evolved(evaluator, workers, settings, rng, run), settings)
+        return _evolved(evaluator, workers, settings, rng, run)
 
 
 def _evolved(
@@ -155,10 +170,18 @@ def _recalled(genes: IntArray, unfinished: Unfinished | None) -> tuple[list[tupl
     return [(np.flatnonzero(found >= 0), recalled)], np.flatnonzero(found < 0)
 
 
-def _result(archive: Archive, history: History, reason: StopReason, settings: IdentificationSettings) -> SearchResult:
+def _front(
+    archive: Archive,
+    evaluator: Evaluator,
+    kept: TorqueSource | None,
+    settings: IdentificationSettings,
+    reason: StopReason,
+) -> Front:
+    """Take the non-dominated chromosomes that have a finite model, and choose among them."""
     front = archive.front
     usable = np.isfinite(front.objectives).all(axis=1)
     if not usable.any():
         raise NothingFoundError(reason)
-    objectives = front.objectives[usable]
-    return SearchResult(Front(front.genes[usable], objectives, choose(objectives, settings.choice)), history, reason)
+    genes, objectives = front.genes[usable], front.objectives[usable]
+    held_out = None if kept is None else held_out_errors(evaluator, kept, genes)
+    return Front(genes, objectives, choose(objectives, settings.choice, held_out), held_out)

@@ -15,7 +15,7 @@ from cpfls_cli.regressor.structure import StructureSettings
 from cpfls_cli.settings import Settings
 
 Base = Literal["none", "rigid-body"]
-Choice = Literal["mse-below-median-condition", "mse", "max-error"]
+Choice = Literal["mse-below-median-condition", "mse", "max-error", "held-out"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,10 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         Le(1000),
         Doc("how often the mean squared error counts in quantity-dominance; the other objectives count once"),
     ] = 10
-    choice: Annotated[Choice, Doc("which member of the Pareto front becomes the model")] = "mse-below-median-condition"
+    choice: Annotated[
+        Choice,
+        Doc("which member of the Pareto front becomes the model; held-out: the best on the flights of --choose-on"),
+    ] = "mse-below-median-condition"
     start: Annotated[
         Literal["random", "with-uniform"],
         Doc("initial population: all random, or random with the equidistant partitions among them"),

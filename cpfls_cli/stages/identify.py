@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.artifacts.records import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
+from cpfls_cli.identification.choice import require_flights
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, identify
 from cpfls_cli.identification.judge import Score
@@ -21,6 +22,7 @@ from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.search import NothingFoundError
 from cpfls_cli.identification.search_run import SearchRun, SearchStep
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.stages.choosing import choosing_roles, choosing_source
 from cpfls_cli.stages.flight_source import flight_source
 from cpfls_cli.stages.job import Job, Outcome, finish
 from cpfls_cli.stages.model_file import model_data
@@ -32,7 +34,12 @@ from cpfls_cli.workers.worker_error import WorkerError
 
 
 def run(
-    job: Job, flights: Sequence[Path], selection: Path | None, validate: Sequence[Path], options: SearchOptions
+    job: Job,
+    flights: Sequence[Path],
+    selection: Path | None,
+    validate: Sequence[Path],
+    options: SearchOptions,
+    choose_on: Sequence[Path] = (),
 ) -> Outcome:
     """Identify a model and write it.
 
@@ -46,20 +53,25 @@ def run(
         Other flights to judge the model on; nothing is learned from them.
     options : SearchOptions
         How the search is run.
+    choose_on : sequence of Path
+        Other flights to choose the model on, for `identification.choice: held-out`.
 
     Returns
     -------
     Outcome
     """
-    started, search = begin_search(job, input_roles(flights, selection, validate), options)
+    started, search = begin_search(job, input_roles(flights, selection, validate, choose_on), options)
     data = read_training(flights, selection, job.study, started.inputs)
+    kept = choosing_source(choose_on, started.inputs)
+    with settings_of("identification", job.study):
+        require_flights(job.study.identification.choice, given=kept is not None)
     held_out = held_out_parts(job.study, data.rests, started.inputs, validate)
     if started.dry_run is not None:
         return started.dry_run
     clock = time.perf_counter()
     watch = Watch(job, options.time_limit_s)
     with search.kept():
-        result = _identify(job, flights, data, held_out, search.run(options, watch, _shown(job)))
+        result = _identify(job, flights, data, held_out, kept, search.run(options, watch, _shown(job)))
     if isinstance(result, NothingFoundError):
         search.end(result.stop_reason)
         raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
@@ -70,7 +82,9 @@ def run(
     return stopped(outcome, result.stop_reason, watch.signal, job.output)
 
 
-def input_roles(flights: Sequence[Path], selection: Path | None, validate: Sequence[Path]) -> dict[str, Path]:
+def input_roles(
+    flights: Sequence[Path], selection: Path | None, validate: Sequence[Path], choose_on: Sequence[Path] = ()
+) -> dict[str, Path]:
     """Give the inputs of an identification their roles.
 
     Parameters
@@ -80,17 +94,24 @@ def input_roles(flights: Sequence[Path], selection: Path | None, validate: Seque
     selection : Path or None
     validate : sequence of Path
         That judge.
+    choose_on : sequence of Path
+        That the model is chosen on.
 
     Returns
     -------
     dict of str to Path
     """
-    roles = flight_roles(flights) | ({"selection": selection} if selection else {})
+    roles = flight_roles(flights) | ({"selection": selection} if selection else {}) | choosing_roles(choose_on)
     return roles | {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
 
 
 def _identify(
-    job: Job, flights: Sequence[Path], data: TrainingData, held_out: dict[str, TorqueSource], run: SearchRun
+    job: Job,
+    flights: Sequence[Path],
+    data: TrainingData,
+    held_out: dict[str, TorqueSource],
+    kept: TorqueSource | None,
+    run: SearchRun,
 ) -> Identification | NothingFoundError:
     try:
         with settings_of("identification", job.study):
@@ -102,6 +123,7 @@ def _identify(
                 generator(job.study, "identify"),
                 run,
                 six_parameters(job.study.vehicle.inertia_kg_m2),
+                kept,
             )
     except NothingFoundError as error:
         return error
@@ -188,6 +210,7 @@ def _outcome(job: Job, result: Identification, learned: int, seconds: float) -> 
         "stop_reason": result.stop_reason,
         "complete": result.complete,
         "front": len(result.front.objectives),
+        "choice_error": None if result.front.held_out is None else float(np.min(result.front.held_out)),
         "samples": result.samples["training"],
         "learned": learned,
         "ridge_weight": result.fit.ridge_weight,
@@ -245,6 +268,11 @@ def _lines(result: Identification, learned: int, stall: int | None) -> list[str]
         f"condition number {system.condition_number:.5g}; {result.history.evaluations[-1]} evaluations",
         *_ending(result, stall),
     ]
+    if result.front.held_out is not None:
+        members = len(result.front.held_out)
+        lines.append(
+            f"chosen among {members} on the flights kept for it, mean squared error {np.min(result.front.held_out):.3g}"
+        )
     moments = " ".join(f"{name} {value:.4g}" for name, value in zip(INERTIA_PARAMETERS, result.rigid_body, strict=True))
     lines.append(f"rigid body that fits best, kg m^2: {moments}")
     width = max(len(part) for part in result.scores)

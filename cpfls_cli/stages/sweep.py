@@ -30,7 +30,13 @@ from cpfls_cli.stages.sweep_words import sweep_outcome
 _END: StopReason = "generations"
 
 
-def run(job: Job, flights: Sequence[Path], validate: Sequence[Path], options: SearchOptions) -> Outcome:
+def run(
+    job: Job,
+    flights: Sequence[Path],
+    validate: Sequence[Path],
+    options: SearchOptions,
+    choose_on: Sequence[Path] = (),
+) -> Outcome:
     """Run every setting of a sweep with every seed.
 
     Parameters
@@ -42,17 +48,19 @@ def run(job: Job, flights: Sequence[Path], validate: Sequence[Path], options: Se
         Other flights to judge the models on; nothing is learned from them.
     options : SearchOptions
         How each search is run; the time limit is for all of them together.
+    choose_on : sequence of Path
+        Other flights to choose models on, for settings with `identification.choice: held-out`.
 
     Returns
     -------
     Outcome
     """
     options.require_one_place()
-    inputs = take_inputs(job, input_roles(flights, None, validate))
+    inputs = take_inputs(job, input_roles(flights, None, validate, choose_on))
     partial = PartialSweep.beside(job.output, header_of(job.study, inputs))
     left = partial.take_up(resume=options.resume, force=job.force)
     check_output(job.output, job.force or (options.resume and partial.output_may_be_replaced()))
-    plan = sweep_plan(job, flights, validate, inputs)
+    plan = sweep_plan(job, flights, validate, inputs, choose_on)
     if (checked := dry_run(job)) is not None:
         return checked
     clock, watch = time.perf_counter(), Watch(job, options.time_limit_s)
@@ -117,6 +125,7 @@ def _identified(
                 generator(study, "identify"),
                 search.run(options, watch, shown),
                 six_parameters(study.vehicle.inertia_kg_m2),
+                setting.kept,
             )
     except NothingFoundError as error:
         return error

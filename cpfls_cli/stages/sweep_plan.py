@@ -12,12 +12,15 @@ from cpfls_cli.artifacts.formats import SELECTION
 from cpfls_cli.artifacts.records import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.variants import Variant, variants
-from cpfls_cli.errors import ComputationError, ConfigError
+from cpfls_cli.errors import ComputationError, ConfigError, InputError
+from cpfls_cli.identification.choice import require_flights
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING
 from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.stages.choosing import choosing_source
 from cpfls_cli.stages.identify import held_out_parts
 from cpfls_cli.stages.job import Job
+from cpfls_cli.stages.study import settings_of
 from cpfls_cli.stages.sweep_samples import SweepSamples
 from cpfls_cli.stages.training import TrainingData
 
@@ -35,11 +38,14 @@ class SweptSetting:
     data : TrainingData
     held_out : mapping of str to TorqueSource
         What is judged beside the training part, by name.
+    kept : TorqueSource or None
+        What its model is chosen on, beside its objectives.
     """
 
     variant: Variant
     data: TrainingData
     held_out: Mapping[str, TorqueSource]
+    kept: TorqueSource | None
 
     @property
     def selection(self) -> InputFile:
@@ -105,7 +111,11 @@ class SweepPlan:
 
 
 def sweep_plan(
-    job: Job, flights: Sequence[Path], validate: Sequence[Path], inputs: Mapping[str, InputFile]
+    job: Job,
+    flights: Sequence[Path],
+    validate: Sequence[Path],
+    inputs: Mapping[str, InputFile],
+    choose_on: Sequence[Path] = (),
 ) -> SweepPlan:
     """Gather the settings of a sweep, and choose the samples of each.
 
@@ -118,6 +128,8 @@ def sweep_plan(
         That only judge.
     inputs : mapping of str to InputFile
         By role.
+    choose_on : sequence of Path
+        That models are chosen on, in settings whose choice is `held-out`.
 
     Returns
     -------
@@ -128,14 +140,25 @@ def sweep_plan(
     InputError, ConfigError, ComputationError
         If a flight is not good, or samples of a setting cannot be chosen.
     """
-    samples, settings = SweepSamples(job, flights, inputs), []
+    samples, settings, kept = SweepSamples(job, flights, inputs), [], choosing_source(choose_on, inputs)
     for variant in variants(job.study):
         with naming(f"sweep setting '{variant.name}'"):
             data = samples.of(variant)
-            settings.append(SweptSetting(variant, data, held_out_parts(variant.study, data.rests, inputs, validate)))
+            held_out = held_out_parts(variant.study, data.rests, inputs, validate)
+            settings.append(SweptSetting(variant, data, held_out, _kept(variant, kept)))
+    if kept is not None and all(setting.kept is None for setting in settings):
+        raise InputError("--choose-on: no setting of the sweep has identification.choice: held-out; leave it out")
     parts = dict.fromkeys([TRAINING, *(part for setting in settings for part in setting.held_out)])
     seeds = tuple((job.study.seed + number) % 2**63 for number in range(job.study.sweep.seeds))
     return SweepPlan(tuple(settings), seeds, tuple(parts))
+
+
+def _kept(variant: Variant, kept: TorqueSource | None) -> TorqueSource | None:
+    choice = variant.study.identification.choice
+    own = kept if choice == "held-out" else None
+    with settings_of("identification", variant.study):
+        require_flights(choice, given=own is not None)
+    return own
 
 
 @contextmanager

@@ -1,0 +1,69 @@
+"""`identify --choose-on` and `sweep --choose-on`: flights that a model is chosen on."""
+
+import json
+
+import h5py
+import pytest
+
+HELD_OUT = ("--set", "identification.choice=held-out")
+SEARCH = ("--set", "identification.generations=2")
+
+
+@pytest.fixture(scope="module")
+def others(cpfls, study, tmp_path_factory):
+    """Two more flights of the tiny study."""
+    folder, flights = tmp_path_factory.mktemp("others"), []
+    for displacement in (50, 40):
+        path, flight = (folder / f"{name}-{displacement}.h5" for name in ("trajectory", "flight"))
+        turned = ("--set", f"trajectory.displacement_m={displacement}.0")
+        for words in (("trajectory", study, *turned, "-o", path), ("simulate", study, path, "-o", flight)):
+            assert cpfls(*words).exit_code == 0
+        flights.append(flight)
+    return flights
+
+
+def test_a_model_is_chosen_on_a_flight_and_judged_on_another(cpfls, study, pipeline, others, tmp_path):
+    model, (kept, judged) = tmp_path / "model.h5", others
+    words = ("--choose-on", kept, "--validate", judged, *HELD_OUT, *SEARCH)
+    result = cpfls("identify", study, pipeline.flight, *words, "-o", model, "--json")
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert list(summary["held_out"]) == [judged.name]
+    again = cpfls("identify", study, pipeline.flight, "--validate", kept, *SEARCH, "-o", tmp_path / "b.h5", "--json")
+    # The same search, chosen by its objectives: never better on the flight that the other was chosen on.
+    assert 0 < summary["choice_error"] <= json.loads(again.stdout)["held_out"][kept.name]["mse"] * (1 + 1e-6)
+    with h5py.File(model) as file:
+        assert {"flight", "choose-on-1", "validate-1"} == set(file["inputs"])
+
+
+def test_a_sweep_takes_it_for_the_settings_that_ask_for_it(cpfls, study, pipeline, others, tmp_path):
+    config, (kept, judged) = tmp_path / "sweep.yaml", others
+    settings = [{"name": "plain"}, {"name": "held out", "set": {"identification.choice": "held-out"}}]
+    config.write_text(f"{study.read_text()}sweep: {json.dumps({'seeds': 1, 'settings': settings})}\n")
+    words = ("sweep", config, pipeline.flight, "--validate", judged, "-o", tmp_path / "sweep.h5")
+    result = cpfls(*words, "--choose-on", kept, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert [setting["runs"] for setting in json.loads(result.stdout)["settings"]] == [1, 1]
+
+
+@pytest.mark.parametrize("command", ["identify", "sweep"])
+def test_choice_and_flights_must_go_together(refuse, study, pipeline, others, tmp_path, command):
+    output = ("-o", tmp_path / "out.h5")
+    (message,) = refuse(command, study, pipeline.flight, *HELD_OUT, *output)
+    assert 'identification.choice = "held-out": needs a flight' in message
+    assert "--choose-on FLIGHT" in message
+    (message,) = refuse(command, study, pipeline.flight, "--choose-on", others[0], *output)
+    assert "--choose-on" in message
+    assert "held-out" in message
+
+
+def test_a_flight_that_trains_or_judges_cannot_choose(refuse, study, pipeline, others, tmp_path):
+    output = ("-o", tmp_path / "out.h5")
+    (message,) = refuse("identify", study, pipeline.flight, "--choose-on", pipeline.flight, *HELD_OUT, *output)
+    assert "is a flight that trains" in message
+    same = ("--validate", others[0], "--choose-on", others[0])
+    (message,) = refuse("identify", study, pipeline.flight, *same, *HELD_OUT, *output)
+    assert "judges (--validate)" in message
+    twice = ("--choose-on", others[0], "--choose-on", others[0])
+    (message,) = refuse("identify", study, pipeline.flight, *twice, *HELD_OUT, *output)
+    assert "is given twice" in message
