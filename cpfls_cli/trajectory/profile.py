@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import asdict, astuple, dataclass, fields
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.trajectory.pulses import carry, pulse
-
-# The Thue-Morse sequence: the ramp up of every derivative is followed by its mirror image.
-_SIGNS = np.array([1, -1, -1, 1, -1, 1, 1, -1, -1, 1, 1, -1, 1, -1, -1, 1], dtype=float)
+from cpfls_cli.trajectory.nesting import peaks_of, spans_of
+from cpfls_cli.trajectory.sampling import sample
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +47,9 @@ class Peaks:
     pop: float
 
 
+_DERIVATIVES = tuple(field.name for field in fields(Peaks))
+
+
 @dataclass(frozen=True, kw_only=True)
 class BaseProfile:
     """A rest-to-rest move with pop ``+-A (2 pi / P) sin(2 pi t / P)`` in sixteen intervals, and holds between.
@@ -55,11 +57,13 @@ class BaseProfile:
     Attributes
     ----------
     amplitude : float, m/s^5
-        A; the crackle is ``A (1 - cos(2 pi t / P))``.
+        A; the crackle is ``A (1 - cos(2 pi t / P))``. Infinite where P is zero, so that the snap jumps.
     period : float, s
         P, the length of one interval.
     holds : Holds
         Pauses between the intervals, during which snap, jerk, acceleration or velocity stays at its peak.
+    displacement : float, m
+        Follows from the amplitude where it is not given; `covering` gives both.
 
     References
     ----------
@@ -69,55 +73,60 @@ class BaseProfile:
     amplitude: float
     period: float
     holds: Holds = Holds()
+    displacement: float = math.nan
+
+    def __post_init__(self) -> None:
+        """Find the displacement where it is not given."""
+        if math.isnan(self.displacement):
+            object.__setattr__(self, "displacement", self.amplitude * _product(self.spans))
+
+    @property
+    def spans(self) -> Array:
+        """Durations T1 to T5, shape (5,), s: snap, jerk, ..., displacement is the one before times its span."""
+        return spans_of(self.period, np.array(astuple(self.holds)))
 
     @property
     def duration(self) -> float:
         """Duration of the move in s, ``16 P + 8 Ts + 4 Tj + 2 Ta + Tv``."""
-        holds = self.holds
-        return 16 * self.period + 8 * holds.snap + 4 * holds.jerk + 2 * holds.acceleration + holds.velocity
+        return float(self.spans.sum())
 
     @property
     def peaks(self) -> Peaks:
         """Largest absolute values in closed form; they nest, so a limit on each is one inequality."""
-        P, holds = self.period, self.holds
-        snap = self.amplitude * P
-        jerk = snap * (P + holds.snap)
-        acceleration = jerk * (2 * P + holds.snap + holds.jerk)
-        velocity = acceleration * (4 * P + 2 * holds.snap + holds.jerk + holds.acceleration)
-        stretch = 8 * P + 4 * holds.snap + 2 * holds.jerk + holds.acceleration + holds.velocity
-        return Peaks(
-            displacement=velocity * stretch,
-            velocity=velocity,
-            acceleration=acceleration,
-            jerk=jerk,
-            snap=snap,
-            crackle=2 * self.amplitude,
-            pop=2 * np.pi * self.amplitude / P,
-        )
+        values = peaks_of(self.displacement, self.spans).tolist()
+        return Peaks(**dict(zip(_DERIVATIVES, values, strict=True)))
 
     def sample(self, time: Array) -> Array:
-        """Evaluate the move in closed form.
+        """Evaluate the move in closed form, every derivative to rounding error of its own peak.
 
         Parameters
         ----------
         time : array, shape (time,), s
-            Any order; at rest before 0 and after `duration`.
+            Any order, fastest when it ascends; at rest before 0 and from `duration` on.
 
         Returns
         -------
         array, shape (time, 7), m and s
-            Displacement, velocity, acceleration, jerk, snap, crackle, pop.
+            Displacement, velocity, acceleration, jerk, snap, crackle, pop. A derivative without bound is zero
+            but at the instants at which the one below jumps.
         """
-        lengths, signs = _segments(self.period, self.holds)
-        starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-        states = _initial_states(self.amplitude * signs, lengths, self.period)
-        segment = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(starts) - 1)
-        elapsed = time - starts[segment]
-        heights = self.amplitude * signs[segment]
-        motion = carry(states[segment], elapsed) + heights[:, None] * pulse(elapsed, self.period)
-        motion[(time < 0) | (time >= self.duration)] = 0.0
-        motion[time >= self.duration, 0] = self.peaks.displacement
-        return motion
+        return sample(self.displacement, self.spans, time)
+
+    def stretched(self, duration: float) -> BaseProfile:
+        """Cover the same displacement in another time, with the same shape.
+
+        Parameters
+        ----------
+        duration : float, s
+
+        Returns
+        -------
+        BaseProfile
+            Its derivative n is smaller by the ratio of the durations to the power of n.
+        """
+        factor = duration / self.duration
+        holds = Holds(**{name: factor * hold for name, hold in asdict(self.holds).items()})
+        return covering(self.displacement, factor * self.period, holds)
 
 
 def covering(displacement: float, period: float, holds: Holds) -> BaseProfile:
@@ -126,7 +135,9 @@ def covering(displacement: float, period: float, holds: Holds) -> BaseProfile:
     Parameters
     ----------
     displacement : float, m
+        A negative one moves backwards.
     period : float, s
+        May be zero, if a hold is not.
     holds : Holds
 
     Returns
@@ -134,26 +145,13 @@ def covering(displacement: float, period: float, holds: Holds) -> BaseProfile:
     BaseProfile
         Of infinite amplitude where the period is too short for any number.
     """
-    reached = BaseProfile(amplitude=1.0, period=period, holds=holds).peaks.displacement
-    return BaseProfile(amplitude=displacement / reached if reached else np.inf, period=period, holds=holds)
+    reached = _product(spans_of(period, np.array(astuple(holds))))
+    unbounded = math.copysign(math.inf, displacement) if displacement else 0.0
+    amplitude = displacement / reached if reached else unbounded
+    return BaseProfile(amplitude=amplitude, period=period, holds=holds, displacement=displacement)
 
 
-def _segments(period: float, holds: Holds) -> tuple[Array, Array]:
-    """Lengths and signs of the 16 intervals and the 15 holds between them (sign 0)."""
-    lengths, signs = np.full(31, period), np.zeros(31)
-    signs[0::2] = _SIGNS
-    lengths[1::4] = holds.snap
-    lengths[3::8] = holds.jerk
-    lengths[7::16] = holds.acceleration
-    lengths[15] = holds.velocity
-    return lengths, signs
-
-
-def _initial_states(heights: Array, lengths: Array, period: float) -> Array:
-    states = np.zeros((len(lengths), 7))
-    gains = heights[:, None] * pulse(lengths, period)
-    for index in range(len(lengths) - 1):
-        end = carry(states[index : index + 1], lengths[index : index + 1])[0] + gains[index]
-        # Crackle and pop vanish at the end of a whole wave; only rounding is left of them.
-        states[index + 1, :5] = end[:5]
-    return states
+def _product(spans: Array) -> float:
+    # What is too large for numbers is infinite, and refused by whoever asks for it.
+    with np.errstate(over="ignore", under="ignore"):
+        return float(np.prod(spans))

@@ -1,0 +1,93 @@
+"""The shortest rest-to-rest move of the family under limits on any of its derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.errors import SettingError
+from cpfls_cli.trajectory.limits import Limits, require_positive, spread
+from cpfls_cli.trajectory.moves import Move, Moves, Outcome, moves_of
+from cpfls_cli.trajectory.ramps import shortest_spans
+
+
+def plan_moves(displacement: Array, limits: Limits, period: float | Array | None = None) -> Moves:
+    """Plan the shortest moves, all at once.
+
+    Minimise ``16 P + 8 Ts + 4 Tj + 2 Ta + Tv`` over A, P and the holds, with the displacement covered and no
+    derivative above its limit.
+
+    Parameters
+    ----------
+    displacement : array, shape (moves,), m
+        Of any sign; a negative one moves backwards.
+    limits : Limits
+        One of each for all moves, or one for each move; those that are left out do not limit.
+    period : float or array, shape (moves,), s, optional
+        The paper's parameter P; chosen where it is not given. With crackle and pop not limited the choice is 0,
+        and the snap jumps.
+
+    Returns
+    -------
+    Moves
+
+    Raises
+    ------
+    SettingError
+        If a displacement is not finite, or a limit or the period is not greater than zero; it names the key.
+
+    References
+    ----------
+    Section 7 of the paper; method.md section 3.
+    """
+    covered = _finite(displacement)
+    bounds = limits.broadcast(len(covered))
+    spans = shortest_spans(np.abs(covered), bounds, _positive(period, len(covered)))
+    return moves_of(covered, spans, bounds, _outcome(covered, bounds, spans, period))
+
+
+def plan_move(displacement: float, limits: Limits, period: float | None = None) -> Move:
+    """Plan the shortest move.
+
+    Parameters
+    ----------
+    displacement : float, m
+    limits : Limits
+    period : float, s, optional
+
+    Returns
+    -------
+    Move
+
+    Raises
+    ------
+    SettingError
+        As `plan_moves`, which plans many moves in little more time than one.
+    """
+    return plan_moves(np.array([displacement]), limits, period)[0]
+
+
+def _finite(displacement: Array) -> Array:
+    covered = np.asarray(displacement, dtype=np.float64)
+    if not np.isfinite(covered).all():
+        wrong = covered[~np.isfinite(covered)][0]
+        raise SettingError("displacement", f"is {wrong:g}; give a finite length in m")
+    return covered
+
+
+def _positive(period: float | Array | None, moves: int) -> Array | None:
+    if period is None:
+        return None
+    require_positive("period", period, "leave it out to have it chosen")
+    if not np.isfinite(period).all():
+        raise SettingError("period", "is not finite; give a time in s, or leave it out to have it chosen")
+    return spread("period", period, moves)
+
+
+def _outcome(displacement: Array, bounds: Array, spans: Array, period: float | Array | None) -> IntArray:
+    duration = spans.sum(axis=0)
+    representable = np.isfinite(duration) & (duration > 0)
+    limited = np.isfinite(bounds).any(axis=0) | (period is not None)
+    outcome = np.where(representable, Outcome.SOLVED, Outcome.OUT_OF_RANGE)
+    outcome = np.where(limited, outcome, Outcome.NO_LIMIT)
+    return np.where(displacement == 0, Outcome.ZERO_DISPLACEMENT, outcome).astype(np.int64)
