@@ -103,7 +103,7 @@ class RotationLimits:
         SettingError
             If the turns alone exceed a limit.
         """
-        self.require_turns(path)
+        self._require_turns(path)
         low, high = 0.0, 1.0
         while self.peaks(path.scaled(high)).max() <= 1:
             low, high = high, 2 * high
@@ -113,19 +113,26 @@ class RotationLimits:
             low, high = (middle, high) if within else (low, middle)
         return path.scaled(low)
 
-    def require_turns(self, path: RotationPath) -> None:
-        """Refuse turns that exceed a limit by themselves.
+    def enforced(self, path: RotationPath) -> RotationPath:
+        """Scale the harmonics of a path down where it exceeds a limit.
 
         Parameters
         ----------
         path : RotationPath
-            Its harmonics do not count.
+
+        Returns
+        -------
+        RotationPath
+            The same path where it exceeds none.
 
         Raises
         ------
         SettingError
-            Names the limit that is exceeded most.
+            If the turns alone exceed a limit.
         """
+        return path if self.peaks(path).max() <= 1 else self.fitted(path)
+
+    def _require_turns(self, path: RotationPath) -> None:
         peaks = self.peaks(path.scaled(0.0))
         worst = int(peaks.argmax())
         if peaks[worst] > 1:

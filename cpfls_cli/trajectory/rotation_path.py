@@ -58,7 +58,7 @@ class RotationPath:
     @property
     def harmonics(self) -> int:
         """Number of harmonics of each angle."""
-        return self.sine.shape[1]
+        return len(self.sine.T)
 
     def sample(self, time: Array) -> RotationMotion:
         """Evaluate the path and its derivatives in closed form.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from annotated_types import Gt
+from annotated_types import Ge, Gt, Le
 from typing_extensions import Doc
 
 from cpfls_cli.settings import Settings
@@ -36,3 +36,5 @@ class RotationSettings(Settings):
         tuple[_Torque, _Torque, _Torque] | None,
         Doc("largest torque on the body about x, y, z that the motion may ask for, N m; null: no limit"),
     ] = None
+    starts: Annotated[int, Ge(1), Doc("random paths of an optimised path, the best of which is improved")] = 10
+    iterations: Annotated[int, Ge(0), Doc("steps of gradient descent that improve an optimised path")] = 200

@@ -1,0 +1,124 @@
+"""Optimal excitation: a path of full rotations on which the parameters of a model are best conditioned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.excitation.adam import adam
+from cpfls_cli.excitation.conditioning import condition_number
+from cpfls_cli.excitation.objective import Objective
+from cpfls_cli.excitation.variables import path_of, variables_of
+from cpfls_cli.regressor import ModelStructure, StructureSettings, model_structure
+from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
+from cpfls_cli.trajectory.rotation_limits import RotationLimits
+from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+Progress = Callable[[int, int, str], None]
+
+# Samples of a path during the search, and how many times as many judge the result.
+_SAMPLES, _SAMPLES_PER_PARAMETER, _FINER = 500, 2, 10
+# Of each design variable, in rad or rad/s.
+_STEP = 0.05
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """An optimised path and what it is worth.
+
+    Attributes
+    ----------
+    path : RotationPath
+    condition_number : float
+        Of the regressor along the path.
+    random : array, shape (starts,)
+        Condition numbers along the random paths; the best of them was improved.
+    history : array, shape (iterations,)
+        Condition numbers in the course of the search, on few samples and before the limits are enforced.
+    """
+
+    path: RotationPath
+    condition_number: float
+    random: Array
+    history: Array
+
+    @property
+    def evaluations(self) -> int:
+        """Number of random paths and iterations."""
+        return len(self.random) + len(self.history)
+
+
+def optimised_rotation(
+    settings: RotationSettings,
+    duration: float,
+    structure_settings: StructureSettings,
+    vehicle: VehicleSettings,
+    rng: np.random.Generator,
+    progress: Progress | None = None,
+) -> Excitation:
+    """Choose a path that minimises the condition number of the regressor Q.
+
+    The best of some random paths is improved by stochastic gradient descent.
+
+    Parameters
+    ----------
+    settings : RotationSettings
+    duration : float, s
+    structure_settings : StructureSettings
+        Model whose regressor is meant, with uniform partitions.
+    vehicle : VehicleSettings
+        Its inertia turns accelerations into torques, where the torque is limited.
+    rng : numpy.random.Generator
+    progress : callable, optional
+        Called with the paths and iterations done, their final number, and a word on what was reached.
+
+    Returns
+    -------
+    Excitation
+
+    Raises
+    ------
+    SettingError
+        If the limits do not leave room for the turns, or no harmonic fits into the duration.
+
+    References
+    ----------
+    Swevers et al. (1997), Optimal robot excitation and identification, IEEE Transactions on Robotics and Automation
+    13(5).
+    """
+    structure, limits = model_structure(structure_settings), RotationLimits(settings, vehicle.inertia_kg_m2)
+    samples, total = _samples(structure), settings.starts + settings.iterations
+    report = _Report(progress, total)
+    paths, random = [], []
+    for _ in range(settings.starts):
+        paths.append(full_rotation(settings, duration, rng, vehicle.inertia_kg_m2))
+        random.append(condition_number(paths[-1], structure, samples))
+        report(min(random))
+    best = paths[int(np.argmin(random))]
+    objective = Objective(best, structure, limits, samples, settings.iterations, rng)
+    variables = variables_of(best)
+    for variables in adam(objective.gradient, variables, settings.iterations, _STEP):
+        report(objective.history[-1])
+    path = limits.enforced(path_of(variables, best))
+    reached = condition_number(path, structure, _FINER * samples)
+    return Excitation(path, reached, np.array(random), np.array(objective.history))
+
+
+def _samples(structure: ModelStructure) -> int:
+    return max(_SAMPLES, _SAMPLES_PER_PARAMETER * structure.parameters)
+
+
+class _Report:
+    """Count what is done."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress, self._total, self._done = progress, total, 0
+
+    def __call__(self, condition_number: float) -> None:
+        self._done += 1
+        if self._progress is not None:
+            self._progress(self._done, self._total, f"condition number {condition_number:.3g}")
