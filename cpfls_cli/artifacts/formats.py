@@ -22,23 +22,36 @@ def _vector(path: str, units: str, frame: str, description: str, required: bool 
 
 TRAJECTORY = ArtifactSpec(
     "cpfls/trajectory",
-    "a planned path with all its derivatives and the attitude that flies it",
+    "a planned path with all its derivatives and the attitude that flies it; without a position the vehicle is held at "
+    "its centre of mass and only turns",
     "trajectory",
     (
         _TIME,
-        _vector("position", "m", WORLD, "position"),
-        _vector("velocity", "m/s", WORLD, "velocity"),
-        _vector("acceleration", "m/s^2", WORLD, "acceleration"),
-        _vector("jerk", "m/s^3", WORLD, "third derivative of position"),
-        _vector("snap", "m/s^4", WORLD, "fourth derivative of position"),
-        _vector("crackle", "m/s^5", WORLD, "fifth derivative of position"),
-        _vector("pop", "m/s^6", WORLD, "sixth derivative of position"),
+        _vector("position", "m", WORLD, "position", required=False),
+        _vector("velocity", "m/s", WORLD, "velocity", required=False),
+        _vector("acceleration", "m/s^2", WORLD, "acceleration", required=False),
+        _vector("jerk", "m/s^3", WORLD, "third derivative of position", required=False),
+        _vector("snap", "m/s^4", WORLD, "fourth derivative of position", required=False),
+        _vector("crackle", "m/s^5", WORLD, "fifth derivative of position", required=False),
+        _vector("pop", "m/s^6", WORLD, "sixth derivative of position", required=False),
         DatasetSpec("yaw", ("time",), "rad", EULER, "planned yaw"),
         DatasetSpec("yaw_rate", ("time",), "rad/s", EULER, "derivative of yaw"),
         DatasetSpec("yaw_acceleration", ("time",), "rad/s^2", EULER, "second derivative of yaw"),
         *_ATTITUDE,
         _vector("body_rate", "rad/s", BODY, "body rates p, q, r"),
+        DatasetSpec("leg/begin", ("leg",), "s", NO_FRAME, "when each move leaves its rest", required=False),
+        DatasetSpec("leg/end", ("leg",), "s", NO_FRAME, "when each move is at rest again", required=False),
+        DatasetSpec("leg/displacement", ("leg", "axis"), "m", WORLD, "displacement of each move", required=False),
+        DatasetSpec(
+            "leg/limited_by",
+            ("leg",),
+            "text",
+            NO_FRAME,
+            "derivatives that reach their limit; empty where a move was not planned under limits",
+            required=False,
+        ),
     ),
+    ("waypoints",),
 )
 
 FLIGHT = ArtifactSpec(

@@ -122,13 +122,30 @@ def _main(
 
 @app.command()
 @with_common
-def trajectory(config: ConfigArgument, output: OutputOption, *, common: Common) -> None:
-    """Plan a smooth training path."""
+def trajectory(
+    config: ConfigArgument,
+    output: OutputOption,
+    waypoints: Annotated[
+        Path | None,
+        typer.Option(
+            "--waypoints",
+            metavar="FILE",
+            help="CSV of points to fly to, in place of the path of the config: x_m, y_m, z_m, and if wanted yaw_rad, "
+            "pause_s.",
+        ),
+    ] = None,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw the derivatives and the attitude, as SVG beside OUTPUT.")
+    ] = False,
+    *,
+    common: Common,
+) -> None:
+    """Plan a smooth path, or full rotations that excite a model."""
 
     def call(job: Job) -> Outcome:
         from cpfls_cli.stages import trajectory as stage
 
-        return stage.run(job)
+        return stage.run(job, waypoints, plot)
 
     _run("trajectory", config, output, common, call)
 

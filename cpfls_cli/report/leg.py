@@ -29,7 +29,7 @@ class FirstLeg:
 
 
 def first_leg(trajectory: Artifact) -> FirstLeg:
-    """Take the first leg of a path, from its start to where it is farthest from it for the first time.
+    """Take the first leg of a path, from rest to rest.
 
     Parameters
     ----------
@@ -39,20 +39,22 @@ def first_leg(trajectory: Artifact) -> FirstLeg:
     -------
     FirstLeg
     """
-    away = trajectory.array("position") - trajectory.array("position")[0]
-    distance = np.linalg.norm(away, axis=1)
-    end = _end(distance, np.linalg.norm(trajectory.array("jerk"), axis=1))
-    direction = away[end] / (distance[end] or 1.0)
-    part = slice(0, end + 1)
+    time, position = trajectory.array("time"), trajectory.array("position")
+    part, direction = _first(trajectory)
     curves = {name: trajectory.array(name)[part] @ direction for name in DERIVATIVES[:-1]}
-    return FirstLeg(trajectory.array("time")[part], curves | {"displacement": away[part] @ direction})
+    return FirstLeg(time[part], curves | {"displacement": (position[part] - position[0]) @ direction})
 
 
-def _end(distance: Array, jerk: Array) -> int:
-    """Find the last sample of the leg; a path comes to rest so softly that distance alone would end it early."""
-    end = int(np.argmax(distance >= distance.max() * (1 - 1e-9)))
-    at_rest = (jerk <= 1e-9 * jerk.max()) | (np.diff(distance, append=-np.inf) < 0)
-    return end + int(np.argmax(at_rest[end:]))
+def _first(trajectory: Artifact) -> tuple[slice, Array]:
+    """Find samples and direction of the first leg; of the whole path where the file does not say what its legs are."""
+    if "leg/begin" in trajectory.data:
+        begin, end = (float(trajectory.array(f"leg/{which}")[0]) for which in ("begin", "end"))
+        first, last = np.searchsorted(trajectory.array("time"), [begin, end])
+        along = trajectory.array("leg/displacement")[0]
+        return slice(int(first), int(last) + 1), along / np.linalg.norm(along)
+    away = trajectory.array("position") - trajectory.array("position")[0]
+    farthest = away[np.argmax(np.linalg.norm(away, axis=1))]
+    return slice(None), farthest / (np.linalg.norm(farthest) or 1.0)
 
 
 def peaks(trajectory: Artifact) -> dict[str, float]:

@@ -92,6 +92,22 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     return Flyability(thrust, tilt, tuple(found), rotor_demand(vehicle, thrust, about_body).violations)
 
 
+def single_axis_torque(vehicle: VehicleSettings) -> Array:
+    """Find the largest torque about each axis alone, either way, that the rotors of a held vehicle can give.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    array, shape (3,), N m, body frame
+    """
+    both = np.concatenate([np.eye(3), -np.eye(3)])
+    needed = rotor_demand(vehicle, collective_thrust(vehicle, both, None), both).squared_speed.max(axis=1)
+    return np.asarray(vehicle.rotor_speed_max_rad_s**2 / np.maximum(needed[:3], needed[3:]))
+
+
 def _tilt(attitude: Array) -> Array:
     """Angle between body z and vertical; the arc cosine of its vertical component would lose small angles."""
     (sr, cr), (sp, cp) = ((np.sin(angle), np.cos(angle)) for angle in attitude.T[:2])

@@ -14,7 +14,8 @@ from cpfls_cli.stages.model_in_flight import model_in_flight
 from cpfls_cli.stages.sources import read_with
 from cpfls_cli.stages.study import generator, settings_of
 
-_PLANNED = ("attitude", "attitude_rate", "attitude_acceleration", "position", "velocity", "acceleration")
+_TURNED = ("attitude", "attitude_rate", "attitude_acceleration")
+_MOVED = ("position", "velocity", "acceleration")
 
 
 def run(job: Job, trajectory: Path, model: Path | None = None) -> Outcome:
@@ -43,13 +44,19 @@ def run(job: Job, trajectory: Path, model: Path | None = None) -> Outcome:
     if model is not None and not closed:
         raise InputError(f"{model}: models are flown in closed loop only; add --mode closed-loop")
     started = begin(job, {"trajectory": trajectory} | ({} if model is None else {"model": model}))
-    source = read_with(trajectory, TRAJECTORY, "time", *_PLANNED)
+    source = read_with(trajectory, TRAJECTORY, "time", *_TURNED)
+    held = "position" not in source.data
+    if held and closed:
+        raise InputError(
+            f"{trajectory}: turns a vehicle that is held at its centre of mass; no autopilot flies it. Leave mode "
+            "closed-loop out, or plan a path in space"
+        )
     flown = FlownModel() if model is None else model_in_flight(model, job.study)
     with settings_of("simulation", job.study):
         flown.with_effects(flown_effects(job.study.simulation.closed_loop.effects, job.study.vehicle))
     if started.dry_run is not None:
         return started.dry_run
-    planned = {name: source.array(name) for name in _PLANNED}
+    planned = {name: source.array(name) for name in (_TURNED if held else _TURNED + _MOVED)}
     if closed:
         return _closed_loop(job, started, source.array("time"), planned, flown)
     return _inverse(job, started, source.array("time"), planned, trajectory)

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from cpfls_cli.report.content import Block, Section, Table
 from cpfls_cli.report.figures.attitude import attitude_figure
 from cpfls_cli.report.figures.derivatives import derivatives_figure
+from cpfls_cli.report.figures.rotation import rotation_figure
 from cpfls_cli.report.leg import DERIVATIVES, UNITS, peaks
 from cpfls_cli.report.numbers import number
 from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 
+_LEGS_SHOWN = 20
 _PRINTED = ("2π = 6.283", "2", "1", "1", "2", "8", "64")
 
 
@@ -32,7 +36,17 @@ def path_section(sources: Sources) -> Section | None:
 
 
 def _path(trajectory: Source, index: int, paper: bool) -> Iterator[Block]:
+    if "position" not in trajectory.artifact.data:
+        yield rotation_figure(f"figure-rotation-{index}", trajectory)
+        return
     yield derivatives_figure(f"figure-2-derivatives-{index}", trajectory)
+    yield _peaks(trajectory, index, paper)
+    if "leg/begin" in trajectory.artifact.data and any(trajectory.artifact.texts("leg/limited_by")):
+        yield _legs(trajectory, index)
+    yield attitude_figure(f"figure-3-attitude-{index}", trajectory)
+
+
+def _peaks(trajectory: Source, index: int, paper: bool) -> Table:
     found = peaks(trajectory.artifact)
     rows = [
         [name, unit, number(found[name]), *([printed] if paper else [])]
@@ -42,5 +56,19 @@ def _path(trajectory: Source, index: int, paper: bool) -> Iterator[Block]:
     if paper:
         caption += " The paper prints its maxima for intervals of P = 1 s."
     header = ("Derivative", "Unit", "Largest", *(("Paper",) if paper else ()))
-    yield Table(f"peaks-{index}", caption, header, rows, frozenset({0, 1}))
-    yield attitude_figure(f"figure-3-attitude-{index}", trajectory)
+    return Table(f"peaks-{index}", caption, header, rows, frozenset({0, 1}))
+
+
+def _legs(trajectory: Source, index: int) -> Table:
+    artifact = trajectory.artifact
+    begins, ends = artifact.array("leg/begin"), artifact.array("leg/end")
+    lengths = np.linalg.norm(artifact.array("leg/displacement"), axis=1)
+    reached = artifact.texts("leg/limited_by")
+    rows = [
+        [str(leg + 1), number(begins[leg]), number(ends[leg] - begins[leg]), number(lengths[leg]), reached[leg]]
+        for leg in range(min(len(begins), _LEGS_SHOWN))
+    ]
+    caption = f"Moves of {trajectory.label} under limits, and the derivatives that reach theirs."
+    if len(begins) > _LEGS_SHOWN:
+        caption += f" The first {_LEGS_SHOWN} of {len(begins)}."
+    return Table(f"legs-{index}", caption, ("Move", "Begins, s", "Takes, s", "Length, m", "Limited by"), rows)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.simulation import flyability
+from cpfls_cli.simulation.flyable import single_axis_torque
 from cpfls_cli.trajectory import TrajectorySettings, plan
 from cpfls_cli.vehicle import VehicleSettings
 
@@ -53,3 +54,9 @@ def test_a_held_vehicle_has_its_thrust_free():
     found = flyability({**motion, "attitude_acceleration": zero}, VehicleSettings(), None)
     np.testing.assert_array_equal(found.thrust, 0.0)
     assert found.tilt.max() > 3.0
+
+
+def test_torque_about_one_axis_is_what_half_the_rotors_give_at_full_speed():
+    full = 121.5e-6 * 1000.0**2
+    expected = [0.3 * full, 0.3 * full, 2 * 2.7e-6 * 1000.0**2]
+    np.testing.assert_allclose(single_axis_torque(VehicleSettings()), expected, rtol=1e-12)

@@ -1,0 +1,26 @@
+"""The times at which a plan is sampled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+
+
+def sample_times(duration: float, sample_time: float) -> Array:
+    """Divide a duration into samples.
+
+    Parameters
+    ----------
+    duration : float, s
+    sample_time : float, s
+
+    Returns
+    -------
+    array, shape (time,), s
+        From 0; the last one is not later than the duration.
+    """
+    # A duration of 0.7 s holds 7 steps of 0.1 s although the quotient is below 7 by rounding.
+    steps = int(duration / sample_time + 1e-6)
+    time: Array = np.arange(steps + 1, dtype=np.float64) * sample_time
+    return time

@@ -1,0 +1,72 @@
+"""The yaw along a path in space: one turn over all of it, or from point to point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.trajectory.legs import Leg
+from cpfls_cli.trajectory.profile import BaseProfile, covering
+
+
+def uniform_heading(time: Array, turn: float, duration: float) -> Array:
+    """Turn at a constant rate.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+    turn : float, rad
+    duration : float, s
+
+    Returns
+    -------
+    array, shape (3, time), rad and s
+        Yaw, its rate and its acceleration.
+    """
+    rate = turn / duration
+    return np.stack([rate * time, np.full_like(time, rate), np.zeros_like(time)])
+
+
+def stretched_heading(time: Array, turn: float, profile: BaseProfile, duration: float) -> Array:
+    """Turn from rest to rest as a move does, stretched in time.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+    turn : float, rad
+    profile : BaseProfile
+        Whose shape the turn has.
+    duration : float, s
+
+    Returns
+    -------
+    array, shape (3, time), rad and s
+        Yaw, its rate and its acceleration.
+    """
+    unit = covering(1.0, profile.period, profile.holds).stretched(duration)
+    return np.asarray(turn * unit.sample(time).T[:3])
+
+
+def heading_of_legs(time: Array, legs: Sequence[Leg]) -> Array:
+    """Turn from point to point, while the vehicle moves.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+    legs : sequence of Leg
+        With a yaw each.
+
+    Returns
+    -------
+    array, shape (3, time), rad and s
+        Yaw, its rate and its acceleration.
+    """
+    heading = np.zeros((3, len(time)))
+    for leg in legs:
+        assert leg.yaw is not None
+        begin, end = leg.yaw
+        heading[0] += begin if leg is legs[0] else 0.0
+        heading += stretched_heading(time - leg.begin, end - begin, leg.profiles[0], leg.duration)
+    return heading
