@@ -78,5 +78,5 @@ def peaks_of(displacement: float | Array, spans: Array) -> Array:
         for order, span in enumerate(spans[::-1], start=1):
             peaks[order] = peaks[order - 1] / span
         peaks[6] = 2 * np.pi * peaks[5] / spans[0]
-    peaks[5] *= 2
+        peaks[5] *= 2
     return np.where(peaks[0] > 0, peaks, 0.0)

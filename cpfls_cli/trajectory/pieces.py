@@ -23,7 +23,6 @@ _WAVE = np.array(
         [0, 1, 0, 0, 0, 0, -1 / _TURN, 0],
     ]
 )
-_FACTORIALS = np.array([1.0, 1.0, 2.0, 6.0, 24.0])
 
 
 @dataclass(frozen=True)
@@ -151,10 +150,11 @@ def _known_states(peaks: Array) -> Array:
 def _piece(start: float, length: float, wave: Array, state: Array) -> Piece:
     """Carry a state through a piece; `wave` holds the signed peaks, zeros in a hold."""
     coefficients = np.zeros((5, 8))
-    for order in range(5):
-        powers = np.arange(5 - order)
-        coefficients[order, : 5 - order] = state[order:] * length**powers / _FACTORIALS[powers]
-    coefficients += (wave[4] * length ** (4.0 - np.arange(5)))[:, np.newaxis] * _WAVE
+    coefficients[:, 0] = state
+    # Each derivative is the integral of the next; powers of a length alone could overflow.
+    for order in (3, 2, 1, 0):
+        coefficients[order, 1:5] = coefficients[order + 1, :4] * length / np.arange(1, 5)
+    coefficients += np.cumprod([wave[4], *[length] * 4])[::-1, np.newaxis] * _WAVE
     return Piece(start, length, coefficients, wave[5] / 2, wave[6])
 
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.limits import Limits, require_positive, spread
 from cpfls_cli.trajectory.moves import Move, Moves, Outcome, moves_of
+from cpfls_cli.trajectory.nesting import peaks_of
 from cpfls_cli.trajectory.ramps import shortest_spans
+
+# By how much a peak may lie above its limit, in parts of it.
+_ROUNDING = 1e-12
 
 
 def plan_moves(displacement: Array, limits: Limits, period: float | Array | None = None) -> Moves:
@@ -85,9 +89,15 @@ def _positive(period: float | Array | None, moves: int) -> Array | None:
 
 
 def _outcome(displacement: Array, bounds: Array, spans: Array, period: float | Array | None) -> IntArray:
-    duration = spans.sum(axis=0)
-    representable = np.isfinite(duration) & (duration > 0)
     limited = np.isfinite(bounds).any(axis=0) | (period is not None)
-    outcome = np.where(representable, Outcome.SOLVED, Outcome.OUT_OF_RANGE)
+    outcome = np.where(_kept(displacement, bounds, spans), Outcome.SOLVED, Outcome.OUT_OF_RANGE)
     outcome = np.where(limited, outcome, Outcome.NO_LIMIT)
     return np.where(displacement == 0, Outcome.ZERO_DISPLACEMENT, outcome).astype(np.int64)
+
+
+def _kept(displacement: Array, bounds: Array, spans: Array) -> BoolArray:
+    """Whether the limits are kept, which is always so unless numbers overflowed on the way, or vanished."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        duration = spans.sum(axis=0)
+    peaks = peaks_of(displacement, spans)
+    return np.isfinite(duration) & (duration > 0) & np.all(peaks[1:] <= bounds * (1 + _ROUNDING), axis=0)
