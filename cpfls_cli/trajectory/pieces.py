@@ -138,13 +138,11 @@ def _known_states(peaks: Array) -> Array:
 
     Derivative k, counted from the snap, has risen or fallen completely after every 2^(k - 1) waves.
     """
-    known = np.full((18, 5), np.nan)
+    known = np.full((16, 5), np.nan)
     for level in range(1, 5):
         blocks = np.arange(1, 16 // 2**level + 1)
-        values = np.cumsum(_SIGNS)[blocks - 1] * peaks[5 - level]
-        known[2**level * blocks - 1, 5 - level] = values
-        known[2**level * blocks, 5 - level] = values
-    return known[:16]
+        known[2**level * blocks - 1, 5 - level] = np.cumsum(_SIGNS)[blocks - 1] * peaks[5 - level]
+    return known
 
 
 def _piece(start: float, length: float, wave: Array, state: Array) -> Piece:

@@ -100,4 +100,5 @@ def _kept(displacement: Array, bounds: Array, spans: Array) -> BoolArray:
     with np.errstate(over="ignore", invalid="ignore"):
         duration = spans.sum(axis=0)
     peaks = peaks_of(displacement, spans)
-    return np.isfinite(duration) & (duration > 0) & np.all(peaks[1:] <= bounds * (1 + _ROUNDING), axis=0)
+    kept: BoolArray = np.isfinite(duration) & (duration > 0)
+    return kept & (peaks[1:] <= bounds * (1 + _ROUNDING)).all(axis=0)
