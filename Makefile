@@ -61,7 +61,7 @@ $(INSTALLED_DEV): pyproject.toml | $(INSTALLED)
 # Each artifact depends on its inputs and on its own part of the config, written out with all defaults and the version
 # of the program; a part that comes out the same leaves its file, and so everything made from it, untouched.
 STRUCTURE := structure input_map consequents harmonic_order products membership_functions training_share
-PART_trajectory := trajectory vehicle seed
+PART_trajectory := trajectory vehicle seed $(addprefix identification.,$(STRUCTURE))
 PART_simulate := vehicle simulation
 PART_import := import vehicle identification.training_share
 PART_reduce := reduction $(addprefix identification.,$(STRUCTURE))

@@ -10,14 +10,22 @@ from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.writing import write_artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError, ConfigError
+from cpfls_cli.excitation import Excitation, optimised_rotation
 from cpfls_cli.simulation.flyable import flyability, single_axis_torque
 from cpfls_cli.stages.flyable_words import flyability_sentences
 from cpfls_cli.stages.job import Job, Outcome, begin, header_of
 from cpfls_cli.stages.path_figures import check_figures, write_figures
 from cpfls_cli.stages.study import generator, settings_of
-from cpfls_cli.stages.trajectory_file import trajectory_data, trajectory_outcome
+from cpfls_cli.stages.trajectory_file import trajectory_data, trajectory_outcome, with_excitation
 from cpfls_cli.stages.waypoints_file import read_waypoints
-from cpfls_cli.trajectory import PlannedRotation, Trajectory, TrajectorySettings, full_rotation, held_rotation, plan
+from cpfls_cli.trajectory import (
+    PlannedRotation,
+    RotationPath,
+    TrajectorySettings,
+    full_rotation,
+    held_rotation,
+    plan,
+)
 
 
 def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
@@ -46,7 +54,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
         check_figures(job, settings.held)
     if started.dry_run is not None:
         return started.dry_run
-    planned = _planned(job, settings)
+    planned, excitation = _planned(job, settings)
     signals = {name: value for name, value in vars(planned).items() if name not in {"legs", "maxima"}}
     found = flyability(signals, job.study.vehicle, settings.tilt_max_rad)
     problems = flyability_sentences(found, planned)
@@ -56,7 +64,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
     artifact = Artifact(TRAJECTORY, header_of(job.study, started.inputs), trajectory_data(planned))
     write_artifact(job.output, artifact)
     figures = write_figures(job, artifact) if plot else ()
-    return trajectory_outcome(planned, found, problems, figures)
+    return with_excitation(trajectory_outcome(planned, found, problems, figures), excitation)
 
 
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
@@ -72,15 +80,24 @@ def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
     return settings
 
 
-def _planned(job: Job, settings: TrajectorySettings) -> Trajectory | PlannedRotation:
+def _planned(job: Job, settings: TrajectorySettings) -> tuple[PlannedRotation, Excitation | None]:
     if not settings.held:
         with settings_of("trajectory", job.study):
-            return plan(settings, job.study.vehicle.gravity_m_s2)
-    assert settings.duration_s is not None
-    rng = generator(job.study, "trajectory")
+            return plan(settings, job.study.vehicle.gravity_m_s2), None
     with settings_of("trajectory.rotation", job.study):
-        path = full_rotation(settings.rotation, settings.duration_s, rng, job.study.vehicle.inertia_kg_m2)
-    return held_rotation(path, settings.sample_time_s)
+        path, excitation = _rotation(job, settings)
+    return held_rotation(path, settings.sample_time_s), excitation
+
+
+def _rotation(job: Job, settings: TrajectorySettings) -> tuple[RotationPath, Excitation | None]:
+    """Draw a path of full rotations, or optimise it for the model of the study."""
+    assert settings.duration_s is not None
+    rng, vehicle = generator(job.study, "trajectory"), job.study.vehicle
+    if settings.path == "full-rotation":
+        return full_rotation(settings.rotation, settings.duration_s, rng, vehicle.inertia_kg_m2), None
+    structure = job.study.identification
+    found = optimised_rotation(settings.rotation, settings.duration_s, structure, vehicle, rng, job.progress)
+    return found.path, found
 
 
 def _remedy(study: Study, settings: TrajectorySettings) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cpfls_cli.artifacts.formats import TRAJECTORY
+from cpfls_cli.excitation.optimise import Excitation
 from cpfls_cli.simulation.flyable import Flyability
 from cpfls_cli.stages.job import Outcome
 from cpfls_cli.trajectory.planned import PlannedRotation, Trajectory
@@ -74,6 +76,30 @@ def trajectory_outcome(
     if isinstance(planned, Trajectory):
         return Outcome(common | _moved(planned), (first, *_path_lines(planned, found), *drawn), problems)
     return Outcome(common, (first, *_held_lines(common), *drawn), problems)
+
+
+def with_excitation(outcome: Outcome, found: Excitation | None) -> Outcome:
+    """Add what an optimised path is worth, beside random ones.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    found : Excitation or None
+        None leaves the outcome as it is.
+
+    Returns
+    -------
+    Outcome
+    """
+    if found is None:
+        return outcome
+    random = {"best": float(found.random.min()), "median": float(np.median(found.random))}
+    summary = {"condition_number": found.condition_number, "random": random, "evaluations": found.evaluations}
+    line = (
+        f"condition number of the model's regressor {found.condition_number:.4g}, uniform partitions; of "
+        f"{len(found.random)} random paths the best had {random['best']:.4g}, the median {random['median']:.4g}"
+    )
+    return replace(outcome, summary={**outcome.summary, **summary}, lines=(*outcome.lines, line))
 
 
 def _largest(values: Any) -> list[float]:

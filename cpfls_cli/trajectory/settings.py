@@ -18,13 +18,13 @@ from cpfls_cli.trajectory.rotation_settings import RotationSettings
 from cpfls_cli.trajectory.shapes import Shape, Timing, shape_of, unit_of
 from cpfls_cli.trajectory.waypoint_settings import WaypointSettings, check_waypoints
 
-PathKind = Literal["cube-diagonal", "straight", "waypoints", "full-rotation"]
+PathKind = Literal["cube-diagonal", "straight", "waypoints", "full-rotation", "optimised"]
 
 _LARGEST_PEAK = 1e100
 _LARGEST_SIZE = 1e9
 _USUAL_PERIOD = 1.0
 _MAY_JUMP = ("crackle", "pop")
-_ROTATIONS = ("full-rotation",)
+_ROTATIONS = ("full-rotation", "optimised")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,8 @@ class TrajectorySettings(Settings):
         PathKind,
         Doc(
             "cube-diagonal: to and fro along (1, 1, 1); straight: along `direction`; waypoints: from point to point; "
-            "full-rotation: held at its centre of mass, turns through complete circles at random"
+            "full-rotation, optimised: held at its centre of mass, turns through complete circles, at random or as "
+            "conditions the model of `identification` best"
         ),
     ] = "cube-diagonal"
     direction: Annotated[
@@ -90,7 +91,7 @@ class TrajectorySettings(Settings):
         Literal["base", "uniform"],
         Doc("base: yaw follows the first move's profile, stretched, from rest to rest; uniform: constant rate"),
     ] = "base"
-    rotation: Annotated[RotationSettings, Doc("for path: full-rotation")] = field(
+    rotation: Annotated[RotationSettings, Doc("for paths full-rotation and optimised")] = field(
         default_factory=RotationSettings
     )
     tilt_max_rad: Annotated[
