@@ -122,7 +122,7 @@ def _moved(planned: Trajectory) -> dict[str, Any]:
 
 def _path_lines(planned: Trajectory, found: Flyability) -> list[str]:
     names = zip(planned.maxima.items(), _UNITS, strict=True)
-    peaks = ", ".join(f"{name} {value:.6g} {unit}" for (name, value), unit in names)
+    peaks = ", ".join(_peak(name, value, unit) for (name, value), unit in names)
     tilt, thrust = np.degrees(found.tilt.max()), found.thrust.max()
     lines = [f"largest {peaks}", f"largest tilt {tilt:.3g} deg, largest thrust {thrust:.4g} N"]
     if not any(leg.limited_by for leg in planned.legs):
@@ -131,6 +131,10 @@ def _path_lines(planned: Trajectory, found: Flyability) -> list[str]:
     lines += [f"leg {number}: {_leg(leg)}" for number, leg in enumerate(shown, start=1)]
     hidden = len(planned.legs) - len(shown)
     return [*lines, f"and {hidden} more legs; --json lists all"] if hidden else lines
+
+
+def _peak(name: str, value: float, unit: str) -> str:
+    return f"{name} {value:.6g} {unit}" if np.isfinite(value) else f"{name} without bound (nothing limits it)"
 
 
 def _leg(leg: Any) -> str:

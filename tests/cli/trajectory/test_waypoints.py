@@ -1,0 +1,157 @@
+"""Waypoints from a file or the config, planned under limits, through the command."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+LIMITED = ("--set", "trajectory.limits={velocity_m_s: 4, acceleration_m_s2: 3, jerk_m_s3: 6, pop_m_s6: 300}")
+FREE = ("--set", "trajectory.duration_s=null")
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text("trajectory: {sample_time_s: 0.05, yaw_turn_rad: 1.0}\n")
+    return path
+
+
+@pytest.fixture
+def points(tmp_path):
+    path = tmp_path / "points.csv"
+    path.write_text("x_m,y_m,z_m,yaw_rad,pause_s\n1,2,3,0,9\n11,2,3,1.5,2\n11,12,8,-0.5,1\n")
+    return path
+
+
+def position(path):
+    with h5py.File(path) as file:
+        return file["time"][:], file["position"][:], file["yaw"][:]
+
+
+def test_every_waypoint_is_reached_at_rest(cpfls, tmp_path, config, points):
+    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, "--json")
+    assert result.exit_code == 0, result.output
+    first, second = json.loads(result.stdout)["legs"]
+    time, place, yaw = position(tmp_path / "t.h5")
+    np.testing.assert_allclose(place[0], [1, 2, 3])
+    # The pause of the first point comes before the first leg, that of the last one after the last leg.
+    assert first["begin_s"] == pytest.approx(9.0)
+    assert second["begin_s"] == pytest.approx(9.0 + first["duration_s"] + 2.0)
+    assert time[-1] == pytest.approx(second["begin_s"] + second["duration_s"] + 1.0, abs=0.051)
+    resting = (time > 9.0 + first["duration_s"]) & (time < second["begin_s"])
+    np.testing.assert_allclose(place[resting], [[11, 2, 3]] * resting.sum(), atol=1e-12)
+    np.testing.assert_allclose(yaw[resting], 1.5, atol=1e-12)
+    np.testing.assert_allclose([*place[-1], yaw[-1]], [11, 12, 8, -0.5], atol=1e-12)
+
+
+def test_limits_hold_and_are_named(cpfls, tmp_path, config, points):
+    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE)
+    assert result.exit_code == 0, result.output
+    assert "leg 1: 10 m in " in result.stdout
+    with h5py.File(tmp_path / "t.h5") as file:
+        assert "pop" in file["leg/limited_by"][0].decode().split()
+        for name, limit in (("velocity", 4), ("acceleration", 3), ("jerk", 6), ("pop", 300)):
+            assert np.linalg.norm(file[name][:], axis=1).max() <= limit * (1 + 1e-12)
+
+
+def test_config_and_file_give_the_same_path(cpfls, tmp_path, config, points):
+    rows = [line.split(",") for line in points.read_text().splitlines()[1:]]
+    stated = ", ".join(f"{{position_m: [{x}, {y}, {z}], yaw_rad: {a}, pause_s: {p}}}" for x, y, z, a, p in rows)
+    from_file = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "f.h5", *FREE)
+    from_config = cpfls(
+        *("trajectory", config, "-o", tmp_path / "c.h5", *FREE, "--set", "trajectory.path=waypoints"),
+        *("--set", f"trajectory.waypoints=[{stated}]"),
+    )
+    assert (from_file.exit_code, from_config.exit_code) == (0, 0), from_config.output
+    for mine, other in zip(position(tmp_path / "f.h5"), position(tmp_path / "c.h5"), strict=True):
+        np.testing.assert_array_equal(mine, other)
+
+
+def test_each_axis_takes_the_time_of_the_slowest(cpfls, tmp_path, config, points):
+    asked = ("--set", "trajectory.coordination=each-axis", "--set", "trajectory.displacement_measure=per-axis")
+    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *asked)
+    assert result.exit_code == 0, result.output
+    with h5py.File(tmp_path / "t.h5") as file:
+        velocity = np.abs(file["velocity"][:])
+        np.testing.assert_allclose(file["position"][-1], [11, 12, 8], atol=1e-12)
+    assert velocity.max() <= 4 * (1 + 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("x_m,y_m\n0,0\n1,1\n", "column 'z_m' is missing; waypoints need x_m, y_m, z_m"),
+        ("x_m,y_m,z_m,yaw_deg\n0,0,0,0\n1,1,1,1\n", "column 'yaw_deg' is not known; did you mean yaw_rad?"),
+        ("x_m,y_m,z_m\n0,0,0\n", "holds 1; a path needs two or more"),
+        ("x_m,y_m,z_m\n0,0,0\n0,0,0\n", ":3: x_m, y_m, z_m: repeats the point before"),
+        ("x_m,y_m,z_m\n0,0,0\n0,nan,1\n", ":3: column 'y_m' = nan: give a finite number"),
+        ("x_m,y_m,z_m\n0,0,0\n0,inf,1\n", ":3: column 'y_m' = inf: give a finite number"),
+        ("x_m,y_m,z_m,pause_s\n0,0,0,-1\n0,0,1,0\n", ":2: column 'pause_s' = -1: give a finite number, 0 or more"),
+        ("x_m,y_m,z_m\n0,0,0\n0,far,1\n", ":3: column 'y_m' = 'far': not a number"),
+    ],
+)
+def test_bad_files_are_refused(refuse, tmp_path, config, text, complaint):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    (message,) = refuse("trajectory", config, "--waypoints", path, "-o", tmp_path / "t.h5")
+    assert message.startswith(str(path))
+    assert complaint in message
+
+
+def test_waypoints_without_points_are_refused(refuse, tmp_path, config):
+    (message,) = refuse("trajectory", config, "-o", tmp_path / "t.h5", "--set", "trajectory.path=waypoints")
+    assert message.startswith("trajectory.waypoints = []: a path needs two or more points")
+
+
+def test_a_duration_too_short_for_the_file_is_refused(refuse, tmp_path, config):
+    path = tmp_path / "far.csv"
+    path.write_text("x_m,y_m,z_m\n0,0,0\n30,0,0\n0,0,0\n30,0,0\n0,0,0\n")
+    (message,) = refuse("trajectory", config, "--waypoints", path, "-o", tmp_path / "t.h5")
+    assert message == "trajectory.duration_s = 54.86: the 4 moves need 64 s; raise it, or set it to null"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "complaint"),
+    [
+        ("limits.velocity_m_s", "-1", "greater than 0"),
+        ("limits.velocity_m_s", "0", "greater than 0"),
+        ("limits.velocity_m_s", ".inf", "finite"),
+        ("limits.velocity_m_s", "[1, 2]", "3"),
+        ("limits.velocty_m_s", "1", "did you mean 'velocity_m_s'?"),
+        ("displacement_m", "0", "must be greater than 0"),
+        ("limits", "{velocity_m_s: 1}", "the snap without limit"),
+    ],
+)
+def test_bad_limits_name_their_key(refuse, tmp_path, config, key, value, complaint):
+    (message,) = refuse("trajectory", config, "-o", tmp_path / "t.h5", "--set", f"trajectory.{key}={value}")
+    assert f"trajectory.{key.split('=')[0]}" in message
+    assert complaint in message
+
+
+def test_more_than_the_rotors_give_is_refused_with_time_and_place(refuse, tmp_path, config):
+    weak = ("--set", "vehicle.rotor_speed_max_rad_s=350")
+    messages = refuse("trajectory", config, "-o", tmp_path / "t.h5", *weak, code=1)
+    assert messages[0].startswith("thrust of up to 66.51")
+    assert " N at 4.00 s, at x y z = " in messages[0]
+    assert "rotor 1: above the limit asked for at " in messages[1]
+    assert messages[-1].endswith("set trajectory.infeasible: report")
+
+
+def test_tilt_beyond_its_limit_is_refused_or_reported(cpfls, refuse, tmp_path, config):
+    steep = ("trajectory", config, "-o", tmp_path / "t.h5", "--set", "trajectory.tilt_max_rad=0.1")
+    messages = refuse(*steep, code=1)
+    assert messages[0].startswith("tilt of up to 0.18")
+    told = cpfls(*steep, "--set", "trajectory.infeasible=report")
+    assert told.exit_code == 0
+    assert "tilt of up to 0.18" in told.stderr
+
+
+def test_plot_draws_both_figures(cpfls, refuse, tmp_path, config):
+    assert cpfls("trajectory", config, "-o", tmp_path / "t.h5", "--plot").exit_code == 0
+    for name, words in (("derivatives", ["pop", "crackle", "displacement"]), ("attitude", ["roll", "pitch"])):
+        drawn = (tmp_path / f"t-{name}.svg").read_text()
+        assert all(f">{word}</" in drawn for word in words)
+    (tmp_path / "t.h5").unlink()
+    (message,) = refuse("trajectory", config, "-o", tmp_path / "t.h5", "--plot")
+    assert message.endswith("t-derivatives.svg: exists already; --force replaces it")
