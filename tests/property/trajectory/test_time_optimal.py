@@ -95,6 +95,7 @@ def test_samples_stay_within_the_peaks_and_end_at_rest(batch):
         assert (motion <= peaks * (1 + 1e-12)).all()
         assert (motion[:, 1:] <= batch.limits[:, index] * (1 + 1e-12)).all()
         assert abs(motion[-1, 0] / peaks[0] - 1) <= 1e-9
-        # Relative to the peak; a derivative that jumps has not come down one instant before the end.
-        falling = np.array([1, 2])[np.isfinite(peaks[2:4])]
-        assert (motion[-1, falling] <= 1e-9 * peaks[falling]).all()
+        # Relative to the peak; what the next derivative does within one rounding of the time is no error.
+        jumped = (move.duration - time[-1]) * peaks[2:4]
+        falling = np.isfinite(peaks[2:4])
+        assert (motion[-1, 1:3][falling] <= (1e-9 * peaks[1:3] + jumped)[falling]).all()
