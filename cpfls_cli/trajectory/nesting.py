@@ -32,8 +32,10 @@ def spans_of(period: float | Array, holds: Array) -> Array:
     """
     spans = np.empty((5, *holds.shape[1:]))
     spans[0] = period
-    for level in range(1, 5):
-        spans[level] = spans[:level].sum(axis=0) + holds[level - 1]
+    # A sum too large for numbers is infinite, and told by whoever asked for it.
+    with np.errstate(over="ignore"):
+        for level in range(1, 5):
+            spans[level] = spans[:level].sum(axis=0) + holds[level - 1]
     return spans
 
 

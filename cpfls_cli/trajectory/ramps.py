@@ -71,8 +71,9 @@ def _with_holds(spans: Array, target: Array, limits: Sequence[Array], rises: Seq
     for below in reversed(range(len(rises))):
         above = len(rises) - below - 1
         here = undecided & _held(target, limits[below], rises[below], above)
-        spans[:, here] = _holding(target[here], limits[below][here], rises[below][:, here], above)
-        undecided &= ~here
+        if here.any():
+            spans[:, here] = _holding(target[here], limits[below][here], rises[below][:, here], above)
+            undecided &= ~here
     return spans
 
 
