@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -23,6 +23,7 @@ import ruckig
 from matplotlib.figure import Figure
 
 from benchmarks.shared.brute_force import shortest_duration
+from benchmarks.shared.exact_move import integrated
 from cpfls_cli.report.canvas import legend_above, plot, style_of
 from cpfls_cli.trajectory import Limits, Moves, plan_move, plan_moves
 from cpfls_cli.trajectory.limits import LIMIT_NAMES
@@ -120,6 +121,27 @@ def correctness(total: int) -> None:
         ),
     ]
     table("planner_correctness", ("random moves over six decades", "figure"), rows)
+
+
+def exactness(cases: int) -> None:
+    """Compare samples, and the end, with an integration that has sixty digits."""
+    rng, inside, end = np.random.default_rng(10), np.zeros(7), np.zeros(7)
+    displacement, limits, _ = random_cases(rng, cases, True)
+    # Without limits on crackle and pop there are jumps, and nothing to integrate there.
+    limits[5] = 10 ** rng.uniform(-3, 3, cases)
+    for move in planned(displacement, limits, None):
+        times, states = integrated(move.profile)
+        peaks = np.array(astuple(move.peaks))
+        slopes = np.append(peaks[1:], 2 * np.pi * peaks[6] / move.profile.period)
+        rounding = np.finfo(float).eps * (peaks + move.duration * slopes)
+        before = times < move.duration
+        errors = np.abs(move.profile.sample(times[before]) - states[before]) / rounding
+        inside = np.maximum(inside, errors.max(axis=0))
+        end = np.maximum(end, np.abs(states[-1] - np.append(move.profile.displacement, np.zeros(6))) / peaks)
+    names = ("displacement", *LIMIT_NAMES)
+    rows = [(name, float(one), f"{other:.1e}") for name, one, other in zip(names, inside, end, strict=True)]
+    columns = (f"{cases} moves against sixty digits", "sample, in roundings of value and time", "end, over the peak")
+    table("planner_exactness", columns, rows)
 
 
 def optimality(cases: int) -> None:
@@ -252,6 +274,8 @@ def draw(output: Path) -> None:
 
 def main(moves: int, cases: int, output: Path) -> None:
     correctness(moves)
+    print()
+    exactness(cases)
     print()
     optimality(cases)
     print()
