@@ -227,6 +227,7 @@ def cost(output: Path) -> None:
     ]
     columns = ("displacement / m", "ruckig / s", *(f"{name} / s" for name in VARIANTS))
     table("planner_cost", columns, rows)
+    print()
     agreement = float(np.max(np.abs(found["as ruckig"] / found["ruckig"] - 1)))
     rows = [(f"{step:g} s", ruckig_snap(step), sampled_snap(step)) for step in (1e-1, 1e-2, 1e-3, 1e-4)]
     table("planner_snap", ("samples every", "ruckig's largest snap, m/s^4", "ours"), rows, agreement=agreement)
