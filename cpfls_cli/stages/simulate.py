@@ -44,22 +44,29 @@ def run(job: Job, trajectory: Path, model: Path | None = None) -> Outcome:
     if model is not None and not closed:
         raise InputError(f"{model}: models are flown in closed loop only; add --mode closed-loop")
     started = begin(job, {"trajectory": trajectory} | ({} if model is None else {"model": model}))
-    source = read_with(trajectory, TRAJECTORY, "time", *_TURNED)
-    held = "position" not in source.data
-    if held and closed:
-        raise InputError(
-            f"{trajectory}: turns a vehicle that is held at its centre of mass; no autopilot flies it. Leave mode "
-            "closed-loop out, or plan a path in space"
-        )
+    time, planned = _plan(trajectory, closed)
     flown = FlownModel() if model is None else model_in_flight(model, job.study)
     with settings_of("simulation", job.study):
         flown.with_effects(flown_effects(job.study.simulation.closed_loop.effects, job.study.vehicle))
     if started.dry_run is not None:
         return started.dry_run
-    planned = {name: source.array(name) for name in (_TURNED if held else _TURNED + _MOVED)}
     if closed:
-        return _closed_loop(job, started, source.array("time"), planned, flown)
-    return _inverse(job, started, source.array("time"), planned, trajectory)
+        return _closed_loop(job, started, time, planned, flown)
+    return _inverse(job, started, time, planned, trajectory)
+
+
+def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:
+    """Read times and signals of a plan; without any translation the vehicle is held at its centre of mass."""
+    source = read_with(trajectory, TRAJECTORY, "time", *_TURNED)
+    held = not any(name in source.data for name in _MOVED)
+    if held and closed:
+        raise InputError(
+            f"{trajectory}: turns a vehicle that is held at its centre of mass; no autopilot flies it. Leave mode "
+            "closed-loop out, or plan a path in space"
+        )
+    needed = _TURNED if held else _TURNED + _MOVED
+    source = read_with(trajectory, TRAJECTORY, "time", *needed)
+    return source.array("time"), {name: source.array(name) for name in needed}
 
 
 def _inverse(job: Job, started: Started, time: Array, planned: dict[str, Array], trajectory: Path) -> Outcome:

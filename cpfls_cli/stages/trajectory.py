@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from cpfls_cli.artifacts.formats import TRAJECTORY
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.writing import write_artifact
@@ -55,7 +57,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
     if started.dry_run is not None:
         return started.dry_run
     planned, excitation = _planned(job, settings)
-    signals = {name: value for name, value in vars(planned).items() if name not in {"legs", "maxima"}}
+    signals = {name: value for name, value in vars(planned).items() if isinstance(value, np.ndarray)}
     found = flyability(signals, job.study.vehicle, settings.tilt_max_rad)
     problems = flyability_sentences(found, planned)
     if problems and settings.infeasible == "stop":

@@ -63,7 +63,7 @@ def trajectory_outcome(
     common = {
         "figures": [str(path) for path in figures],
         "samples": len(planned.time),
-        "duration_s": float(planned.time[-1]),
+        "duration_s": planned.duration,
         "dt_s": float(planned.time[1]),
         "max_rate_rad_s": _largest(planned.attitude_rate),
         "max_body_rate_rad_s": _largest(planned.body_rate),
@@ -71,7 +71,7 @@ def trajectory_outcome(
         "max_thrust_n": float(found.thrust.max()),
         "max_tilt_rad": float(found.tilt.max()),
     }
-    first = f"{len(planned.time)} samples over {planned.time[-1]:g} s"
+    first = f"{len(planned.time)} samples over {planned.duration:g} s"
     drawn = [f"drawn: {', '.join(map(str, figures))}"] if figures else []
     if isinstance(planned, Trajectory):
         return Outcome(common | _moved(planned), (first, *_path_lines(planned, found), *drawn), problems)

@@ -27,6 +27,7 @@ def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
     planes = (motion.attitude, motion.attitude_rate, motion.attitude_acceleration)
     yaw, yaw_rate, yaw_acceleration = (np.ascontiguousarray(values[:, 2]) for values in planes)
     return PlannedRotation(
+        duration=path.duration,
         time=time,
         yaw=yaw,
         yaw_rate=yaw_rate,

@@ -59,6 +59,7 @@ def _planned(settings: TrajectorySettings, gravity: float) -> Trajectory:
     flat = flat_attitude(time, motion[2:5], heading, gravity)
     position, velocity, acceleration, jerk, snap, crackle, pop = motion
     return Trajectory(
+        duration=duration,
         time=time,
         position=position,
         velocity=velocity,

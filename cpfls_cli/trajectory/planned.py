@@ -16,6 +16,8 @@ class PlannedRotation:
 
     Attributes
     ----------
+    duration : float, s
+        Of the path; the last sample is not later.
     time : array, shape (time,), s
     yaw, yaw_rate, yaw_acceleration : array, shape (time,), rad and s
         Not wrapped.
@@ -24,6 +26,7 @@ class PlannedRotation:
     body_rate : array, shape (time, 3), rad/s, body frame
     """
 
+    duration: float
     time: Array
     yaw: Array
     yaw_rate: Array

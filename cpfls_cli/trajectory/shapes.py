@@ -12,7 +12,8 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.limit_settings import LimitSettings
 from cpfls_cli.trajectory.moves import Move
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, covering
-from cpfls_cli.trajectory.time_optimal import plan_move, plan_moves
+from cpfls_cli.trajectory.synchronised import synchronised
+from cpfls_cli.trajectory.time_optimal import plan_move
 
 Measure = Literal["along-path", "per-axis"]
 Coordination = Literal["straight-line", "each-axis"]
@@ -51,7 +52,7 @@ class Shape:
     directions : array, shape (profiles, 3)
         World vector that one metre of each profile moves along.
     limited_by : tuple of str
-        Derivatives that reach their limit, of the slowest axis; empty where the move was not planned under limits.
+        Derivatives that reach their limit on any axis; empty where the move was not planned under limits.
     """
 
     profiles: tuple[BaseProfile, ...]
@@ -111,19 +112,18 @@ def shape_of(vector: Array, timing: Timing) -> Shape:
         move = plan_move(length, timing.limits.along(direction), timing.period)
         return _smooth((move,), direction[None])
     axes = np.flatnonzero(vector)
-    moves = plan_moves(vector[axes], timing.limits.of_axes(axes), timing.period)
-    return _smooth(tuple(moves[index] for index in range(len(axes))), np.eye(3)[axes])
+    moves = synchronised(vector[axes], timing.limits.of_axes(axes), timing.period, "each-axis")
+    return _smooth(moves, np.eye(3)[axes])
 
 
 def _smooth(moves: tuple[Move, ...], directions: Array) -> Shape:
-    """Refuse what has no attitude: its acceleration follows from the snap. Bring all to the time of the slowest."""
+    """Refuse what has no attitude: its acceleration follows from the snap."""
     for move in moves:
         if not move.outcome.solved:
             raise SettingError("limits", move.outcome.words)
         if not np.isfinite(move.peaks.snap):
             message = "leave the snap without limit, and with it the acceleration of the attitude; give a limit on"
             raise SettingError("limits", f"{message} snap_m_s4, crackle_m_s5 or pop_m_s6, or a period_s")
-    duration = max(move.duration for move in moves)
-    in_step = tuple(m.profile if m.duration == duration else m.profile.stretched(duration) for m in moves)
-    slowest = next(move for move in moves if move.duration == duration)
-    return Shape(profiles=in_step, directions=directions, limited_by=slowest.active)
+    reached = dict.fromkeys(name for move in moves for name in move.active)
+    profiles = tuple(move.profile for move in moves)
+    return Shape(profiles=profiles, directions=directions, limited_by=tuple(reached))

@@ -115,9 +115,9 @@ def test_config_that_was_edited_in_place(refuse, changed):
 
 
 def test_required_datasets_missing(refuse, changed, study, tmp_path):
-    path = changed("trajectory", drop("jerk", "time"))
+    path = changed("trajectory", drop("yaw", "time"))
     (line,) = refuse("simulate", study, path, "-o", tmp_path / "out.h5")
-    assert line == f"{path}: the cpfls/trajectory lacks time, jerk; make it again"
+    assert line == f"{path}: the cpfls/trajectory lacks time, yaw; make it again"
 
 
 @pytest.mark.parametrize(
