@@ -56,7 +56,7 @@ def jumps(torque, angle: int) -> list[float]:
 
 
 def main() -> None:
-    models = {name: uniform_model(random_states(1), settings) for name, settings in SYSTEMS.items()}
+    models = {name: uniform_model(random_states(1), settings).model for name, settings in SYSTEMS.items()}
     rows = [
         (f"{name.partition(',')[0]}, {SWEPT[angle]}", *jumps(model.torque, angle))
         for name, model in models.items()

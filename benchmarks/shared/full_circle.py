@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.config.study import Study
+from cpfls_cli.excitation import optimised_rotation
+from cpfls_cli.identification.choice import choose
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
-from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.search import search
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor import Motion
+from cpfls_cli.regressor import Motion, StructureSettings
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
 from cpfls_cli.trajectory.rotation_settings import RotationSettings
 from cpfls_cli.vehicle import newton_euler_torque
+
+CONFIG = Path(__file__).resolve().parents[2] / "configs" / "full-circle.yaml"
+PAPER = StructureSettings(consequents="seesaw", products="additive", membership_functions=5)
+"""The structure of the paper: 113 parameters."""
 
 INERTIA = np.diag([0.6, 0.6, 1.2])
 """Of the paper's vehicle, kg m^2."""
@@ -43,7 +53,12 @@ class Judged:
     root_mean_square: Array
 
     def __str__(self) -> str:
-        return f"{np.median(self.largest):.3g} ({self.largest.max():.3g})"
+        return f"{np.median(self.largest):.2g} ({self.largest.max():.2g})"
+
+    @property
+    def rms(self) -> float:
+        """Median root mean square."""
+        return float(np.median(self.root_mean_square))
 
 
 def torque_data(motion: Motion, inertia: Array) -> TorqueData:
@@ -68,22 +83,61 @@ def random_flight(seed: int, inertia: Array = INERTIA) -> TorqueData:
     return flown(full_rotation(RotationSettings(), DURATION_S, np.random.default_rng(seed)), inertia)
 
 
-def solved_model(evaluator: Evaluator, chromosome: Array) -> Model:
+def optimised_flight(study: Study, structure: StructureSettings, seed: int = 1) -> TorqueData:
+    """Fly the path that conditions a structure best."""
+    trajectory, rng = study.trajectory, np.random.default_rng(seed)
+    found = optimised_rotation(trajectory.rotation, DURATION_S, structure, study.vehicle, rng)
+    return flown(found.path)
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A model with what its system was worth."""
+
+    model: Model
+    rank: int
+    condition_number: float
+
+
+@dataclass(frozen=True)
+class Searched:
+    """One search, and three models of it."""
+
+    uniform: Solved
+    by_objectives: Solved
+    held_out: Solved
+    evaluations: int
+    seconds: float
+
+
+def solved(evaluator: Evaluator, chromosome: Array) -> Solved:
     """Solve a chromosome."""
     fit, learned = evaluator.fit(chromosome), evaluator.solver.learned
     assert fit is not None
     partitions = decode(learned.structure, chromosome.astype(float))
-    exact, _ = evaluator.solver.exact(partitions, fit)
-    return Model(learned.structure, learned.ranges, partitions, exact.coefficients, exact.rigid_body, _NOWHERE)
+    exact, system = evaluator.solver.exact(partitions, fit)
+    model = Model(learned.structure, learned.ranges, partitions, exact.coefficients, exact.rigid_body, _NOWHERE)
+    return Solved(model, system.rank, system.condition_number)
 
 
-def uniform_model(training: TorqueData, settings: IdentificationSettings) -> Model:
+def uniform_model(training: TorqueSource, settings: IdentificationSettings) -> Solved:
     """Fit a model with equidistant partitions."""
     evaluator = model_evaluator(training, training, settings)
-    return solved_model(evaluator, uniform_chromosome(evaluator.structure))
+    return solved(evaluator, uniform_chromosome(evaluator.structure))
 
 
-def judged(torque, flights: Sequence[TorqueData]) -> Judged:
+def searched(training: TorqueSource, settings: IdentificationSettings, kept: TorqueSource, seed: int = 1) -> Searched:
+    """Search for partitions; choose by the default rule, and on flights kept for it."""
+    evaluator, begin = model_evaluator(training, training, settings), time.perf_counter()
+    by_held_out = replace(settings, choice="held-out")
+    found = search(evaluator, by_held_out, np.random.default_rng(seed), kept=kept)
+    seconds, front = time.perf_counter() - begin, found.front
+    by_objectives = choose(front.objectives, "mse-below-median-condition")
+    members = (uniform_chromosome(evaluator.structure), *front.chromosomes[[by_objectives, front.chosen]])
+    return Searched(*(solved(evaluator, member) for member in members), int(found.history.evaluations[-1]), seconds)
+
+
+def judged(torque: Callable[[Motion], Array], flights: Sequence[TorqueData]) -> Judged:
     """Judge predictions of torque on several flights."""
     scores = [score_of(flight, torque) for flight in flights]
     squares = [np.mean(flight.torque**2) for flight in flights]
