@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.formats import TRAJECTORY
 from cpfls_cli.excitation.optimise import Excitation
 from cpfls_cli.simulation.flyable import Flyability
 from cpfls_cli.stages.job import Outcome
+from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planned import PlannedRotation, Trajectory
 
 _UNITS = ("m", "m/s", "m/s^2", "m/s^3", "m/s^4", "m/s^5", "m/s^6")
@@ -113,7 +114,7 @@ def _moved(planned: Trajectory) -> dict[str, Any]:
             "duration_s": leg.duration,
             "displacement_m": leg.vector.tolist(),
             "limited_by": list(leg.limited_by),
-            "jerk_integral_m_s2": max(4 * abs(profile.peaks.acceleration) for profile in leg.profiles),
+            "jerk_integral_m_s2": _jerk(leg),
         }
         for leg in planned.legs
     ]
@@ -137,9 +138,15 @@ def _peak(name: str, value: float, unit: str) -> str:
     return f"{name} {value:.6g} {unit}" if np.isfinite(value) else f"{name} without bound (nothing limits it)"
 
 
-def _leg(leg: Any) -> str:
+def _leg(leg: Leg) -> str:
     length = float(np.linalg.norm(leg.vector))
-    return f"{length:.6g} m in {leg.duration:.6g} s, limited by {', '.join(leg.limited_by) or 'its period alone'}"
+    limited = ", ".join(leg.limited_by) or "its period alone"
+    return f"{length:.6g} m in {leg.duration:.6g} s, limited by {limited}; integral of |jerk| {_jerk(leg):.4g} m/s^2"
+
+
+def _jerk(leg: Leg) -> float:
+    """Integrate the absolute jerk of the axis that has most of it: four times the peak of its acceleration."""
+    return max(4 * abs(profile.peaks.acceleration) for profile in leg.profiles)
 
 
 def _held_lines(common: Mapping[str, Any]) -> list[str]:

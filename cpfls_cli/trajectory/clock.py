@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.errors import SettingError
+
+_LARGEST_SIZE = 1e9
 
 
 def sample_times(duration: float, sample_time: float) -> Array:
@@ -24,3 +27,22 @@ def sample_times(duration: float, sample_time: float) -> Array:
     steps = int(duration / sample_time + 1e-6)
     time: Array = np.arange(steps + 1, dtype=np.float64) * sample_time
     return time
+
+
+def check_samples(duration: float, sample_time: float) -> None:
+    """Refuse a sample time that does not suit a duration.
+
+    Parameters
+    ----------
+    duration : float, s
+    sample_time : float, s
+
+    Raises
+    ------
+    SettingError
+        If there would be one sample, or more than memory holds.
+    """
+    if duration > _LARGEST_SIZE * sample_time:
+        raise SettingError("sample_time_s", f"makes more than {_LARGEST_SIZE:g} samples of {duration:g} s; raise it")
+    if sample_time > duration:
+        raise SettingError("sample_time_s", f"is longer than the whole path, which takes {duration:g} s")

@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
+from cpfls_cli.trajectory.clock import check_samples
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.trajectory.shapes import Shape, shape_of
@@ -55,10 +56,17 @@ def duration_of(settings: TrajectorySettings, legs: tuple[Leg, ...]) -> float:
     -------
     float, s
         Where the settings leave it to the moves, up to the first sample at which all is at rest.
+
+    Raises
+    ------
+    SettingError
+        If the sample time does not suit it.
     """
     if settings.duration_s is not None:
         return settings.duration_s
-    steps = np.ceil((legs[-1].end + _last_pause(settings)) / settings.sample_time_s - 1e-6)
+    duration = legs[-1].end + _last_pause(settings)
+    check_samples(duration, settings.sample_time_s)
+    steps = np.ceil(duration / settings.sample_time_s - 1e-6)
     return float(steps * settings.sample_time_s)
 
 

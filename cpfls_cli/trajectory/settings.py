@@ -12,6 +12,7 @@ from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
+from cpfls_cli.trajectory.clock import check_samples
 from cpfls_cli.trajectory.limit_settings import LimitSettings
 from cpfls_cli.trajectory.profile import BaseProfile, Holds
 from cpfls_cli.trajectory.rotation_settings import RotationSettings
@@ -21,7 +22,6 @@ from cpfls_cli.trajectory.waypoint_settings import WaypointSettings, check_waypo
 PathKind = Literal["cube-diagonal", "straight", "waypoints", "full-rotation", "optimised"]
 
 _LARGEST_PEAK = 1e100
-_LARGEST_SIZE = 1e9
 _USUAL_PERIOD = 1.0
 _MAY_JUMP = ("crackle", "pop")
 _ROTATIONS = ("full-rotation", "optimised")
@@ -170,10 +170,7 @@ class TrajectorySettings(Settings):
             if self.held:
                 raise SettingError("duration_s", f"is null; path {self.path} needs a duration")
             return
-        if self.duration_s > _LARGEST_SIZE * self.sample_time_s:
-            raise SettingError("sample_time_s", f"makes more than {_LARGEST_SIZE:g} samples of duration_s; raise it")
-        if self.sample_time_s > self.duration_s:
-            raise SettingError("sample_time_s", "is longer than duration_s")
+        check_samples(self.duration_s, self.sample_time_s)
 
     def _check_direction(self) -> None:
         if not any(self.direction):

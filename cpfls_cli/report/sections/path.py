@@ -65,10 +65,17 @@ def _legs(trajectory: Source, index: int) -> Table:
     lengths = np.linalg.norm(artifact.array("leg/displacement"), axis=1)
     reached = artifact.texts("leg/limited_by")
     rows = [
-        [str(leg + 1), number(begins[leg]), number(ends[leg] - begins[leg]), number(lengths[leg]), reached[leg]]
+        [
+            str(leg + 1),
+            number(begins[leg]),
+            number(ends[leg] - begins[leg]),
+            number(lengths[leg]),
+            reached[leg].replace(" ", ", "),
+        ]
         for leg in range(min(len(begins), _LEGS_SHOWN))
     ]
+    header = ("Move", "Begins, s", "Takes, s", "Length, m", "Limited by")
     caption = f"Moves of {trajectory.label} under limits, and the derivatives that reach theirs."
     if len(begins) > _LEGS_SHOWN:
         caption += f" The first {_LEGS_SHOWN} of {len(begins)}."
-    return Table(f"legs-{index}", caption, ("Move", "Begins, s", "Takes, s", "Length, m", "Limited by"), rows)
+    return Table(f"legs-{index}", caption, header, rows, frozenset({0, 4}))
