@@ -45,9 +45,9 @@ from cpfls_cli.trajectory import plan
 
 UNSEEN = {"path": "straight", "direction": (1.0, -0.6, 0.2), "displacement_m": 50.0, "yaw_turn_rad": -2 * np.pi}
 SEARCH = {"base": "none", "population": 30, "generations": 10}
-COLUMNS = ("training path", "model", "rank", "condition number") + tuple(
-    f"{part}: {kind}" for part in ("unseen", "rotations") for kind in ("uniform", "genetic", "held-out")
-)
+KINDS = ("uniform", "genetic", "held-out")
+ERRORS = [f"{part}: {kind}" for part in ("unseen", "rotations") for kind in KINDS]
+COLUMNS = ("training path", "model", "rank", "condition number", *ERRORS)
 Parts = Sequence[Sequence[TorqueData]]
 STRUCTURES = {
     "seesaw, 5 functions, data-range": {**vars(PAPER), "input_map": "data-range"},
@@ -68,8 +68,10 @@ def main() -> None:
             rows.append((path, name, *row(shown if found.evaluations > 1 else shown[:1], parts)))
         over_rigid_body = uniform_model(training, IdentificationSettings(base="rigid-body"))
         rows.append((path, "harmonic 2 tensor over a rigid body", *row((over_rigid_body,), parts)))
-        for baseline in fit_baselines(training, np.ones(3), 1e-9)[:2]:
-            rows.append((path, baseline.name, "", "", *errors([baseline.torque], parts)))
+        rows += [
+            (path, baseline.name, "", "", *errors([baseline.torque], parts))
+            for baseline in fit_baselines(training, np.ones(3), 1e-9)[:2]
+        ]
     table("unseen_path", COLUMNS, rows)
 
 
@@ -90,7 +92,7 @@ def errors(torques: Sequence[Callable[[Motion], Array]], parts: Parts) -> list[s
     return [
         f"{np.median(judged(torques[number], part).largest):.2g}" if number < len(torques) else ""
         for part in parts
-        for number in range(3)
+        for number in range(len(KINDS))
     ]
 
 
