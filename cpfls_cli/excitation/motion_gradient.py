@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import product
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 
+ALL_INPUTS = tuple(product(range(3), range(3)))
+"""Every component of attitude, rate and acceleration."""
+
 
 def motion_gradient(
-    function: Callable[[Array], Array], motion: Array, weights: Array, steps: tuple[float, float, float]
+    function: Callable[[Array], Array],
+    motion: Array,
+    weights: Array,
+    step: float,
+    inputs: Sequence[tuple[int, int]] = ALL_INPUTS,
 ) -> Array:
     """Differentiate ``sum_n <weights_n, f(motion_n)>`` by central differences.
 
-    What is quadratic in an input has no error from the size of its step. A kink or jump is smoothed over the step, so
-    that its share in the slope is not lost between samples.
+    A jump is smoothed over the step, so that its share in the slope is not lost between samples.
 
     Parameters
     ----------
@@ -24,18 +31,19 @@ def motion_gradient(
     motion : array, shape (3, samples, 3)
         Attitude, Euler rates, Euler accelerations.
     weights : array, shape (samples, ...)
-    steps : tuple of float
-        Of attitude in rad, of rate in rad/s, of acceleration in rad/s^2.
+    step : float, rad and s
+    inputs : sequence of pairs of int
+        Index of attitude, rate or acceleration, and of the axis.
 
     Returns
     -------
     array, shape (3, samples, 3)
+        Zero for the inputs that are left out.
     """
     gradient, flat = np.zeros_like(motion), weights.reshape(len(weights), -1)
-    for kind, step in enumerate(steps):
-        for axis in range(3):
-            shift = np.zeros_like(motion)
-            shift[kind, :, axis] = step
-            difference = function(motion + shift) - function(motion - shift)
-            gradient[kind, :, axis] = np.einsum("ni,ni->n", flat, difference.reshape(flat.shape)) / (2 * step)
+    for kind, axis in inputs:
+        shift = np.zeros_like(motion)
+        shift[kind, :, axis] = step
+        difference = function(motion + shift) - function(motion - shift)
+        gradient[kind, :, axis] = np.einsum("ni,ni->n", flat, difference.reshape(flat.shape)) / (2 * step)
     return gradient

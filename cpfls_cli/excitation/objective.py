@@ -7,18 +7,17 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.excitation.conditioning import conditioning, regressor_of
 from cpfls_cli.excitation.motion_gradient import motion_gradient
+from cpfls_cli.excitation.regressor_gradient import regressor_gradient
 from cpfls_cli.excitation.variables import design
 from cpfls_cli.regressor import ModelStructure
 from cpfls_cli.trajectory.rotation import RotationMotion, RotationPath
 from cpfls_cli.trajectory.rotation_limits import RotationLimits
 
-# From all eigenvalues to the extremes, in the course of the descent.
-_FIRST_EXPONENT, _LAST_EXPONENT = 1.0, 4.0
-# Share of a limit from which on it costs, and how much; what remains above the limit is scaled away at the end.
-_FREE_SHARE, _COST = 0.97, 100.0
-# The derivatives of membership functions and of the triangle wave jump; a wide step in attitude smooths them.
-_REGRESSOR_STEPS = (0.1, 1.0, 1.0)
-_LOAD_STEPS = (1e-4, 1e-4, 1e-4)
+# In the course of the descent: from all eigenvalues to the extremes, and from limits that give way to hard ones.
+_EXPONENTS, _COSTS = (1.0, 4.0), (100.0, 3000.0)
+# Share of a limit from which on it costs.
+_FREE_SHARE = 0.98
+_LOAD_STEP = 1e-4
 
 
 class Objective:
@@ -35,7 +34,7 @@ class Objective:
     limits : RotationLimits
     samples : int
     iterations : int
-        Evaluations over which the exponent of the smoothed condition number grows.
+        Evaluations in all, over which the exponent of the smoothed condition number and the cost of the penalty grow.
     rng : numpy.random.Generator
 
     Attributes
@@ -55,7 +54,7 @@ class Objective:
     ) -> None:
         self._path, self._structure, self._limits, self._rng = path, structure, limits, rng
         self._times = path.times(samples)
-        self._exponents = np.geomspace(_FIRST_EXPONENT, _LAST_EXPONENT, iterations)
+        self._exponents, self._costs = np.geomspace(*_EXPONENTS, iterations), np.geomspace(*_COSTS, iterations)
         self.history: list[float] = []
 
     def gradient(self, variables: Array) -> Array:
@@ -71,10 +70,10 @@ class Objective:
         """
         shifted = design(self._path, self._times + self._rng.random() * self._times[1])
         motion = shifted.motion(variables)
-        exponent = float(self._exponents[len(self.history)])
+        exponent, cost = float(self._exponents[len(self.history)]), float(self._costs[len(self.history)])
         reached, by_motion = conditioning_gradient(self._structure, motion, exponent)
         self.history.append(reached)
-        return shifted.gradient(by_motion + penalty_gradient(self._limits, motion))
+        return shifted.gradient(by_motion + penalty_gradient(self._limits, motion, cost))
 
 
 def conditioning_gradient(structure: ModelStructure, motion: Array, exponent: float) -> tuple[float, Array]:
@@ -97,17 +96,18 @@ def conditioning_gradient(structure: ModelStructure, motion: Array, exponent: fl
     rows = Q.reshape(-1, structure.parameters)
     reached = conditioning(rows.T @ rows, exponent)
     weights = 2 * (rows @ reached.slope).reshape(Q.shape)
-    gradient = motion_gradient(lambda moved: regressor_of(structure, moved), motion, weights, _REGRESSOR_STEPS)
-    return reached.condition_number, gradient
+    return reached.condition_number, regressor_gradient(structure, motion, weights)
 
 
-def penalty_gradient(limits: RotationLimits, motion: Array) -> Array:
+def penalty_gradient(limits: RotationLimits, motion: Array, cost: float) -> Array:
     """Differentiate the mean square of what exceeds the limits by the motion.
 
     Parameters
     ----------
     limits : RotationLimits
     motion : array, shape (3, samples, 3)
+    cost : float
+        Of a limit exceeded twofold, all the time.
 
     Returns
     -------
@@ -115,5 +115,5 @@ def penalty_gradient(limits: RotationLimits, motion: Array) -> Array:
     """
     loads = limits.loads(RotationMotion(*motion))
     excess = np.sign(loads) * np.maximum(np.abs(loads) - _FREE_SHARE, 0.0)
-    weights = 2 * _COST / len(loads) * excess
-    return motion_gradient(lambda moved: limits.loads(RotationMotion(*moved)), motion, weights, _LOAD_STEPS)
+    weights = 2 * cost / len(loads) * excess
+    return motion_gradient(lambda moved: limits.loads(RotationMotion(*moved)), motion, weights, _LOAD_STEP)

@@ -91,20 +91,15 @@ def optimised_rotation(
     13(5).
     """
     structure, limits = model_structure(structure_settings), RotationLimits(settings, vehicle.inertia_kg_m2)
-    samples, total = _samples(structure), settings.starts + settings.iterations
-    report = _Report(progress, total)
-    paths, random = [], []
-    for _ in range(settings.starts):
-        paths.append(full_rotation(settings, duration, rng, vehicle.inertia_kg_m2))
-        random.append(condition_number(paths[-1], structure, samples))
-        report(min(random))
-    best = paths[int(np.argmin(random))]
+    samples, report = _samples(structure), _Report(progress, settings.starts + settings.iterations)
+    paths = [full_rotation(settings, duration, rng, vehicle.inertia_kg_m2) for _ in range(settings.starts)]
+    random = [report(condition_number(path, structure, samples)) for path in paths]
+    path = best = paths[int(np.argmin(random))]
     objective = Objective(best, structure, limits, samples, settings.iterations, rng)
-    variables = variables_of(best)
-    for variables in adam(objective.gradient, variables, settings.iterations, _STEP):
+    for variables in adam(objective.gradient, variables_of(best), settings.iterations, _STEP):
         report(objective.history[-1])
-    path = limits.enforced(path_of(variables, best))
-    reached = condition_number(path, structure, _FINER * samples)
+        path = path_of(variables, best)
+    reached, path = _better(limits.enforced(path), best, structure, _FINER * samples)
     return Excitation(path, reached, np.array(random), np.array(objective.history))
 
 
@@ -112,13 +107,22 @@ def _samples(structure: ModelStructure) -> int:
     return max(_SAMPLES, _SAMPLES_PER_PARAMETER * structure.parameters)
 
 
+def _better(
+    path: RotationPath, other: RotationPath, structure: ModelStructure, samples: int
+) -> tuple[float, RotationPath]:
+    """Choose by condition number: enforced limits may cost a path what it had gained."""
+    one, two = (condition_number(either, structure, samples) for either in (path, other))
+    return (one, path) if one <= two else (two, other)
+
+
 class _Report:
-    """Count what is done."""
+    """Count what is done, and pass on what it reached."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = progress, total, 0
 
-    def __call__(self, condition_number: float) -> None:
+    def __call__(self, condition_number: float) -> float:
         self._done += 1
         if self._progress is not None:
             self._progress(self._done, self._total, f"condition number {condition_number:.3g}")
+        return condition_number

@@ -119,5 +119,5 @@ def design(like: RotationPath, time: Array) -> Design:
 
 def _frequency(path: RotationPath) -> Array:
     """Angular frequencies of the harmonics, rad/s."""
-    frequency: Array = 2 * np.pi / path.duration * np.arange(1, path.harmonics + 1)
-    return frequency
+    harmonic = np.arange(1, path.harmonics + 1, dtype=np.float64)
+    return harmonic * (2 * np.pi / path.duration)

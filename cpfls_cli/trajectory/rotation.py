@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -51,7 +52,8 @@ def full_rotation(
     harmonic = np.arange(1, _harmonics(settings, duration) + 1)
     turns = _turns(settings, duration, rng)
     start, sine, cosine = rng.uniform(0, 2 * np.pi, 3), *rng.standard_normal((2, 3, len(harmonic)))
-    return limits.fitted(RotationPath(start, turns, sine / harmonic, cosine / harmonic, duration))
+    path = RotationPath(start, turns, sine / harmonic, cosine / harmonic, duration)
+    return limits.fitted(path if settings.turns is not None else _with_room(path, limits))
 
 
 def _harmonics(settings: RotationSettings, duration: float) -> int:
@@ -76,3 +78,11 @@ def _turns(settings: RotationSettings, duration: float, rng: np.random.Generator
     most = max(int(_TURNING * possible), 1)
     turns: IntArray = rng.integers(1, most, size=3, endpoint=True) * rng.choice(np.array([-1, 1]), size=3)
     return turns
+
+
+def _with_room(path: RotationPath, limits: RotationLimits) -> RotationPath:
+    """Halve the turns until they leave half of every limit to the harmonics, or no angle turns more than once."""
+    while np.abs(path.turns).max() > 1 and limits.peaks(path.scaled(0.0)).max() > 0.5:
+        halved = np.maximum(np.abs(path.turns) // 2, 1)
+        path = replace(path, turns=np.sign(path.turns) * halved)
+    return path

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt
 from typing_extensions import Doc
 
 from cpfls_cli.settings import Settings
@@ -27,7 +27,7 @@ class RotationSettings(Settings):
     ] = None
     frequency_max_hz: Annotated[
         float, Gt(0), Doc("highest frequency of the harmonics that are superposed on the turns, Hz")
-    ] = 0.3
+    ] = 0.5
     rate_max_rad_s: Annotated[float, Gt(0), Doc("largest rate of an Euler angle and of the body, rad/s")] = 6.0
     acceleration_max_rad_s2: Annotated[
         float, Gt(0), Doc("largest acceleration of an Euler angle and of the body, rad/s^2")
@@ -37,4 +37,4 @@ class RotationSettings(Settings):
         Doc("largest torque on the body about x, y, z that the motion may ask for, N m; null: no limit"),
     ] = None
     starts: Annotated[int, Ge(1), Doc("random paths of an optimised path, the best of which is improved")] = 10
-    iterations: Annotated[int, Ge(0), Doc("steps of gradient descent that improve an optimised path")] = 200
+    iterations: Annotated[int, Ge(0), Doc("steps of gradient descent that improve an optimised path")] = 400
