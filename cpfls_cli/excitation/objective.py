@@ -14,7 +14,7 @@ from cpfls_cli.trajectory.rotation import RotationMotion, RotationPath
 from cpfls_cli.trajectory.rotation_limits import RotationLimits
 
 # In the course of the descent: from all eigenvalues to the extremes, and from limits that give way to hard ones.
-_EXPONENTS, _COSTS = (1.0, 4.0), (100.0, 3000.0)
+_EXPONENTS, _COSTS = (1.0, 16.0), (100.0, 3000.0)
 # Share of a limit from which on it costs.
 _FREE_SHARE = 0.98
 _LOAD_STEP = 1e-4

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import brentq
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
@@ -15,6 +16,8 @@ from cpfls_cli.trajectory.rotation_settings import RotationSettings
 
 # Samples in one period of the fastest part of the motion.
 _PER_PERIOD = 48
+# Of the factor that uses up a limit.
+_PRECISION = 1e-5
 _LIMITS = ("rate_max_rad_s", "acceleration_max_rad_s2", "torque_max_n_m")
 
 
@@ -104,14 +107,17 @@ class RotationLimits:
             If the turns alone exceed a limit.
         """
         self._require_turns(path)
-        low, high = 0.0, 1.0
-        while self.peaks(path.scaled(high)).max() <= 1:
-            low, high = high, 2 * high
-        for _ in range(20):
-            middle = 0.5 * (low + high)
-            within = self.peaks(path.scaled(middle)).max() <= 1
-            low, high = (middle, high) if within else (low, middle)
-        return path.scaled(low)
+
+        def excess(factor: float) -> float:
+            return float(self.peaks(path.scaled(factor)).max()) - 1.0
+
+        high = 1.0
+        while excess(high) < 0:
+            high *= 2
+        factor, back = brentq(excess, 0.0, high, rtol=_PRECISION), _PRECISION
+        while excess(factor) > 0:
+            factor, back = factor * (1 - min(back, 1.0)), 2 * back
+        return path.scaled(factor)
 
     def enforced(self, path: RotationPath) -> RotationPath:
         """Scale the harmonics of a path down where it exceeds a limit.
