@@ -74,9 +74,7 @@ class RotationPath:
         """
         base = 2 * np.pi / self.duration
         frequency = base * np.arange(1, self.harmonics + 1)
-        # Powers of the first wave are ten times faster than a sine and a cosine of each harmonic.
-        waves = np.cumprod(np.repeat(np.exp(1j * base * time)[:, None], self.harmonics, axis=1), axis=1)
-        sine, cosine = waves.imag.copy(), waves.real.copy()
+        sine, cosine = np.sin(time[:, None] * frequency), np.cos(time[:, None] * frequency)
         turning = base * self.turns
         rate = cosine @ (frequency * self.sine).T - sine @ (frequency * self.cosine).T
         acceleration = -sine @ (frequency**2 * self.sine).T - cosine @ (frequency**2 * self.cosine).T
