@@ -45,6 +45,16 @@ def test_limits_hold():
     assert np.abs(limits.loads(path.sample(path.times(40_000)))).max() <= 1
 
 
+def test_limits_hold_where_the_search_left_them(monkeypatch):
+    monkeypatch.setattr("cpfls_cli.excitation.objective._COSTS", (1e-9, 1e-9))
+    limits, seen = RotationLimits(RotationSettings()), []
+    enforced = RotationLimits.enforced
+    monkeypatch.setattr(RotationLimits, "enforced", lambda own, path: seen.append(path) or enforced(own, path))
+    path = optimised().path
+    assert limits.peaks(seen[0]).max() > 1.05
+    assert limits.peaks(path).max() <= 1
+
+
 def test_a_seed_gives_one_path():
     first, again = (optimised(seed=4, iterations=3) for _ in range(2))
     np.testing.assert_array_equal(first.path.sine, again.path.sine)
