@@ -41,6 +41,7 @@ from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor.structure import INERTIA_FUNCTIONS
 from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient
 
+ERRORS = ("uniform", "searched", "rms, uniform", "rms, searched")
 SEARCH = {"base": "none", "population": 20, "generations": 6}
 SEESAW = IdentificationSettings(**vars(PAPER), **SEARCH)
 HARMONIC = IdentificationSettings(**{**vars(PAPER), "consequents": "harmonic", "harmonic_order": 1}, **SEARCH)
