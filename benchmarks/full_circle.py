@@ -56,7 +56,7 @@ LARGER = {
 
 def main() -> None:
     study = load_study(CONFIG)
-    training, states = optimised_flight(study, PAPER), random_states(1)
+    training, states = optimised_flight(PAPER), random_states(1)
     kept = joined([random_flight(seed) for seed in range(200, 203)])
     unseen = [random_flight(seed) for seed in range(100, 108)]
     rows = [
@@ -70,7 +70,7 @@ def main() -> None:
             for name, keys in LARGER.items()
         ),
     ]
-    own = optimised_flight(study, study.identification)
+    own = optimised_flight(study.identification)
     name = "harmonic 2 tensor, 1 function, on its own path"
     rows.append(uniform_row(name, study.identification, own, states, unseen))
     table("full_circle", (*COLUMNS, *MORE), rows)

@@ -23,7 +23,6 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.full_circle import (
-    CONFIG,
     INERTIA,
     PAPER,
     judged,
@@ -34,7 +33,6 @@ from benchmarks.shared.full_circle import (
 )
 from benchmarks.shared.studies import paper_flight
 from cpfls_cli.arrays import Array
-from cpfls_cli.config.load import load_study
 from cpfls_cli.identification.data import joined
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings
@@ -48,13 +46,12 @@ HARMONIC = IdentificationSettings(**{**vars(PAPER), "consequents": "harmonic", "
 
 
 def main() -> None:
-    study = load_study(CONFIG)
     kept = joined([random_flight(seed) for seed in range(200, 203)])
     unseen = [random_flight(seed) for seed in range(100, 108)]
     trainings = {
         "the paper's path": paper_flight(),
         "random full rotations, 55 s": random_flight(1),
-        "optimised full rotations, 55 s": optimised_flight(study, PAPER),
+        "optimised full rotations, 55 s": optimised_flight(PAPER),
         "random full rotations, 220 s": joined([random_flight(seed) for seed in range(1, 5)]),
         "6000 random states": random_states(1),
         "24000 random states": random_states(2, 24000),

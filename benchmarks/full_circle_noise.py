@@ -27,7 +27,6 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.full_circle import (
-    CONFIG,
     PAPER,
     judged,
     optimised_flight,
@@ -35,7 +34,6 @@ from benchmarks.shared.full_circle import (
     searched,
     uniform_model,
 )
-from cpfls_cli.config.load import load_study
 from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.data import TorqueData, joined
 from cpfls_cli.identification.settings import IdentificationSettings
@@ -58,8 +56,7 @@ RULES = {
 
 
 def main() -> None:
-    study = load_study(CONFIG)
-    flights = (optimised_flight(study, PAPER), [random_flight(s) for s in range(200, 203)], unseen())
+    flights = (optimised_flight(PAPER), [random_flight(s) for s in range(200, 203)], unseen())
     for vehicle, sharpness in SHARPNESS.items():
         training, kept, judging = (changed(part, ring(sharpness)) for part in flights)
         print(f"\n{vehicle}:\n")

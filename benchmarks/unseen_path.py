@@ -23,7 +23,6 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.full_circle import (
-    CONFIG,
     INERTIA,
     PAPER,
     Solved,
@@ -36,7 +35,6 @@ from benchmarks.shared.full_circle import (
 )
 from benchmarks.shared.studies import paper_flight, paper_study
 from cpfls_cli.arrays import Array
-from cpfls_cli.config.load import load_study
 from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.settings import IdentificationSettings
@@ -57,8 +55,8 @@ STRUCTURES = {
 
 
 def main() -> None:
-    study, paper = load_study(CONFIG), paper_flight()
-    rotations, kept = optimised_flight(study, PAPER), random_flight(200)
+    paper = paper_flight()
+    rotations, kept = optimised_flight(PAPER), random_flight(200)
     parts = ([unseen_flight()], [random_flight(seed) for seed in range(100, 108)])
     rows = []
     for path, training in {"the paper's": paper, "full rotations, optimised": rotations}.items():

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.config.study import Study
 from cpfls_cli.excitation import optimised_rotation
 from cpfls_cli.identification.choice import choose
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
@@ -24,7 +23,7 @@ from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion, StructureSettings
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
 from cpfls_cli.trajectory.rotation_settings import RotationSettings
-from cpfls_cli.vehicle import newton_euler_torque
+from cpfls_cli.vehicle import VehicleSettings, newton_euler_torque
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "full-circle.yaml"
 PAPER = StructureSettings(consequents="seesaw", products="additive", membership_functions=5)
@@ -83,11 +82,10 @@ def random_flight(seed: int, inertia: Array = INERTIA) -> TorqueData:
     return flown(full_rotation(RotationSettings(), DURATION_S, np.random.default_rng(seed)), inertia)
 
 
-def optimised_flight(study: Study, structure: StructureSettings, seed: int = 1) -> TorqueData:
-    """Fly the path that conditions a structure best."""
-    trajectory, rng = study.trajectory, np.random.default_rng(seed)
-    found = optimised_rotation(trajectory.rotation, DURATION_S, structure, study.vehicle, rng)
-    return flown(found.path)
+def optimised_flight(structure: StructureSettings, seed: int = 1) -> TorqueData:
+    """Fly the path that conditions a structure best, with the program's own limits."""
+    rng = np.random.default_rng(seed)
+    return flown(optimised_rotation(RotationSettings(), DURATION_S, structure, VehicleSettings(), rng).path)
 
 
 @dataclass(frozen=True)

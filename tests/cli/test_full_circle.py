@@ -1,0 +1,58 @@
+"""The shipped study of the whole circle through the commands, on short random paths."""
+
+import json
+from pathlib import Path
+
+import h5py
+import pytest
+import yaml
+
+CONFIG = Path(__file__).parents[2] / "configs" / "full-circle.yaml"
+SHORT = (
+    "--set",
+    "trajectory.path=full-rotation",
+    "--set",
+    "trajectory.duration_s=12.0",
+    "--set",
+    "trajectory.sample_time_s=0.04",
+)
+
+
+@pytest.fixture(scope="module")
+def flights(cpfls, tmp_path_factory):
+    folder, made = tmp_path_factory.mktemp("circle"), []
+    for seed in (1, 2, 3):
+        path, flight = (folder / f"{name}-{seed}.h5" for name in ("path", "flight"))
+        for words in (("trajectory", CONFIG, *SHORT, "-o", path), ("simulate", CONFIG, path, "-o", flight)):
+            result = cpfls(*words, "--seed", seed)
+            assert result.exit_code == 0, result.stderr
+        made.append(flight)
+    return made
+
+
+def test_the_model_of_one_flight_is_exact_on_another(cpfls, flights, tmp_path):
+    first, _, other = flights
+    words = ("identify", CONFIG, first, "--validate", other, "-o", tmp_path / "model.h5", "--json")
+    result = cpfls(*words)
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert (summary["rank"], summary["parameters"]) == (61, 61)
+    assert summary["held_out"][other.name]["relative_error"] < 1e-8
+
+
+def test_its_sweep_tells_structures_apart(cpfls, flights, tmp_path):
+    """All of its settings are checked, the two smallest of a kind are run."""
+    first, kept, other = flights
+    output = tmp_path / "sweep.h5"
+    words = ("sweep", CONFIG, first, "--choose-on", kept, "--validate", other, "-o", output)
+    assert cpfls(*words, "--dry-run").exit_code == 0
+    shipped = yaml.safe_load(CONFIG.read_text())["sweep"]["settings"]
+    small, best = "seesaw, 3 functions", "harmonic 2 tensor, 1 function"
+    settings = [setting for setting in shipped if setting["name"] in {small, best}]
+    search = {"population": 4, "generations": 1, "local_search": {"enabled": False}}
+    less = [word for key, value in search.items() for word in ("--set", f"identification.{key}={json.dumps(value)}")]
+    result = cpfls(*words, "--set", f"sweep.settings={json.dumps(settings)}", *less)
+    assert result.exit_code == 0, result.stderr
+    with h5py.File(output) as file:
+        error = dict(zip(file["setting/name"].asstr(), file["run/relative_error"][:, 1], strict=True))
+    assert error[best] < 1e-8 < 0.05 < error[small]
