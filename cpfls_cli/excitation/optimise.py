@@ -20,8 +20,9 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 Progress = Callable[[int, int, str], None]
 
-# Samples of a path during the search, and how many times as many judge the result.
-_SAMPLES, _SAMPLES_PER_PARAMETER, _FINER = 500, 2, 10
+# Samples of a path during the search: the most of these; and how many times as many judge the result.
+_SAMPLES, _SAMPLES_PER_PARAMETER, _SAMPLES_PER_SECOND = 500, 2, 8
+_FINER = 10
 # Of each design variable, in rad or rad/s.
 _STEP = 0.05
 
@@ -91,7 +92,7 @@ def optimised_rotation(
     13(5).
     """
     structure, limits = model_structure(structure_settings), RotationLimits(settings, vehicle.inertia_kg_m2)
-    samples, report = _samples(structure), _Report(progress, settings.starts + settings.iterations)
+    samples, report = _samples(structure, duration), _Report(progress, settings.starts + settings.iterations)
     paths = [full_rotation(settings, duration, rng, vehicle.inertia_kg_m2) for _ in range(settings.starts)]
     random = [report(condition_number(path, structure, samples)) for path in paths]
     path = best = paths[int(np.argmin(random))]
@@ -103,8 +104,8 @@ def optimised_rotation(
     return Excitation(path, reached, np.array(random), np.array(objective.history))
 
 
-def _samples(structure: ModelStructure) -> int:
-    return max(_SAMPLES, _SAMPLES_PER_PARAMETER * structure.parameters)
+def _samples(structure: ModelStructure, duration: float) -> int:
+    return max(_SAMPLES, _SAMPLES_PER_PARAMETER * structure.parameters, round(_SAMPLES_PER_SECOND * duration))
 
 
 def _better(
