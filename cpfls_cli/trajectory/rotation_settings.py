@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, Le
 from typing_extensions import Doc
 
 from cpfls_cli.settings import Settings
 
+_Turns = Annotated[int, Ge(-10_000), Le(10_000)]
 _Torque = Annotated[float, Gt(0)]
 
 
@@ -22,7 +23,7 @@ class RotationSettings(Settings):
     """
 
     turns: Annotated[
-        tuple[int, int, int] | None,
+        tuple[_Turns, _Turns, _Turns] | None,
         Doc("complete turns of roll, pitch and yaw over the duration, negative backwards; null chooses them"),
     ] = None
     frequency_max_hz: Annotated[
