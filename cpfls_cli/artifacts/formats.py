@@ -192,6 +192,15 @@ MODEL = ArtifactSpec(
             _OBJECTIVES,
         ),
         DatasetSpec("front/chosen", (), "1", NO_FRAME, "index of the chosen member"),
+        DatasetSpec(
+            "front/held_out",
+            ("member",),
+            "SI",
+            NO_FRAME,
+            "mean squared error on the flights kept for the choice; objective 1 of them",
+            required=False,
+            gaps=True,
+        ),
         *_HISTORY,
         DatasetSpec(
             "search/stop_reason",
@@ -226,7 +235,7 @@ MODEL = ArtifactSpec(
         DatasetSpec("training/indices", ("sample",), "1", NO_FRAME, "samples of the flight that trained"),
         DatasetSpec("findings", ("finding",), "text", NO_FRAME, "what failed or was not excited, in words"),
     ),
-    ("flight", "selection", "validate"),
+    ("flight", "selection", "validate", "choose-on"),
 )
 
 CHECKPOINT = ArtifactSpec(
@@ -262,7 +271,7 @@ CHECKPOINT = ArtifactSpec(
         DatasetSpec("unfinished/objectives", ("unfinished", "3"), "SI", NO_FRAME, _OBJECTIVES, gaps=True),
         DatasetSpec("sha256", (), "text", NO_FRAME, "of the bytes of all datasets above, in this order"),
     ),
-    ("flight", "selection", "validate"),
+    ("flight", "selection", "validate", "choose-on"),
 )
 
 PREDICTION = ArtifactSpec(

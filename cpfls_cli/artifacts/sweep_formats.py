@@ -34,5 +34,5 @@ SWEEP = ArtifactSpec(
         ),
         number("complete", (), "1 where every run is finished, 0 where `--resume` goes on"),
     ),
-    ("flight", "validate"),
+    ("flight", "validate", "choose-on"),
 )

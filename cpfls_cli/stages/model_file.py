@@ -130,6 +130,7 @@ def _search(result: Identification) -> dict[str, Any]:
         "front/chromosomes": result.front.chromosomes,
         "front/objectives": result.front.objectives,
         "front/chosen": result.front.chosen,
+        **({} if result.front.held_out is None else {"front/held_out": result.front.held_out}),
         "history/evaluations": result.history.evaluations,
         "history/best": result.history.best,
         "history/front_size": result.history.front_size,
