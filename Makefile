@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce quick sweep table-5 hexarotor crazyflie gap-example test lint bench blind-study clean FORCE
+.PHONY: help reproduce quick sweep table-5 hexarotor full-circle crazyflie gap-example test lint bench blind-study clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -19,6 +19,7 @@ help:
 	@echo "  make sweep       Table 5 from three small searches of each setting, in minutes"
 	@echo "  make table-5     Table 5 from ten searches of the paper's size each, most of a day on one core"
 	@echo "  make hexarotor   a six-rotor study with a rigid body under the fuzzy part"
+	@echo "  make full-circle full rotations of a held vehicle: the structure that wins, and a sweep over twelve others"
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
 	@echo "  make gap-example [HIDDEN=NAME=VALUES]   a flight with a hidden effect, and what the gap workflow makes of it"
 	@echo "  make lint        formatting, lint, types, import contracts"
@@ -40,6 +41,9 @@ table-5: data/paper/table-5.html
 
 hexarotor: data/hexarotor/report.html
 	@echo "open data/hexarotor/report.html"
+
+full-circle: data/full-circle/report.html
+	@echo "open data/full-circle/report.html"
 
 ifdef LOGS
 crazyflie: data/crazyflie/report.html
@@ -133,6 +137,21 @@ SWEPT = $(firstword $(wildcard data/$*/table-5.h5 data/$*/sweep.h5))
 data/%/report.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
 	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) $(SWEPT) -o $@ --force
 
+# Full rotations: one flight to choose models on, one that judges them; both random, of seeds of their own.
+CIRCLE := data/full-circle
+$(CIRCLE)/kept-trajectory.h5 $(CIRCLE)/unseen-trajectory.h5: UNSEEN = --set trajectory.path=full-rotation --seed $(CIRCLE_SEED)
+$(CIRCLE)/kept-trajectory.h5: CIRCLE_SEED := 101
+$(CIRCLE)/unseen-trajectory.h5: CIRCLE_SEED := 201
+$(CIRCLE)/kept-trajectory.h5: $(CIRCLE)/.part/trajectory.yaml
+	$(CPFLS) trajectory configs/full-circle.yaml -o $@ --force $(UNSEEN)
+
+$(CIRCLE)/kept.h5: $(CIRCLE)/kept-trajectory.h5 $(CIRCLE)/.part/simulate.yaml
+	$(CPFLS) simulate configs/full-circle.yaml $< -o $@ --force
+
+$(CIRCLE)/sweep.h5: SMALL := --choose-on $(CIRCLE)/kept.h5 --validate $(CIRCLE)/unseen.h5
+$(CIRCLE)/sweep.h5: $(CIRCLE)/kept.h5 $(CIRCLE)/unseen.h5
+$(CIRCLE)/report.html: $(CIRCLE)/sweep.h5
+
 # The real flight: its logs are in the folder LOGS.
 REAL := data/crazyflie
 $(REAL)/log%.h5: $(LOGS)/log%.csv $(REAL)/.part/import.yaml
@@ -206,6 +225,13 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python benchmarks/judging.py $(STUDY)
 	$(BIN)/python benchmarks/time_to_quality.py $(STUDY)
 	$(BIN)/python benchmarks/quality_elsewhere.py
+	$(BIN)/python benchmarks/trajectory_planning.py
+	$(BIN)/python benchmarks/excitation.py
+	$(BIN)/python benchmarks/full_circle.py
+	$(BIN)/python benchmarks/full_circle_limit.py
+	$(BIN)/python benchmarks/full_circle_noise.py
+	$(BIN)/python benchmarks/unseen_path.py
+	$(BIN)/python benchmarks/seam.py
 
 # Stopped and started again it goes on where it was. SIZE takes more options: `python -m tests.gap.study --help`.
 SEED := 2027
