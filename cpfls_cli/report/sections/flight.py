@@ -6,8 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Table, Text
 from cpfls_cli.report.figures.attitude import attitude_figure
+from cpfls_cli.report.figures.rotation import rotation_figure
 from cpfls_cli.report.figures.torque import torque_figure
 from cpfls_cli.report.numbers import count, number, plain
 from cpfls_cli.report.sections.each import section_of_each
@@ -38,11 +40,19 @@ def _flight(flight: Source, index: int, sources: Sources) -> Iterator[Block]:
     if "quality/warning" in artifact.data:
         yield from [Text(f"{warning}.", "warning") for warning in artifact.texts("quality/warning")]
     if "attitude" in artifact.data and sources.by_hash(flight.made_from("trajectory")) is None:
-        yield attitude_figure(f"figure-3-flight-{index}", flight)
+        drawn = rotation_figure if _turns(artifact) else attitude_figure
+        yield drawn(f"figure-3-flight-{index}", flight)
     if "torque" in artifact.data:
         yield torque_figure(f"figure-4-torque-{index}", flight)
     else:
         yield Text("This flight holds no torque, so nothing can be learned from it.", "warning")
+
+
+def _turns(artifact: Artifact) -> bool:
+    """Tell whether roll or pitch goes round the circle, so that angles alone would run off the figure."""
+    if "attitude_rate" not in artifact.data:
+        return False
+    return bool(np.ptp(artifact.array("attitude")[:, :2], axis=0).max() > 2 * np.pi)
 
 
 def _facts(flight: Source) -> list[tuple[str, str]]:

@@ -71,6 +71,9 @@ def test_a_model_learned_on_full_rotations_holds_on_another_one(cpfls, tmp_path,
     )
     assert found.exit_code == 0, found.output
     assert json.loads(found.stdout)["held_out"]["f2.h5"]["relative_error"] < 1e-8
+    report = cpfls("report", study(), tmp_path / "f1.h5", "-o", tmp_path / "r.html")
+    assert report.exit_code == 0, report.output
+    assert "turns covered: roll" in (tmp_path / "r.html").read_text()
 
 
 def test_no_autopilot_flies_a_held_vehicle(cpfls, refuse, tmp_path, study):
