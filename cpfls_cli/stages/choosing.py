@@ -44,14 +44,19 @@ def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) ->
     Raises
     ------
     InputError
-        If one of them trains or judges too: what was chosen on a flight has been fitted to it.
+        If one of them is another input too: what was chosen on a flight has been fitted to it.
     """
     for role, path in choosing_roles(flights).items():
         others = {other: file for other, file in inputs.items() if other != role}
         same = next((other for other, file in others.items() if file.sha256 == inputs[role].sha256), None)
         if same is not None:
-            raise InputError(f"--choose-on {path}: {_USED[same.partition('-')[0]]}; choose on another one")
+            raise InputError(f"--choose-on {path}: {_USED[same.partition('-')[0]]}; choose on another flight")
     return joined([flight_source(path) for path in flights]) if flights else None
 
 
-_USED = {"flight": "is a flight that trains", "validate": "judges (--validate)", "choose": "is given twice"}
+_USED = {
+    "flight": "is a flight that trains",
+    "selection": "is the selection, no flight",
+    "validate": "judges (--validate)",
+    "choose": "is given twice",
+}

@@ -67,3 +67,13 @@ def test_a_flight_that_trains_or_judges_cannot_choose(refuse, study, pipeline, o
     twice = ("--choose-on", others[0], "--choose-on", others[0])
     (message,) = refuse("identify", study, pipeline.flight, *twice, *HELD_OUT, *output)
     assert "is given twice" in message
+
+
+def test_what_is_no_flight_cannot_choose(refuse, study, pipeline, tmp_path):
+    """Not even where the same file is an input of its own."""
+    words = ("--choose-on", pipeline.selection, *HELD_OUT, "-o", tmp_path / "out.h5")
+    (message,) = refuse("identify", study, pipeline.flight, "--selection", pipeline.selection, *words)
+    assert f"--choose-on {pipeline.selection}: is the selection, no flight" in message
+    (message,) = refuse("identify", study, pipeline.flight, *words)
+    assert str(pipeline.selection) in message
+    assert "flight" in message
