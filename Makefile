@@ -135,7 +135,7 @@ ARTIFACTS := trajectory flight unseen selection model prediction prediction-unse
 # A sweep is shown where there is one, but not made for the page.
 SWEPT = $(firstword $(wildcard data/$*/table-5.h5 data/$*/sweep.h5))
 data/%/report.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
-	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) $(SWEPT) -o $@ --force
+	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) $(filter-out $^,$(SWEPT)) -o $@ --force
 
 # Full rotations: one flight to choose models on, one that judges them; both random, of seeds of their own.
 CIRCLE := data/full-circle

@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.errors import SettingError
 from cpfls_cli.simulation.collective import collective_thrust
 from cpfls_cli.simulation.noise import noisy
 from cpfls_cli.simulation.settings import SimulationSettings
@@ -56,6 +57,13 @@ def simulate(
     -------
     SimulatedFlight
 
+    Raises
+    ------
+    SettingError
+        If a signal that a held vehicle does not have is to be noisy.
+    ComputationError
+        If the rotors cannot produce thrust, roll, pitch and yaw independently.
+
     References
     ----------
     Equations (1) and (2); method.md sections 1 and 2.
@@ -66,10 +74,18 @@ def simulate(
     thrust = collective_thrust(vehicle, about_body, planned.get("acceleration"))
     demand = rotor_demand(vehicle, thrust, about_body)
     exact = {**planned, "torque": torque(q, qd, qdd, inertia), "body_torque": about_body, "rotor_speed": demand.speed}
+    _refuse_noise_of_nothing(exact, settings)
     signals, noise_std = noisy(exact, settings, rng)
     signals["torque"], signals["body_torque"] = _torques(signals, frozenset(noise_std))
     signals["body_rate"] = rotations.body_rate(signals["attitude"], signals["attitude_rate"])
     return SimulatedFlight(signals, demand.violations, noise_std)
+
+
+def _refuse_noise_of_nothing(exact: Mapping[str, Array], settings: SimulationSettings) -> None:
+    for key in ("noise", "relative_noise"):
+        missing = sorted({str(name) for name in getattr(settings, key)} - exact.keys())
+        if missing:
+            raise SettingError(key, f"{', '.join(missing)}: a vehicle that is held at its centre of mass has none")
 
 
 def _torques(signals: Mapping[str, Array], noised: frozenset[str]) -> tuple[Array, Array]:

@@ -82,9 +82,23 @@ def violation_sentence(violation: RotorViolation, time: Array) -> str:
     """
     start, end = time[violation.first], time[violation.last]
     return (
-        f"rotor {violation.rotor + 1}: {violation.kind} asked for at {violation.count} samples from {start:.2f} s to "
+        f"rotor {violation.rotor + 1}: {violation.kind} asked for at {samples(violation.count)} from {start:.2f} s to "
         f"{end:.2f} s (worst squared speed {violation.worst:.6g} rad^2/s^2)"
     )
+
+
+def samples(count: int) -> str:
+    """Count samples in words.
+
+    Parameters
+    ----------
+    count : int
+
+    Returns
+    -------
+    str
+    """
+    return f"{count} sample{'' if count == 1 else 's'}"
 
 
 def noise_record(noise_std: Mapping[str, Array]) -> dict[str, Any]:

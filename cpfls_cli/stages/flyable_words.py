@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.simulation.flyable import Flyability, TooMuch
-from cpfls_cli.stages.flown import violation_sentence
+from cpfls_cli.stages.flown import samples, violation_sentence
 from cpfls_cli.trajectory.planned import PlannedRotation, Trajectory
 
 
@@ -38,7 +38,7 @@ def _sentences(found: Flyability, planned: PlannedRotation) -> Iterator[str]:
 def _too_much(found: TooMuch, planned: PlannedRotation) -> str:
     name, unit = found.what.split(", ")
     worst = f"{found.worst:.4g} {unit} at {planned.time[found.at]:.2f} s{_place(found.at, planned)}"
-    start = f"from {planned.time[found.first]:.2f} s, {found.count} samples"
+    start = f"from {planned.time[found.first]:.2f} s, {samples(found.count)}"
     return f"{name} of up to {worst} asked for; the limit is {found.limit:.4g} {unit} (beyond it {start})"
 
 

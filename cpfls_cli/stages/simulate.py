@@ -70,7 +70,8 @@ def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:
 
 
 def _inverse(job: Job, started: Started, time: Array, planned: dict[str, Array], trajectory: Path) -> Outcome:
-    flight = simulate(planned, job.study.vehicle, job.study.simulation, generator(job.study, "simulate"))
+    with settings_of("simulation", job.study):
+        flight = simulate(planned, job.study.vehicle, job.study.simulation, generator(job.study, "simulate"))
     problems = tuple(violation_sentence(violation, time) for violation in flight.violations)
     if problems and job.study.simulation.infeasible == "stop":
         remedy = "fly gentler, change the vehicle, or set simulation.infeasible: report"

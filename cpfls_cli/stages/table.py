@@ -77,6 +77,24 @@ def _columns(path: Path, stream: TextIO, wanted: set[str]) -> dict[str, Array]:
     return columns | {names[index]: values[:, place] for place, index in enumerate(kept)}
 
 
+def row_lines(path: Path) -> list[int]:
+    """Tell in which line of a CSV each row of values stands; empty lines hold none.
+
+    Parameters
+    ----------
+    path : Path
+        As `read_csv` takes it.
+
+    Returns
+    -------
+    list of int
+        From 1; the names stand before the first row.
+    """
+    with _open(path) as stream:
+        lines = [number for number, line in enumerate(stream, start=1) if line.strip()]
+    return lines[1:]
+
+
 def _number(field: str, path: Path, row: int, column: str) -> float:
     text = field.strip()
     if not text:

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.writing import write_artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.excitation import Excitation, optimised_rotation
-from cpfls_cli.simulation.flyable import flyability, single_axis_torque
+from cpfls_cli.simulation.flyable import Flyability, flyability, single_axis_torque
 from cpfls_cli.stages.flyable_words import flyability_sentences
 from cpfls_cli.stages.job import Job, Outcome, begin, header_of
 from cpfls_cli.stages.path_figures import check_figures, write_figures
@@ -54,15 +54,17 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
     settings = _settings(job.study, waypoints)
     if plot:
         check_figures(job, settings.held)
-    if started.dry_run is not None:
+    # To optimise takes long; what else can go wrong shows only when it is planned.
+    if started.dry_run is not None and settings.path == "optimised":
         return started.dry_run
     planned, excitation = _planned(job, settings)
-    signals = {name: value for name, value in vars(planned).items() if isinstance(value, np.ndarray)}
-    found = flyability(signals, job.study.vehicle, settings.tilt_max_rad)
+    found = _asked(job.study, settings, planned)
     problems = flyability_sentences(found, planned)
     if problems and settings.infeasible == "stop":
         remedy = f"{_remedy(job.study, settings)}, change the vehicle, or set trajectory.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{job.output}: no path was written; {remedy}"]))
+    if started.dry_run is not None:
+        return started.dry_run
     artifact = Artifact(TRAJECTORY, header_of(job.study, started.inputs), trajectory_data(planned))
     write_artifact(job.output, artifact)
     figures = write_figures(job, artifact) if plot else ()
@@ -103,7 +105,24 @@ def _rotation(job: Job, settings: TrajectorySettings) -> tuple[RotationPath, Exc
 
 
 def _remedy(study: Study, settings: TrajectorySettings) -> str:
-    if not settings.held:
-        return "lower the limits of the path"
-    alone = " ".join(f"{torque:.3g}" for torque in single_axis_torque(study.vehicle))
-    return f"set trajectory.rotation.torque_max_n_m (about one axis at a time the rotors give up to {alone} N m)"
+    """Say what to change, of what the config holds."""
+    if settings.held:
+        alone = " ".join(f"{torque:.3g}" for torque in single_axis_torque(study.vehicle))
+        return f"set trajectory.rotation.torque_max_n_m (about one axis at a time the rotors give up to {alone} N m)"
+    keys = ["limits"] if settings.limits.given else ["displacement_m or raise trajectory.period_s"]
+    if settings.yaw_turn and not _problems(study, replace(settings, yaw_turn_rad=0.0)):
+        return f"it is the turn in yaw: lower trajectory.yaw_turn_rad = {settings.yaw_turn:.4g}, or take longer over it"
+    if settings.tilt_max_rad is not None:
+        keys.append("acceleration, or raise trajectory.tilt_max_rad")
+    return f"lower trajectory.{keys[0]}" + "".join(f", lower the {key}" for key in keys[1:])
+
+
+def _problems(study: Study, settings: TrajectorySettings) -> tuple[str, ...]:
+    planned = plan(settings, study.vehicle.gravity_m_s2)
+    return flyability_sentences(_asked(study, settings, planned), planned)
+
+
+def _asked(study: Study, settings: TrajectorySettings, planned: PlannedRotation) -> Flyability:
+    """Check a plan against the vehicle."""
+    signals = {name: value for name, value in vars(planned).items() if isinstance(value, np.ndarray)}
+    return flyability(signals, study.vehicle, settings.tilt_max_rad)

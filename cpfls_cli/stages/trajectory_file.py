@@ -61,7 +61,7 @@ def trajectory_outcome(
     -------
     Outcome
     """
-    common = {
+    common: dict[str, Any] = {
         "figures": [str(path) for path in figures],
         "samples": len(planned.time),
         "duration_s": planned.duration,
@@ -70,11 +70,11 @@ def trajectory_outcome(
         "max_body_rate_rad_s": _largest(planned.body_rate),
         "max_acceleration_rad_s2": _largest(planned.attitude_acceleration),
         "max_thrust_n": float(found.thrust.max()),
-        "max_tilt_rad": float(found.tilt.max()),
     }
     first = f"{len(planned.time)} samples over {planned.duration:g} s"
     drawn = [f"drawn: {', '.join(map(str, figures))}"] if figures else []
     if isinstance(planned, Trajectory):
+        common["max_tilt_rad"] = float(found.tilt.max())
         return Outcome(common | _moved(planned), (first, *_path_lines(planned, found), *drawn), problems)
     return Outcome(common, (first, *_held_lines(common), *drawn), problems)
 
@@ -140,13 +140,13 @@ def _peak(name: str, value: float, unit: str) -> str:
 
 def _leg(leg: Leg) -> str:
     length = float(np.linalg.norm(leg.vector))
-    limited = ", ".join(leg.limited_by) or "its period alone"
+    limited = ", ".join(leg.limited_by)
     return f"{length:.6g} m in {leg.duration:.6g} s, limited by {limited}; integral of |jerk| {_jerk(leg):.4g} m/s^2"
 
 
 def _jerk(leg: Leg) -> float:
-    """Integrate the absolute jerk of the axis that has most of it: four times the peak of its acceleration."""
-    return max(4 * abs(profile.peaks.acceleration) for profile in leg.profiles)
+    """Integrate the absolute jerk of the axis that has most of it."""
+    return max(profile.integral_of_absolute_jerk for profile in leg.profiles)
 
 
 def _held_lines(common: Mapping[str, Any]) -> list[str]:

@@ -9,12 +9,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
-from cpfls_cli.stages.table import read_csv
+from cpfls_cli.stages.table import read_csv, row_lines
 from cpfls_cli.trajectory.waypoint_settings import WaypointSettings, check_waypoints
 
 _POSITION = ("x_m", "y_m", "z_m")
 _OPTIONAL = ("yaw_rad", "pause_s")
-_HEADER_ROWS = 2
 
 
 def read_waypoints(path: Path, paused: bool) -> tuple[WaypointSettings, ...]:
@@ -38,7 +37,8 @@ def read_waypoints(path: Path, paused: bool) -> tuple[WaypointSettings, ...]:
     """
     columns = read_csv(path, {*_POSITION, *_OPTIONAL})
     _check_columns(path, columns)
-    _check_values(path, columns)
+    lines = row_lines(path)
+    _check_values(path, columns, lines)
     count = len(columns[_POSITION[0]])
     yaw = columns["yaw_rad"].tolist() if "yaw_rad" in columns else [None] * count
     pause = columns.get("pause_s", np.zeros(count)).tolist()
@@ -48,7 +48,7 @@ def read_waypoints(path: Path, paused: bool) -> tuple[WaypointSettings, ...]:
     try:
         check_waypoints(waypoints, paused)
     except SettingError as error:
-        raise InputError(f"{path}{_place(error.key)}: {error}") from None
+        raise InputError(f"{path}{_place(error.key, lines)}: {error}") from None
     return waypoints
 
 
@@ -65,21 +65,22 @@ def _check_columns(path: Path, columns: dict[str, Array]) -> None:
         raise InputError("\n".join(problems))
 
 
-def _check_values(path: Path, columns: dict[str, Array]) -> None:
+def _check_values(path: Path, columns: dict[str, Array], lines: list[int]) -> None:
     problems = []
     for name, values in columns.items():
         wrong = ~np.isfinite(values) | ((values < 0) if name == "pause_s" else False)
         for row in np.flatnonzero(wrong):
             expected = "a finite number, 0 or more" if name == "pause_s" else "a finite number"
-            problems.append(f"{path}:{row + _HEADER_ROWS}: column '{name}' = {values[row]:g}: give {expected}")
+            found = "is empty or not a number" if np.isnan(values[row]) else f"= {values[row]:g}"
+            problems.append(f"{path}:{lines[row]}: column '{name}' {found}: give {expected}")
     if problems:
         raise InputError("\n".join(problems))
 
 
-def _place(key: str) -> str:
-    """Row and column of an entry such as ``waypoints.3.position_m``."""
+def _place(key: str, lines: list[int]) -> str:
+    """Line and column of an entry such as ``waypoints.3.position_m``."""
     parts = key.split(".")
     if len(parts) < 3:
         return ""
     column = {"position_m": ", ".join(_POSITION)}.get(parts[2], parts[2])
-    return f":{int(parts[1]) + _HEADER_ROWS}: {column}"
+    return f":{lines[int(parts[1])]}: {column}"

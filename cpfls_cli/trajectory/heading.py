@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.trajectory.legs import Leg
+from cpfls_cli.trajectory.legs import Leg, in_turn
 from cpfls_cli.trajectory.profile import BaseProfile, covering
 
 
@@ -64,9 +64,15 @@ def heading_of_legs(time: Array, legs: Sequence[Leg]) -> Array:
         Yaw, its rate and its acceleration.
     """
     heading = np.zeros((3, len(time)))
-    for leg in legs:
-        assert leg.yaw is not None
-        begin, end = leg.yaw
-        heading[0] += begin if leg is legs[0] else 0.0
-        heading += stretched_heading(time - leg.begin, end - begin, leg.profiles[0], leg.duration)
+    heading[0] = _yaw(legs[0])[0]
+    for leg, samples in in_turn(legs, time):
+        begin, end = _yaw(leg)
+        turned = stretched_heading(time[samples] - leg.begin, end - begin, leg.profiles[0], leg.duration)
+        heading[:, samples] = turned
+        heading[0, samples] += begin
     return heading
+
+
+def _yaw(leg: Leg) -> tuple[float, float]:
+    assert leg.yaw is not None
+    return leg.yaw

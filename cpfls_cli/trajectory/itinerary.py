@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.errors import SettingError
-from cpfls_cli.trajectory.clock import check_samples
+from cpfls_cli.trajectory.clock import check_duration, check_samples
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.trajectory.shapes import Shape, shape_of
@@ -99,9 +98,7 @@ def _begins(settings: TrajectorySettings, durations: Array) -> Array:
             pauses += [waypoint.pause_s for waypoint in settings.waypoints[:-1]]
         return np.asarray(np.cumsum(durations + pauses) - durations)
     needed = float(durations.sum())
-    if needed > settings.duration_s * (1 + 1e-12):
-        message = f"the {len(durations)} moves need {needed:g} s; raise it, or set it to null"
-        raise SettingError("duration_s", message)
+    check_duration(len(durations), needed, settings.duration_s)
     pause = (settings.duration_s - needed) / max(len(durations) - 1, 1)
     return np.asarray(np.cumsum(durations) - durations + pause * np.arange(len(durations)))
 
@@ -120,7 +117,7 @@ def maxima(legs: tuple[Leg, ...]) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        By name of the derivative, m and s; infinite where a derivative jumps to its neighbour's limit.
+        By name of the derivative, m and s; infinite for crackle and pop where nothing limits them.
     """
     peaks = [asdict(profile.peaks) for leg in legs for profile in leg.profiles]
     return {name: max(abs(peak[name]) for peak in peaks) for name in peaks[0]}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +51,7 @@ class Leg:
     @property
     def vector(self) -> Array:
         """Displacement, shape (3,), m, world frame."""
-        covered = np.array([profile.peaks.displacement for profile in self.profiles])
+        covered = np.array([profile.displacement for profile in self.profiles])
         return np.asarray(covered @ self.directions)
 
 
@@ -70,10 +70,31 @@ def along(legs: Sequence[Leg], time: Array) -> Array:
     array, shape (7, time, 3), m and s
     """
     motion = np.zeros((7, len(time), 3))
-    motion[0] += legs[0].start
-    for leg in legs:
-        first, after = np.searchsorted(time, [leg.begin, leg.end])
+    motion[0] = legs[0].start
+    for leg, samples in in_turn(legs, time):
+        elapsed = time[samples] - leg.begin
+        motion[0, samples] = leg.start
         for profile, direction in zip(leg.profiles, leg.directions, strict=True):
-            motion[:, first:after] += profile.sample(time[first:after] - leg.begin).T[..., None] * direction
-        motion[0, after:] += leg.vector
+            motion[:, samples] += profile.sample(elapsed).T[..., None] * direction
     return motion
+
+
+def in_turn(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, slice]]:
+    """Divide samples among legs, so that the work grows with the samples and not with their product.
+
+    Parameters
+    ----------
+    legs : sequence of Leg
+    time : array, shape (time,), s
+        Ascending.
+
+    Yields
+    ------
+    leg : Leg
+    samples : slice
+        From its beginning to that of the next one; it is at rest at the end of them.
+    """
+    firsts = np.searchsorted(time, [*(leg.begin for leg in legs), np.inf])
+    for leg, first, after in zip(legs, firsts[:-1], firsts[1:], strict=True):
+        if first < after:
+            yield leg, slice(int(first), int(after))

@@ -72,8 +72,8 @@ class Move:
 
     @property
     def integral_of_absolute_jerk(self) -> float:
-        """The paper's measure of energy, m/s^2: four times the peak of the acceleration, with or without holds."""
-        return 4 * self.peaks.acceleration
+        """The paper's measure of energy, m/s^2."""
+        return self.profile.integral_of_absolute_jerk
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -85,5 +85,5 @@ def _heading(settings: TrajectorySettings, legs: tuple[Leg, ...], time: Array, d
     if legs[0].yaw is not None:
         return heading_of_legs(time, legs)
     if settings.yaw_profile == "uniform":
-        return uniform_heading(time, settings.yaw_turn_rad, duration)
-    return stretched_heading(time, settings.yaw_turn_rad, legs[0].profiles[0], duration)
+        return uniform_heading(time, settings.yaw_turn, duration)
+    return stretched_heading(time, settings.yaw_turn, legs[0].profiles[0], duration)

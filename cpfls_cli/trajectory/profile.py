@@ -96,6 +96,11 @@ class BaseProfile:
         values = peaks_of(self.displacement, self.spans).tolist()
         return Peaks(**dict(zip(_DERIVATIVES, values, strict=True)))
 
+    @property
+    def integral_of_absolute_jerk(self) -> float:
+        """The paper's measure of energy, m/s^2: four times the peak of the acceleration, with or without holds."""
+        return 4 * self.peaks.acceleration
+
     def sample(self, time: Array) -> Array:
         """Evaluate the move in closed form, every derivative to rounding error of its own peak.
 

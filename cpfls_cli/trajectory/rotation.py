@@ -10,15 +10,13 @@ import numpy as np
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_path import RotationMotion, RotationPath
+from cpfls_cli.trajectory.rotation_path import RotationPath
 from cpfls_cli.trajectory.rotation_settings import RotationSettings
 
 # Share of the rate limit that the turns of one angle may take; the harmonics have the rest.
 _TURNING = 0.15
 # More would need more memory than a flight is worth.
 _MOST_HARMONICS, _MOST_TURNS = 300, 10_000
-
-__all__ = ["RotationMotion", "RotationPath", "full_rotation"]
 
 
 def full_rotation(

@@ -12,7 +12,7 @@ from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
-from cpfls_cli.trajectory.clock import check_samples
+from cpfls_cli.trajectory.clock import check_duration, check_samples
 from cpfls_cli.trajectory.limit_settings import LimitSettings
 from cpfls_cli.trajectory.profile import BaseProfile, Holds
 from cpfls_cli.trajectory.rotation_settings import RotationSettings
@@ -84,9 +84,13 @@ class TrajectorySettings(Settings):
     ] = 54.86
     pause_s: Annotated[float, Ge(0), Doc("rest between two moves, s, where duration_s is null")] = 0.0
     sample_time_s: Annotated[float, Gt(0), Doc("time between samples, s")] = 0.01
-    yaw_turn_rad: Annotated[float, Doc("yaw turned over the whole duration, rad, unless the waypoints have a yaw")] = (
-        2 * math.pi
-    )
+    yaw_turn_rad: Annotated[
+        float | None,
+        Doc(
+            "yaw turned over the whole duration, rad, unless the waypoints have a yaw; null: a full turn on a path to "
+            "and fro, none through waypoints"
+        ),
+    ] = None
     yaw_profile: Annotated[
         Literal["base", "uniform"],
         Doc("base: yaw follows the first move's profile, stretched, from rest to rest; uniform: constant rate"),
@@ -112,6 +116,7 @@ class TrajectorySettings(Settings):
         """
         self._check_clock()
         if self.held:
+            self._check_held()
             return
         self._check_direction()
         self._check_limits()
@@ -127,6 +132,13 @@ class TrajectorySettings(Settings):
     def held(self) -> bool:
         """Whether the vehicle is held at its centre of mass and only turns."""
         return self.path in _ROTATIONS
+
+    @property
+    def yaw_turn(self) -> float:
+        """Yaw turned over the whole duration, rad."""
+        if self.yaw_turn_rad is not None:
+            return self.yaw_turn_rad
+        return 0.0 if self.path == "waypoints" else 2 * math.pi
 
     @property
     def period(self) -> float | None:
@@ -171,6 +183,14 @@ class TrajectorySettings(Settings):
                 raise SettingError("duration_s", f"is null; path {self.path} needs a duration")
             return
         check_samples(self.duration_s, self.sample_time_s)
+        if self.pause_s:
+            raise SettingError("pause_s", "contradicts duration_s, which leaves what rest there is; set that to null")
+
+    def _check_held(self) -> None:
+        if self.limits.given:
+            raise SettingError("limits", f"hold for moves in space; path {self.path} has those of the key rotation")
+        if self.tilt_max_rad is not None:
+            raise SettingError("tilt_max_rad", f"holds for paths in space; path {self.path} turns all the way round")
 
     def _check_direction(self) -> None:
         if not any(self.direction):
@@ -206,12 +226,8 @@ class TrajectorySettings(Settings):
         line = self.line
         for profile in line.profiles:
             self._check_peaks(profile, "displacement_m" if self.amplitude_m_s5 is None else "amplitude_m_s5")
-        if self.duration_s is None:
-            return
-        needed = self.legs * line.duration
-        if needed > self.duration_s * (1 + 1e-12):
-            message = f"{self.legs} moves of {line.duration:g} s need {needed:g} s; raise it or lower legs"
-            raise SettingError("duration_s", message)
+        if self.duration_s is not None:
+            check_duration(self.legs, self.legs * line.duration, self.duration_s)
 
     def _check_peaks(self, profile: BaseProfile, key: str) -> None:
         peaks = {name: value for name, value in asdict(profile.peaks).items() if name not in _MAY_JUMP}

@@ -12,11 +12,10 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.limit_settings import LimitSettings
 from cpfls_cli.trajectory.moves import Move
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, covering
-from cpfls_cli.trajectory.synchronised import synchronised
+from cpfls_cli.trajectory.synchronised import Synchronisation, synchronised
 from cpfls_cli.trajectory.time_optimal import plan_move
 
 Measure = Literal["along-path", "per-axis"]
-Coordination = Literal["straight-line", "each-axis"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +35,7 @@ class Timing:
     """
 
     limits: LimitSettings
-    coordination: Coordination
+    coordination: Synchronisation
     period: float | None
     holds: Holds
     measure: Measure
@@ -52,7 +51,8 @@ class Shape:
     directions : array, shape (profiles, 3)
         World vector that one metre of each profile moves along.
     limited_by : tuple of str
-        Derivatives that reach their limit on any axis; empty where the move was not planned under limits.
+        Derivatives that reach their limit on any axis, or ``period`` where none does; empty where the move was not
+        planned under limits.
     """
 
     profiles: tuple[BaseProfile, ...]
@@ -124,6 +124,7 @@ def _smooth(moves: tuple[Move, ...], directions: Array) -> Shape:
         if not np.isfinite(move.peaks.snap):
             message = "leave the snap without limit, and with it the acceleration of the attitude; give a limit on"
             raise SettingError("limits", f"{message} snap_m_s4, crackle_m_s5 or pop_m_s6, or a period_s")
-    reached = dict.fromkeys(name for move in moves for name in move.active)
+    # Where no limit is reached, the period that was given decides.
+    reached = dict.fromkeys(name for move in moves for name in move.active) or {"period": None}
     profiles = tuple(move.profile for move in moves)
     return Shape(profiles=profiles, directions=directions, limited_by=tuple(reached))

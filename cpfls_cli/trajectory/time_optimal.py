@@ -73,6 +73,8 @@ def plan_move(displacement: float, limits: Limits, period: float | None = None) 
 
 def _finite(displacement: Array) -> Array:
     covered = np.asarray(displacement, dtype=np.float64)
+    if covered.ndim != 1:
+        raise SettingError("displacement", f"has shape {covered.shape}; give one length for each move")
     if not np.isfinite(covered).all():
         wrong = covered[~np.isfinite(covered)][0]
         raise SettingError("displacement", f"is {wrong:g}; give a finite length in m")

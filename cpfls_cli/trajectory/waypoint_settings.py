@@ -44,7 +44,7 @@ def check_waypoints(waypoints: Sequence[WaypointSettings], paused: bool) -> None
         raise SettingError("waypoints", f"holds {len(waypoints)}; a path needs two or more, here or in a CSV file")
     for number, (before, point) in enumerate(pairwise(waypoints), start=1):
         if before.position_m == point.position_m:
-            message = "repeats the point before; take one of them out, and rest there with pause_s"
+            message = "repeats the point before; take one out: a rest is pause_s, and no turn on the spot is planned"
             raise SettingError(f"waypoints.{number}.position_m", message)
     headings = [point.yaw_rad is None for point in waypoints]
     if len(set(headings)) > 1:

@@ -73,7 +73,15 @@ def test_a_model_learned_on_full_rotations_holds_on_another_one(cpfls, tmp_path,
     assert json.loads(found.stdout)["held_out"]["f2.h5"]["relative_error"] < 1e-8
     report = cpfls("report", study(), tmp_path / "f1.h5", "-o", tmp_path / "r.html")
     assert report.exit_code == 0, report.output
-    assert "turns covered: roll" in (tmp_path / "r.html").read_text()
+    assert "Attitude and Euler rates of f1.h5" in (tmp_path / "r.html").read_text()
+
+
+def test_what_a_held_vehicle_lacks_has_no_noise(cpfls, refuse, tmp_path, study):
+    assert cpfls("trajectory", study(), "-o", tmp_path / "t.h5").exit_code == 0
+    noise = ("--set", "simulation.noise={position: 0.5}")
+    (message,) = refuse("simulate", study(), tmp_path / "t.h5", "-o", tmp_path / "f.h5", *noise)
+    assert "simulation.noise" in message
+    assert "position: a vehicle that is held at its centre of mass has none" in message
 
 
 def test_no_autopilot_flies_a_held_vehicle(cpfls, refuse, tmp_path, study):

@@ -68,6 +68,32 @@ def test_config_and_file_give_the_same_path(cpfls, tmp_path, config, points):
         np.testing.assert_array_equal(mine, other)
 
 
+def test_each_axis_goes_where_it_is_to_go_forwards_or_backwards(cpfls, tmp_path, config):
+    places = np.array([[5, 1, 1], [-2, 1, 4], [-2, 30, 4], [7, -20, 3]], dtype=float)
+    path = tmp_path / "zigzag.csv"
+    path.write_text("x_m,y_m,z_m\n" + "\n".join(",".join(map(str, place)) for place in places) + "\n")
+    asked = ("--set", "trajectory.coordination=each-axis", "--set", "trajectory.displacement_measure=per-axis")
+    uneven = (
+        "--set",
+        "trajectory.limits={velocity_m_s: [4, 3, 2], acceleration_m_s2: 3, snap_m_s4: 20, pop_m_s6: 300}",
+    )
+    result = cpfls(
+        *("trajectory", config, "--waypoints", path, "-o", tmp_path / "t.h5", *uneven, *FREE, *asked, "--json"),
+        *("--set", "trajectory.pause_s=1"),
+    )
+    assert result.exit_code == 0, result.output
+    time, place, _ = position(tmp_path / "t.h5")
+    for leg, end in zip(json.loads(result.stdout)["legs"], places[1:], strict=True):
+        resting = (time > leg["begin_s"] + leg["duration_s"]) & (time < leg["begin_s"] + leg["duration_s"] + 0.9)
+        np.testing.assert_allclose(place[resting], np.tile(end, (resting.sum(), 1)), atol=1e-12)
+        assert resting.any() or end is places[-1]
+    np.testing.assert_allclose(place[-1], places[-1], atol=1e-12)
+    with h5py.File(tmp_path / "t.h5") as file:
+        assert (np.abs(file["velocity"][:]).max(axis=0) <= np.array([4, 3, 2]) * (1 + 1e-12)).all()
+        steps = np.abs(np.diff(place, axis=0)).max(axis=0)
+    assert (steps <= np.array([4, 3, 2]) * 0.05 * (1 + 1e-9)).all()
+
+
 def test_each_axis_takes_the_time_of_the_slowest(cpfls, tmp_path, config, points):
     asked = ("--set", "trajectory.coordination=each-axis", "--set", "trajectory.displacement_measure=per-axis")
     result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *asked)
@@ -85,10 +111,12 @@ def test_each_axis_takes_the_time_of_the_slowest(cpfls, tmp_path, config, points
         ("x_m,y_m,z_m,yaw_deg\n0,0,0,0\n1,1,1,1\n", "column 'yaw_deg' is not known; did you mean yaw_rad?"),
         ("x_m,y_m,z_m\n0,0,0\n", "holds 1; a path needs two or more"),
         ("x_m,y_m,z_m\n0,0,0\n0,0,0\n", ":3: x_m, y_m, z_m: repeats the point before"),
-        ("x_m,y_m,z_m\n0,0,0\n0,nan,1\n", ":3: column 'y_m' = nan: give a finite number"),
+        ("x_m,y_m,z_m\n0,0,0\n0,nan,1\n", ":3: column 'y_m' is empty or not a number: give a finite number"),
         ("x_m,y_m,z_m\n0,0,0\n0,inf,1\n", ":3: column 'y_m' = inf: give a finite number"),
         ("x_m,y_m,z_m,pause_s\n0,0,0,-1\n0,0,1,0\n", ":2: column 'pause_s' = -1: give a finite number, 0 or more"),
         ("x_m,y_m,z_m\n0,0,0\n0,far,1\n", ":3: column 'y_m' = 'far': not a number"),
+        ("x_m,y_m,z_m\n\n0,0,0\n\n1,,0\n", ":5: column 'y_m' is empty or not a number"),
+        ("x_m,y_m,z_m\n\n0,0,0\n\n0,0,0\n", ":5: x_m, y_m, z_m: repeats the point before"),
     ],
 )
 def test_bad_files_are_refused(refuse, tmp_path, config, text, complaint):
@@ -108,7 +136,10 @@ def test_a_duration_too_short_for_the_file_is_refused(refuse, tmp_path, config):
     path = tmp_path / "far.csv"
     path.write_text("x_m,y_m,z_m\n0,0,0\n30,0,0\n0,0,0\n30,0,0\n0,0,0\n")
     (message,) = refuse("trajectory", config, "--waypoints", path, "-o", tmp_path / "t.h5")
-    assert message == "trajectory.duration_s = 54.86: the 4 moves need 64 s; raise it, or set it to null"
+    assert (
+        message
+        == "trajectory.duration_s = 54.86: 4 moves take 64 s; raise it, or set it to null for as long as they take"
+    )
 
 
 @pytest.mark.parametrize(
@@ -145,6 +176,31 @@ def test_tilt_beyond_its_limit_is_refused_or_reported(cpfls, refuse, tmp_path, c
     told = cpfls(*steep, "--set", "trajectory.infeasible=report")
     assert told.exit_code == 0
     assert "tilt of up to 0.18" in told.stderr
+
+
+def test_a_turn_in_yaw_that_is_too_fast_is_named(refuse, tmp_path, config):
+    near = tmp_path / "near.csv"
+    near.write_text("x_m,y_m,z_m\n0,0,0\n3,0,0\n")
+    turn = ("--set", "trajectory.yaw_turn_rad=6.28")
+    messages = refuse(
+        "trajectory", config, "--waypoints", near, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *turn, code=1
+    )
+    assert "it is the turn in yaw: lower trajectory.yaw_turn_rad = 6.28" in messages[-1]
+
+
+def test_a_dry_run_finds_what_the_plan_would(refuse, tmp_path, config):
+    far = tmp_path / "far.csv"
+    far.write_text("x_m,y_m,z_m\n0,0,0\n30,0,0\n0,0,0\n30,0,0\n0,0,0\n")
+    (message,) = refuse("trajectory", config, "--waypoints", far, "-o", tmp_path / "t.h5", "--dry-run")
+    assert "4 moves take 64 s" in message
+    weak = ("--set", "vehicle.rotor_speed_max_rad_s=350")
+    assert refuse("trajectory", config, "-o", tmp_path / "t.h5", "--dry-run", *weak, code=1)
+
+
+def test_a_given_period_that_decides_alone_is_named(cpfls, tmp_path, config):
+    loose = ("--set", "trajectory.limits.pop_m_s6=100", "--set", "trajectory.period_s=1")
+    result = cpfls("trajectory", config, "-o", tmp_path / "t.h5", *loose)
+    assert "leg 1: 64 m in 16 s, limited by period" in result.stdout
 
 
 def test_plot_draws_both_figures(cpfls, refuse, tmp_path, config):

@@ -32,6 +32,9 @@ def point(x, **more):
         ("coordination", {"coordination": "each-axis"}),
         ("displacement_measure", {"limits": LimitSettings(pop_m_s6=1.0), "coordination": "each-axis"}),
         ("duration_s", {"path": "full-rotation", "duration_s": None}),
+        ("limits", {"path": "full-rotation", "limits": LimitSettings(snap_m_s4=1.0)}),
+        ("tilt_max_rad", {"path": "full-rotation", "tilt_max_rad": 0.5}),
+        ("pause_s", {"pause_s": 1.0}),
         ("duration_s", {"limits": LimitSettings(snap_m_s4=1e-3)}),
         ("waypoints", {"path": "waypoints", "waypoints": (point(0),)}),
         ("waypoints.2.position_m", {"path": "waypoints", "waypoints": (point(0), point(1), point(1))}),
@@ -50,7 +53,7 @@ def test_moves_that_fill_the_duration_exactly_are_accepted():
 
 
 def test_message_says_how_long_the_moves_take():
-    with pytest.raises(SettingError, match=r"4 moves of 16 s need 64 s"):
+    with pytest.raises(SettingError, match=r"4 moves take 64 s"):
         TrajectorySettings(legs=4)
 
 
