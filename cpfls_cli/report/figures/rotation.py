@@ -44,7 +44,7 @@ def rotation_figure(name: str, trajectory: Source) -> Plot:
         legend_above(angles)
 
     turns = ", ".join(f"{axis} {np.ptp(degrees[:, index]) / _TURN:.1f}" for index, axis in enumerate(_AXES))
-    caption = f"Attitude and Euler rates of {trajectory.label}; turns covered: {turns}."
+    caption = f"Attitude and Euler rates of {trajectory.label}; range in turns: {turns}."
     return plot(name, caption, "Roll, pitch and yaw on the circle, and their rates, over time", 4.6, draw)
 
 
