@@ -10,6 +10,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale
 from cpfls_cli.identification.judge import Explained
 from cpfls_cli.identification.least_squares import Triangle
+from cpfls_cli.identification.physics import vertical
 from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.rotations import body_acceleration, body_torque, euler_rate_matrix
 
@@ -23,9 +24,9 @@ class AxisEvidence:
     constant : array, shape (3,), N m
         Constant body torque fitted beside the rigid body.
     r2 : array, shape (3,)
-        Share of the body torque explained by both.
+        Share of the body torque explained by both, at samples where the pitch is not vertical; NaN if there are none.
     torque : array, shape (3,), N m
-        Root mean square of the body torque.
+        Root mean square of the body torque at these samples.
     acceleration : array, shape (3,), rad/s^2
         Root mean square of the derivative of the body rates.
     """
@@ -52,14 +53,15 @@ def axis_evidence(source: TorqueSource, rank_tolerance: float) -> AxisEvidence:
     rows = ((_columns(data) * scale[:, None], data.torque * scale) for data in source.chunks())
     triangle = Triangle.of((columns.reshape(-1, columns.shape[2]), torque.reshape(-1)) for columns, torque in rows)
     parameters = triangle.solve(rank_tolerance).coefficients
-    explained, torque, acceleration = Explained(), np.zeros(3), np.zeros(3)
+    explained, count, torque, acceleration = Explained(), 0, np.zeros(3), np.zeros(3)
     for data in source.chunks():
-        motion = data.motion
-        measured = body_torque(motion.attitude, data.torque)
-        explained.add(measured, measured - body_torque(motion.attitude, _columns(data) @ parameters))
-        torque += np.sum(measured**2, axis=0)
+        motion, told = data.motion, ~vertical(data.motion.attitude)
+        by_both = _columns(data) @ parameters
+        measured, found = (body_torque(motion.attitude[told], values[told]) for values in (data.torque, by_both))
+        explained.add(measured, measured - found)
+        count, torque = count + len(measured), torque + np.sum(measured**2, axis=0)
         acceleration += np.sum(body_acceleration(motion.attitude, motion.rate, motion.acceleration) ** 2, axis=0)
-    size = np.sqrt(np.array([torque, acceleration]) / len(source))
+    size = np.sqrt([torque / max(count, 1), acceleration / len(source)])
     return AxisEvidence(parameters[RIGID:], explained.r2, size[0], size[1])
 
 

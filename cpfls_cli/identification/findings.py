@@ -13,7 +13,7 @@ from cpfls_cli.identification.excitation import RuleExcitation
 from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.least_squares import LeastSquares
-from cpfls_cli.identification.physics import why_unphysical
+from cpfls_cli.identification.physics import VERTICAL, why_unphysical
 
 AXES = ("roll", "pitch", "yaw")
 BADLY_EXPLAINED_R2 = 0.5
@@ -46,8 +46,9 @@ class Evidence:
         Inertia stated for the vehicle.
     indefinite : int
         Training samples at which D(q) is not positive definite.
-    samples, outside : mapping of str to int
-        Samples judged, and of them outside the visited attitudes, by part; the training part comes first.
+    samples, outside, vertical : mapping of str to int
+        Samples judged, and of them outside the visited attitudes, and near a pitch of +-90 degrees, by part; the
+        training part comes first.
     scores : mapping of str to mapping of str to Score
         By part, then by model.
     """
@@ -61,6 +62,7 @@ class Evidence:
     indefinite: int
     samples: Mapping[str, int]
     outside: Mapping[str, int]
+    vertical: Mapping[str, int]
     scores: Mapping[str, Mapping[str, Score]]
 
 
@@ -75,8 +77,9 @@ def findings(evidence: Evidence) -> list[str]:
     -------
     list of str
     """
-    rules = (_physics, _scale, _axes, _rank, _silent_rules, _fuzzy_part_off, _beaten, _badly_explained, _outside)
-    return [finding for rule in rules for finding in rule(evidence)]
+    of_the_model = (_physics, _scale, _axes, _rank, _silent_rules, _fuzzy_part_off)
+    of_its_errors = (_beaten, _badly_explained, _outside, _vertical)
+    return [finding for rule in of_the_model + of_its_errors for finding in rule(evidence)]
 
 
 def _physics(evidence: Evidence) -> Iterator[str]:
@@ -87,6 +90,8 @@ def _physics(evidence: Evidence) -> Iterator[str]:
     if evidence.indefinite:
         training = next(iter(evidence.samples.values()))
         share = f"{evidence.indefinite} of {training} training samples"
+        if why is None and np.all(evidence.scores[_training(evidence)]["rigid-body"].r2_body > BADLY_EXPLAINED_R2):
+            remedy = "a rigid body explains this flight, so it is the structure or its excitation that fails"
         yield f"D(q) is not positive definite at {share}: not a model of a body, do not use it; {remedy}"
 
 
@@ -191,3 +196,13 @@ def _outside(evidence: Evidence) -> Iterator[str]:
         if outside:
             samples = evidence.samples[part]
             yield f"{part}: {outside} of {samples} samples lie outside the attitudes that training visited"
+
+
+def _vertical(evidence: Evidence) -> Iterator[str]:
+    """Say which samples the shares of body torque in the other sentences leave out."""
+    left_out = [f"{count} of {evidence.samples[part]} ({part})" for part, count in evidence.vertical.items() if count]
+    if left_out:
+        yield (
+            f"body torque is judged without the samples nearer than {np.degrees(np.arcsin(VERTICAL)):.0f} degrees to a "
+            f"pitch of +-90 degrees, {', '.join(left_out)}: it is divided by cos(pitch), and every error with it"
+        )

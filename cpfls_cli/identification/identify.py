@@ -21,7 +21,7 @@ from cpfls_cli.identification.folds import with_folds
 from cpfls_cli.identification.judge import Score, score_of
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.physics import not_positive_definite
+from cpfls_cli.identification.physics import not_positive_definite, vertical
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import search
@@ -101,9 +101,10 @@ def identify(
         axes=axis_evidence(training, settings.rank_tolerance),
         rigid_body=baselines[0].parameters,
         stated=stated_inertia,
-        indefinite=_count(training, lambda attitude: not_positive_definite(model.inertia(attitude).value)),
+        indefinite=_count(training, lambda attitude: not_positive_definite(model.inertia(attitude).value, attitude)),
         samples={part: len(data) for part, data in parts.items()},
         outside={part: _count(data, model.outside) for part, data in parts.items()},
+        vertical={part: _count(data, vertical) for part, data in parts.items()},
         scores=scores,
     )
     ridge, told = evaluator.solver.curve(model.partitions), tuple(findings(evidence))

@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueData, TorqueSource
+from cpfls_cli.identification.physics import vertical
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.rotations import body_torque
 
@@ -28,7 +29,8 @@ class Score:
     r2 : array, shape (3,)
         Share of the torque's variance explained; NaN for an axis whose torque does not vary.
     r2_body : array, shape (3,)
-        The same for body torque.
+        The same for body torque, at samples where the pitch is not vertical: it is divided by cos(pitch), and errors
+        with it. NaN if no such sample is left.
     """
 
     mse: Array
@@ -93,7 +95,9 @@ class Explained:
         self._mean, self._about_mean, self._error = np.zeros(3), np.zeros(3), np.zeros(3)
 
     def add(self, measured: Array, error: Array) -> None:
-        """Take note of samples; both arrays have the shape (samples, 3)."""
+        """Take note of samples, if any; both arrays have the shape (samples, 3)."""
+        if len(measured) == 0:
+            return
         count, mean = len(measured), np.mean(measured, axis=0)
         both, apart = self._count + count, mean - self._mean
         self._about_mean = self._about_mean + np.sum((measured - mean) ** 2, axis=0)
@@ -122,7 +126,8 @@ class _Sums:
     def add(self, data: TorqueData, predicted: Array) -> None:
         error, attitude = data.torque - predicted, data.motion.attitude
         self._euler.add(data.torque, error)
-        self._body.add(body_torque(attitude, data.torque), body_torque(attitude, error))
+        told = ~vertical(attitude)
+        self._body.add(*(body_torque(attitude[told], torque[told]) for torque in (data.torque, error)))
         self._largest = np.maximum(self._largest, np.max(np.abs(data.torque), axis=0))
         self._largest_error = np.maximum(self._largest_error, np.max(np.abs(error), axis=0))
 

@@ -103,6 +103,12 @@ class Model:
         """
         return outside_visited(self.visited, attitude)
 
+    @property
+    def same_everywhere(self) -> bool:
+        """Whether one rule acts at all attitudes, and training went all the way round in roll and in pitch."""
+        one_rule = all(block.rules == 1 for block in self.structure.blocks)
+        return one_rule and all(self.visited.any(axis=angle).all() for angle in (0, 1))
+
     def _torque(self, motion: Motion) -> Array:
         fuzzy = Regressor(self.structure, motion, self.ranges).torque(self.partitions, self.coefficients)
         return np.asarray(fuzzy + rigid_columns(motion) @ self.rigid_body)

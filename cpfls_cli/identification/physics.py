@@ -7,23 +7,42 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.inertia import symmetric
 
-# Rounding of eigenvalues where a pitch of +-90 degrees makes the inertia matrix singular.
-_ROUNDING = 1e-9
+VERTICAL = 0.1
+"""|cos(pitch)| below which the nose points up or down, so that Euler angles tell little of the body's axes."""
+
+# Shares of the largest eigenvalue. Near a vertical pitch a body's own smallest one is not larger than the second.
+_ROUNDING, _HAIR = 1e-9, 0.01
 
 
-def not_positive_definite(matrices: Array) -> BoolArray:
-    """Flag inertia matrices that no body has.
+def vertical(attitude: Array) -> BoolArray:
+    """Flag attitudes near a pitch of +-90 degrees, where the inertia matrix of every body is all but singular.
+
+    Parameters
+    ----------
+    attitude : array, shape (samples, 3), rad
+
+    Returns
+    -------
+    array of bool, shape (samples,)
+    """
+    return np.asarray(np.abs(np.cos(attitude[:, 1])) < VERTICAL)
+
+
+def not_positive_definite(matrices: Array, attitude: Array) -> BoolArray:
+    """Flag inertia matrices that no body has; near a vertical pitch they may fall short of it by a hair.
 
     Parameters
     ----------
     matrices : array, shape (samples, 3, 3), kg m^2
+    attitude : array, shape (samples, 3), rad
 
     Returns
     -------
     array of bool, shape (samples,)
     """
     eigenvalues = np.linalg.eigvalsh(matrices)
-    return np.asarray(eigenvalues[:, 0] < -_ROUNDING * np.abs(eigenvalues).max(axis=1, initial=0.0))
+    tolerance = np.where(vertical(attitude), _HAIR, _ROUNDING)
+    return np.asarray(eigenvalues[:, 0] < -tolerance * np.abs(eigenvalues).max(axis=1, initial=0.0))
 
 
 def why_unphysical(inertia: Array) -> str | None:

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import score
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.physics import not_positive_definite
+from cpfls_cli.identification.physics import not_positive_definite, vertical
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.stages.extended_file import is_extended
 from cpfls_cli.stages.flight_source import MOTION, flight_motion
@@ -21,6 +21,9 @@ from cpfls_cli.stages.job import Job, Outcome, begin, finish
 from cpfls_cli.stages.model_file import read_model
 from cpfls_cli.stages.predict_extended import extended_prediction
 from cpfls_cli.stages.sources import read_good, read_with
+
+_NO_TRUST = "do not trust the model there"
+_WELL_CONDITIONED = 100.0
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:
@@ -43,13 +46,14 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
             return started.dry_run
         finish(job, PREDICTION, data, started.inputs)
         return _outcome(data)
-    identified = read_model(read_good(model, MODEL), model)
+    artifact = read_good(model, MODEL)
+    identified = read_model(artifact, model)
     source = read_with(flight, FLIGHT, "time", *MOTION)
     if started.dry_run is not None:
         return started.dry_run
     data = _predict(identified, source)
     finish(job, PREDICTION, data, started.inputs)
-    return _outcome(data)
+    return _outcome(data, _trust_outside(identified, artifact))
 
 
 def _predict(model: Model, flight: Artifact) -> dict[str, Any]:
@@ -69,15 +73,26 @@ def _predict(model: Model, flight: Artifact) -> dict[str, Any]:
     return data
 
 
-def _outcome(data: dict[str, Any]) -> Outcome:
+def _trust_outside(model: Model, artifact: Artifact) -> str:
+    """Say what the model is worth at attitudes that training did not visit."""
+    rank, parameters, condition = (
+        float(artifact.array(f"solve/{name}")) for name in ("rank", "parameters", "condition_number")
+    )
+    if model.same_everywhere and rank == parameters and condition <= _WELL_CONDITIONED:
+        return f"the same coefficients hold there, if the structure does, and all are known (condition {condition:.3g})"
+    return _NO_TRUST
+
+
+def _outcome(data: dict[str, Any], trust_outside: str = _NO_TRUST) -> Outcome:
     samples, outside = len(data["time"]), int(np.sum(data["outside"]))
-    indefinite = int(np.sum(not_positive_definite(data["inertia"])))
+    indefinite = int(np.sum(not_positive_definite(data["inertia"], data["attitude"])))
     summary: dict[str, Any] = {"samples": samples, "mse": None, "relative_error": None, "outside": outside}
     summary["not_positive_definite"] = indefinite
     lines = [f"{samples} samples, {outside} outside the region that the training data visited"]
     warnings = []
     if outside:
-        warnings.append(f"{outside} of {samples} samples are extrapolated: do not trust the model there")
+        visited = f"{outside} of {samples} samples lie outside the attitudes that training visited"
+        warnings.append(f"{visited}: {trust_outside}")
     if indefinite:
         warnings.append(f"D(q) is not positive definite at {indefinite} of {samples} samples: no body moves like that")
     if "error" in data:
@@ -89,5 +104,7 @@ def _outcome(data: dict[str, Any]) -> Outcome:
         summary |= {"mse": float(np.mean(judged.mse)), "relative_error": judged.worst_relative_error}
         summary |= {"r2": judged.r2.tolist(), "r2_body": judged.r2_body.tolist()}
         lines.append(f"MSE {summary['mse']:.4g} (N m)^2, relative error {judged.worst_relative_error:.3%} (worst axis)")
-        lines.append("R2 of body torque, roll pitch yaw: " + " ".join(f"{value:.4f}" for value in judged.r2_body))
+        r2, left_out = " ".join(f"{value:.4f}" for value in judged.r2_body), int(np.sum(vertical(attitude)))
+        without = f" (without {left_out} samples near a vertical pitch)" if left_out else ""
+        lines.append(f"R2 of body torque, roll pitch yaw: {r2}{without}")
     return Outcome(summary, tuple(lines), tuple(warnings))

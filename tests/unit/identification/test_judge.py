@@ -35,6 +35,27 @@ def test_body_axes():
     np.testing.assert_allclose(judged.r2_body, judged.r2[[0, 2, 1]], rtol=1e-12)
 
 
+def test_body_torque_is_judged_where_the_pitch_is_not_vertical():
+    """Near +-90 degrees it is divided by next to nothing: one such sample would outweigh all others."""
+    rng = np.random.default_rng(7)
+    attitude, torque, error = rng.uniform(-1.2, 1.2, (40, 3)), *rng.standard_normal((2, 40, 3))
+    rest, steep = np.arange(40) != 5, attitude.copy()
+    steep[5, 1] = np.pi / 2 - 1e-7
+    judged = score(level(torque, steep), torque + 0.1 * error)
+    others = score(level(torque[rest], steep[rest]), (torque + 0.1 * error)[rest])
+    np.testing.assert_allclose(judged.r2_body, others.r2_body)
+    assert np.all(judged.r2_body > 0.8)
+    assert not np.array_equal(judged.mse, others.mse)
+
+
+@pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2 + 0.05, 4.7])
+def test_a_flight_at_a_vertical_pitch_tells_nothing_of_body_torque(pitch):
+    torque = np.random.default_rng(8).standard_normal((5, 3))
+    judged = score(level(torque, np.tile([0.3, pitch, 0.0], (5, 1))), 0.9 * torque)
+    assert np.isnan(judged.r2_body).all()
+    assert np.all(judged.r2 > 0.5)
+
+
 @pytest.mark.parametrize(
     ("torque", "samples", "message"),
     [

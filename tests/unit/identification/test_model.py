@@ -87,3 +87,21 @@ def test_attitudes_outside_training_are_flagged(case):
     model, motion = case
     assert not model.outside(motion.attitude).any()
     assert model.outside(np.random.default_rng(20).uniform(-np.pi, np.pi, (500, 3))).any()
+
+
+def test_one_rule_learned_all_round_the_circle_is_the_same_everywhere():
+    circle = np.linspace(-np.pi, np.pi, 200)
+    round_both = np.column_stack([circle, 2 * circle, 0 * circle])
+    near_hover, round_roll = 0.1 * round_both, round_both * [1.0, 0.1, 1.0]
+
+    def model(attitude, functions):
+        structure = model_structure(StructureSettings(membership_functions=functions))
+        partitions = decode(structure, np.ones(structure.genes))
+        ranges, visited = data_ranges(structure, attitude), visited_cells([attitude])
+        return Model(structure, ranges, partitions, np.zeros(structure.parameters), np.ones(6), visited)
+
+    assert model(round_both, 1).same_everywhere
+    assert model(round_both, 1).outside(np.array([[0.0, 2.0, 0.0]])).all()
+    assert not model(round_both, 3).same_everywhere
+    assert not model(near_hover, 1).same_everywhere
+    assert not model(round_roll, 1).same_everywhere
