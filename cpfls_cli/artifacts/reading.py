@@ -69,6 +69,30 @@ def format_name(path: Path) -> str | None:
         return None
 
 
+def read_header(path: Path) -> Header:
+    """Read where an artifact comes from, and none of its data.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Header
+
+    Raises
+    ------
+    InputError
+        If the file is not a good artifact.
+    """
+    with _open(path) as file:
+        try:
+            _identify(path, file)
+            return _read_header(file)
+        except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError) as error:
+            raise InputError(f"{path}: damaged: {_one_line(error)}") from None
+
+
 @contextmanager
 def _open(path: Path) -> Iterator[h5py.File]:
     if not path.exists():

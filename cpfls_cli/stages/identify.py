@@ -27,6 +27,7 @@ from cpfls_cli.stages.flight_source import flight_source
 from cpfls_cli.stages.job import Job, Outcome, finish
 from cpfls_cli.stages.model_file import model_data
 from cpfls_cli.stages.resumable import SearchOptions, Watch, begin_search
+from cpfls_cli.stages.same_vehicle import other_vehicles
 from cpfls_cli.stages.stopped import stopped, without_model
 from cpfls_cli.stages.study import generator, settings_of
 from cpfls_cli.stages.training import TrainingData, flight_roles, read_training
@@ -66,6 +67,7 @@ def run(
     with settings_of("identification", job.study):
         require_flights(job.study.identification.choice, given=kept is not None)
     held_out = held_out_parts(job.study, data.rests, started.inputs, validate)
+    others = other_vehicles([*choose_on, *validate], job.study)
     if started.dry_run is not None:
         return started.dry_run
     clock = time.perf_counter()
@@ -78,7 +80,7 @@ def run(
     with search.kept():
         finish(job, MODEL, model_data(result, job.study.identification.base, data.indices), started.inputs)
     search.end(result.stop_reason)
-    outcome = _outcome(job, result, len(data.learned), time.perf_counter() - clock)
+    outcome = _outcome(job, result, len(data.learned), time.perf_counter() - clock, others)
     return stopped(outcome, result.stop_reason, watch.signal, job.output)
 
 
@@ -196,7 +198,7 @@ def _note(step: SearchStep) -> str:
     return f"{generation}  best error {step.best[0]:.3g}, max {step.best[1]:.3g} N m, cond {step.best[2]:.4g}"
 
 
-def _outcome(job: Job, result: Identification, learned: int, seconds: float) -> Outcome:
+def _outcome(job: Job, result: Identification, learned: int, seconds: float, others: tuple[str, ...]) -> Outcome:
     training = result.scores["training"]
     held_out = {part: scores for part, scores in result.scores.items() if part != "training"}
     baselines = [name for name in training if name != "model"]
@@ -236,7 +238,7 @@ def _outcome(job: Job, result: Identification, learned: int, seconds: float) -> 
         "seconds": round(seconds, 3),
     }
     stall = job.study.identification.stall_generations
-    return Outcome(summary, tuple(_lines(result, learned, stall)), result.findings)
+    return Outcome(summary, tuple(_lines(result, learned, stall)), (*others, *result.findings))
 
 
 def _score_summary(score: Score) -> dict[str, Any]:

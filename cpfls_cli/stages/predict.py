@@ -75,9 +75,7 @@ def _predict(model: Model, flight: Artifact) -> dict[str, Any]:
 
 def _trust_outside(model: Model, artifact: Artifact) -> str:
     """Say what the model is worth at attitudes that training did not visit."""
-    rank, parameters, condition = (
-        float(artifact.array(f"solve/{name}")) for name in ("rank", "parameters", "condition_number")
-    )
+    rank, parameters, condition = (artifact.number(f"solve/{n}") for n in ("rank", "parameters", "condition_number"))
     if model.same_everywhere and rank == parameters and condition <= _WELL_CONDITIONED:
         return f"the same coefficients hold there, if the structure does, and all are known (condition {condition:.3g})"
     return _NO_TRUST

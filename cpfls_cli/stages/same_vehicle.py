@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.reading import read_header
+from cpfls_cli.artifacts.records import Artifact, Header
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -28,14 +30,11 @@ def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettin
     InputError
         Naming the keys that differ.
     """
-    different = [f.name for f in fields(own) if getattr(own, f.name) != getattr(wanted, f.name)]
+    different = _different(own, wanted)
     if different:
-        first = different[0]
-        values = "" if first == "rotors" else f" ({getattr(own, first)} there, {getattr(wanted, first)} in the config)"
-        keys = ", ".join([f"vehicle.{first}{values}", *(f"vehicle.{name}" for name in different[1:])])
         raise InputError(
-            f"{path}: was made with another vehicle; not the same: {keys}; use the config of that vehicle, or make the "
-            "file again"
+            f"{path}: was made with another vehicle; not the same: {different}; use the config of that vehicle, or "
+            "make the file again"
         )
 
 
@@ -52,6 +51,48 @@ def require_vehicle_of(path: Path, artifact: Artifact, study: Study) -> None:
     ------
     InputError
     """
+    require_same_vehicle(path, _vehicle_of(path, artifact.header), study.vehicle)
+
+
+def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
+    """Name flights that were made with another vehicle than that of the config.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        That judge a model, or choose it; one whose config this version cannot read is passed over.
+    study : Study
+
+    Returns
+    -------
+    tuple of str
+        A sentence for each.
+    """
+    found = [(path, _difference_of(path, study)) for path in dict.fromkeys(paths)]
+    return tuple(
+        f"{path}: was made with another vehicle; not the same: {different}; what it says of the model is of that one"
+        for path, different in found
+        if different
+    )
+
+
+def _difference_of(path: Path, study: Study) -> str:
+    try:
+        return _different(_vehicle_of(path, read_header(path)), study.vehicle)
+    except ConfigError:
+        return ""
+
+
+def _vehicle_of(path: Path, header: Header) -> VehicleSettings:
     source = f"{path}: /config"
-    own = validate(parse_config(artifact.header.config, source), source)
-    require_same_vehicle(path, own.vehicle, study.vehicle)
+    return validate(parse_config(header.config, source), source).vehicle
+
+
+def _different(own: VehicleSettings, wanted: VehicleSettings) -> str:
+    """Name the keys that differ, the first with its values; empty where none does."""
+    different = [f.name for f in fields(own) if getattr(own, f.name) != getattr(wanted, f.name)]
+    if not different:
+        return ""
+    first = different[0]
+    values = "" if first == "rotors" else f" ({getattr(own, first)} there, {getattr(wanted, first)} in the config)"
+    return ", ".join([f"vehicle.{first}{values}", *(f"vehicle.{name}" for name in different[1:])])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.artifacts.output import check_output
@@ -19,6 +20,7 @@ from cpfls_cli.stages.checkpoint import Checkpoint
 from cpfls_cli.stages.identify import input_roles
 from cpfls_cli.stages.job import Job, Outcome, dry_run, finish, header_of, take_inputs
 from cpfls_cli.stages.resumable import Resumable, SearchOptions, Watch
+from cpfls_cli.stages.same_vehicle import other_vehicles
 from cpfls_cli.stages.state_file import StoppedSearch
 from cpfls_cli.stages.stopped import stopped
 from cpfls_cli.stages.study import generator, settings_of
@@ -61,6 +63,7 @@ def run(
     left = partial.take_up(resume=options.resume, force=job.force)
     check_output(job.output, job.force or (options.resume and partial.output_may_be_replaced()))
     plan = sweep_plan(job, flights, validate, inputs, choose_on)
+    others = other_vehicles([*choose_on, *validate], job.study)
     if (checked := dry_run(job)) is not None:
         return checked
     clock, watch = time.perf_counter(), Watch(job, options.time_limit_s)
@@ -70,7 +73,9 @@ def run(
         finish(job, SWEEP, data, inputs)
     if is_end(reason):
         partial.remove()
-    return stopped(sweep_outcome(data, plan.runs, time.perf_counter() - clock), reason, watch.signal, job.output)
+    outcome = sweep_outcome(data, plan.runs, time.perf_counter() - clock)
+    outcome = replace(outcome, warnings=(*others, *outcome.warnings))
+    return stopped(outcome, reason, watch.signal, job.output)
 
 
 def _all_runs(

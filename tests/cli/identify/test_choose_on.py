@@ -77,3 +77,21 @@ def test_what_is_no_flight_cannot_choose(refuse, study, pipeline, tmp_path):
     (message,) = refuse("identify", study, pipeline.flight, *words)
     assert str(pipeline.selection) in message
     assert "flight" in message
+
+
+@pytest.mark.parametrize("command", ["identify", "sweep"])
+def test_flights_of_another_vehicle_are_named(cpfls, study, pipeline, others, tmp_path, command):
+    """Their numbers are of that vehicle; they are used all the same."""
+    heavy, config = tmp_path / "heavy.h5", study
+    path = others[0].with_name(others[0].name.replace("flight", "trajectory"))
+    inertia = ("--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]")
+    assert cpfls("simulate", study, path, *inertia, "-o", heavy).exit_code == 0
+    if command == "sweep":
+        config = tmp_path / "sweep.yaml"
+        config.write_text(f"{study.read_text()}sweep: {json.dumps({'seeds': 1, 'settings': [{'name': 'plain'}]})}\n")
+    words = (command, config, pipeline.flight, *HELD_OUT, *SEARCH, "--choose-on", heavy, "--validate", others[1])
+    result = cpfls(*words, "-o", tmp_path / "out.h5")
+    assert result.exit_code == 0, result.stderr
+    said = [line for line in result.stderr.splitlines() if "another vehicle" in line]
+    assert len(said) == 1
+    assert f"{heavy}: was made with another vehicle; not the same: vehicle.inertia_kg_m2" in said[0]
