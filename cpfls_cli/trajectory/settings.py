@@ -43,7 +43,7 @@ class TrajectorySettings(Settings):
         tuple[float, float, float],
         Doc("direction of a straight path, world frame with z up; any length but zero"),
     ] = (1.0, 1.0, 1.0)
-    legs: Annotated[int, Ge(1), Le(100_000), Doc("number of moves to and fro: out, back, out, ...")] = 3
+    legs: Annotated[int, Ge(1), Le(10_000), Doc("number of moves to and fro: out, back, out, ...")] = 3
     displacement_m: Annotated[
         float | None,
         Doc("displacement of a move to or fro, m; null when amplitude_m_s5 is given"),
