@@ -13,8 +13,8 @@ _DIGITS = 4
 _SMALLEST, _LARGEST = -4, 6
 """Powers of ten between which no power is written."""
 
-_FEWEST, _MOST = 2, 12
-"""Significant digits."""
+_FEWEST, _MOST = 2, 15
+"""Significant digits; a number holds fifteen."""
 
 
 def with_interval(value: float, low: float, high: float) -> tuple[str, str, str]:
