@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
@@ -12,18 +12,16 @@ from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
-from cpfls_cli.trajectory.clock import check_duration, check_samples
+from cpfls_cli.trajectory.consistency import check_consistency
 from cpfls_cli.trajectory.limit_settings import LimitSettings
 from cpfls_cli.trajectory.profile import BaseProfile, Holds
 from cpfls_cli.trajectory.rotation_settings import RotationSettings
 from cpfls_cli.trajectory.shapes import Shape, Timing, shape_of, unit_of
-from cpfls_cli.trajectory.waypoint_settings import WaypointSettings, check_waypoints
+from cpfls_cli.trajectory.waypoint_settings import WaypointSettings
 
 PathKind = Literal["cube-diagonal", "straight", "waypoints", "full-rotation", "optimised"]
 
-_LARGEST_PEAK = 1e100
 _USUAL_PERIOD = 1.0
-_MAY_JUMP = ("crackle", "pop")
 _ROTATIONS = ("full-rotation", "optimised")
 
 
@@ -114,19 +112,7 @@ class TrajectorySettings(Settings):
         SettingError
             If the direction, the size of a move, its limits or the time it needs contradicts another setting.
         """
-        self._check_clock()
-        if self.held:
-            self._check_held()
-            return
-        self._check_direction()
-        self._check_limits()
-        if self.path == "waypoints":
-            # None at all may still come with a file.
-            if self.waypoints:
-                check_waypoints(self.waypoints, self.duration_s is None)
-            return
-        self._check_size()
-        self._check_moves()
+        check_consistency(self)
 
     @property
     def held(self) -> bool:
@@ -176,63 +162,3 @@ class TrajectorySettings(Settings):
         if self.displacement_m is None:
             raise SettingError("displacement_m", "is missing")
         return shape_of(self.displacement_m * unit, self.timing)
-
-    def _check_clock(self) -> None:
-        if self.duration_s is None:
-            if self.held:
-                raise SettingError("duration_s", f"is null; path {self.path} needs a duration")
-            return
-        check_samples(self.duration_s, self.sample_time_s)
-        if self.pause_s:
-            raise SettingError("pause_s", "contradicts duration_s, which leaves what rest there is; set that to null")
-
-    def _check_held(self) -> None:
-        if self.limits.given:
-            raise SettingError("limits", f"hold for moves in space; path {self.path} has those of the key rotation")
-        if self.tilt_max_rad is not None:
-            raise SettingError("tilt_max_rad", f"holds for paths in space; path {self.path} turns all the way round")
-
-    def _check_direction(self) -> None:
-        if not any(self.direction):
-            raise SettingError("direction", "has length zero; give at least one component that is not 0")
-        if self.path == "cube-diagonal" and len(set(self.direction)) > 1:
-            message = "a cube-diagonal moves along (1, 1, 1); use path: straight for another direction"
-            raise SettingError("direction", message)
-
-    def _check_limits(self) -> None:
-        if not self.limits.given:
-            if self.coordination == "each-axis":
-                raise SettingError("coordination", "each-axis plans under limits; give some, or use straight-line")
-            return
-        given = [key for key, value in asdict(self.holds).items() if value]
-        if given:
-            raise SettingError(f"hold_{given[0]}_s", "contradicts limits, which choose the holds; set it to 0")
-        if self.amplitude_m_s5 is not None:
-            raise SettingError("amplitude_m_s5", "contradicts limits, which choose it; set it to null")
-        if self.coordination == "each-axis" and self.displacement_measure == "along-path":
-            message = "along-path has no meaning where every axis is planned by itself; use per-axis"
-            raise SettingError("displacement_measure", message)
-
-    def _check_size(self) -> None:
-        given = {"displacement_m": self.displacement_m, "amplitude_m_s5": self.amplitude_m_s5}
-        if (self.displacement_m is None) == (self.amplitude_m_s5 is None):
-            message = "give either displacement_m or amplitude_m_s5, and set the other to null"
-            raise SettingError("amplitude_m_s5", message)
-        for key, value in given.items():
-            if value is not None and value <= 0:
-                raise SettingError(key, "must be greater than 0")
-
-    def _check_moves(self) -> None:
-        line = self.line
-        for profile in line.profiles:
-            self._check_peaks(profile, "displacement_m" if self.amplitude_m_s5 is None else "amplitude_m_s5")
-        if self.duration_s is not None:
-            check_duration(self.legs, self.legs * line.duration, self.duration_s)
-
-    def _check_peaks(self, profile: BaseProfile, key: str) -> None:
-        peaks = {name: value for name, value in asdict(profile.peaks).items() if name not in _MAY_JUMP}
-        name, value = max(peaks.items(), key=lambda peak: peak[1])
-        # The attitude multiplies up to three of them, and the largest number is 1.8e308.
-        if not value < _LARGEST_PEAK:
-            message = f"a move with period_s = {profile.period:g} has {name} up to {value:.3g} in m and s: too large to"
-            raise SettingError(key, f"{message} compute with; lower it, or raise period_s")

@@ -26,6 +26,7 @@ def point(x, **more):
         ("displacement_m", {"displacement_m": 1e300}),
         ("displacement_m", {"period_s": 1e-70}),
         ("amplitude_m_s5", {"displacement_m": None, "amplitude_m_s5": 1e306}),
+        ("amplitude_m_s5", {"displacement_m": None, "amplitude_m_s5": 1.0, "period_s": 1e-80}),
         ("hold_jerk_s", {"limits": LimitSettings(snap_m_s4=1.0), "hold_jerk_s": 0.1}),
         ("amplitude_m_s5", {"limits": LimitSettings(pop_m_s6=1.0), "displacement_m": None, "amplitude_m_s5": 1.0}),
         ("limits", {"limits": LimitSettings(velocity_m_s=1.0, acceleration_m_s2=1.0, jerk_m_s3=1.0)}),

@@ -1,0 +1,115 @@
+"""Rules between the settings of a path."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from cpfls_cli.errors import SettingError
+from cpfls_cli.trajectory.clock import check_duration, check_samples
+from cpfls_cli.trajectory.profile import BaseProfile
+from cpfls_cli.trajectory.waypoint_settings import check_waypoints
+
+if TYPE_CHECKING:
+    from cpfls_cli.trajectory.settings import TrajectorySettings
+
+_LARGEST_PEAK = 1e100
+_MAY_JUMP = ("crackle", "pop")
+
+
+def check_consistency(settings: TrajectorySettings) -> None:
+    """Refuse combinations that do not describe a path.
+
+    Parameters
+    ----------
+    settings : TrajectorySettings
+
+    Raises
+    ------
+    SettingError
+        If the direction, the size of a move, its limits or the time it needs contradicts another setting.
+    """
+    _check_clock(settings)
+    if settings.held:
+        _check_held(settings)
+        return
+    _check_direction(settings)
+    _check_limits(settings)
+    if settings.path == "waypoints":
+        # None at all may still come with a file.
+        if settings.waypoints:
+            check_waypoints(settings.waypoints, settings.duration_s is None)
+        return
+    _check_size(settings)
+    _check_moves(settings)
+
+
+def _check_clock(settings: TrajectorySettings) -> None:
+    if settings.duration_s is None:
+        if settings.held:
+            raise SettingError("duration_s", f"is null; path {settings.path} needs a duration")
+        return
+    check_samples(settings.duration_s, settings.sample_time_s)
+    if settings.pause_s:
+        raise SettingError("pause_s", "contradicts duration_s, which leaves what rest there is; set that to null")
+
+
+def _check_held(settings: TrajectorySettings) -> None:
+    if settings.limits.given:
+        raise SettingError("limits", f"hold for moves in space; path {settings.path} has those of the key rotation")
+    if settings.tilt_max_rad is not None:
+        raise SettingError("tilt_max_rad", f"holds for paths in space; path {settings.path} turns all the way round")
+
+
+def _check_direction(settings: TrajectorySettings) -> None:
+    if not any(settings.direction):
+        raise SettingError("direction", "has length zero; give at least one component that is not 0")
+    if settings.path == "cube-diagonal" and len(set(settings.direction)) > 1:
+        message = "a cube-diagonal moves along (1, 1, 1); use path: straight for another direction"
+        raise SettingError("direction", message)
+
+
+def _check_limits(settings: TrajectorySettings) -> None:
+    if not settings.limits.given:
+        if settings.coordination == "each-axis":
+            raise SettingError("coordination", "each-axis plans under limits; give some, or use straight-line")
+        return
+    given = [key for key, value in asdict(settings.holds).items() if value]
+    if given:
+        raise SettingError(f"hold_{given[0]}_s", "contradicts limits, which choose the holds; set it to 0")
+    if settings.amplitude_m_s5 is not None:
+        raise SettingError("amplitude_m_s5", "contradicts limits, which choose it; set it to null")
+    if settings.coordination == "each-axis" and settings.displacement_measure == "along-path":
+        message = "along-path has no meaning where every axis is planned by itself; use per-axis"
+        raise SettingError("displacement_measure", message)
+
+
+def _check_size(settings: TrajectorySettings) -> None:
+    given = {"displacement_m": settings.displacement_m, "amplitude_m_s5": settings.amplitude_m_s5}
+    if (settings.displacement_m is None) == (settings.amplitude_m_s5 is None):
+        message = "give either displacement_m or amplitude_m_s5, and set the other to null"
+        raise SettingError("amplitude_m_s5", message)
+    for key, value in given.items():
+        if value is not None and value <= 0:
+            raise SettingError(key, "must be greater than 0")
+
+
+def _check_moves(settings: TrajectorySettings) -> None:
+    line = settings.line
+    for profile in line.profiles:
+        _check_peaks(profile, "displacement_m" if settings.amplitude_m_s5 is None else "amplitude_m_s5")
+    if settings.duration_s is not None:
+        check_duration(settings.legs, settings.legs * line.duration, settings.duration_s)
+
+
+def _check_peaks(profile: BaseProfile, key: str) -> None:
+    if not profile.displacement:
+        raise SettingError(
+            key, f"with period_s = {profile.period:g} makes a move too short for numbers to hold; raise it"
+        )
+    peaks = {name: value for name, value in asdict(profile.peaks).items() if name not in _MAY_JUMP}
+    name, value = max(peaks.items(), key=lambda peak: peak[1])
+    # The attitude multiplies up to three of them, and the largest number is 1.8e308.
+    if not value < _LARGEST_PEAK:
+        message = f"a move with period_s = {profile.period:g} has {name} up to {value:.3g} in m and s: too large to"
+        raise SettingError(key, f"{message} compute with; lower it, or raise period_s")
