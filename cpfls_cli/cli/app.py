@@ -141,6 +141,8 @@ def trajectory(
     common: Common,
 ) -> None:
     """Plan a smooth path, or full rotations that excite a model."""
+    if waypoints is not None:
+        common = replace(common, overrides=[*(common.overrides or []), "trajectory.path=waypoints"])
 
     def call(job: Job) -> Outcome:
         from cpfls_cli.stages import trajectory as stage

@@ -51,6 +51,8 @@ def _first(trajectory: Artifact) -> tuple[slice, Array]:
         begin, end = (float(trajectory.array(f"leg/{which}")[0]) for which in ("begin", "end"))
         first, last = np.searchsorted(trajectory.array("time"), [begin, end])
         along = trajectory.array("leg/displacement")[0]
+        # Divided by the largest component first: the square of a tiny one is zero.
+        along = along / np.abs(along).max()
         return slice(int(first), int(last) + 1), along / np.linalg.norm(along)
     away = trajectory.array("position") - trajectory.array("position")[0]
     farthest = away[np.argmax(np.linalg.norm(away, axis=1))]

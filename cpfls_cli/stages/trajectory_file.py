@@ -12,6 +12,7 @@ import numpy as np
 from cpfls_cli.artifacts.formats import TRAJECTORY
 from cpfls_cli.excitation.optimise import Excitation
 from cpfls_cli.simulation.flyable import Flyability
+from cpfls_cli.stages.flyable_check import Checked
 from cpfls_cli.stages.job import Outcome
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planned import PlannedRotation, Trajectory
@@ -43,17 +44,14 @@ def trajectory_data(planned: PlannedRotation) -> dict[str, Any]:
     }
 
 
-def trajectory_outcome(
-    planned: PlannedRotation, found: Flyability, problems: tuple[str, ...], figures: tuple[Path, ...]
-) -> Outcome:
+def trajectory_outcome(planned: PlannedRotation, checked: Checked, figures: tuple[Path, ...]) -> Outcome:
     """Describe a plan.
 
     Parameters
     ----------
     planned : PlannedRotation
-    found : Flyability
-    problems : tuple of str
-        What is asked of the vehicle beyond what it has.
+    checked : Checked
+        What it asks of the vehicle.
     figures : tuple of Path
         Pictures that were drawn.
 
@@ -61,6 +59,7 @@ def trajectory_outcome(
     -------
     Outcome
     """
+    found, problems = checked.found, checked.problems
     common: dict[str, Any] = {
         "figures": [str(path) for path in figures],
         "samples": len(planned.time),

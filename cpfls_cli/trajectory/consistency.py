@@ -29,9 +29,10 @@ def check_consistency(settings: TrajectorySettings) -> None:
     SettingError
         If the direction, the size of a move, its limits or the time it needs contradicts another setting.
     """
-    _check_clock(settings)
     if settings.held:
         _check_held(settings)
+    _check_clock(settings)
+    if settings.held:
         return
     _check_direction(settings)
     _check_limits(settings)
@@ -39,6 +40,9 @@ def check_consistency(settings: TrajectorySettings) -> None:
         # None at all may still come with a file.
         if settings.waypoints:
             check_waypoints(settings.waypoints, settings.duration_s is None)
+        if settings.amplitude_m_s5 is not None:
+            message = "has no meaning through waypoints, whose distances choose it; set it to null"
+            raise SettingError("amplitude_m_s5", message)
         return
     _check_size(settings)
     _check_moves(settings)
@@ -55,6 +59,8 @@ def _check_clock(settings: TrajectorySettings) -> None:
 
 
 def _check_held(settings: TrajectorySettings) -> None:
+    if settings.pause_s:
+        raise SettingError("pause_s", f"has no meaning on path {settings.path}, which never rests; set it to 0")
     if settings.limits.given:
         raise SettingError("limits", f"hold for moves in space; path {settings.path} has those of the key rotation")
     if settings.tilt_max_rad is not None:
@@ -97,12 +103,24 @@ def _check_size(settings: TrajectorySettings) -> None:
 def _check_moves(settings: TrajectorySettings) -> None:
     line = settings.line
     for profile in line.profiles:
-        _check_peaks(profile, "displacement_m" if settings.amplitude_m_s5 is None else "amplitude_m_s5")
+        check_peaks(profile, "displacement_m" if settings.amplitude_m_s5 is None else "amplitude_m_s5")
     if settings.duration_s is not None:
         check_duration(settings.legs, settings.legs * line.duration, settings.duration_s)
 
 
-def _check_peaks(profile: BaseProfile, key: str) -> None:
+def check_peaks(profile: BaseProfile, key: str) -> None:
+    """Refuse a move that numbers cannot hold.
+
+    Parameters
+    ----------
+    profile : BaseProfile
+    key : str
+        Setting that made it so.
+
+    Raises
+    ------
+    SettingError
+    """
     if not profile.displacement:
         raise SettingError(
             key, f"with period_s = {profile.period:g} makes a move too short for numbers to hold; raise it"

@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.trajectory.clock import check_duration, check_samples
+from cpfls_cli.trajectory.consistency import check_peaks
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.trajectory.shapes import Shape, shape_of
@@ -78,7 +79,10 @@ def _to_and_fro(settings: TrajectorySettings) -> list[Shape]:
 def _between_waypoints(settings: TrajectorySettings) -> list[Shape]:
     check_waypoints(settings.waypoints, settings.duration_s is None)
     points = [np.array(waypoint.position_m) for waypoint in settings.waypoints]
-    return [shape_of(end - start, settings.timing) for start, end in pairwise(points)]
+    shapes = [shape_of(end - start, settings.timing) for start, end in pairwise(points)]
+    for profile in (profile for shape in shapes for profile in shape.profiles):
+        check_peaks(profile, "limits" if settings.limits.given else "period_s")
+    return shapes
 
 
 def _start(settings: TrajectorySettings) -> tuple[Array, list[float] | None]:

@@ -49,7 +49,7 @@ def _path(trajectory: Source, index: int, paper: bool) -> Iterator[Block]:
 def _peaks(trajectory: Source, index: int, paper: bool) -> Table:
     found = peaks(trajectory.artifact)
     rows = [
-        [name, unit, number(found[name]), *([printed] if paper else [])]
+        [name, unit, _peak(name, found), *([printed] if paper else [])]
         for name, unit, printed in zip(DERIVATIVES, UNITS, _PRINTED, strict=True)
     ]
     caption = f"Largest length of each derivative at the samples of {trajectory.label}, along the path."
@@ -57,6 +57,11 @@ def _peaks(trajectory: Source, index: int, paper: bool) -> Table:
         caption += " The paper prints its maxima for intervals of P = 1 s."
     header = ("Derivative", "Unit", "Largest", *(("Paper",) if paper else ()))
     return Table(f"peaks-{index}", caption, header, rows, frozenset({0, 1}))
+
+
+def _peak(name: str, found: dict[str, float]) -> str:
+    """Write a peak; above a snap that jumps there is nothing at the samples, and no bound between them."""
+    return "no bound" if name in ("crackle", "pop") and not found[name] and found["snap"] else number(found[name])
 
 
 def _legs(trajectory: Source, index: int) -> Table:

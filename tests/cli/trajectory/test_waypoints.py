@@ -188,6 +188,50 @@ def test_a_turn_in_yaw_that_is_too_fast_is_named(refuse, tmp_path, config):
     assert "it is the turn in yaw: lower trajectory.yaw_turn_rad = 6.28" in messages[-1]
 
 
+def test_a_turn_between_points_that_is_too_fast_is_named(refuse, tmp_path, config):
+    points = "[{position_m: [0,0,0], yaw_rad: 0}, {position_m: [60,0,0], yaw_rad: 40}]"
+    asked = ("--set", "trajectory.path=waypoints", "--set", f"trajectory.waypoints={points}")
+    messages = refuse("trajectory", config, "-o", tmp_path / "t.h5", *asked, code=1)
+    assert "it is the turn in yaw: lower trajectory.waypoints: their yaw_rad" in messages[-1]
+
+
+def test_what_lies_between_two_samples_is_checked_too(refuse, tmp_path, config):
+    short = (
+        "--set",
+        "trajectory.period_s=0.1",
+        "--set",
+        "trajectory.duration_s=8",
+        "--set",
+        "trajectory.path=straight",
+    )
+    level = ("--set", "trajectory.direction=[1, 0, 0]", "--set", "trajectory.yaw_turn_rad=0")
+    coarse = ("--set", "trajectory.sample_time_s=0.8", "--set", "trajectory.displacement_m=0.64")
+    command = ("trajectory", config, "-o", tmp_path / "t.h5", *short, *level, *coarse)
+    messages = refuse(*command, "--set", "trajectory.tilt_max_rad=0.2", code=1)
+    # Two metres per second squared at P = 1 s are 2 * 0.64 / 64 / P^2 here: 1.1 rad from the vertical.
+    assert messages[0].startswith("tilt of up to 1.1")
+
+
+def test_a_move_too_short_to_be_looked_at_is_refused(refuse, tmp_path, config):
+    short = ("--set", "trajectory.period_s=1e-5", "--set", "trajectory.displacement_m=1e-12")
+    (message,) = refuse("trajectory", config, "-o", tmp_path / "t.h5", *short)
+    assert "trajectory.sample_time_s = 0.05: moves have parts of 1e-05 s" in message
+
+
+def test_waypoints_that_numbers_cannot_hold_are_refused(refuse, tmp_path, config):
+    points = "[{position_m: [0, 0, 0]}, {position_m: [1e300, 0, 0]}]"
+    asked = ("--set", "trajectory.path=waypoints", "--set", f"trajectory.waypoints={points}")
+    (message,) = refuse("trajectory", config, "-o", tmp_path / "t.h5", *asked)
+    assert "trajectory.period_s" in message
+    assert "too large to compute with" in message
+
+
+def test_a_file_replaces_a_path_that_could_not_be_planned(cpfls, tmp_path, config, points):
+    replaced = ("--set", "trajectory.path=optimised")
+    result = cpfls("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *replaced)
+    assert result.exit_code == 0, result.output
+
+
 def test_a_dry_run_finds_what_the_plan_would(refuse, tmp_path, config):
     far = tmp_path / "far.csv"
     far.write_text("x_m,y_m,z_m\n0,0,0\n30,0,0\n0,0,0\n30,0,0\n0,0,0\n")

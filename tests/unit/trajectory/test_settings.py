@@ -36,6 +36,8 @@ def point(x, **more):
         ("limits", {"path": "full-rotation", "limits": LimitSettings(snap_m_s4=1.0)}),
         ("tilt_max_rad", {"path": "full-rotation", "tilt_max_rad": 0.5}),
         ("pause_s", {"pause_s": 1.0}),
+        ("pause_s", {"path": "full-rotation", "pause_s": 1.0}),
+        ("amplitude_m_s5", {"path": "waypoints", "waypoints": (point(0), point(1)), "amplitude_m_s5": 1.0}),
         ("duration_s", {"limits": LimitSettings(snap_m_s4=1e-3)}),
         ("waypoints", {"path": "waypoints", "waypoints": (point(0),)}),
         ("waypoints.2.position_m", {"path": "waypoints", "waypoints": (point(0), point(1), point(1))}),
