@@ -196,20 +196,12 @@ def test_a_turn_between_points_that_is_too_fast_is_named(refuse, tmp_path, confi
 
 
 def test_what_lies_between_two_samples_is_checked_too(refuse, tmp_path, config):
-    short = (
-        "--set",
-        "trajectory.period_s=0.1",
-        "--set",
-        "trajectory.duration_s=8",
-        "--set",
-        "trajectory.path=straight",
-    )
-    level = ("--set", "trajectory.direction=[1, 0, 0]", "--set", "trajectory.yaw_turn_rad=0")
-    coarse = ("--set", "trajectory.sample_time_s=0.8", "--set", "trajectory.displacement_m=0.64")
-    command = ("trajectory", config, "-o", tmp_path / "t.h5", *short, *level, *coarse)
-    messages = refuse(*command, "--set", "trajectory.tilt_max_rad=0.2", code=1)
-    # Two metres per second squared at P = 1 s are 2 * 0.64 / 64 / P^2 here: 1.1 rad from the vertical.
-    assert messages[0].startswith("tilt of up to 1.1")
+    keys = ("period_s=0.1", "duration_s=8", "path=straight", "direction=[1, 0, 0]", "yaw_turn_rad=0")
+    coarse = ("displacement_m=0.64", "sample_time_s=0.8", "tilt_max_rad=0.15")
+    asked = [word for key in keys + coarse for word in ("--set", f"trajectory.{key}")]
+    messages = refuse("trajectory", config, "-o", tmp_path / "t.h5", *asked, code=1)
+    # A hundredth of the printed displacement in a tenth of the period has the printed 2 m/s^2: arctan(2 / 9.81).
+    assert messages[0].startswith("tilt of up to 0.2011 rad")
 
 
 def test_a_move_too_short_to_be_looked_at_is_refused(refuse, tmp_path, config):
