@@ -7,6 +7,8 @@ from dataclasses import replace
 from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.spec import BODY, EULER, NO_FRAME, WORLD, ArtifactSpec, DatasetSpec
 from cpfls_cli.artifacts.sweep_formats import SWEEP
+from cpfls_cli.artifacts.tracking_formats import TRACKING
+from cpfls_cli.artifacts.validation_formats import VALIDATION
 
 _TIME = DatasetSpec("time", ("time",), "s", NO_FRAME, "time from the first sample")
 _ATTITUDE = (
@@ -107,6 +109,7 @@ FLIGHT = ArtifactSpec(
             "effects/name", ("flown",), "text", NO_FRAME, "what was flown beyond the model, by value", required=False
         ),
         DatasetSpec("effects/value", ("flown",), "SI", NO_FRAME, "the true value of each", required=False),
+        *TRACKING,
     ),
     ("trajectory", "log"),
 )
@@ -227,6 +230,15 @@ MODEL = ArtifactSpec(
         DatasetSpec("judged/relative_error", _JUDGED, "1", EULER, "largest error over largest torque", gaps=True),
         DatasetSpec("judged/r2", _JUDGED, "1", EULER, "share of the torque's variance explained", gaps=True),
         DatasetSpec(
+            "judged/vaf",
+            _JUDGED,
+            "1",
+            EULER,
+            "the same without the mean of the error: variance accounted for",
+            required=False,
+            gaps=True,
+        ),
+        DatasetSpec(
             "judged/r2_body", _JUDGED, "1", BODY, "the same for body torque, not near a pitch of +-90 deg", gaps=True
         ),
         DatasetSpec("baselines/rigid_body", ("6",), "kg m^2", BODY, "six inertia parameters by least squares"),
@@ -236,6 +248,7 @@ MODEL = ArtifactSpec(
         DatasetSpec("ridge/standard_error", ("tried",), "1", NO_FRAME, "its standard error", required=False),
         DatasetSpec("training/indices", ("sample",), "1", NO_FRAME, "samples of the flight that trained"),
         DatasetSpec("findings", ("finding",), "text", NO_FRAME, "what failed or was not excited, in words"),
+        *VALIDATION,
     ),
     ("flight", "selection", "validate", "choose-on"),
 )
@@ -276,6 +289,8 @@ CHECKPOINT = ArtifactSpec(
     ("flight", "selection", "validate", "choose-on"),
 )
 
+_MATRIX = ("time", "axis", "axis")
+
 PREDICTION = ArtifactSpec(
     "cpfls/prediction",
     "torque, inertia matrix and Coriolis matrix of a model along a flight",
@@ -288,6 +303,10 @@ PREDICTION = ArtifactSpec(
         _vector("measured_torque", "N m", EULER, "generalised torque of the flight", required=False),
         _vector("error", "N m", EULER, "measured minus model torque", required=False),
         DatasetSpec("inertia", ("time", "axis", "axis"), "kg m^2", EULER, "inertia matrix D_ij(q)"),
+        DatasetSpec("inertia_low", _MATRIX, "kg m^2", EULER, "lower end of its 95 % band", required=False),
+        DatasetSpec("inertia_high", _MATRIX, "kg m^2", EULER, "upper end of its 95 % band", required=False),
+        _vector("torque_low", "N m", EULER, "lower end of the 95 % band of the model torque", required=False),
+        _vector("torque_high", "N m", EULER, "upper end of the 95 % band of the model torque", required=False),
         DatasetSpec("coriolis", ("time", "axis", "axis"), "kg m^2/s", EULER, "C(q, qd) by Christoffel symbols"),
         DatasetSpec("outside", ("time",), "1", NO_FRAME, "1 where the attitude lies outside the excited region"),
     ),

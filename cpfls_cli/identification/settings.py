@@ -45,6 +45,30 @@ class LocalSearchSettings(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ValidationSettings(Settings):
+    """How far to trust the model: what is computed once it is found."""
+
+    enabled: Annotated[bool, Doc("gather the evidence; without, the model holds its scores only")] = True
+    folds: Annotated[int, Ge(2), Le(20), Doc("contiguous blocks of the cross-validation of structures")] = 5
+    structures: Annotated[bool, Doc("compare other structures by cross-validation, without a search")] = True
+    draws: Annotated[int, Ge(20), Le(5000), Doc("draws of the block bootstrap behind every band")] = 200
+    block_s: Annotated[
+        float | None, Gt(0), Doc("duration of a block that is drawn, s; null: a fortieth of the training part")
+    ] = None
+    horizon_samples: Annotated[int, Ge(1), Le(1000), Doc("longest window that measured torques are replayed over")] = 50
+    windows: Annotated[int, Ge(1), Le(10000), Doc("windows replayed at most, evenly spread")] = 500
+    lags: Annotated[int, Ge(1), Le(1000), Doc("lags of the autocorrelation of the residuals, in samples")] = 50
+    samples: Annotated[
+        int,
+        Ge(100),
+        Doc("samples that structures are compared on at most, in contiguous blocks; a long flight has more"),
+    ] = 20000
+    r2_min: Annotated[
+        float, Gt(0), Le(1), Doc("R2 of body torque that a model good for control has on held-out data, each axis")
+    ] = 0.8
+
+
+@dataclass(frozen=True, kw_only=True)
 class IdentificationSettings(StructureSettings, EvolutionSettings):
     """Structure of the model, search for its partitions, and how it is judged."""
 
@@ -83,6 +107,7 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         LocalSearchSettings()
     )
     ridge: Annotated[RidgeSettings, Doc("ridge weight of the fuzzy part (base: rigid-body)")] = RidgeSettings()
+    validation: Annotated[ValidationSettings, Doc("evidence on how far to trust the model")] = ValidationSettings()
 
     def __post_init__(self) -> None:
         """Apply the rules of both parents."""

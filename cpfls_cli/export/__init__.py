@@ -1,0 +1,1 @@
+"""An identified model as source code and data that a controller takes."""
