@@ -28,7 +28,7 @@ def test_a_benchmark_without_its_files_says_how_to_call_it():
     assert "python benchmarks/judging.py configs/paper.yaml" in done.stderr
 
 
-OF_THE_EXTRA = {"apricot", "cma", "distributed", "pymoo", "ruckig", "skmatter"}
+OF_THE_EXTRA = {"anfis_toolbox", "apricot", "cma", "distributed", "pyfume", "pymoo", "ruckig", "skmatter"}
 
 
 @pytest.mark.parametrize("path", sorted(BENCHMARKS.glob("*.py")), ids=lambda path: path.stem)
