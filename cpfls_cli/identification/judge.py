@@ -31,6 +31,9 @@ class Score:
     r2_body : array, shape (3,)
         The same for body torque, at samples where the pitch is not vertical: it is divided by cos(pitch), and errors
         with it. NaN if no such sample is left.
+    vaf : array, shape (3,)
+        Variance accounted for, ``1 - var(error) / var(torque)`` by Euler axis: R2 without the mean of the error. NaN
+        for an axis whose torque does not vary.
     """
 
     mse: Array
@@ -38,6 +41,7 @@ class Score:
     relative_error: Array
     r2: Array
     r2_body: Array
+    vaf: Array
 
     @property
     def worst_relative_error(self) -> float:
@@ -83,7 +87,37 @@ def score_of(source: TorqueSource, torque: Callable[[Motion], Array]) -> Score:
 
 
 class Explained:
-    """Sums for the share of the variance explained, ``1 - sum e^2 / sum (y - mean y)^2``, chunk by chunk.
+    """Sums for the share of the variance explained, ``1 - sum e^2 / sum (y - mean y)^2``, chunk by chunk."""
+
+    def __init__(self) -> None:
+        self._measured, self._error, self._square = _AboutMean(), _AboutMean(), np.zeros(3)
+
+    def add(self, measured: Array, error: Array) -> None:
+        """Take note of samples, if any; both arrays have the shape (samples, 3)."""
+        if len(measured) == 0:
+            return
+        self._measured.add(measured)
+        self._error.add(error)
+        self._square = self._square + np.sum(error**2, axis=0)
+
+    @property
+    def mean_squared_error(self) -> Array:
+        """Mean squared error by channel."""
+        return np.asarray(self._square / self._error.count)
+
+    @property
+    def r2(self) -> Array:
+        """Share of the variance explained by channel; NaN where the measured channel does not vary."""
+        return 1.0 - _ratio(self._square, self._measured.square)
+
+    @property
+    def vaf(self) -> Array:
+        """The same of the error about its mean: what is left when a constant is forgiven."""
+        return 1.0 - _ratio(self._error.square, self._measured.square)
+
+
+class _AboutMean:
+    """Sum of squares about the mean, chunk by chunk.
 
     References
     ----------
@@ -91,29 +125,15 @@ class Explained:
     """
 
     def __init__(self) -> None:
-        self._count = 0
-        self._mean, self._about_mean, self._error = np.zeros(3), np.zeros(3), np.zeros(3)
+        self.count, self.square = 0, np.zeros(3)
+        self._mean = np.zeros(3)
 
-    def add(self, measured: Array, error: Array) -> None:
-        """Take note of samples, if any; both arrays have the shape (samples, 3)."""
-        if len(measured) == 0:
-            return
-        count, mean = len(measured), np.mean(measured, axis=0)
-        both, apart = self._count + count, mean - self._mean
-        self._about_mean = self._about_mean + np.sum((measured - mean) ** 2, axis=0)
-        self._about_mean += apart**2 * (self._count * count / both)
-        self._mean, self._count = self._mean + apart * (count / both), both
-        self._error = self._error + np.sum(error**2, axis=0)
-
-    @property
-    def mean_squared_error(self) -> Array:
-        """Mean squared error by channel."""
-        return np.asarray(self._error / self._count)
-
-    @property
-    def r2(self) -> Array:
-        """Share of the variance explained by channel; NaN where the measured channel does not vary."""
-        return 1.0 - _ratio(self._error, self._about_mean)
+    def add(self, values: Array) -> None:
+        count, mean = len(values), np.mean(values, axis=0)
+        both, apart = self.count + count, mean - self._mean
+        self.square = self.square + np.sum((values - mean) ** 2, axis=0)
+        self.square += apart**2 * (self.count * count / both)
+        self._mean, self.count = self._mean + apart * (count / both), both
 
 
 class _Sums:
@@ -138,6 +158,7 @@ class _Sums:
             relative_error=_ratio(self._largest_error, self._largest),
             r2=self._euler.r2,
             r2_body=self._body.r2,
+            vaf=self._euler.vaf,
         )
 
 

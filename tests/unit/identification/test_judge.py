@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification import TorqueData
-from cpfls_cli.identification.judge import score
+from cpfls_cli.identification.judge import score, score_of
 from cpfls_cli.regressor import Motion
 
 
@@ -25,6 +25,25 @@ def test_by_hand():
     # Sum of squares about the mean is 8 for roll; pitch and yaw do not vary.
     np.testing.assert_allclose(judged.r2, [1 - 5 / 8, np.nan, np.nan])
     np.testing.assert_allclose(judged.r2_body, judged.r2)
+
+
+def test_variance_accounted_for_forgives_a_constant():
+    """Errors of 3, 4 and 5 have the variance of -1, 0 and 1."""
+    data = level([[1, 0, 2], [3, 1, 2], [5, 8, 2]])
+    judged = score(data, data.torque - [[3, 7, 0], [4, 7, 0], [5, 7, 1]])
+    np.testing.assert_allclose(judged.vaf, [1 - 2 / 8, 1.0, np.nan])
+    np.testing.assert_allclose(judged.r2, [1 - 50 / 8, 1 - 147 / 38, np.nan])
+
+
+def test_variances_are_the_same_chunk_by_chunk(monkeypatch):
+    rng = np.random.default_rng(9)
+    torque, error = rng.standard_normal((2, 50, 3)) + 5.0
+    data = level(torque)
+    monkeypatch.setattr("cpfls_cli.identification.data.CHUNK", 7)
+    predicted = [(torque - error)[start : start + 7] for start in range(0, 50, 7)]
+    judged = score_of(data, lambda motion: predicted.pop(0)[: len(motion)])
+    np.testing.assert_allclose(judged.vaf, 1 - error.var(axis=0) / torque.var(axis=0))
+    np.testing.assert_allclose(judged.r2, 1 - np.mean(error**2, axis=0) / torque.var(axis=0))
 
 
 def test_body_axes():
