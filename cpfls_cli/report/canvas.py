@@ -6,14 +6,17 @@ from collections.abc import Callable
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.report.collect import panels_of
+from cpfls_cli.report.collect_artists import SPREAD
 from cpfls_cli.report.content import Plot
-from cpfls_cli.report.decimation import kept_samples
+from cpfls_cli.report.decimation import evenly_spread, kept_samples
 from cpfls_cli.report.numbers import plain
 from cpfls_cli.report.svg import inline_svg
 
@@ -83,7 +86,7 @@ def plot(name: str, caption: str, description: str, height: float, draw: Callabl
         matplotlib.rcParams.update(style)
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         draw(figure)
-        return Plot(name, caption, inline_svg(figure, name, description))
+        return Plot(name, caption, inline_svg(figure, name, description), description, panels_of(figure))
 
 
 def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
@@ -96,9 +99,25 @@ def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
     **style
         As `Axes.plot` takes it.
     """
-    kept = kept_samples(y)
-    axes.plot(x[kept], y[kept], **style)
+    kept, shown = kept_samples(y), evenly_spread(len(y))
+    for curve in axes.plot(x[kept], y[kept], **style):
+        # A table of the curve shows samples of the whole one: extremes alone would make it look rough.
+        setattr(curve, SPREAD, (x[shown], y[shown]))
     plain_ticks(axes.yaxis)
+
+
+def band(axes: Axes, x: Array, low: Array, high: Array, **style: Any) -> None:
+    """Shade the range of a curve, thinned out so that no peak is lost.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    x, low, high : array, shape (samples,)
+    **style
+        As `Axes.fill_between` takes it.
+    """
+    kept = np.union1d(kept_samples(low), kept_samples(high))
+    axes.fill_between(x[kept], low[kept], high[kept], **{"linewidth": 0.0, "zorder": 1.0, **style})
 
 
 def stacked(figure: Figure, rows: int) -> list[Axes]:

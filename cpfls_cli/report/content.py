@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from cpfls_cli.report.drawn import Panel
+
 Tone = Literal["plain", "note", "good", "warning"]
 
 
@@ -94,11 +96,17 @@ class Plot:
     caption : str
     svg : str
         One ``svg`` element without external references.
+    description : str
+        What the figure shows, for those who do not see it.
+    panels : sequence of Panel
+        The numbers behind it.
     """
 
     name: str
     caption: str
     svg: str
+    description: str = ""
+    panels: Sequence[Panel] = ()
     kind: ClassVar[str] = "plot"
 
 

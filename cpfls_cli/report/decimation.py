@@ -7,6 +7,8 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 
 LARGEST = 1500
+ROWS = 25
+"""Of a table of the data of a figure, at most."""
 
 
 def kept_samples(values: Array, largest: int = LARGEST) -> IntArray:
@@ -31,6 +33,23 @@ def kept_samples(values: Array, largest: int = LARGEST) -> IntArray:
     ends = np.searchsorted(stretch[order], np.arange(largest // 2), side="right")
     starts = np.concatenate([[0], ends[:-1]])
     return np.unique(np.concatenate([order[starts], order[ends - 1], [0, samples - 1]]))
+
+
+def evenly_spread(samples: int, rows: int = ROWS) -> IntArray:
+    """Choose the samples of a curve that a table shows: both ends and some between.
+
+    Parameters
+    ----------
+    samples : int
+    rows : int
+        At most so many.
+
+    Returns
+    -------
+    array of int
+        Ascending indices.
+    """
+    return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, rows)).round().astype(int))
 
 
 def runs(marked: Array) -> list[tuple[int, int]]:

@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from cpfls_cli.report.content import Section
+from cpfls_cli.report.figure_tables import figure_tables
 from cpfls_cli.report.missing import missing
 from cpfls_cli.report.sections.diagnosis import diagnosis_section
 from cpfls_cli.report.sections.disagreement import disagreement_section
@@ -104,5 +105,6 @@ def _render(sections: Sequence[Section], sources: Sources, version: str) -> str:
     )
     # Figures are made here and hold only escaped text; everything else on the page is escaped by the template.
     environment.filters["figure"] = Markup
+    environment.filters["figure_tables"] = figure_tables
     template = environment.get_template("page.html")
     return template.render(title=sources.title, sections=sections, version=version, sources=sources.all)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -68,7 +69,7 @@ def free_runs_figure(name: str, diagnosis: Source, after: str) -> Plot:
         f"rates and then runs freely on the rotor speeds of the flight. Before: the model as given; after: "
         f"{after}.{repaired}{astray}"
     )
-    return Plot(name, caption, drawn.svg)
+    return replace(drawn, caption=caption)
 
 
 def _draw_axis(axes: Axes, time: Array, curves: dict[str, Array], runs: Sequence[IntArray]) -> None:
