@@ -14,6 +14,7 @@ from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.narration import Narration
 from cpfls_cli.cli.options import Common, ConfigArgument, OutputOption, with_common
 from cpfls_cli.cli.terminal import messages_for_errors, progress_bar, tell
+from cpfls_cli.report.forms import Form
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -305,13 +306,23 @@ def predict(
 
 @app.command()
 @with_common
-def report(config: ConfigArgument, artifacts: ArtifactsArgument, output: OutputOption, *, common: Common) -> None:
-    """Write one self-contained HTML page about artifacts."""
+def report(
+    config: ConfigArgument,
+    artifacts: ArtifactsArgument,
+    output: OutputOption,
+    form: Annotated[
+        Form | None,
+        typer.Option("--format", help="Form of the report; without, by the suffix of FILE (.md, .json), else html."),
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Write one self-contained page about artifacts (html, md or json); models that are given together are compared."""
 
     def call(job: Job) -> Outcome:
         from cpfls_cli.stages import report as stage
 
-        return stage.run(job, artifacts)
+        return stage.run(job, artifacts, form)
 
     _run("report", config, output, common, call)
 

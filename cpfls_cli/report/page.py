@@ -1,15 +1,13 @@
-"""The page: all sections in one HTML file that needs nothing else."""
+"""The page: all sections in one file that needs nothing else."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
-
-from cpfls_cli.report.content import Section
-from cpfls_cli.report.figure_tables import figure_tables
+from cpfls_cli.report.forms import Form
+from cpfls_cli.report.html import html_page
+from cpfls_cli.report.json_page import json_page
+from cpfls_cli.report.markdown import markdown_page
 from cpfls_cli.report.missing import missing
 from cpfls_cli.report.sections.diagnosis import diagnosis_section
 from cpfls_cli.report.sections.disagreement import disagreement_section
@@ -51,34 +49,38 @@ _SECTIONS = (
 )
 
 
+_WRITE = {Form.HTML: html_page, Form.MARKDOWN: markdown_page, Form.JSON: json_page}
+
+
 @dataclass(frozen=True)
 class Page:
     """A finished report.
 
     Attributes
     ----------
-    html : str
+    text : str
     sections, figures, tables : tuple of str
         Names of what it shows, in order.
     missing : tuple of str
         Formats of which no artifact was given.
     """
 
-    html: str
+    text: str
     sections: tuple[str, ...]
     figures: tuple[str, ...]
     tables: tuple[str, ...]
     missing: tuple[str, ...]
 
 
-def report_page(sources: Sources, version: str) -> Page:
+def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
     """Write a report about artifacts.
 
     Parameters
     ----------
     sources : Sources
     version : str
-        Of the program, for the footer.
+        Of the program.
+    form : Form
 
     Returns
     -------
@@ -87,24 +89,9 @@ def report_page(sources: Sources, version: str) -> Page:
     """
     sections = [section for make in _SECTIONS if (section := make(sources)) is not None]
     return Page(
-        html=_render(sections, sources, version),
+        text=_WRITE[form](sections, sources, version),
         sections=tuple(section.name for section in sections),
         figures=tuple(name for section in sections for name in section.plots),
         tables=tuple(name for section in sections for name in section.tables),
         missing=tuple(missing(sources)),
     )
-
-
-def _render(sections: Sequence[Section], sources: Sources, version: str) -> str:
-    environment = Environment(
-        loader=PackageLoader("cpfls_cli.report", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    # Figures are made here and hold only escaped text; everything else on the page is escaped by the template.
-    environment.filters["figure"] = Markup
-    environment.filters["figure_tables"] = figure_tables
-    template = environment.get_template("page.html")
-    return template.render(title=sources.title, sections=sections, version=version, sources=sources.all)

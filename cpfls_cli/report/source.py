@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -54,6 +55,11 @@ class Source:
     def short_hash(self) -> str:
         """First digits of the hash."""
         return self.sha256[:HASH_SHOWN]
+
+    @property
+    def config_sha256(self) -> str:
+        """Hash of the config that made it."""
+        return hashlib.sha256(self.artifact.header.config.encode()).hexdigest()
 
     def made_from(self, role: str) -> str | None:
         """Hash of an input by its role; None where it had none."""

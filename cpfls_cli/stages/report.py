@@ -1,4 +1,4 @@
-"""Stage `report`: one self-contained HTML page about artifacts."""
+"""Stage `report`: one self-contained page about artifacts."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from cpfls_cli.config.load import validate
 from cpfls_cli.config.resolved import resolved
 from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.report.forms import Form, form_of
 from cpfls_cli.report.page import Page, report_page
 from cpfls_cli.report.source import Source, Sources, unique_labels
 from cpfls_cli.stages.job import Job, Outcome, begin
 
 
-def run(job: Job, artifacts: Sequence[Path]) -> Outcome:
+def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcome:
     """Write a report about artifacts.
 
     Parameters
@@ -25,6 +26,8 @@ def run(job: Job, artifacts: Sequence[Path]) -> Outcome:
     job : Job
     artifacts : sequence of Path
         Of any format and from any flights; a file given twice counts once.
+    form : Form or None
+        None to choose it by the suffix of the output.
 
     Returns
     -------
@@ -37,8 +40,9 @@ def run(job: Job, artifacts: Sequence[Path]) -> Outcome:
     sources = _sources(kept, [files[path] for path in kept])
     if started.dry_run is not None:
         return started.dry_run
-    page = report_page(Sources(sources, job.study.vehicle, job.study.report), cpfls_cli.__version__)
-    write_text(job.output, page.html)
+    given = Sources(sources, job.study.vehicle, job.study.report)
+    page = report_page(given, cpfls_cli.__version__, form or form_of(job.output))
+    write_text(job.output, page.text)
     repeated = tuple(
         f"{path}: holds the same as {distinct[files[path]]}; shown once" for path in files if path not in kept
     )
@@ -63,7 +67,7 @@ def _printable(name: str) -> str:
 
 
 def _outcome(output: Path, page: Page, repeated: Sequence[str]) -> Outcome:
-    size = len(page.html.encode())
+    size = len(page.text.encode())
     summary = {
         "output": str(output),
         "figures": list(page.figures),

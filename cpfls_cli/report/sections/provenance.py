@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-
 from cpfls_cli.report.content import Block, Listing, Section, Table
 from cpfls_cli.report.source import Source, Sources
 
@@ -34,15 +32,16 @@ def provenance_section(sources: Sources) -> Section:
         caption = "The files that they were made from."
         blocks.append(Table("inputs", caption, header, inputs, frozenset(range(6))))
     for config in dict.fromkeys(source.artifact.header.config for source in sources.all):
-        users = [source.label for source in sources.all if source.artifact.header.config == config]
-        blocks.append(Listing(f"Config of {', '.join(users)} (SHA-256 {_hash(config)[:12]})", config))
+        users = [source for source in sources.all if source.artifact.header.config == config]
+        names = ", ".join(source.label for source in users)
+        blocks.append(Listing(f"Config of {names} (SHA-256 {users[0].config_sha256[:12]})", config))
     return Section("provenance", "Provenance", blocks)
 
 
 def _artifact(source: Source) -> list[str]:
     header = source.artifact.header
     name = source.artifact.spec.format
-    return [source.label, name, header.version, str(header.seed), source.sha256, _hash(header.config)]
+    return [source.label, name, header.version, str(header.seed), source.sha256, source.config_sha256]
 
 
 def _inputs(source: Source, sources: Sources) -> list[list[str]]:
@@ -50,7 +49,3 @@ def _inputs(source: Source, sources: Sources) -> list[list[str]]:
         [source.label, role, file.name, file.format, file.sha256, "yes" if sources.by_hash(file.sha256) else "no"]
         for role, file in source.artifact.header.inputs.items()
     ]
-
-
-def _hash(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

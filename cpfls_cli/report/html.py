@@ -1,0 +1,40 @@
+"""A report as one HTML page that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from cpfls_cli.report.content import Section
+from cpfls_cli.report.figure_tables import figure_tables
+from cpfls_cli.report.source import Sources
+
+
+def html_page(sections: Sequence[Section], sources: Sources, version: str) -> str:
+    """Write sections as HTML.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+    sources : Sources
+    version : str
+        Of the program.
+
+    Returns
+    -------
+    str
+    """
+    environment = Environment(
+        loader=PackageLoader("cpfls_cli.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    # Figures are made here and hold only escaped text; everything else on the page is escaped by the template.
+    environment.filters["figure"] = Markup
+    environment.filters["figure_tables"] = figure_tables
+    template = environment.get_template("page.html")
+    return template.render(title=sources.title, sections=sections, version=version, sources=sources.all)

@@ -1,0 +1,116 @@
+"""A report as JSON: sections, facts, tables, figures with their data, provenance."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.report.content import Block, Facts, Folded, Plot, Section, Table
+from cpfls_cli.report.drawn import Panel, Series
+from cpfls_cli.report.source import Source, Sources
+
+_DIGITS = 6
+
+
+def json_page(sections: Sequence[Section], sources: Sources, version: str) -> str:
+    """Write sections as one JSON object.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+    sources : Sources
+    version : str
+        Of the program.
+
+    Returns
+    -------
+    str
+        Numbers of figures have six digits; null where one is not known or goes to the edge of its panel.
+    """
+    page = {
+        "title": sources.title,
+        "cpfls_version": version,
+        "sections": [
+            {"name": section.name, "title": section.title, "blocks": [_block(block) for block in section.blocks]}
+            for section in sections
+        ],
+        "artifacts": [_artifact(source) for source in sources.all],
+    }
+    return json.dumps(page, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
+
+
+def _block(block: Block) -> dict[str, Any]:
+    match block:
+        case Table():
+            return _table(block)
+        case Folded():
+            return {"kind": block.kind, "summary": block.summary, "tables": [_table(table) for table in block.tables]}
+        case Facts():
+            return {"kind": block.kind, "rows": [list(row) for row in block.rows]}
+        case Plot():
+            panels = [_panel(panel) for panel in block.panels]
+            words = {"name": block.name, "caption": block.caption, "description": block.description}
+            return {"kind": "figure", **words, "panels": panels}
+        case _:
+            return {"kind": block.kind, **asdict(block)}
+
+
+def _table(table: Table) -> dict[str, Any]:
+    cells = table.cells
+    marked = [
+        {"row": row, "column": column, "tone": cell.tone}
+        for row, line in enumerate(cells)
+        for column, cell in enumerate(line)
+        if cell.tone != "plain"
+    ]
+    return {
+        "kind": table.kind,
+        "name": table.name,
+        "caption": table.caption,
+        "header": list(table.header),
+        "rows": [[cell.text for cell in line] for line in cells],
+        "marked": marked,
+    }
+
+
+def _panel(panel: Panel) -> dict[str, Any]:
+    named: Mapping[str, Any] = {
+        key: [{"at": _rounded(place), "word": word} for place, word in names.items()]
+        for key, names in (("x_names", panel.x_names), ("y_names", panel.y_names))
+        if names
+    }
+    words = {"title": panel.title, "x_label": panel.x_label, "y_label": panel.y_label}
+    return {**words, **named, "series": [_series(series) for series in panel.series]}
+
+
+def _series(series: Series) -> dict[str, Any]:
+    columns = {key: getattr(series, key) for key in ("x", "y", "low", "high", "value")}
+    numbers = {key: _numbers(values) for key, values in columns.items() if values is not None}
+    return {"label": series.label, "form": series.form, **numbers}
+
+
+def _numbers(values: Array) -> list[float | None]:
+    return [_rounded(value) for value in values]
+
+
+def _rounded(value: float) -> float | None:
+    return float(f"{value:.{_DIGITS}g}") + 0.0 if np.isfinite(value) else None
+
+
+def _artifact(source: Source) -> dict[str, Any]:
+    header = source.artifact.header
+    return {
+        "file": source.label,
+        "format": source.artifact.spec.format,
+        "cpfls_version": header.version,
+        "seed": header.seed,
+        "sha256": source.sha256,
+        "config_sha256": source.config_sha256,
+        "inputs": {role: asdict(file) for role, file in header.inputs.items()},
+        "config": header.config,
+    }
