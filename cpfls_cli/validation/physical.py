@@ -1,0 +1,100 @@
+"""Whether an identified model could be a body wherever training was: positive definite, no energy of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.identification.excitation import CELLS
+from cpfls_cli.identification.model import Model, coriolis_matrix
+from cpfls_cli.identification.physics import not_positive_definite, vertical
+from cpfls_cli.regressor.regressor import InertiaValues
+
+
+@dataclass(frozen=True)
+class Physics:
+    """Physical sense of a model over the cells of roll and pitch that training visited.
+
+    Attributes
+    ----------
+    cells : int
+        Cells examined at their centres; those near a pitch of +-90 degrees, where the inertia matrix of every body is
+        all but singular, are left out.
+    indefinite : int
+        Of them those where D(q) is not positive definite.
+    smallest_eigenvalue : float, kg m^2
+        Of D(q) over the cells; NaN without cells.
+    worst_attitude : array, shape (2,), rad
+        Roll and pitch where it is smallest.
+    energy : float
+        Largest size of ``qd^T (dD/dt - 2 C) qd`` over the sum of the sizes of its terms. Torque that is D and C does
+        work on kinetic energy alone, so that it is rounding for every model with Christoffel symbols.
+    """
+
+    cells: int
+    indefinite: int
+    smallest_eigenvalue: float
+    worst_attitude: Array
+    energy: float
+
+
+def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
+    """Examine a model at the centres of the cells that training visited.
+
+    Parameters
+    ----------
+    model : Model
+    rng : numpy.random.Generator
+        Draws an attitude rate for every cell.
+
+    Returns
+    -------
+    Physics
+
+    References
+    ----------
+    Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 6.5 (skew symmetry, passivity).
+    """
+    attitude = _centres(model)
+    if len(attitude) == 0:
+        return Physics(0, 0, float("nan"), np.full(2, np.nan), 0.0)
+    values = model.inertia(attitude)
+    smallest = np.linalg.eigvalsh(values.value)[:, 0]
+    worst = int(np.argmin(smallest))
+    return Physics(
+        cells=len(attitude),
+        indefinite=int(np.sum(not_positive_definite(values.value, attitude))),
+        smallest_eigenvalue=float(smallest[worst]),
+        worst_attitude=attitude[worst, :2],
+        energy=energy_share(values, rng.standard_normal(attitude.shape)),
+    )
+
+
+def energy_share(values: InertiaValues, rate: Array) -> float:
+    """Measure the power of ``dD/dt - 2 C`` against the sizes of its terms.
+
+    Parameters
+    ----------
+    values : InertiaValues
+    rate : array, shape (samples, 3), rad/s
+        Euler rates.
+
+    Returns
+    -------
+    float
+        The largest over the samples; 0 where no term is.
+    """
+    along = np.einsum("nkij,nk->nij", values.gradient, rate)
+    outer = rate[:, :, None] * rate[:, None, :]
+    terms = np.stack([along * outer, -2.0 * coriolis_matrix(values, rate) * outer], axis=1)
+    power, size = np.abs(np.sum(terms, axis=(1, 2, 3))), np.sum(np.abs(terms), axis=(1, 2, 3))
+    return float(np.max(power / np.where(size > 0, size, 1.0)))
+
+
+def _centres(model: Model) -> Array:
+    roll, pitch = np.nonzero(model.visited)
+    centres = (np.stack([roll, pitch, np.zeros_like(roll)], axis=1) + 0.5) * (2 * np.pi / CELLS) - np.pi
+    attitude = centres * [1.0, 1.0, 0.0]
+    return np.asarray(attitude[~vertical(attitude)])
