@@ -1,0 +1,123 @@
+"""The same report as HTML, Markdown and JSON."""
+
+import json
+import re
+
+import pytest
+
+from cpfls_cli.artifacts import read_artifact
+from cpfls_cli.report.content import Listing, Section
+from cpfls_cli.report.markdown import markdown_page
+from cpfls_cli.report.settings import ReportSettings
+from cpfls_cli.report.source import Sources
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"
+
+
+@pytest.fixture(scope="module")
+def report(cpfls, pipeline, study, tmp_path_factory):
+    """Write a report of the tiny study to a file of this name, and read it."""
+
+    def write(name, *options):
+        output = tmp_path_factory.mktemp("report") / name
+        result = cpfls("report", study, *pipeline.paths.values(), "-o", output, "--json", *options)
+        assert result.exit_code == 0, result.stderr
+        return output.read_text(encoding="utf-8"), json.loads(result.stdout)
+
+    return write
+
+
+@pytest.fixture(scope="module")
+def as_json(report):
+    text, summary = report("all.json")
+    return json.loads(text), summary
+
+
+def blocks(page, kind):
+    return [block for section in page["sections"] for block in section["blocks"] if block["kind"] == kind]
+
+
+def tables(page):
+    return blocks(page, "table") + [table for folded in blocks(page, "folded") for table in folded["tables"]]
+
+
+def test_the_suffix_chooses_the_form_and_the_option_has_the_last_word(report):
+    assert report("a.html")[0].startswith("<!DOCTYPE html>")
+    assert report("a.txt")[0].startswith("<!DOCTYPE html>")
+    assert report("a.md")[0].startswith("# ")
+    assert report("a.MD", "--format", "json")[0].startswith("{")
+    assert report("a.json", "--format", "html")[0].startswith("<!DOCTYPE html>")
+
+
+def test_an_unknown_form_is_refused(cpfls, pipeline, study, tmp_path):
+    result = cpfls("report", study, pipeline.flight, "-o", tmp_path / "a.html", "--format", "pdf")
+    assert result.exit_code == 2
+    assert "pdf" in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["a.md", "a.json"])
+def test_equal_artifacts_give_equal_text(report, name):
+    assert report(name)[0] == report(name)[0]
+
+
+def test_all_forms_hold_the_same_sections_figures_and_tables(report, as_json):
+    page, summary = as_json
+    html, markdown = report("a.html")[0], report("a.md")[0]
+    assert [section["name"] for section in page["sections"]] == summary["sections"]
+    assert re.findall(r'<section id="([^"]+)"', html) == summary["sections"]
+    assert re.findall(r'^<a id="([^"]+)"></a>$', markdown, re.MULTILINE) == summary["sections"]
+    assert [figure["name"] for figure in blocks(page, "figure")] == summary["figures"]
+    assert re.findall(r"^> Figure `([^`]+)`", markdown, re.MULTILINE) == summary["figures"]
+    assert sorted(table["name"] for table in tables(page)) == sorted(summary["tables"])
+    assert html.count('<details class="data">') == len(summary["figures"])
+
+
+def test_the_json_form_holds_what_the_figures_draw(as_json, pipeline):
+    page, _ = as_json
+    figures = {figure["name"]: figure for figure in blocks(page, "figure")}
+    assert all(panel["series"] for figure in figures.values() for panel in figure["panels"])
+    flight = read_artifact(pipeline.flight)
+    panels = figures["figure-4-torque-1"]["panels"]
+    assert [panel["title"] for panel in panels] == ["torque on roll", "torque on pitch", "torque on yaw"]
+    for axis, panel in enumerate(panels):
+        (curve,) = panel["series"]
+        assert (panel["x_label"], panel["y_label"]) == ("time, s", "N m")
+        assert curve["x"] == pytest.approx(flight.array("time"), rel=1e-5)
+        assert curve["y"] == pytest.approx(flight.array("torque")[:, axis], rel=1e-5, abs=1e-12)
+
+
+def test_the_json_form_says_where_everything_comes_from(as_json, pipeline):
+    page, _ = as_json
+    given = {artifact["file"]: artifact for artifact in page["artifacts"]}
+    assert set(given) == {path.name for path in pipeline.paths.values()}
+    model = given["model.h5"]
+    assert model["inputs"]["flight"]["sha256"] == given["flight.h5"]["sha256"]
+    assert model["config"] == read_artifact(pipeline.model).header.config
+
+
+def test_every_row_of_a_markdown_table_has_as_many_cells_as_its_header(report):
+    text = report("a.md", "--set", f"report.title={json.dumps(HOSTILE)}")[0]
+    rows = re.findall(r"(?:^\|.*\|$\n?)+", text, re.MULTILINE)
+    assert len(rows) > 5
+    for table in rows:
+        assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1
+
+
+def test_hostile_words_stay_words_in_markdown(report):
+    notes = json.dumps([HOSTILE, "1. no list", "# no heading", "> no quote", "one\n\ntwo"])
+    text = report("a.md", "--set", f"report.title={json.dumps(HOSTILE)}", "--set", f"report.notes={notes}")[0]
+    assert "<script" not in text
+    heading = text.splitlines()[0]
+    assert heading.startswith(
+        r"# a\|b &lt;script&gt;alert(1)&lt;/script&gt; \`x\` \[y\](http://z) \*w\* \\ &amp; \#1 \$m\$"
+    )
+    for line in (r"1\. no list", r"\# no heading", "&gt; no quote", "one two"):
+        assert f"> **Note.** {line}\n" in text
+
+
+def test_a_listing_cannot_end_its_own_fence():
+    sources = Sources([], VehicleSettings(), ReportSettings())
+    page = markdown_page([Section("a", "A", [Listing("B", "``` ````\n# c")])], sources, "1")
+    assert page.count("`````text\n``` ````\n# c\n`````\n") == 1
