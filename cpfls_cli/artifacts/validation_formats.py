@@ -28,6 +28,7 @@ _RESIDUALS = (
     _spec("residuals/autocorrelation", _BY_LAG, "1", EULER, "of the torque error", gaps=True),
     _spec("residuals/band", (), "1", NO_FRAME, "1.96 / sqrt(samples): holds 95 % of the lags of white noise"),
     _spec("residuals/ljung_box", ("axis",), "1", EULER, "p-value of Ljung and Box: small where not white", gaps=True),
+    _spec("residuals/exact", ("axis",), "1", EULER, "1 where errors are rounding, which is never white"),
     _spec("residuals/input", ("input",), "text", NO_FRAME, "signals that errors are correlated with"),
     _spec("residuals/input_lag", ("input_lag",), "s", NO_FRAME, "positive: the error follows the input"),
     _spec("residuals/correlation", ("input", "input_lag", "axis"), "1", EULER, "of error and input", gaps=True),
@@ -60,6 +61,7 @@ _STEPS = (
     _spec("steps/samples", ("horizon",), "1", NO_FRAME, "samples replayed"),
     _spec("steps/horizon", ("horizon",), "s", NO_FRAME, "the same as time"),
     _spec("steps/windows", (), "1", NO_FRAME, "windows replayed"),
+    _spec("steps/lost", ("predictor", "horizon"), "1", NO_FRAME, "windows in which a predictor ran away"),
     _spec("steps/attitude", ("predictor", "horizon", "axis"), "rad", BODY, "root mean square error", gaps=True),
     _spec("steps/body_rate", ("predictor", "horizon", "axis"), "rad/s", BODY, "root mean square error", gaps=True),
 )
