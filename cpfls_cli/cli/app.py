@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -96,6 +97,16 @@ SweepTimeLimitOption = Annotated[
         help="Stop all runs together after TIME (90, 90s, 10m, 2h) and write the finished ones; --resume goes on.",
     ),
 ]
+
+
+class ExportFormat(StrEnum):
+    """What a model is exported as."""
+
+    JSON = "json"
+    C = "c"
+    PYTHON = "python"
+
+
 WorkersOption = Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that evaluate.")]
 SchedulerOption = Annotated[
     str | None,
@@ -401,6 +412,41 @@ def gap(
         return stage.run(job, flights, held_out or [], model)
 
     _run("gap", config, output, common, call)
+
+
+@app.command()
+@with_common
+def export(
+    model: ModelArgument,
+    output: OutputOption,
+    form: Annotated[
+        ExportFormat,
+        typer.Option(
+            "--format",
+            help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
+            "module that needs NumPy only.",
+        ),
+    ],
+    name: Annotated[
+        str | None,
+        typer.Option("--name", metavar="NAME", help="Prefix of the names in C; without, from the name of the output."),
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Write a model as JSON, C or Python that computes torque, D(q) and C(q, qd) without this program."""
+    with messages_for_errors():
+        from cpfls_cli.config.load import validate
+        from cpfls_cli.stages import export as stage
+        from cpfls_cli.stages.job import Job
+
+        narration = Narration("export", common.verbose and not common.quiet)
+        with progress_bar("export", common) as progress:
+            job = Job(validate({}, "default"), output, common.force, common.dry_run, progress, narration.reads)
+            outcome = stage.run(job, model, form.value, name)
+        if not common.dry_run:
+            narration.wrote(output)
+        tell(outcome, common)
 
 
 @app.command()

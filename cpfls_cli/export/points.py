@@ -1,0 +1,109 @@
+"""States with what the library computes there, which an export carries to test itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.identification.excitation import CELLS
+from cpfls_cli.identification.model import Model
+from cpfls_cli.inertia import symmetric
+from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.vehicle.rigid_body import body_torque
+
+POINTS = 8
+_RATE, _ACCELERATION = 3.0, 10.0
+_UPRIGHT = 0.2
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What a model gives along a motion.
+
+    Attributes
+    ----------
+    motion : Motion
+    inertia, coriolis : array, shape (samples, 3, 3)
+    torque, body : array, shape (samples, 3), N m
+    inside : array of bool, shape (samples,)
+    scale : array, shape (samples, 4)
+        Sizes of the terms that D, C, torque and body torque are sums of: what their rounding errors are relative to.
+    """
+
+    motion: Motion
+    inertia: Array
+    coriolis: Array
+    torque: Array
+    body: Array
+    inside: BoolArray
+    scale: Array
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        return len(self.motion)
+
+
+def expected(model: Model, motion: Motion) -> Expected:
+    """Compute what an export has to give along a motion.
+
+    Parameters
+    ----------
+    model : Model
+    motion : Motion
+
+    Returns
+    -------
+    Expected
+        The torque of the rigid body is computed about the body axes, where it is finite at every attitude.
+    """
+    q, qd, qdd = motion.attitude, motion.rate, motion.acceleration
+    inertia = model.inertia(q)
+    torque = model.torque(motion)
+    rigid = body_torque(q, qd, qdd, symmetric(model.rigid_body))
+    fuzzy = torque - rotations.generalised_torque(q, rigid) if model.rigid_body.any() else torque
+    size, slope = (np.abs(a).reshape(len(q), -1).max(axis=1) for a in (inertia.value, inertia.gradient))
+    speed, push = np.abs(qd).max(axis=1), np.abs(qdd).max(axis=1)
+    of_torque = size * push + slope * speed**2
+    scale = np.column_stack([size, slope * speed, of_torque, of_torque / np.abs(np.cos(q[:, 1]))])
+    return Expected(
+        motion,
+        inertia.value,
+        model.coriolis(q, qd),
+        torque,
+        rigid + rotations.body_torque(q, fuzzy),
+        ~model.outside(q),
+        np.where(scale > 0.0, scale, 1.0),
+    )
+
+
+def reference_points(model: Model, rng: np.random.Generator) -> Expected:
+    """Draw a few states, half of them where training went, and compute what the model gives there.
+
+    Parameters
+    ----------
+    model : Model
+    rng : Generator
+
+    Returns
+    -------
+    Expected
+        In the middle of cells, away from a vertical pitch, so that single precision agrees as well.
+    """
+    centres = (np.arange(CELLS) + 0.5) * (2.0 * np.pi / CELLS) - np.pi
+    upright = np.abs(np.cos(centres)) > _UPRIGHT
+    cells = list(_cells(model.visited & upright, rng)) + list(_cells(np.broadcast_to(upright, (CELLS, CELLS)), rng))
+    places = np.array(cells[-POINTS:])
+    attitude = np.column_stack([centres[places], rng.uniform(-np.pi, np.pi, POINTS)])
+    attitude[0, :2] += 2.0 * np.pi
+    rate = rng.uniform(-_RATE, _RATE, (POINTS, 3))
+    return expected(model, Motion(attitude, rate, rng.uniform(-_ACCELERATION, _ACCELERATION, (POINTS, 3))))
+
+
+def _cells(allowed: BoolArray, rng: np.random.Generator) -> Iterator[tuple[int, int]]:
+    places = np.argwhere(allowed)
+    for place in rng.permutation(len(places))[:POINTS]:
+        yield int(places[place, 0]), int(places[place, 1])
