@@ -1,0 +1,211 @@
+"""Structures compared by cross-validation over contiguous blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.errors import SettingError
+from cpfls_cli.identification.cross_validation import SMALLEST_ERROR, ridge_curve
+from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale, gathered
+from cpfls_cli.identification.folds import with_folds
+from cpfls_cli.identification.normal_equations import SMALLEST_SINGULAR_SHARE
+from cpfls_cli.identification.rigid_columns import RIGID
+from cpfls_cli.identification.samples import Products, Ready, Samples
+from cpfls_cli.identification.settings import Base, IdentificationSettings
+from cpfls_cli.identification.solver import LARGEST_SQUARE, RidgeChoice, column_size
+from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
+from cpfls_cli.validation.candidates import candidates, structure_name
+
+RIGID_BODY = "rigid body"
+
+# Contiguous pieces that stand for a long flight.
+_PIECES = 20
+_MOST_PARAMETERS = 400
+
+# The columns of a rigid body stand before those of any structure: the smallest will do.
+_RIGID_ONLY = StructureSettings(harmonic_order=1, products="additive")
+
+
+@dataclass(frozen=True)
+class StructureComparison:
+    """Structures and the error of each on blocks that it did not learn from.
+
+    Attributes
+    ----------
+    name : tuple of str
+        The rigid body first; none where the samples are too few for the folds.
+    parameters : array of int, shape (candidates,)
+        Linear parameters of the fuzzy part.
+    error : array, shape (candidates,)
+        Mean squared error of the torque scaled by axis, on held-out blocks.
+    standard_error : array, shape (candidates,)
+        Its standard error over the blocks.
+    ridge_weight : array, shape (candidates,)
+        Chosen on the same blocks; 0 without a ridge, infinite where the fuzzy part is off.
+    own : array of bool, shape (candidates,)
+        Which is the structure of the model.
+    """
+
+    name: tuple[str, ...]
+    parameters: IntArray
+    error: Array
+    standard_error: Array
+    ridge_weight: Array
+    own: BoolArray
+
+
+@dataclass(frozen=True)
+class _Result:
+    """Cross-validation of one structure."""
+
+    error: float
+    standard_error: float
+    ridge_weight: float
+
+
+@dataclass(frozen=True)
+class _Folds:
+    """Data to learn from and to judge on, labelled by fold; a rigid body stands before the columns of every structure.
+
+    Attributes
+    ----------
+    learned, judged : Samples
+    choice : RidgeChoice
+    base : Base
+    rank_tolerance : float
+    """
+
+    learned: Samples
+    judged: Samples
+    choice: RidgeChoice
+    base: Base
+    rank_tolerance: float
+
+    @classmethod
+    def of(cls, training: TorqueSource, learned: TorqueSource, settings: IdentificationSettings) -> _Folds:
+        """Take some of the samples where there are many, and label them."""
+        validation, scale = settings.validation, 1.0 / axis_scale(learned)
+        structure = model_structure(_RIGID_ONLY)
+        judges = _pieces(training, validation.samples)
+        learns = judges if len(learned) == len(training) else _pieces(learned, validation.samples)
+        ranges = data_ranges(structure, judges.motion.attitude)
+        part, whole = (Samples.of(Ready(source, rigid=True), structure, ranges) for source in (learns, judges))
+        part, choice = with_folds(part, whole, replace(settings.ridge, folds=validation.folds))
+        own_scale = scale if settings.base == "rigid-body" else np.ones(3)
+        judged = replace(choice.judged, scale=scale)
+        return cls(replace(part, scale=own_scale), judged, choice, settings.base, settings.rank_tolerance)
+
+    def rigid_body(self) -> _Result:
+        """Cross-validate the rigid body alone."""
+        products = self._products(_RIGID_ONLY)
+        assert products is not None
+        return self._plain(*products, slice(0, RIGID), np.inf)
+
+    def structure(self, settings: StructureSettings) -> _Result | None:
+        """Cross-validate a structure; None where the samples cannot tell its parameters, or it is not finite."""
+        if model_structure(settings).parameters > min(_MOST_PARAMETERS, self._fewest_rows()):
+            return None
+        products = self._products(settings)
+        if products is None:
+            return None
+        if self.base == "none":
+            return self._plain(*products, slice(RIGID, None), 0.0)
+        learned, judged = products
+        curve = ridge_curve(learned, judged, self.choice.left_out, self.choice.weights, column_size(learned.sum()))
+        return _Result(*(float(values[curve.chosen]) for values in (curve.error, curve.standard_error, curve.weight)))
+
+    def _products(self, settings: StructureSettings) -> tuple[Products, Products] | None:
+        structure = model_structure(settings)
+        ranges = data_ranges(structure, np.concatenate([c.attitude for c in self.judged.ready]))
+        partitions = uniform_breakpoints(structure)
+        learned, judged = (
+            replace(samples, structure=structure, ranges=ranges).products(partitions)
+            for samples in (self.learned, self.judged)
+        )
+        usable = max(np.max(np.abs(learned.gram)), np.max(np.abs(judged.gram))) <= LARGEST_SQUARE
+        return (learned, judged) if usable else None
+
+    def _plain(self, learned: Products, judged: Products, columns: slice, weight: float) -> _Result:
+        """Cross-validate some columns without a ridge."""
+        errors = [
+            _fold_error(learned.sum(~left_out), judged, fold, columns, self.rank_tolerance)
+            for fold, left_out in enumerate(self.choice.left_out)
+        ]
+        spread = np.std(errors, ddof=1) / np.sqrt(len(errors))
+        return _Result(float(np.average(errors, weights=judged.rows)), float(spread), weight)
+
+    def _fewest_rows(self) -> int:
+        samples = np.bincount(self.learned.label, minlength=self.learned.labels)
+        return 3 * int(np.min(~self.choice.left_out @ samples))
+
+
+def compare_structures(
+    training: TorqueSource, learned: TorqueSource, settings: IdentificationSettings
+) -> StructureComparison:
+    """Cross-validate structures that differ from the settings' in one choice, and the rigid body alone.
+
+    All have equidistant partitions: nothing is searched for, so a structure whose partitions matter looks worse here
+    than a search would leave it, the model's own as well. The ridge weight of a fuzzy part over a rigid body is chosen
+    by the one-standard-error rule on the same blocks; without a rigid body the coefficients are those of minimum norm.
+    A structure is left out where it has more than 400 parameters, or more than the rows that a fold learns from.
+
+    Parameters
+    ----------
+    training : TorqueSource
+        Judges; of more than `validation.samples` samples, as many in contiguous pieces.
+    learned : TorqueSource
+        The samples of it that parameters are learned from.
+    settings : IdentificationSettings
+
+    Returns
+    -------
+    StructureComparison
+        Empty where the samples are too few for the folds and the time left out around them.
+    """
+    try:
+        folds = _Folds.of(training, learned, settings)
+    except SettingError:
+        return _comparison([])
+    own = candidates(settings)[0]
+    rows = [(RIGID_BODY, 0, False, folds.rigid_body())]
+    for other in candidates(settings):
+        result = folds.structure(other)
+        if result is not None:
+            rows.append((structure_name(other), model_structure(other).parameters, other == own, result))
+    return _comparison(rows)
+
+
+def _comparison(rows: list[tuple[str, int, bool, _Result]]) -> StructureComparison:
+    results = [result for *_, result in rows]
+    return StructureComparison(
+        name=tuple(name for name, *_ in rows),
+        parameters=np.array([parameters for _, parameters, *_ in rows], dtype=np.int64),
+        error=np.array([result.error for result in results], dtype=float),
+        standard_error=np.array([result.standard_error for result in results], dtype=float),
+        ridge_weight=np.array([result.ridge_weight for result in results], dtype=float),
+        own=np.array([own for *_, own, _ in rows], dtype=bool),
+    )
+
+
+def _pieces(source: TorqueSource, most: int) -> TorqueData:
+    """Gather contiguous pieces, evenly spread, of a source that has too many samples."""
+    samples = len(source)
+    if samples <= most:
+        return gathered(source, np.arange(samples))
+    starts = np.arange(_PIECES) * samples // _PIECES
+    return gathered(source, (starts[:, None] + np.arange(most // _PIECES)).ravel())
+
+
+def _fold_error(learned: Products, judged: Products, fold: int, columns: slice, rank_tolerance: float) -> float:
+    """Mean squared error on one block of the parameters of minimum norm."""
+    values, vectors = np.linalg.eigh(learned.gram[0, columns, columns])
+    kept = values > max(rank_tolerance, SMALLEST_SINGULAR_SHARE) ** 2 * max(values[-1], 0.0)
+    basis = vectors[:, kept]
+    x = basis @ ((basis.T @ learned.moment[0, columns]) / values[kept])
+    explained = 2.0 * judged.moment[fold, columns] @ x - x @ judged.gram[fold, columns, columns] @ x
+    square = judged.square[fold]
+    return float(max(square - explained, SMALLEST_ERROR * square) / judged.rows[fold])
