@@ -175,8 +175,9 @@ def simulate(
         typer.Option(
             "--model",
             metavar="MODEL",
-            help="Fly this model, made by `cpfls extend` or `cpfls identify`, in closed loop; without, the vehicle of "
-            "the config. Effects given come on top.",
+            help="Control the attitude with this model of `cpfls identify`, and compare its tracking error with those "
+            "of a rigid body and of PD alone. With --mode closed-loop: fly it, or one of `cpfls extend`, in place of "
+            "the vehicle of the config; effects given come on top.",
         ),
     ] = None,
     mode: Annotated[
@@ -184,8 +185,8 @@ def simulate(
         typer.Option(
             "--mode",
             metavar="MODE",
-            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it. "
-            "Overrides simulation.mode.",
+            help="inverse: torques of the planned motion itself; closed-loop: an autopilot flies it, sensors log it; "
+            "computed-torque: attitude control by --model. Overrides simulation.mode.",
         ),
     ] = None,
     effect: Annotated[
@@ -200,7 +201,7 @@ def simulate(
     *,
     common: Common,
 ) -> None:
-    """Fly a trajectory with the exact vehicle, or in closed loop with effects that its model lacks."""
+    """Fly a trajectory: exactly, in closed loop with effects that a model lacks, or with a model that controls it."""
     with messages_for_errors():
         from cpfls_cli.stages.effect_options import simulation_overrides
 
@@ -209,7 +210,7 @@ def simulate(
     def call(job: Job) -> Outcome:
         from cpfls_cli.stages import simulate as stage
 
-        return stage.run(job, trajectory, model)
+        return stage.run(job, trajectory, model, mode)
 
     _run("simulate", config, output, common, call)
 

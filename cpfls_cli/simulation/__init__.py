@@ -4,11 +4,12 @@ from cpfls_cli.simulation.flown_effects import FlownEffect, FlownEffects, flown_
 from cpfls_cli.simulation.flown_model import FlownModel, flown_model
 from cpfls_cli.simulation.flyable import Flyability, TooMuch, flyability
 from cpfls_cli.simulation.measured import MeasuredFlight, measure
-from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
+from cpfls_cli.simulation.settings import ClosedLoopSettings, ComputedTorqueSettings, SimulationSettings
 from cpfls_cli.simulation.simulate import SimulatedFlight, simulate
 
 __all__ = [
     "ClosedLoopSettings",
+    "ComputedTorqueSettings",
     "FlownEffect",
     "FlownEffects",
     "FlownModel",

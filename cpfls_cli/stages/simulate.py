@@ -1,13 +1,16 @@
-"""Stage `simulate`: fly a trajectory, with the exact vehicle or in closed loop."""
+"""Stage `simulate`: fly a trajectory, with the exact vehicle, in closed loop, or with a model that controls it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT, TRAJECTORY
+from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.simulation import FlownModel, flown_effects, measure, simulate
+from cpfls_cli.stages import tracking
 from cpfls_cli.stages.flown import closed_loop_outcome, effect_record, exact_outcome, noise_record, violation_sentence
 from cpfls_cli.stages.job import Job, Outcome, Started, begin, finish
 from cpfls_cli.stages.model_in_flight import model_in_flight
@@ -18,7 +21,7 @@ _TURNED = ("attitude", "attitude_rate", "attitude_acceleration")
 _MOVED = ("position", "velocity", "acceleration")
 
 
-def run(job: Job, trajectory: Path, model: Path | None = None) -> Outcome:
+def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None = None) -> Outcome:
     """Simulate a flight along a trajectory and write it.
 
     Parameters
@@ -26,7 +29,10 @@ def run(job: Job, trajectory: Path, model: Path | None = None) -> Outcome:
     job : Job
     trajectory : Path
     model : Path or None
-        Flown in closed loop in place of the vehicle of the config: one with effects, or an identified one.
+        In mode closed-loop flown in place of the vehicle of the config: one with effects, or an identified one. Without
+        a mode an identified one, with which the attitude of that vehicle is controlled.
+    mode : str or None
+        Of the command line, which the config has too; None where it gives none.
 
     Returns
     -------
@@ -40,9 +46,16 @@ def run(job: Job, trajectory: Path, model: Path | None = None) -> Outcome:
         If a rotor would have to do what it cannot, unless `simulation.infeasible` is ``report``, or a flight in closed
         loop loses its path.
     """
+    if model is not None and mode is None:
+        job = replace(job, study=_with_a_model(job.study))
+    if job.study.simulation.mode == "computed-torque":
+        return tracking.run(job, trajectory, _required(model))
     closed = job.study.simulation.mode == "closed-loop"
     if model is not None and not closed:
-        raise InputError(f"{model}: models are flown in closed loop only; add --mode closed-loop")
+        raise InputError(
+            f"{model}: no model is flown in mode inverse; leave the mode out to control the vehicle with it, or add "
+            "--mode closed-loop to fly it"
+        )
     started = begin(job, {"trajectory": trajectory} | ({} if model is None else {"model": model}))
     time, planned = _plan(trajectory, closed)
     flown = FlownModel() if model is None else model_in_flight(model, job.study)
@@ -53,6 +66,20 @@ def run(job: Job, trajectory: Path, model: Path | None = None) -> Outcome:
     if closed:
         return _closed_loop(job, started, time, planned, flown)
     return _inverse(job, started, time, planned, trajectory)
+
+
+def _with_a_model(study: Study) -> Study:
+    """Let a model control the attitude, where nothing else is said."""
+    if study.simulation.mode != "inverse":
+        return study
+    with settings_of("simulation", study):
+        return study.model_copy(update={"simulation": replace(study.simulation, mode="computed-torque")})
+
+
+def _required(model: Path | None) -> Path:
+    if model is None:
+        raise InputError("simulation.mode = computed-torque: controls the attitude with a model; add --model MODEL")
+    return model
 
 
 def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:

@@ -1,0 +1,164 @@
+"""Let several controllers follow one plan, each with its own vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.control.integrate import Actuators, advance, steps_of
+from cpfls_cli.control.laws import Controller, Gains
+from cpfls_cli.control.plan import Plan
+from cpfls_cli.control.plants import Plant
+
+_STEPS_BETWEEN_REPORTS = 100
+# Seen from the side of the plan: a vehicle that leapt over the vertical has a cosine below zero.
+_VERTICAL = 0.02
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """Noise of what the controllers measure, the same for all of them.
+
+    Attributes
+    ----------
+    attitude, body_rate : array, shape (control, 3), rad and rad/s
+    """
+
+    attitude: Array
+    body_rate: Array
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What the vehicles did, at the instants of control; NaN where one was lost.
+
+    Attributes
+    ----------
+    attitude, body_rate : array, shape (controller, control, 3), rad and rad/s
+    body_torque : array, shape (controller, control, 3), N m, body frame
+        That acts from the instant on.
+    clipped : array of bool, shape (controller, control)
+        Where a command was larger than the actuators can do.
+    """
+
+    attitude: Array
+    body_rate: Array
+    body_torque: Array
+    clipped: BoolArray
+
+
+@dataclass(frozen=True)
+class Loop:
+    """What closes the loop between controllers and vehicles.
+
+    Attributes
+    ----------
+    plant : callable
+    gains : Gains
+    actuators : Actuators
+    sensing : Sensing or None
+        None for exact measurements.
+    integration_rate : float, Hz
+    """
+
+    plant: Plant
+    gains: Gains
+    actuators: Actuators
+    sensing: Sensing | None
+    integration_rate: float
+
+
+def track(
+    plan: Plan,
+    controllers: Sequence[Controller],
+    loop: Loop,
+    initial_error: Array,
+    initial_torque: Array,
+    progress: Callable[[float, int], None] = lambda _done, _total: None,
+) -> Tracked:
+    """Fly all controllers along a plan.
+
+    A vehicle is lost where an angle is off by more than 90 degrees, its pitch reaches the vertical, or its state is not
+    finite; the others go on.
+
+    Parameters
+    ----------
+    plan : Plan
+    controllers : sequence of Controller
+    loop : Loop
+    initial_error : array, shape (3,), rad
+        Planned less flown angles at the start; the Euler rates are those of the plan.
+    initial_torque : array, shape (3,), N m, body frame
+        That acts before the first command, for actuators with a lag.
+    progress : callable
+        Takes steps done and steps in all.
+
+    Returns
+    -------
+    Tracked
+    """
+    vehicles, instants = len(controllers), len(plan)
+    start = (plan.attitude[:1] - initial_error, plan.rate[:1])
+    state = np.tile(np.concatenate([start[0], rotations.body_rate(*start)], axis=1), (vehicles, 1))
+    torque = np.tile(initial_torque, (vehicles, 1))
+    steps = steps_of(plan.period, loop.integration_rate, loop.actuators.time_constant)
+    record = np.full((instants, vehicles, 9), np.nan)
+    clipped = np.zeros((instants, vehicles), dtype=bool)
+    # A vehicle that is lost may reach infinity before the next instant, where it is told.
+    with np.errstate(all="ignore"):
+        for instant in range(instants):
+            state[_lost(state, plan.attitude[instant])] = np.nan
+            flown = np.flatnonzero(~np.isnan(state[:, 0]))
+            if not flown.size:
+                break
+            own, before = state[flown], torque[flown]
+            asked = _commands(plan, instant, [controllers[index].law for index in flown.tolist()], loop, own)
+            command = loop.actuators.clipped(asked)
+            clipped[instant, flown] = (command != asked).any(axis=1)
+            acting = partial(loop.actuators.torque, before, command)
+            record[instant, flown] = np.concatenate([own, acting(0.0)], axis=1)
+            state[flown] = advance(loop.plant, own, acting, plan.period, steps)
+            torque[flown] = acting(plan.period)
+            if instant % _STEPS_BETWEEN_REPORTS == 0:
+                progress(instant, instants)
+    attitude, body_rate, body_torque = np.split(record.swapaxes(0, 1), 3, axis=2)
+    return Tracked(attitude, body_rate, body_torque, clipped.T)
+
+
+def wrapped(angle: Array) -> Array:
+    """Wrap angles to [-pi, pi).
+
+    Parameters
+    ----------
+    angle : array, rad
+
+    Returns
+    -------
+    array, rad
+    """
+    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
+
+
+def _lost(state: Array, planned: Array) -> BoolArray:
+    attitude = state[:, :3]
+    off = ~(np.abs(wrapped(planned - attitude)) < 0.5 * np.pi).all(axis=1)
+    upright = np.cos(attitude[:, 1]) * np.sign(np.cos(planned[1]))
+    return np.asarray(off | ~(upright > _VERTICAL) | ~np.isfinite(state).all(axis=1))
+
+
+def _commands(plan: Plan, instant: int, laws: Sequence[Callable[..., Array]], loop: Loop, state: Array) -> Array:
+    """Body torques that the controllers command for what they measure, shape (vehicle, 3)."""
+    attitude, body_rate = state[:, :3], state[:, 3:]
+    if loop.sensing is not None:
+        attitude = attitude + loop.sensing.attitude[instant]
+        body_rate = body_rate + loop.sensing.body_rate[instant]
+    rate = rotations.attitude_rate(attitude, body_rate)
+    feedback = loop.gains.feedback(wrapped(plan.attitude[instant] - attitude), plan.rate[instant] - rate)
+    wanted = plan.acceleration[instant]
+    torque = [law(*measured, wanted) for law, *measured in zip(laws, attitude, rate, feedback, strict=True)]
+    return rotations.body_torque(attitude, np.array(torque).reshape(-1, 3))

@@ -1,0 +1,91 @@
+"""Stage `simulate` in mode computed-torque: attitude control by an identified model, beside other controllers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cpfls_cli.artifacts.formats import FLIGHT, TRAJECTORY
+from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.config.study import Study
+from cpfls_cli.control import Plan, flown_signals, plan_of, scores, track
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.stages.base_file import model_base
+from cpfls_cli.stages.extended_file import is_extended
+from cpfls_cli.stages.flown import noise_record
+from cpfls_cli.stages.job import Job, Outcome, begin, finish
+from cpfls_cli.stages.model_file import read_model
+from cpfls_cli.stages.sources import read_with
+from cpfls_cli.stages.study import generator, settings_of
+from cpfls_cli.stages.tracking_file import logged_signals, tracking_data
+from cpfls_cli.stages.tracking_setup import controllers_of, loop_of, planned_torque
+from cpfls_cli.stages.tracking_words import tracking_outcome
+
+_TURNED = ("attitude", "attitude_rate", "attitude_acceleration")
+
+
+def run(job: Job, trajectory: Path, model: Path) -> Outcome:
+    """Follow the attitude of a trajectory with several controllers, and write the flight under the model's.
+
+    Parameters
+    ----------
+    job : Job
+    trajectory : Path
+    model : Path
+        Identified.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    InputError
+        If the model has effects, or is of another vehicle.
+    ConfigError
+        If the control rate is lower than that of the trajectory.
+    ComputationError
+        If the planned pitch comes near the vertical.
+    """
+    started = begin(job, {"trajectory": trajectory, "model": model})
+    artifact = _identified(model, job.study)
+    identified = read_model(artifact, model)
+    plan = _plan(trajectory, job.study)
+    if started.dry_run is not None:
+        return started.dry_run
+    settings, vehicle = job.study.simulation.computed_torque, job.study.vehicle
+    rng = generator(job.study, "simulate")
+    controllers = controllers_of(plan, identified, artifact.array("baselines/rigid_body"), vehicle)
+    loop = loop_of(plan, settings, identified, vehicle, rng)
+    error = np.array(settings.initial_error_rad)
+    tracked = track(plan, controllers, loop, error, planned_torque(plan, vehicle), job.progress)
+    names = [controller.name for controller in controllers]
+    exact = flown_signals(plan, tracked, names.index("model"), loop.plant)
+    record = tracking_data(plan, names, scores(plan, tracked, loop.gains.settling_time), identified, exact["attitude"])
+    signals, noise = logged_signals(exact, job.study, rng)
+    finish(job, FLIGHT, {**signals, **noise_record(noise), **record}, started.inputs)
+    return tracking_outcome(signals, sorted(noise), record, _complete(artifact))
+
+
+def _identified(path: Path, study: Study) -> Artifact:
+    if is_extended(path):
+        raise InputError(
+            f"{path}: a model with effects is flown in closed loop only; add --mode closed-loop, or give a model that "
+            "`cpfls identify` made"
+        )
+    return model_base(path, study)
+
+
+def _complete(artifact: Artifact) -> bool:
+    return "search/complete" not in artifact.data or bool(artifact.number("search/complete"))
+
+
+def _plan(trajectory: Path, study: Study) -> Plan:
+    source = read_with(trajectory, TRAJECTORY, "time", *_TURNED)
+    planned = {name: source.array(name) for name in _TURNED}
+    with settings_of("simulation", study):
+        try:
+            return plan_of(source.array("time"), planned, study.simulation.computed_torque.control_rate_hz)
+        except ComputationError as error:
+            raise ComputationError(f"{trajectory}: {error}") from None
