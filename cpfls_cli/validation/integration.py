@@ -9,30 +9,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.validation.replay_windows import Windows
-from cpfls_cli.validation.turning import Law
+from cpfls_cli.validation.turning import Law, State
 
 # The error of a step of the classic Runge-Kutta method that turns by x is of the order x^5 / 120: 1e-7 rad here.
 _TURN_PER_STEP = 0.1
 # Far beyond it the method does not follow any motion; the run is lost.
 _LARGEST_TURN = 1.0
 _MOST_STEPS = 20
-
-
-class State(NamedTuple):
-    """Bodies that turn.
-
-    Attributes
-    ----------
-    rotation : array, shape (bodies, 3, 3)
-        Body to world.
-    body_rate : array, shape (bodies, 3), rad/s, body frame
-    exists : array of bool, shape (bodies,)
-        False from where on a run is lost; it stays where it was.
-    """
-
-    rotation: Array
-    body_rate: Array
-    exists: BoolArray
 
 
 def free_runs(law: Law, windows: Windows) -> Iterator[State]:
@@ -55,7 +38,7 @@ def free_runs(law: Law, windows: Windows) -> Iterator[State]:
     interval = np.diff(windows.time, axis=1)
     fastest = np.max(np.linalg.norm(windows.body_rate, axis=2), initial=0.0)
     steps = int(np.clip(np.ceil(fastest * np.max(interval, initial=0.0) / _TURN_PER_STEP), 1, _MOST_STEPS))
-    state = State(windows.rotation[:, 0], windows.body_rate[:, 0], np.ones(len(interval), dtype=bool))
+    state = windows.start
     for sample in range(interval.shape[1]):
         torque, change = windows.torque[:, sample], np.diff(windows.torque[:, sample : sample + 2], axis=1)[:, 0]
         for step in range(steps):
@@ -70,34 +53,37 @@ def _step(law: Law, state: State, torque: tuple[Array, Array], interval: Array) 
     second = _slope(law, _moved(state, first, interval / 2), middle)
     third = _slope(law, _moved(state, second, interval / 2), middle)
     fourth = _slope(law, _moved(state, third, interval), torque[1])
-    mean = State(
+    mean = _Slope(
         (first.rotation + 2 * second.rotation + 2 * third.rotation + fourth.rotation) / 6,
         (first.body_rate + 2 * second.body_rate + 2 * third.body_rate + fourth.body_rate) / 6,
         fourth.exists,
     )
-    moved = _moved(state, mean, interval)
-    exists = moved.exists & _followed(moved.body_rate, interval)
-    return State(
-        np.where(exists[:, None, None], moved.rotation, state.rotation),
-        np.where(exists[:, None], moved.body_rate, state.body_rate),
-        exists,
-    )
+    return _moved(state, mean, interval)
 
 
-def _slope(law: Law, state: State, torque: Array) -> State:
-    acceleration = law(state.rotation, state.body_rate, torque)
-    return State(
-        np.cross(state.rotation, state.body_rate[:, None]), acceleration.value, state.exists & acceleration.exists
-    )
+class _Slope(NamedTuple):
+    """Derivatives of rotation and body rate, and whether all that led to them exists."""
+
+    rotation: Array
+    body_rate: Array
+    exists: BoolArray
 
 
-def _moved(state: State, slope: State, interval: Array) -> State:
+def _slope(law: Law, state: State, torque: Array) -> _Slope:
+    acceleration = law(state, torque)
+    turning = np.cross(state.rotation, state.body_rate[:, None])
+    return _Slope(turning, acceleration.value, state.exists & acceleration.exists)
+
+
+def _moved(state: State, slope: _Slope, interval: Array) -> State:
     """Move on; what would leave every bound stays, and is lost."""
     body_rate = state.body_rate + interval * slope.body_rate
     exists = slope.exists & _followed(body_rate, interval)
+    rotation = state.rotation + interval[:, :, None] * slope.rotation
     return State(
-        np.where(exists[:, None, None], state.rotation + interval[:, :, None] * slope.rotation, state.rotation),
+        np.where(exists[:, None, None], rotation, state.rotation),
         np.where(exists[:, None], body_rate, state.body_rate),
+        state.beyond,
         exists,
     )
 

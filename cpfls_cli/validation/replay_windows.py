@@ -10,11 +10,13 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.identification.data import TorqueSource, gathered, sample_times
-from cpfls_cli.identification.physics import vertical
 from cpfls_cli.validation.stretches import sample_period, stretch_numbers
+from cpfls_cli.validation.turning import State
 
 # 40 MB of rotations, rates and torques at a time.
 _SAMPLES_AT_ONCE = 200_000
+# |cos(pitch)| of every sample of a window: errors of D(q) come to the body axes divided by its square, here by ten.
+_CLEAR = 0.3
 
 
 @dataclass(frozen=True)
@@ -28,12 +30,20 @@ class Windows:
         Body to world.
     body_rate : array, shape (window, sample, 3), rad/s, body frame
     torque : array, shape (window, sample, 3), N m, body frame
+    beyond : array of bool, shape (window,)
+        Whether the pitch of the flight is beyond +-90 degrees; in no window it crosses them.
     """
 
     time: Array
     rotation: Array
     body_rate: Array
     torque: Array
+    beyond: BoolArray
+
+    @property
+    def start(self) -> State:
+        """What was measured at the start of the windows."""
+        return State(self.rotation[:, 0], self.body_rate[:, 0], self.beyond, np.ones(len(self.time), dtype=bool))
 
 
 @dataclass(frozen=True)
@@ -56,7 +66,7 @@ class Plan:
 
 
 def plan_windows(source: TorqueSource, horizon: int, most: int) -> Plan:
-    """Choose windows, evenly spread over all that hold no pause and no pitch near +-90 degrees.
+    """Choose windows, evenly spread over all that hold no pause and no pitch within 17 degrees of the vertical.
 
     Parameters
     ----------
@@ -73,7 +83,7 @@ def plan_windows(source: TorqueSource, horizon: int, most: int) -> Plan:
     """
     time = sample_times(source)
     stretch = stretch_numbers(time)
-    steep = np.concatenate([vertical(data.motion.attitude) for data in source.chunks()])
+    steep = np.concatenate([np.abs(np.cos(data.motion.attitude[:, 1])) < _CLEAR for data in source.chunks()])
     starts = _starts(stretch, steep, horizon)
     while len(starts) == 0 and horizon > 1:
         horizon //= 2
@@ -105,6 +115,7 @@ def read_windows(source: TorqueSource, plan: Plan) -> Iterator[Windows]:
             rotation=rotations.rotation_matrix(attitude)[places],
             body_rate=rotations.body_rate(attitude, rate)[places],
             torque=rotations.body_torque(attitude, data.torque)[places],
+            beyond=np.cos(attitude[places[:, 0], 1]) < 0,
         )
 
 

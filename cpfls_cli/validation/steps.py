@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.validation.integration import State, free_runs
+from cpfls_cli.validation.integration import free_runs
 from cpfls_cli.validation.replay_windows import Windows, plan_windows, read_windows
-from cpfls_cli.validation.turning import Predictor, turning_law
+from cpfls_cli.validation.turning import Predictor, State, turning_law
 
 NOTHING_MOVES = "nothing-moves"
 """The predictor by which attitude and body rate stay what they were at the start of a window."""
@@ -135,5 +135,4 @@ def _errors(measured: Windows, sample: int, state: State) -> tuple[Array, Array]
 
 
 def _still(measured: Windows) -> Iterator[State]:
-    start = State(measured.rotation[:, 0], measured.body_rate[:, 0], np.ones(len(measured.time), dtype=bool))
-    return iter([start] * (measured.time.shape[1] - 1))
+    return iter([measured.start] * (measured.time.shape[1] - 1))

@@ -20,6 +20,27 @@ Predictor = InertiaModel | Array
 _STEEP = 1e-8
 
 
+class State(NamedTuple):
+    """Bodies that turn.
+
+    Attributes
+    ----------
+    rotation : array, shape (bodies, 3, 3)
+        Body to world.
+    body_rate : array, shape (bodies, 3), rad/s, body frame
+    beyond : array of bool, shape (bodies,)
+        Whether the pitch is counted beyond +-90 degrees. Every attitude has Euler angles on both sides, and a model
+        of the full circle has learned from those of the flight.
+    exists : array of bool, shape (bodies,)
+        False from where on a run is lost; it stays where it was.
+    """
+
+    rotation: Array
+    body_rate: Array
+    beyond: BoolArray
+    exists: BoolArray
+
+
 class Acceleration(NamedTuple):
     """Derivative of the body rates.
 
@@ -35,8 +56,8 @@ class Acceleration(NamedTuple):
     exists: BoolArray
 
 
-Law = Callable[[Array, Array, Array], Acceleration]
-"""Takes rotations, shape (bodies, 3, 3), body rates and body torques, shape (bodies, 3) each."""
+Law = Callable[[State, Array], Acceleration]
+"""Takes bodies and the torques on them, shape (bodies, 3), N m, body frame."""
 
 
 def turning_law(predictor: Predictor) -> Law:
@@ -56,9 +77,9 @@ def turning_law(predictor: Predictor) -> Law:
 def _rigid(inertia: Array) -> Law:
     """Turn as ``I omega' = M - omega x I omega``."""
 
-    def law(rotation: Array, body_rate: Array, torque: Array) -> Acceleration:  # noqa: ARG001
-        matrices = np.broadcast_to(inertia, (len(body_rate), 3, 3))
-        return _solved(matrices, torque - np.cross(body_rate, body_rate @ inertia))
+    def law(state: State, torque: Array) -> Acceleration:
+        matrices = np.broadcast_to(inertia, (len(torque), 3, 3))
+        return _solved(matrices, torque - np.cross(state.body_rate, state.body_rate @ inertia))
 
     return law
 
@@ -66,11 +87,11 @@ def _rigid(inertia: Array) -> Law:
 def _identified(model: InertiaModel) -> Law:
     """Turn as ``J qdd = W^T M - (dJ/dt) qd + 1/2 grad (qd^T J qd)``, and then ``omega' = W qdd + (dW/dt) qd``."""
 
-    def law(rotation: Array, body_rate: Array, torque: Array) -> Acceleration:
-        q = euler_angles(rotation)
+    def law(state: State, torque: Array) -> Acceleration:
+        q = _attitude(state)
         steep = np.abs(np.cos(q[:, 1])) < _STEEP
         q = np.where(steep[:, None], 0.0, q)
-        qd = rotations.attitude_rate(q, body_rate)
+        qd = rotations.attitude_rate(q, state.body_rate)
         values = model.inertia(q)
         along = np.einsum("nkij,nk,nj->ni", values.gradient, qd, qd)
         potential = 0.5 * np.einsum("nkij,ni,nj->nk", values.gradient, qd, qd)
@@ -78,6 +99,12 @@ def _identified(model: InertiaModel) -> Law:
         return Acceleration(rotations.body_acceleration(q, qd, found.value), found.exists & ~steep)
 
     return law
+
+
+def _attitude(state: State) -> Array:
+    """Give the Euler angles on the side of the vertical that the pitch is counted on."""
+    near = euler_angles(state.rotation)
+    return np.where(state.beyond[:, None], np.pi + near * [1.0, -1.0, 1.0], near)
 
 
 def _solved(matrices: Array, right_side: Array) -> Acceleration:

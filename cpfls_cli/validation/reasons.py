@@ -1,0 +1,212 @@
+"""What speaks for a model and against it, one sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.identification.findings import AXES
+from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
+from cpfls_cli.validation.paired import Comparison
+from cpfls_cli.validation.steps import NOTHING_MOVES
+
+FOR, NEITHER, AGAINST = 1, 0, -1
+
+# White errors fall below it once in a hundred times an axis.
+_NOT_WHITE = 0.01
+
+
+class Reason(NamedTuple):
+    """A reason.
+
+    Attributes
+    ----------
+    text : str
+        One sentence with its number.
+    speaks : int
+        1 for the model, -1 against it, 0 neither.
+    """
+
+    text: str
+    speaks: int
+
+
+def reasons(grounds: Grounds) -> Iterator[Reason]:
+    """List what speaks for a model and against it, the most important first.
+
+    Parameters
+    ----------
+    grounds : Grounds
+
+    Yields
+    ------
+    Reason
+    """
+    rules = (_held_out, _hardly_excited, _beside_rigid_body, _steps, _lost, _definite, _fuzzy_part, _determined)
+    for rule in (*rules, _band, _search, _outside, _white):
+        yield from rule(grounds)
+
+
+def numbers(values: Array) -> str:
+    """Print the numbers of the three axes.
+
+    Parameters
+    ----------
+    values : array, shape (3,)
+
+    Returns
+    -------
+    str
+        As ``roll 0.95 pitch 0.97 yaw 0.23``.
+    """
+    return " ".join(f"{axis} {value:.3g}" for axis, value in zip(AXES, values, strict=True))
+
+
+def _held_out(grounds: Grounds) -> Iterator[Reason]:
+    r2 = grounds.r2(MODEL)
+    if not grounds.held_out:
+        yield Reason(
+            f"judged on its own training data alone (R2 of body torque {numbers(r2)}), which says nothing of any other "
+            "flight: hold some out with identification.training_share below 1, or --validate another flight",
+            AGAINST,
+        )
+        return
+    low = [name for name, value in zip(AXES, r2, strict=True) if not value >= grounds.r2_min]
+    parts = f"worst of {len(grounds.held_out)} held-out parts" if len(grounds.held_out) > 1 else "held out"
+    text = f"R2 of body torque, {parts}: {numbers(r2)}"
+    if low:
+        yield Reason(f"{text}; below {grounds.r2_min:g} about {', '.join(low)}", AGAINST)
+    else:
+        yield Reason(f"{text}; {grounds.r2_min:g} or more about every axis", FOR)
+
+
+def _hardly_excited(grounds: Grounds) -> Iterator[Reason]:
+    for axis in np.flatnonzero(grounds.hardly_excited):
+        ours, still = grounds.rate_error(MODEL)[axis], grounds.rate_error(NOTHING_MOVES)[axis]
+        # Also where a run was lost and there is no number.
+        worse = not ours <= still
+        yield Reason(
+            f"{AXES[axis]} hardly moves in training: its rate is predicted with an error of {ours:.3g} rad/s, "
+            f"{still:.3g} if nothing moved"
+            + ("" if worse else ", which neither confirms the model there nor refutes it"),
+            AGAINST if worse else NEITHER,
+        )
+
+
+def _beside_rigid_body(grounds: Grounds) -> Iterator[Reason]:
+    if grounds.torque is not None:
+        yield _compared("squared error of held-out torque", grounds.torque)
+    if grounds.steps.windows:
+        compared = grounds.steps_beside(RIGID_BODY)
+        reason = _compared(f"squared error of the body rate replayed ({grounds.steps.part})", compared)
+        # What was learned from is no witness.
+        yield reason if grounds.steps.part in grounds.held_out else Reason(reason.text, NEITHER)
+
+
+def _compared(what: str, found: Comparison) -> Reason:
+    if found.change == 0:
+        return Reason(f"{what}: the same as that of the rigid body", AGAINST)
+    text = f"{what}: {abs(100 * found.change):.3g} % {'below' if found.change < 0 else 'above'} that of the rigid body"
+    if found.lower or found.higher:
+        return Reason(f"{text}, by more than chance over {found.blocks} blocks", FOR if found.lower else AGAINST)
+    return Reason(f"{text}, which may be chance over {found.blocks} blocks", AGAINST)
+
+
+def _steps(grounds: Grounds) -> Iterator[Reason]:
+    steps = grounds.steps
+    if not steps.windows:
+        yield Reason(f"{steps.part}: no stretch without a pause or a vertical pitch to replay torques on", NEITHER)
+        return
+    ours, still = (
+        float(np.degrees(np.linalg.norm(steps.attitude[steps.model.index(name), -1])))
+        for name in (MODEL, NOTHING_MOVES)
+    )
+    if np.isfinite(ours):
+        text = (
+            f"after {steps.horizon[-1]:.3g} s of torques replayed ({steps.part}, {steps.windows} windows) the attitude"
+        )
+        yield Reason(
+            f"{text} is off by {ours:.3g} degrees, {still:.3g} if nothing moved", FOR if ours < still else AGAINST
+        )
+
+
+def _lost(grounds: Grounds) -> Iterator[Reason]:
+    if grounds.lost(MODEL):
+        yield Reason(
+            f"{grounds.lost(MODEL)} of {grounds.steps.windows} windows replayed do not come to their end: D(q) is not "
+            "positive definite there, or the model turns faster than any step of integration",
+            AGAINST,
+        )
+
+
+def _definite(grounds: Grounds) -> Iterator[Reason]:
+    physics = grounds.physics
+    if physics.cells and not grounds.impossible:
+        yield Reason(
+            f"D(q) is positive definite in all {physics.cells} cells of attitude that training visited; its smallest "
+            f"eigenvalue is {physics.smallest_eigenvalue:.3g} kg m^2",
+            FOR,
+        )
+
+
+def _fuzzy_part(grounds: Grounds) -> Iterator[Reason]:
+    if grounds.fuzzy_part_off:
+        text = "cross-validation switched the fuzzy part off: no evidence for an inertia that depends on attitude"
+        yield Reason(text, AGAINST)
+
+
+def _determined(grounds: Grounds) -> Iterator[Reason]:
+    found = grounds.identification
+    if grounds.fuzzy_part_off:
+        return
+    if grounds.determined:
+        yield Reason(f"every coefficient is determined; condition number {found.system.condition_number:.3g}", FOR)
+    else:
+        share, weak = 100 * float(np.mean(found.excitation.determined)), int(np.sum(~found.excitation.excited))
+        rules = f"{weak} of {len(found.excitation.name)} rules are not excited beyond the noise"
+        yield Reason(f"{share:.3g} % of what the rules could say is determined by the flight; {rules}", AGAINST)
+
+
+def _band(grounds: Grounds) -> Iterator[Reason]:
+    if grounds.band is None:
+        return
+    widest = float(np.max(grounds.band))
+    text = f"the widest 95 % band of a moment of inertia is {100 * widest:.3g} % of the inertia itself"
+    # A band as wide as its value leaves open by more than a factor of two how hard the body is to turn.
+    yield Reason(text, FOR if widest < 1 else AGAINST)
+
+
+def _search(grounds: Grounds) -> Iterator[Reason]:
+    found = grounds.identification
+    if not found.complete:
+        done = len(found.history.evaluations) - 1
+        text = f"the search stopped before its end ({found.stop_reason}, after {done} generations)"
+        yield Reason(f"{text}: better partitions may exist", AGAINST)
+
+
+def _outside(grounds: Grounds) -> Iterator[Reason]:
+    found = grounds.identification
+    outside, samples = (sum(of[part] for part in grounds.held_out) for of in (found.outside, found.samples))
+    if outside and not (grounds.fuzzy_part_off or grounds.everywhere):
+        yield Reason(
+            f"{100 * outside / samples:.3g} % of the held-out samples lie outside the attitudes that training visited",
+            NEITHER,
+        )
+
+
+def _white(grounds: Grounds) -> Iterator[Reason]:
+    errors = grounds.residuals
+    told = np.flatnonzero(np.isfinite(errors.ljung_box))
+    coloured = [AXES[axis] for axis in told if errors.ljung_box[axis] < _NOT_WHITE]
+    if coloured:
+        smallest = float(np.min(errors.ljung_box[told]))
+        text = f"torque errors about {', '.join(coloured)} are not white ({errors.part}, p {smallest:.2g})"
+        yield Reason(f"{text}: filters of the log do that, and so does an effect that has no term", NEITHER)
+    elif len(told):
+        text = f"torque errors are white noise as far as {errors.samples} samples of {errors.part} tell"
+        yield Reason(f"{text} (p {np.min(errors.ljung_box[told]):.2g})", FOR)
+    elif np.all(errors.exact):
+        yield Reason(f"the torque of {errors.part} is met to rounding", FOR)
