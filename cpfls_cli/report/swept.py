@@ -1,89 +1,118 @@
-"""A sweep read from its artifact, setting by setting."""
+"""Sweeps read from their artifacts, setting by setting."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.report.source import Source
+from cpfls_cli.report.swept_setting import SweptSetting
 from cpfls_cli.report.table_5 import PRINTED, PrintedColumn
+
+_MEASURES = ("seed", "evaluations", "mse", "max_error", "relative_error", "condition_number")
 
 
 @dataclass(frozen=True)
-class SweptSetting:
-    """One setting of a sweep.
+class Sweep:
+    """Sweeps of the same settings with different seeds, taken as one.
 
     Attributes
     ----------
-    name, structure : str
-    samples, population, generations : int
-    mse, max_error, relative_error : array, shape (runs, parts)
-        Not finite where a run found no model.
-    condition_number : array, shape (runs,)
+    sources : tuple of Source
+        At least one.
     """
 
-    name: str
-    structure: str
-    samples: int
-    population: int
-    generations: int
-    mse: Array
-    max_error: Array
-    relative_error: Array
-    condition_number: Array
+    sources: tuple[Source, ...]
 
     @property
-    def runs(self) -> int:
-        """Number of finished runs."""
-        return len(self.condition_number)
+    def label(self) -> str:
+        """File names."""
+        return " and ".join(source.label for source in self.sources)
 
     @property
-    def best(self) -> int | None:
-        """The run with the smallest mean squared error; None where no run found a model."""
-        return int(np.nanargmin(self.mse[:, 0])) if np.isfinite(self.mse[:, 0]).any() else None
+    def parts(self) -> list[str]:
+        """What models are judged on; the training part first."""
+        return self.sources[0].artifact.texts("part")
 
-    def best_of(self, values: Array) -> float:
-        """Pick the value of the best run."""
-        return float("nan") if self.best is None else float(values[self.best])
+    @property
+    def complete(self) -> bool:
+        """Whether every run is finished."""
+        return all(source.artifact.number("complete") for source in self.sources)
+
+    @property
+    def planned_seeds(self) -> int:
+        """Runs of each setting when all are finished."""
+        return sum(int(source.config["sweep"]["seeds"]) for source in self.sources)
+
+    @cached_property
+    def settings(self) -> list[SweptSetting]:
+        """The settings with their runs, in the order of the config."""
+        names = self.sources[0].artifact.texts("setting/name")
+        return [self._setting(name, place) for place, name in enumerate(names)]
+
+    def _setting(self, name: str, place: int) -> SweptSetting:
+        artifact = self.sources[0].artifact
+        samples, population, generations = (
+            int(artifact.array(f"setting/{key}")[place]) for key in ("samples", "population", "generations")
+        )
+        seeds, evaluations, *measured = (self._by_run(key, place) for key in _MEASURES)
+        return SweptSetting(
+            name,
+            artifact.texts("setting/structure")[place],
+            artifact.texts("setting/criterion")[place],
+            samples,
+            population,
+            generations,
+            seeds.astype(int),
+            evaluations.astype(int),
+            *measured,
+        )
+
+    def _by_run(self, key: str, place: int) -> Array:
+        artifacts = [source.artifact for source in self.sources]
+        return np.concatenate([a.array(f"run/{key}")[a.array("run/setting").astype(int) == place] for a in artifacts])
 
 
-def swept_settings(sweep: Source) -> list[SweptSetting]:
-    """Read the settings of a sweep with their runs.
+def joined_sweeps(sweeps: Sequence[Source]) -> list[Sweep]:
+    """Take sweeps of equal settings and inputs as one, unless a seed stands in both.
 
     Parameters
     ----------
-    sweep : Source
+    sweeps : sequence of Source
 
     Returns
     -------
-    list of SweptSetting
+    list of Sweep
+        In the order of the first of each.
     """
-    artifact = sweep.artifact
-    setting = artifact.array("run/setting").astype(int)
+    joined: list[Sweep] = []
+    for source in sweeps:
+        place = next((place for place, sweep in enumerate(joined) if _goes_with(source, sweep)), None)
+        if place is None:
+            joined.append(Sweep((source,)))
+        else:
+            joined[place] = Sweep((*joined[place].sources, source))
+    return joined
 
-    def whole(key: str, place: int) -> int:
-        return int(artifact.array(f"setting/{key}")[place])
 
-    def by_run(key: str, place: int) -> Array:
-        return np.asarray(artifact.array(f"run/{key}")[setting == place])
+def _goes_with(source: Source, sweep: Sweep) -> bool:
+    taken = {int(seed) for other in sweep.sources for seed in other.artifact.array("run/seed")}
+    seeds = {int(seed) for seed in source.artifact.array("run/seed")}
+    return _identity(source) == _identity(sweep.sources[0]) and not taken & seeds
 
-    return [
-        SweptSetting(
-            name=name,
-            structure=artifact.texts("setting/structure")[place],
-            samples=whole("samples", place),
-            population=whole("population", place),
-            generations=whole("generations", place),
-            mse=by_run("mse", place),
-            max_error=by_run("max_error", place),
-            relative_error=by_run("relative_error", place),
-            condition_number=by_run("condition_number", place),
-        )
-        for place, name in enumerate(artifact.texts("setting/name"))
-    ]
+
+def _identity(source: Source) -> tuple[object, ...]:
+    """Tell what a sweep does apart from its seeds: inputs, parts, and every column of its table of settings."""
+    artifact = source.artifact
+    inputs = tuple(sorted((role, file.sha256) for role, file in artifact.header.inputs.items()))
+    texts = ("part", "setting/name", "setting/overrides", "setting/structure", "setting/selection")
+    numbers = ("setting/samples", "setting/population", "setting/generations")
+    columns = [*(artifact.texts(key) for key in texts), *(artifact.array(key).tolist() for key in numbers)]
+    return inputs, tuple(tuple(column) for column in columns)
 
 
 def printed_beside(settings: list[SweptSetting]) -> list[PrintedColumn | None]:
@@ -118,7 +147,7 @@ def repeats_table_5(sweeps: Sequence[Source]) -> bool:
     -------
     bool
     """
-    return any(column for sweep in sweeps for column in printed_beside(swept_settings(sweep)))
+    return any(column for sweep in joined_sweeps(sweeps) for column in printed_beside(sweep.settings))
 
 
 def _fits(setting: SweptSetting, column: PrintedColumn, exact: bool) -> bool:

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.identification.spread import spread
 from cpfls_cli.report.canvas import plain_ticks, plot, style_of
 from cpfls_cli.report.content import Plot
-from cpfls_cli.report.swept import SweptSetting
+from cpfls_cli.report.swept_setting import SweptSetting
 
 _DECADE = 10.0
 _TICKS = 4

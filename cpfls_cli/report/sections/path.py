@@ -12,11 +12,11 @@ from cpfls_cli.report.figures.derivatives import derivatives_figure
 from cpfls_cli.report.figures.rotation import rotation_figure
 from cpfls_cli.report.leg import DERIVATIVES, UNITS, peaks
 from cpfls_cli.report.numbers import number
+from cpfls_cli.report.printed import PRINTED_PEAKS
 from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 
 _LEGS_SHOWN = 20
-_PRINTED = ("2π = 6.283", "2", "1", "1", "2", "8", "64")
 
 
 def path_section(sources: Sources) -> Section | None:
@@ -49,8 +49,8 @@ def _path(trajectory: Source, index: int, paper: bool) -> Iterator[Block]:
 def _peaks(trajectory: Source, index: int, paper: bool) -> Table:
     found = peaks(trajectory.artifact)
     rows = [
-        [name, unit, _peak(name, found), *([printed] if paper else [])]
-        for name, unit, printed in zip(DERIVATIVES, UNITS, _PRINTED, strict=True)
+        [name, unit, _peak(name, found), *([number(PRINTED_PEAKS[name])] if paper else [])]
+        for name, unit in zip(DERIVATIVES, UNITS, strict=True)
     ]
     caption = f"Largest length of each derivative at the samples of {trajectory.label}, along the path."
     if paper:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from cpfls_cli.report.content import Block, Cell, Section, Table, Text
 from cpfls_cli.report.figures.reduction import reduction_figure
 from cpfls_cli.report.numbers import change, count, number, percent
+from cpfls_cli.report.printed import TABLE_4
 from cpfls_cli.report.source import Source, Sources
 
 _HEADER = (
@@ -20,8 +21,8 @@ _HEADER = (
     "Change",
     "Random choice of equal size",
 )
-_PAPER = ((5487, 56254, 0.0), (2743, 56805, 0.0098), (1170, 59771, 0.0625), (685, 68934, 0.2254))
-"""Table 4: samples, condition number, printed change."""
+_PAPER = ("Paper: condition number", "Paper: change")
+_Row = list[str | Cell]
 
 
 def reduction_section(sources: Sources) -> Section | None:
@@ -69,31 +70,37 @@ def _deficient(sources: Sources) -> Iterator[Text]:
 
 
 def _table(sources: Sources) -> Table:
-    paper = sources.settings.paper
-    ours = (tuple(row) for selection in sources.selections for row in _rows(selection))
+    ours = [row for selection in sources.selections for row in _rows(selection)]
     # Selections from one flight share its full set, which then stands once.
-    rows: list[Sequence[str | Cell]] = list(dict.fromkeys(ours))
-    if paper:
-        rows += [
-            [
-                f"Paper, {'full set' if samples == _PAPER[0][0] else 'reduced'}",
-                str(samples),
-                percent(samples / _PAPER[0][0]),
-                "",
-                str(condition),
-                change(grown),
-                "",
-            ]
-            for samples, condition, grown in _PAPER
-        ]
+    ours = [row for place, row in enumerate(ours) if row not in ours[:place]]
+    rows = _beside_the_paper(ours) if sources.settings.paper else ours
     caption = (
         "Table 4. Condition number of the regressor with uniform partitions, all samples against reduced sets. Change "
         "is against the full set of the same flight; random is the median of random choices."
     )
-    return Table("table-4-reduction", caption, _HEADER, rows)
+    header = (*_HEADER, *(_PAPER if sources.settings.paper else ()))
+    return Table("table-4-reduction", caption, header, rows)
 
 
-def _rows(selection: Source) -> Iterator[list[str | Cell]]:
+def _beside_the_paper(ours: list[_Row]) -> list[_Row]:
+    """Add the printed columns by number of samples, largest sets first; those that nobody repeats stand alone."""
+    printed = {str(column.samples): [str(column.condition_number), change(column.change)] for column in TABLE_4}
+    found = {_samples(row) for row in ours}
+    rows = [[*row, *printed.get(_samples(row), ["", ""])] for row in ours]
+    full = TABLE_4[0].samples
+    rows += [
+        [f"Paper, {'full set' if int(samples) == full else 'reduced'}", samples, percent(int(samples) / full), "", "",
+         "", "", *columns]
+        for samples, columns in printed.items() if samples not in found
+    ]  # fmt: skip
+    return sorted(rows, key=lambda row: -int(_samples(row)))
+
+
+def _samples(row: _Row) -> str:
+    return str(row[1])
+
+
+def _rows(selection: Source) -> Iterator[_Row]:
     artifact = selection.artifact
     candidates, kept = artifact.number("candidates"), len(artifact.array("indices"))
     condition, full = artifact.number("condition_number"), artifact.number("condition_number_full")

@@ -11,9 +11,9 @@ from cpfls_cli.identification.spread import spread
 from cpfls_cli.report.content import Block, Section, Table, Text
 from cpfls_cli.report.figures.replicates import replicates_figure
 from cpfls_cli.report.numbers import UNKNOWN, number, percent
-from cpfls_cli.report.sections.each import section_of_each
-from cpfls_cli.report.source import Source, Sources
-from cpfls_cli.report.swept import SweptSetting, printed_beside, repeats_table_5, swept_settings
+from cpfls_cli.report.source import Sources
+from cpfls_cli.report.swept import Sweep, joined_sweeps, printed_beside, repeats_table_5
+from cpfls_cli.report.swept_setting import SweptSetting
 from cpfls_cli.report.table_5 import RELATIVE_ERROR, PrintedColumn
 
 # Units are not torn apart at the end of a line.
@@ -39,30 +39,30 @@ def replicates_section(sources: Sources) -> Section | None:
     ----------
     Table 5 of the paper.
     """
-    return section_of_each(
-        "replicates",
-        "Replicates of the search",
-        sources.sweeps,
-        lambda sweep, index: _sweep(sweep, index, sources.settings.paper),
-    )
+    if not sources.sweeps:
+        return None
+    sweeps, paper = joined_sweeps(sources.sweeps), sources.settings.paper
+    blocks = [block for index, sweep in enumerate(sweeps, start=1) for block in _sweep(sweep, index, paper)]
+    return Section("replicates", "Replicates of the search", blocks)
 
 
-def _sweep(sweep: Source, index: int, paper: bool) -> Iterator[Block]:
-    settings = swept_settings(sweep)
-    runs, seeds = sum(setting.runs for setting in settings), int(sweep.config["sweep"]["seeds"])
-    if not sweep.artifact.number("complete"):
+def _sweep(sweep: Sweep, index: int, paper: bool) -> Iterator[Block]:
+    settings = sweep.settings
+    runs = sum(setting.runs for setting in settings)
+    if not sweep.complete:
         yield Text(
-            f"Unfinished: {runs} of {len(settings) * seeds} runs of {sweep.label}. The same command with --resume "
-            "goes on.",
+            f"Unfinished: {runs} of {len(settings) * sweep.planned_seeds} runs of {sweep.label}. The same command with "
+            "--resume goes on.",
             "warning",
         )
     yield _table(sweep, index, settings, paper)
-    if paper and repeats_table_5([sweep]):
+    if paper and repeats_table_5(sweep.sources):
         yield Text(_PAPER_NOTE, "note")
     yield replicates_figure(f"replicates-{index}", sweep.label, settings)
     yield from _held_out(sweep, index, settings)
+    first = min(source.artifact.header.seed for source in sweep.sources)
     yield Text(
-        f"Every setting was searched with the same seeds, from {sweep.artifact.header.seed} on. "
+        f"Every setting was searched with the same seeds, from {first} on. "
         "cpfls reduce and cpfls identify with the overrides of a setting and --seed find each model again."
     )
 
@@ -75,14 +75,14 @@ _PAPER_NOTE = (
 )
 
 
-def _table(sweep: Source, index: int, settings: list[SweptSetting], paper: bool) -> Table:
+def _table(sweep: Sweep, index: int, settings: list[SweptSetting], paper: bool) -> Table:
     printed = printed_beside(settings) if paper else [None for _ in settings]
     rows: list[list[str]] = []
     for title, ours, theirs in _rows():
         rows.append([title, *(ours(setting) for setting in settings)])
         if theirs is not None and any(printed):
             rows.append(["· paper", *(theirs(column) if column else UNKNOWN for column in printed)])
-    numbered = "Table 5. " if repeats_table_5([sweep]) else ""
+    numbered = "Table 5. " if repeats_table_5(sweep.sources) else ""
     caption = (
         f"{numbered}Results of {sweep.label} on the whole training part. The best run of a setting is that of the "
         "smallest mean squared error; mean and standard deviation are over its seeds; the "
@@ -132,9 +132,9 @@ def _deviation(values: Array) -> str:
     return number(spread(values).deviation, 2)
 
 
-def _held_out(sweep: Source, index: int, settings: list[SweptSetting]) -> Iterator[Block]:
+def _held_out(sweep: Sweep, index: int, settings: list[SweptSetting]) -> Iterator[Block]:
     """Show what the models are worth on what they were not learned from."""
-    for place, part in enumerate(sweep.artifact.texts("part")[1:], start=1):
+    for place, part in enumerate(sweep.parts[1:], start=1):
         measures = ("mse", "max_error", "relative_error")
         rows = [
             [setting.name, str(setting.runs), *(_both(getattr(setting, key)[:, place]) for key in measures)]

@@ -2,13 +2,16 @@
 
 import numpy as np
 
-from cpfls_cli.report.swept import SweptSetting, printed_beside
+from cpfls_cli.report.swept import printed_beside
+from cpfls_cli.report.swept_setting import SweptSetting
 from cpfls_cli.report.table_5 import PRINTED
 
 
 def setting(structure="cpfls", samples=685, population=500, generations=200, mse=(1.0,)):
+    runs = np.arange(len(mse))
     errors = np.array(mse)[:, None]
-    return SweptSetting("x", structure, samples, population, generations, errors, errors, errors, np.arange(len(mse)))
+    sizes = (samples, population, generations)
+    return SweptSetting("x", structure, "D", *sizes, runs, runs, errors, errors, errors, runs)
 
 
 def test_the_papers_own_settings_find_their_columns():

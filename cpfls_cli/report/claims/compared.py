@@ -1,0 +1,61 @@
+"""A figure of the paper beside ours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from cpfls_cli.report.numbers import UNKNOWN
+
+Agreement = Literal["agrees", "differs", "cannot be compared", "not shown"]
+
+
+@dataclass(frozen=True)
+class ComparedFigure:
+    """A figure of the paper beside ours.
+
+    Attributes
+    ----------
+    title : str
+        Number and subject.
+    paper, ours : str
+        What the paper's text says of it in numbers, and the same of ours.
+    agreement : {"agrees", "differs", "cannot be compared", "not shown"}
+    why : str
+    """
+
+    title: str
+    paper: str
+    ours: str
+    agreement: Agreement
+    why: str
+
+
+def agreement(agrees: bool) -> Agreement:
+    """Say whether two numbers agree.
+
+    Parameters
+    ----------
+    agrees : bool
+
+    Returns
+    -------
+    {"agrees", "differs"}
+    """
+    return "agrees" if agrees else "differs"
+
+
+def not_shown(title: str, printed: str, why: str) -> ComparedFigure:
+    """Keep the place of a figure that cannot be drawn.
+
+    Parameters
+    ----------
+    title, printed : str
+    why : str
+        What is missing.
+
+    Returns
+    -------
+    ComparedFigure
+    """
+    return ComparedFigure(title, printed, UNKNOWN, "not shown", why)
