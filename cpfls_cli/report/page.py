@@ -20,6 +20,7 @@ from cpfls_cli.report.sections.prediction import prediction_section
 from cpfls_cli.report.sections.provenance import provenance_section
 from cpfls_cli.report.sections.reduction import reduction_section
 from cpfls_cli.report.sections.replicates import replicates_section
+from cpfls_cli.report.sections.reproduction import reproduction_section
 from cpfls_cli.report.sections.rules import rules_section
 from cpfls_cli.report.sections.search import search_section
 from cpfls_cli.report.sections.sensors import sensors_section
@@ -30,6 +31,7 @@ from cpfls_cli.report.source import Sources
 
 _SECTIONS = (
     summary_section,
+    reproduction_section,
     diagnosis_section,
     extension_section,
     disagreement_section,
