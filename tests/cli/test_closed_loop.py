@@ -132,7 +132,7 @@ def test_effects_without_closed_loop_are_refused(short, refuse, tmp_path):
 
 def test_unknown_mode_is_refused(short, refuse, tmp_path):
     (line,) = refuse("simulate", *short, "--mode", "open", "-o", tmp_path / "flight.h5")
-    assert "'inverse' or 'closed-loop'" in line
+    assert "'inverse', 'closed-loop' or 'computed-torque'" in line
 
 
 def test_lost_flight_is_refused_with_a_remedy(short, refuse, tmp_path):
