@@ -9,8 +9,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.normal_equations import SMALLEST_SINGULAR_SHARE
 
-# Between the powers 1/2 of CR2 and 1 of CR3, by measurement.
-_POWER = -0.75
+POWER = 0.75
+"""Of the correction for leverage: between 1/2, CR2, and 1, CR3; benchmarks/coverage.py measures all three."""
 
 # A direction that one block alone determines leaves it no residual: there the correction would find rounding.
 _SMALLEST_REST = 1e-3
@@ -30,12 +30,15 @@ class BlockScores:
         Diagonal of P.
     parameters : array, shape (parameters,)
         x.
+    power : float, optional
+        Of the correction for what the fit has followed of the noise.
     """
 
     gram: Array
     score: Array
     penalty: Array
     parameters: Array
+    power: float = POWER
 
     def draws(self, weights: Array, rank_tolerance: float) -> Array:
         """Weight the blocks.
@@ -54,7 +57,7 @@ class BlockScores:
         half = self._half_inverse(rank_tolerance)
         values, vectors = np.linalg.eigh(half.T @ self.gram @ half)
         along = np.einsum("bij,bi->bj", vectors, self.score @ half)
-        along *= np.maximum(1.0 - values, _SMALLEST_REST) ** _POWER
+        along *= np.maximum(1.0 - values, _SMALLEST_REST) ** -self.power
         return np.asarray(weights @ np.einsum("bij,bj->bi", vectors, along) @ half.T)
 
     def bias(self, rank_tolerance: float) -> Array:
