@@ -1,0 +1,102 @@
+"""Time of an evaluation and of the singular value decomposition in it, by the size of the training set.
+
+python benchmarks/reproduction_time.py [--out FILE]
+
+With FILE the rows go there and nowhere else, as one line for `--set report.evaluation_times=`: no artifact holds a
+time, so that equal content stays an equal file. Seconds of processor time, medians.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from time import process_time
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import numpy as np
+
+from benchmarks.shared.studies import paper_flight, paper_study, regressor_matrix
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.reference import ReferenceEvaluator
+from cpfls_cli.report.claims.timing import line_through
+
+SIZES = (343, 485, 685, 970, 1170, 1940, 2743, 3880, 5487)
+COLUMNS = ("samples", "svd_s", "evaluation_s", "compiled_s")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
+    parser.add_argument("--out", type=Path, help="write the rows here, as one line of YAML")
+    parser.add_argument("--repeats", type=int, default=7)
+    options = parser.parse_args()
+    rows = measured(options.repeats)
+    if options.out:
+        records = [dict(zip(COLUMNS, row, strict=True)) for row in rows]
+        options.out.write_text(json.dumps(records) + "\n", encoding="utf-8")
+    else:
+        publish(rows)
+
+
+def publish(rows: list[tuple[int, float, float, float]]) -> None:
+    """Print the table and the lines through its logarithms."""
+    samples, svd, evaluation, compiled = np.log(np.array(rows)).T
+    fits = {
+        "decomposition over samples": line_through(samples, svd),
+        "evaluation over decomposition": line_through(svd, evaluation),
+        "compiled evaluation over decomposition": line_through(svd, compiled),
+    }
+    table("reproduction_time", COLUMNS, rows, fits={name: vars(fit) for name, fit in fits.items()})
+    for name, fit in fits.items():
+        print(f"\nslope of the logarithms, {name}: {fit.slope:.3f}, R2 {fit.r2:.4f}")
+
+
+def measured(repeats: int) -> list[tuple[int, float, float, float]]:
+    """Time all sizes in turn, so that a slow moment of the machine meets all of them."""
+    works = {size: works_of(size) for size in SIZES}
+    for work in (work for several in works.values() for work in several):
+        work()
+    rounds = [{size: [seconds(work) for work in works[size]] for size in SIZES} for _ in range(repeats)]
+    return [(size, *(median(one[size][place] for one in rounds) for place in range(3))) for size in SIZES]
+
+
+def works_of(size: int) -> tuple[Callable[[], object], ...]:
+    """Prepare the decomposition, the plain evaluation and the compiled one of so many samples."""
+    learned = spread_samples(size)
+    matrix = regressor_matrix(learned.motion).reshape(3 * size, -1)
+    search = paper_study().identification
+    plain = replace(search, local_search=replace(search.local_search, enabled=False))
+    reference, fast = ReferenceEvaluator(learned, learned, plain), model_evaluator(learned, learned, plain)
+    genes = np.random.default_rng(5).integers(1, 2**16, (1, reference.structure.genes))
+    return (
+        lambda: np.linalg.svd(matrix, full_matrices=False),
+        lambda: reference(genes),
+        lambda: fast(genes),
+    )
+
+
+def spread_samples(size: int) -> TorqueData:
+    """Take samples spread over the whole flight."""
+    flight = paper_flight()
+    return flight[np.linspace(0, len(flight) - 1, size).round().astype(int)]
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """Time something once, in seconds of processor time."""
+    start = process_time()
+    work()
+    return process_time() - start
+
+
+if __name__ == "__main__":
+    main()
