@@ -10,9 +10,10 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.excitation import CELLS
-from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.model import Model, coriolis_matrix
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import InertiaValues, Regressor
 from cpfls_cli.vehicle.rigid_body import body_torque
 
 POINTS = 8
@@ -61,23 +62,31 @@ def expected(model: Model, motion: Motion) -> Expected:
         The torque of the rigid body is computed about the body axes, where it is finite at every attitude.
     """
     q, qd, qdd = motion.attitude, motion.rate, motion.acceleration
-    inertia = model.inertia(q)
-    torque = model.torque(motion)
+    inertia, fuzzy = model.inertia(q), _fuzzy_torque(model, motion)
     rigid = body_torque(q, qd, qdd, symmetric(model.rigid_body))
-    fuzzy = torque - rotations.generalised_torque(q, rigid) if model.rigid_body.any() else torque
-    size, slope = (np.abs(a).reshape(len(q), -1).max(axis=1) for a in (inertia.value, inertia.gradient))
-    speed, push = np.abs(qd).max(axis=1), np.abs(qdd).max(axis=1)
-    of_torque = size * push + slope * speed**2
-    scale = np.column_stack([size, slope * speed, of_torque, of_torque / np.abs(np.cos(q[:, 1]))])
     return Expected(
         motion,
         inertia.value,
-        model.coriolis(q, qd),
-        torque,
+        coriolis_matrix(inertia, qd),
+        model.torque(motion),
         rigid + rotations.body_torque(q, fuzzy),
         ~model.outside(q),
-        np.where(scale > 0.0, scale, 1.0),
+        _scale(inertia, motion, bool(fuzzy.any())),
     )
+
+
+def _fuzzy_torque(model: Model, motion: Motion) -> Array:
+    return Regressor(model.structure, motion, model.ranges).torque(model.partitions, model.coefficients)
+
+
+def _scale(inertia: InertiaValues, motion: Motion, fuzzy: bool) -> Array:
+    samples = len(motion)
+    size, slope = (np.abs(a).reshape(samples, -1).max(axis=1) for a in (inertia.value, inertia.gradient))
+    speed, push = (np.abs(a).max(axis=1) for a in (motion.rate, motion.acceleration))
+    torque = size * push + slope * speed**2
+    upright = np.abs(np.cos(motion.attitude[:, 1])) if fuzzy else np.ones(samples)
+    scale = np.column_stack([size, slope * speed, torque, torque / upright])
+    return np.where(scale > 0.0, scale, 1.0)
 
 
 def reference_points(model: Model, rng: np.random.Generator) -> Expected:
