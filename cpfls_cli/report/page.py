@@ -25,6 +25,7 @@ from cpfls_cli.report.sections.rules import rules_section
 from cpfls_cli.report.sections.search import search_section
 from cpfls_cli.report.sections.sensors import sensors_section
 from cpfls_cli.report.sections.summary import summary_section
+from cpfls_cli.report.sections.tracking import tracking_section
 from cpfls_cli.report.sections.unseen import unseen_section
 from cpfls_cli.report.sections.vehicle import vehicle_section
 from cpfls_cli.report.source import Sources
@@ -46,6 +47,7 @@ _SECTIONS = (
     search_section,
     partitions_section,
     prediction_section,
+    tracking_section,
     rules_section,
     provenance_section,
 )

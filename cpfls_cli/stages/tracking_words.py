@@ -10,8 +10,6 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.stages.job import Outcome
 
-_AXES = ("roll", "pitch", "yaw")
-
 
 def tracking_outcome(
     signals: Mapping[str, Array], noise: Sequence[str], record: Mapping[str, Any], complete: bool
@@ -44,7 +42,7 @@ def tracking_outcome(
         "not_positive_definite": int(record["tracking/not_positive_definite"]),
         "controllers": list(_controllers(record)),
     }
-    lines = (_first_line(summary, record), _head(summary), *_table(summary["controllers"]), *_closest(record))
+    lines = (_first_line(summary, record), _head(summary), *_table(summary["controllers"]), *_compared(record))
     return Outcome(summary, lines, tuple(_warnings(summary, complete)))
 
 
@@ -88,13 +86,16 @@ def _three(values: Sequence[float] | Array) -> str:
     return " ".join(f"{value:>9.3g}" for value in values)
 
 
-def _closest(record: Mapping[str, Any]) -> Iterator[str]:
-    """Say where a rigid body does as well as the model or better: nobody should have to find it in a table."""
+def _compared(record: Mapping[str, Any]) -> Iterator[str]:
+    """Say how the model does beside the others: nobody should have to divide for it."""
     rms = dict(zip(record["tracking/controller"].tolist(), record["tracking/settled_rms"], strict=True))
-    pairs = zip(_AXES, rms["model"], rms["rigid-body"], strict=True)
-    better = [axis for axis, own, rigid in pairs if np.isfinite(rigid) and not own < rigid]
-    if better:
-        yield f"the rigid body fitted to the same samples follows {', '.join(better)} as closely, or closer"
+    shares = [
+        f"{_three(rms['model'] / rms[other]).strip()} of {words}"
+        for other, words in (("rigid-body", "the rigid body fitted to the same samples"), ("pd", "PD alone"))
+        if np.all(rms[other] > 0) and np.isfinite(rms["model"]).all()
+    ]
+    if shares:
+        yield f"rms error of the model as a multiple: {'; '.join(shares)}"
 
 
 def _warnings(summary: Mapping[str, Any], complete: bool) -> Iterator[str]:

@@ -113,7 +113,8 @@ def test_the_model_itself_can_be_controlled(control):
 
 
 def test_a_loss_is_a_result(control, cpfls):
-    path, result = control("--set", "simulation.computed_torque.torque_max_n_m=[0.01, 0.01, 0.01]")
+    """At 50 commands in a second feedback of 30 Hz throws the vehicle about."""
+    path, result = control("--set", "simulation.computed_torque.natural_frequency_hz=[30, 30, 30]")
     lost, error = read(path, "tracking/lost_at", "tracking/error")
     (time,) = read(path, "time")
     assert np.isfinite(lost).all()
@@ -179,7 +180,8 @@ def test_a_file_that_is_no_model_is_refused(made, refuse, tmp_path):
 def test_full_rotations_are_refused_with_the_time_and_a_remedy(made, refuse, cpfls, tmp_path):
     config, _, model = made
     path = tmp_path / "turning.h5"
-    assert cpfls("trajectory", config, "--set", "trajectory.path=full-rotation", "-o", path).exit_code == 0
+    turning = "trajectory={path: full-rotation, duration_s: 8.0, sample_time_s: 0.02, infeasible: report}"
+    assert cpfls("trajectory", config, "--set", turning, "-o", path).exit_code == 0
     (line,) = refuse("simulate", config, path, "--model", model, "-o", tmp_path / "x.h5", code=1)
     assert line.startswith(f"{path}: the planned pitch comes within 5.7 degrees of the vertical at t = ")
     assert "cube-diagonal" in line
