@@ -13,8 +13,8 @@ from cpfls_cli.report.source import Sources
 
 _GENES = 4
 _DRAWN = TABLE_4[2]
-_PRECISION = 5e-6
-"""Half of the last digit of the printed breakpoints."""
+_PRECISION = 1e-5
+"""One unit in the last digit of the printed breakpoints."""
 
 
 def reduction_compared(sources: Sources) -> ComparedFigure:

@@ -1,0 +1,143 @@
+"""What counts as a pass, a failure, or neither, for each kind of claim."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from cpfls_cli.report.claims.claim import Verdict
+from cpfls_cli.report.claims.model_figures import partitions_compared
+from cpfls_cli.report.claims.motion_figures import seesaw_compared
+from cpfls_cli.report.claims.paired import paired_ratio
+from cpfls_cli.report.claims.reduction import reduction_claims
+from cpfls_cli.report.claims.searches import AS_GOOD, search_claims
+from cpfls_cli.report.claims.timing import timing_claims
+from cpfls_cli.report.settings import EvaluationTime
+from cpfls_cli.report.swept_setting import SweptSetting
+
+NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
+"""What a seed does to all settings alike."""
+
+
+def setting(mse, structure="cpfls", samples=5487, size=(40, 10), seeds=None):
+    values = np.asarray(mse, dtype=float)
+    seeds = np.arange(len(values)) if seeds is None else np.asarray(seeds)
+    criterion = "all" if samples == 5487 else "KD-exchange"
+    errors = values[:, None]
+    return SweptSetting("x", structure, criterion, samples, *size, seeds, seeds, errors, errors, errors, seeds)
+
+
+def sweep(*settings):
+    return SimpleNamespace(settings=list(settings))
+
+
+def claims(*settings):
+    """Verdicts by number: 2743, 1170 and 685 samples, the smaller search, the classic system."""
+    return [claim.verdict for claim in search_claims([sweep(*settings)] if settings else [])]
+
+
+def test_a_ratio_is_that_of_a_t_test_on_logarithms_of_pairs():
+    rng = np.random.default_rng(8)
+    one, other = np.exp(rng.normal(0.3, 0.5, (2, 9)))
+    shuffled = rng.permutation(9)
+    found = paired_ratio(setting(one), setting(other[shuffled], seeds=shuffled))
+    test = stats.ttest_1samp(np.log(one / other), 0.0).confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx((np.exp(test.low), np.exp(test.high)))
+    assert found.ratio == pytest.approx(stats.gmean(one) / stats.gmean(other))
+    assert found.p_value == pytest.approx(stats.wilcoxon(one, other).pvalue, abs=0.05)
+
+
+def test_only_seeds_of_both_and_runs_that_found_a_model_are_paired():
+    found = paired_ratio(setting([2.0, 4.0, np.nan], seeds=[1, 2, 3]), setting([9.0, 2.0, 1.0], seeds=[5, 2, 3]))
+    assert (found.seeds, found.ratio) == (1, 2.0)
+    assert np.isnan(found.low)
+    assert paired_ratio(setting([1.0]), setting([1.0], seeds=[7])).seeds == 0
+
+
+def test_the_margin_is_the_largest_that_the_paper_prints_and_calls_no_difference():
+    assert pytest.approx(12 / 9) == AS_GOOD
+
+
+@pytest.mark.parametrize(
+    ("factor", "scatter", "verdict"),
+    [
+        (1.1, 0.05, Verdict.PASS),
+        (0.5, 0.05, Verdict.PASS),
+        (2.0, 0.05, Verdict.FAIL),
+        (1.3, 0.3, Verdict.UNDECIDED),
+    ],
+)
+def test_reduced_sets_against_the_full_one(factor, scatter, verdict):
+    own = np.exp(scatter * np.array([1, -1, 1, -1, 1, -1, 1, -1, 1, -1]))
+    reduced = [setting(factor * NOISE * own, samples=samples) for samples in (2743, 1170, 685)]
+    assert claims(setting(NOISE), *reduced)[:3] == [verdict] * 3
+
+
+def test_one_seed_decides_nothing_and_unequal_searches_are_not_compared():
+    assert claims(setting([1.0]), setting([9.0], samples=685))[2] == Verdict.UNDECIDED
+    assert claims(setting(NOISE), setting(NOISE, samples=685, size=(75, 25)))[2] == Verdict.NOT_MEASURED
+    assert claims() == [Verdict.NOT_MEASURED] * 5
+
+
+def test_a_smaller_search_needs_a_much_larger_one_beside_it():
+    small = setting(1.05 * NOISE, samples=685, size=(75, 25))
+    assert claims(small, setting(NOISE, samples=685, size=(40, 10)))[3] == Verdict.NOT_MEASURED
+    assert claims(small, setting(NOISE, samples=685, size=(500, 200)))[3] == Verdict.PASS
+    assert claims(small, setting(NOISE / 3, samples=685, size=(500, 200)))[3] == Verdict.FAIL
+    assert claims(small, setting(NOISE, samples=1170, size=(500, 200)))[3] == Verdict.NOT_MEASURED
+
+
+def test_the_periodic_system_against_the_classic_one():
+    assert claims(setting(3 * NOISE), setting(NOISE, "fls"))[4] == Verdict.FAIL
+    assert claims(setting(NOISE), setting(3 * NOISE, "fls"))[4] == Verdict.PASS
+
+
+def test_the_larger_search_decides():
+    small, large = (
+        sweep(setting(factor * NOISE, size=size), setting(NOISE, "fls", size=size))
+        for factor, size in ((3.0, (40, 10)), (1.0, (500, 200)))
+    )
+    assert [search_claims(order)[4].verdict for order in ([small, large], [large, small])] == [Verdict.PASS] * 2
+
+
+def times(evaluation, svd=lambda n: 1e-5 * n):
+    return [
+        EvaluationTime(samples=n, svd_s=svd(n), evaluation_s=evaluation(n), compiled_s=1e-3)
+        for n in (343, 685, 1170, 2743, 5487)
+    ]
+
+
+def test_time_in_proportion_to_the_decomposition():
+    assert [c.verdict for c in timing_claims(times(lambda n: 3e-5 * n))] == [Verdict.PASS, Verdict.FAIL]
+    assert timing_claims(times(lambda n: 1e-2 + 1e-5 * n))[0].verdict == Verdict.FAIL
+    assert timing_claims(times(lambda n: 1e-9 * n**2))[0].verdict == Verdict.FAIL
+    assert timing_claims(times(lambda n: 1e-5 * n, lambda n: np.exp(n / 1e3)))[1].verdict == Verdict.PASS
+    assert [c.verdict for c in timing_claims(())] == [Verdict.NOT_MEASURED] * 2
+
+
+def selection(kept, condition, trace, rank=9):
+    numbers = {"rank": rank, "rank_full": 9, "candidates": 100, "condition_number": condition}
+    arrays = {
+        "indices": np.arange(kept),
+        "trace/condition_number": np.array(trace, dtype=float),
+        "random/condition_number": np.array([400.0]),
+    }
+    artifact = SimpleNamespace(number={**numbers, "condition_number_full": 100.0}.get, array=arrays.get)
+    return SimpleNamespace(label="s.h5", artifact=artifact)
+
+
+def test_what_a_fifth_of_the_samples_keeps():
+    contribution, floor = reduction_claims([selection(19, 124.0, [np.inf, 120, 130, 124.9, 124])])
+    assert (contribution.verdict, floor.verdict) == (Verdict.PASS, Verdict.PASS)
+    assert "4 samples (4.0 %) already keep 80 %" in contribution.why
+    assert "keeps 25.0 %" in contribution.why
+    contribution, floor = reduction_claims([selection(19, 126.0, [126]), selection(50, 99.0, [99])])
+    assert (contribution.verdict, floor.verdict) == (Verdict.FAIL, Verdict.FAIL)
+    assert reduction_claims([selection(19, 7.0, [7], rank=8)])[0].verdict == Verdict.FAIL
+    assert reduction_claims([selection(20, 100.0, [100])])[0].verdict == Verdict.NOT_MEASURED
+
+
+def test_the_printed_numbers_are_read_as_the_paper_means_them():
+    assert seesaw_compared().agreement == "agrees"
+    assert partitions_compared(SimpleNamespace(models=["one"])).agreement == "agrees"
