@@ -90,12 +90,12 @@ def _compared(record: Mapping[str, Any]) -> Iterator[str]:
     """Say how the model does beside the others: nobody should have to divide for it."""
     rms = dict(zip(record["tracking/controller"].tolist(), record["tracking/settled_rms"], strict=True))
     shares = [
-        f"{_three(rms['model'] / rms[other]).strip()} of {words}"
+        f"{' '.join(f'{share:.3g}' for share in rms['model'] / rms[other])} of that of {words}"
         for other, words in (("rigid-body", "the rigid body fitted to the same samples"), ("pd", "PD alone"))
         if np.all(rms[other] > 0) and np.isfinite(rms["model"]).all()
     ]
     if shares:
-        yield f"rms error of the model as a multiple: {'; '.join(shares)}"
+        yield f"rms error with the model (roll pitch yaw): {', '.join(f'times {share}' for share in shares)}"
 
 
 def _warnings(summary: Mapping[str, Any], complete: bool) -> Iterator[str]:

@@ -20,6 +20,8 @@ CONTROLLERS = {
 """What controllers are called on the page, by name in the artifact."""
 
 _WINDOW_S = 1.0
+_SHOWN = 1e-6
+"""Share of the largest error below which none is worth a look."""
 
 
 def tracking_figure(name: str, flight: Source) -> Plot:
@@ -47,6 +49,8 @@ def tracking_figure(name: str, flight: Source) -> Plot:
             for number, controller in enumerate(names):
                 style = BASELINE if controller == "vehicle" else style_of(number)
                 line(axes, *_averaged(time, error[number, :, index], window), label=CONTROLLERS[controller], **style)
+            lowest, highest = axes.get_ylim()
+            axes.set_ylim(bottom=max(lowest, _SHOWN * highest))
             axes.axvline(time[0] + artifact.number("tracking/settled_from"), color=GREY, linewidth=0.8, linestyle=":")
             axes.set_title(f"error in {axis}", loc="left" if index else "right")
             axes.set_ylabel("°")

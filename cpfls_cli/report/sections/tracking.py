@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.report.content import Block, Cell, Heading, Section, Table, Text, Tone
 from cpfls_cli.report.figures.tracking import AXES, CONTROLLERS, tracking_figure
-from cpfls_cli.report.numbers import number, percent
+from cpfls_cli.report.numbers import number, percent, plain
 from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 
@@ -53,12 +53,12 @@ def _tracking(flight: Source, index: int) -> Iterator[Block]:
 def _setting(flight: Source, settings: dict[str, Any]) -> str:
     model, path = flight.input_name("model"), flight.input_name("trajectory")
     plant = "the exact vehicle" if settings["plant"] == "vehicle" else "the identified model itself"
-    frequencies = ", ".join(number(value, 3) for value in settings["natural_frequency_hz"])
-    rate = number(flight.artifact.number("tracking/control_rate"), 3)
+    frequencies = ", ".join(plain(value) for value in settings["natural_frequency_hz"])
+    rate = plain(flight.artifact.number("tracking/control_rate"))
     return (
         f"The attitude of {path} is followed by {plant}, held at its centre of mass, under τ = D(q) v + C(q, q̇) q̇ with "
         f"v = q̈ planned + Kd ė + Kp e: natural frequency {frequencies} Hz in roll, pitch and yaw, damping "
-        f"{number(settings['damping'], 3)}, {rate} commands in a second. D and C are those of {model}, of the rigid "
+        f"{plain(settings['damping'])}, {rate} commands in a second. D and C are those of {model}, of the rigid "
         "body fitted to the same samples, and of the exact vehicle; PD alone has the same gains times a constant "
         "inertia and knows nothing else."
     )
