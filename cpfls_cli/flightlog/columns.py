@@ -75,4 +75,10 @@ def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> 
 def _hint(name: str, columns: Mapping[str, Array]) -> str:
     by_lower = {column.lower(): column for column in columns}
     nearest = [by_lower[match] for match in get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)]
-    return f" (nearest: {', '.join(nearest)})" if nearest else f" (columns: {', '.join(columns)})"
+    if nearest:
+        return f" (nearest: {', '.join(nearest)})"
+    # A log of topics has hundreds of columns.
+    topics = sorted({column.partition(".")[0] for column in columns})
+    if all("." in column for column in columns):
+        return f" (topics: {', '.join(topics)})"
+    return f" (columns: {', '.join(columns)})"

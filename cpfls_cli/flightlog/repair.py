@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import pi
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -91,20 +93,41 @@ def fill(time: Array, values: Array, target: Array) -> Array:
     return np.column_stack([np.interp(target, time[k], v[k]) for k, v in zip(known.T, values.T, strict=True)])
 
 
-def without_jumps(angles: Array) -> Array:
+def without_jumps(angles: Array, turn: float = 2 * pi) -> Array:
     """Remove the jumps of full turns from angles, over absent values.
 
     Parameters
     ----------
-    angles : array, shape (sample,), rad
+    angles : array, shape (sample,)
+    turn : float
+        A full turn in the unit of the angles; rad if not given.
 
     Returns
     -------
-    array, shape (sample,), rad
+    array, shape (sample,)
     """
     known = np.isfinite(angles)
-    continuous = angles.copy()
-    continuous[known] = np.unwrap(angles[known])
+    continuous = np.array(angles, dtype=float)
+    continuous[known] = np.unwrap(continuous[known], period=turn)
+    return continuous
+
+
+def same_sign(quaternion: Array) -> Array:
+    """Give each quaternion the sign that is nearer to the one before; q and -q are one attitude.
+
+    Parameters
+    ----------
+    quaternion : array, shape (sample, 4)
+
+    Returns
+    -------
+    array, shape (sample, 4)
+    """
+    known = np.isfinite(quaternion).all(axis=1)
+    continuous = np.array(quaternion, dtype=float)
+    present = continuous[known]
+    flips = np.sign((present[1:] * present[:-1]).sum(axis=1))
+    continuous[known] = present * np.cumprod(np.concatenate([[1.0], np.where(flips < 0, -1.0, 1.0)]))[:, None]
     return continuous
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.clock import increasing_rows
-from cpfls_cli.flightlog.repair import find_spikes, without_jumps
+from cpfls_cli.flightlog.repair import find_spikes, same_sign, without_jumps
 from cpfls_cli.flightlog.restart import refuse_restart
 from cpfls_cli.flightlog.settings import ImportSettings
 
@@ -99,7 +99,7 @@ def made_continuous(table: Table) -> Table:
         roll, pitch, yaw = signals["attitude"].T
         signals["attitude"] = np.column_stack([without_jumps(roll), pitch, without_jumps(yaw)])
     if "quaternion" in signals:
-        signals["quaternion"] = _same_sign(signals["quaternion"])
+        signals["quaternion"] = same_sign(signals["quaternion"])
     return Table(table.time, signals)
 
 
@@ -141,13 +141,3 @@ def without(table: Table, marked: Mapping[str, BoolArray]) -> Table:
     """
     signals = {name: np.where(marked[name], np.nan, values) for name, values in table.signals.items()}
     return Table(table.time, signals)
-
-
-def _same_sign(quaternion: Array) -> Array:
-    """Give each quaternion the sign that is nearer to the one before; q and -q are one attitude."""
-    known = np.isfinite(quaternion).all(axis=1)
-    present = quaternion[known]
-    flips = np.sign((present[1:] * present[:-1]).sum(axis=1))
-    continuous = quaternion.copy()
-    continuous[known] = present * np.cumprod(np.concatenate([[1.0], np.where(flips < 0, -1.0, 1.0)]))[:, None]
-    return continuous

@@ -16,12 +16,11 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import CpflsError
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import ImportedFlight
-from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.stages.job import Job, Outcome, begin, finish
+from cpfls_cli.stages.log_file import read_log
 from cpfls_cli.stages.log_quality import found_and_done, missing_signals
 from cpfls_cli.stages.rotor_torque import rotor_torque, rotor_torque_words
 from cpfls_cli.stages.study import settings_of
-from cpfls_cli.stages.table import read_csv
 
 
 def run(job: Job, log: Path) -> Outcome:
@@ -31,7 +30,7 @@ def run(job: Job, log: Path) -> Outcome:
     ----------
     job : Job
     log : Path
-        CSV, plain or gzip-compressed.
+        CSV, plain or gzip-compressed, Parquet or ULog.
 
     Returns
     -------
@@ -72,9 +71,10 @@ def imported(log: Path, study: Study) -> ImportedFlight:
     ConfigError
         If a key of the section `import` does not suit the log.
     """
-    columns = read_csv(log, _wanted(study.import_))
+    read = read_log(log, study.import_)
     with _naming(log), settings_of("import", study):
-        return _import(columns, study)
+        flight = _import(read.columns, study)
+    return _with_warnings(flight, read.warnings)
 
 
 @contextmanager
@@ -97,12 +97,11 @@ def _import(columns: dict[str, Array], study: Study) -> ImportedFlight:
 
 def _with_hints(flight: ImportedFlight) -> ImportedFlight:
     """Add to the warnings what later stages will miss."""
-    warnings = (*flight.report.warnings, *missing_signals(flight))
-    return replace(flight, report=replace(flight.report, warnings=warnings))
+    return _with_warnings(flight, missing_signals(flight))
 
 
-def _wanted(settings: ImportSettings) -> set[str]:
-    return {settings.time_column} | {column for signal in settings.signals.values() for column in signal.columns}
+def _with_warnings(flight: ImportedFlight, warnings: tuple[str, ...]) -> ImportedFlight:
+    return replace(flight, report=replace(flight.report, warnings=(*flight.report.warnings, *warnings)))
 
 
 def flight_signals(flight: ImportedFlight) -> dict[str, Array]:

@@ -19,12 +19,12 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.motion import body_rate_of
 from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.stages.import_log import flight_signals, imported
+from cpfls_cli.stages.log_file import is_log
 from cpfls_cli.stages.log_quality import found_and_done
 from cpfls_cli.stages.rotor_torque import commanded_speed
 from cpfls_cli.stages.same_vehicle import require_same_vehicle
 from cpfls_cli.stages.sources import read_good
 
-_LOGS = (".csv", ".csv.gz")
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
 _UNIFORM = 0.01
 
@@ -71,7 +71,7 @@ def read_flights(paths: Sequence[Path], study: Study) -> Flights:
     InputError
         If a flight is of another vehicle, has no actuation, or is not uniform in time.
     """
-    sources = [_log(path, study) if path.name.endswith(_LOGS) else _artifact(path, study) for path in paths]
+    sources = [_log(path, study) if is_log(path) else _artifact(path, study) for path in paths]
     made = [_recording(source, study) for source in sources]
     recordings, said = _with_voltage([recording for recording, _ in made], sources)
     notes = [f"{source.name}: {w}" for source, (_, own) in zip(sources, made, strict=True) for w in own]

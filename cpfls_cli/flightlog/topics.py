@@ -1,0 +1,123 @@
+"""Topics of a log, each with a clock of its own, put on the clock of one of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from math import pi
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.repair import same_sign, without_jumps
+from cpfls_cli.flightlog.resampling import held, interpolated
+from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.flightlog.signal_map import SignalMap
+from cpfls_cli.units import known_unit
+
+Topics = Mapping[str, Mapping[str, Array]]
+
+STAMP = "timestamp"
+"""The field of a topic that says when."""
+
+_SETPOINTS = ("torque", "body_torque", "thrust", "rotor_command")
+_ANGLES_THAT_JUMP = (0, 2)
+_THINNED = 1.5
+
+
+def topic_and_field(column: str) -> tuple[str, str]:
+    """Split the name of a column, ``topic.field`` or ``topic[instance].field``; the first instance needs no number.
+
+    Parameters
+    ----------
+    column : str
+
+    Returns
+    -------
+    tuple of str
+        Topic and field; the field is empty where the name has none.
+    """
+    topic, _, field = column.partition(".")
+    return re.sub(r"\[0\]$", "", topic), field
+
+
+def on_one_clock(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Put the mapped columns of all topics on the clock that `time_column` names.
+
+    Between two samples a setpoint (torque, thrust, rotor command) keeps the previous value, and what is measured is
+    interpolated linearly, quaternions with one sign and roll and yaw without full turns. Inside a pause of a topic
+    longer than `gap_s` the values are absent.
+
+    Parameters
+    ----------
+    topics : mapping from topic to mapping from field to array, shape (sample,)
+        Stamps in s from one origin.
+    settings : ImportSettings
+        `time_column`, `signals` and `gap_s`.
+
+    Returns
+    -------
+    columns : dict from str to array, shape (row,)
+        The mapped columns that exist, by the names that the settings use; the others by name only, as empty arrays.
+    warnings : tuple of str
+
+    Raises
+    ------
+    InputError
+        If a topic is always slower than `gap_s`.
+    """
+    columns = {f"{topic}.{field}": np.empty(0) for topic, fields in topics.items() for field in fields}
+    base, stamp = topic_and_field(settings.time_column)
+    if stamp not in topics.get(base, {}):
+        return columns, ()
+    clocks = {topic: fields.get(stamp, fields[STAMP]) for topic, fields in topics.items() if STAMP in fields}
+    columns[settings.time_column] = target = topics[base][stamp]
+    used = {base}
+    for name, signal in settings.signals.items():
+        for column, values in _continuous(name, signal, topics).items():
+            topic = topic_and_field(column)[0]
+            used.add(topic)
+            if topic != base:
+                _require_fast(topic, clocks[topic], settings)
+                between = held if name in _SETPOINTS else interpolated
+                values = between(clocks[topic], values, target, settings.gap_s)
+            columns[column] = values
+    return columns, _warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)})
+
+
+def _continuous(name: str, signal: SignalMap, topics: Topics) -> dict[str, Array]:
+    """Take the columns of a signal that exist, without the jumps that are no motion."""
+    parts = {column: topic_and_field(column) for column in signal.columns}
+    found = {column: topics[topic][field] for column, (topic, field) in parts.items() if field in topics.get(topic, {})}
+    of_one_topic = len({topic for topic, _ in parts.values()}) == 1 and len(found) == len(parts)
+    if name == "quaternion" and of_one_topic:
+        return dict(zip(found, same_sign(np.column_stack(list(found.values()))).T, strict=True))
+    if name == "attitude":
+        turn = 2 * pi / abs(signal.scale * known_unit(signal.unit).factor)
+        jumping = {column for place, column in enumerate(signal.columns) if place in _ANGLES_THAT_JUMP}
+        return {column: without_jumps(v, turn) if column in jumping else v for column, v in found.items()}
+    return found
+
+
+def _require_fast(topic: str, time: Array, settings: ImportSettings) -> None:
+    step = _step(time)
+    if step > settings.gap_s:
+        raise InputError(
+            f"topic {topic} has a sample only every {step:.3g} s (median), longer than import.gap_s ="
+            f" {settings.gap_s:g}: raise import.gap_s, or leave its signals out of import.signals"
+        )
+
+
+def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]:
+    step = _step(clocks[base])
+    faster = {topic: 1 / _step(time) for topic, time in clocks.items() if 0 < _step(time) * _THINNED < step}
+    return tuple(
+        f"topic {topic} ({rate_hz:.4g} Hz) is thinned to the clock of {base} ({1 / step:.4g} Hz), which folds its noise"
+        f" into the flight: name the faster one in import.time_column"
+        for topic, rate_hz in faster.items()
+    )
+
+
+def _step(time: Array) -> float:
+    return float(np.median(np.diff(time))) if len(time) > 1 else float("inf")

@@ -1,0 +1,238 @@
+"""Logs in ULog, written here byte by byte from the public description of the format, and files that are none."""
+
+import json
+import struct
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+from cpfls_cli.rotations import rotation_matrix
+
+CONFIG = """\
+import:
+  time_column: vehicle_angular_velocity.timestamp
+  body_frame: FRD
+  world_frame: NED
+  signals:
+    quaternion:
+      columns: ["vehicle_attitude.q[0]", "vehicle_attitude.q[1]", "vehicle_attitude.q[2]", "vehicle_attitude.q[3]"]
+      unit: "1"
+    body_rate:
+      columns: ["vehicle_angular_velocity.xyz[0]", "vehicle_angular_velocity.xyz[1]", "vehicle_angular_velocity.xyz[2]"]
+      unit: rad/s
+    body_torque:
+      columns: ["vehicle_torque_setpoint.xyz[0]", "vehicle_torque_setpoint.xyz[1]", "vehicle_torque_setpoint.xyz[2]"]
+      unit: N m
+"""
+ATTITUDE, RATE, TORQUE = "vehicle_attitude", "vehicle_angular_velocity", "vehicle_torque_setpoint"
+FIELDS = {
+    ATTITUDE: "uint64_t timestamp;float[4] q",
+    RATE: "uint64_t timestamp;float[3] xyz",
+    TORQUE: "uint64_t timestamp;float[3] xyz",
+}
+BEGIN = 3_600_000_000
+ROLL_RATE, YAW_RATE, NORTH = 0.0, 2.0, 0.3
+
+
+def message(kind, content):
+    return struct.pack("<HB", len(content), ord(kind)) + content
+
+
+def header():
+    return b"ULog\x01\x12\x35\x01" + struct.pack("<Q", BEGIN)
+
+
+def definitions(fields=FIELDS):
+    formats = [message("F", f"{name}:{own};".encode()) for name, own in fields.items()]
+    added = [
+        message("A", struct.pack("<BH", instance, number) + name.encode())
+        for number, (name, instance) in enumerate((name, 0) for name in fields)
+    ]
+    return b"".join([message("B", bytes(40)), *formats, *added])
+
+
+def rows():
+    """A turn about the vertical with a constant roll of 0, in NED and FRD: topic, stamp and values, in order."""
+    sent = []
+    for number, step_us in ((0, 10_000), (1, 4_000), (2, 8_000)):
+        for stamp in range(500 * number, 2_000_000, step_us):
+            time = 1e-6 * stamp
+            yaw = NORTH + YAW_RATE * time
+            # The estimator may give either sign.
+            sign = -1.0 if (stamp // 50_000) % 2 else 1.0
+            values = {
+                0: sign * np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]),
+                1: np.array([0.0, 0.0, YAW_RATE]),
+                2: np.array([0.1 * time, 0.02, 0.01 * (stamp // 8_000)]),
+            }[number]
+            sent.append((stamp, number, values))
+    return sorted(sent, key=lambda row: row[:2])
+
+
+def data(stamp, number, values):
+    return message("D", struct.pack("<HQ", number, BEGIN + stamp) + np.asarray(values, "<f4").tobytes())
+
+
+def ulog(sent=None, fields=FIELDS):
+    return header() + definitions(fields) + b"".join(data(*row) for row in (rows() if sent is None else sent))
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(CONFIG)
+    return path
+
+
+@pytest.fixture
+def write(tmp_path):
+    def call(content):
+        path = tmp_path / "log.ulg"
+        path.write_bytes(content)
+        return path
+
+    return call
+
+
+@pytest.fixture
+def flown(cpfls, config, write, tmp_path):
+    def call(content, *words):
+        flight = tmp_path / "flight.h5"
+        result = cpfls("import", config, write(content), "-o", flight, "--json", *words)
+        assert result.exit_code == 0, result.stderr
+        with h5py.File(flight) as file:
+            signals = {name: file[name][()] for name in ("time", "attitude", "body_rate", "body_torque")}
+        return json.loads(result.stdout), signals, result.stderr
+
+    return call
+
+
+@pytest.fixture
+def wrong(refuse, config, write, tmp_path):
+    def call(content, *words):
+        log = write(content)
+        lines = refuse("import", config, log, "-o", tmp_path / "flight.h5", *words)
+        return [line.replace(str(log), "LOG") for line in lines]
+
+    return call
+
+
+def test_topics_of_three_rates_become_one_flight_in_the_frames_of_the_program(flown):
+    summary, flight, _ = flown(ulog())
+    assert summary["log_rate_hz"] == pytest.approx(250.0)
+    assert summary["rate_hz"] == pytest.approx(250.0)
+    time = flight["time"] + summary["span_s"][0] + 0.0005
+    # Heading NORTH clockwise from north is a quarter turn less NORTH counter-clockwise from east; FRD's z is down.
+    np.testing.assert_allclose(flight["attitude"][:, 2], np.pi / 2 - NORTH - YAW_RATE * time, atol=1e-4)
+    np.testing.assert_allclose(flight["attitude"][:, :2], 0.0, atol=1e-6)
+    np.testing.assert_allclose(flight["body_rate"], [0.0, 0.0, -YAW_RATE] * np.ones((len(time), 1)), atol=1e-6)
+    held = np.floor((time - 0.001) / 0.008 + 1e-6)
+    np.testing.assert_allclose(flight["body_torque"][:, 2], -0.01 * held, atol=1e-6)
+    np.testing.assert_allclose(flight["body_torque"][:, 0], 0.1 * (0.001 + 0.008 * held), atol=1e-6)
+    forward = rotation_matrix(flight["attitude"])[0, :, 0]
+    heading = NORTH + YAW_RATE * time[0]
+    np.testing.assert_allclose(forward, [np.sin(heading), np.cos(heading), 0.0], atol=1e-4)
+
+
+def test_stamps_are_microseconds_whatever_the_config_says(flown):
+    summary, _, _ = flown(ulog(), "--set", "import.time_unit=ms")
+    assert summary["log_rate_hz"] == pytest.approx(250.0)
+
+
+def test_dropouts_of_the_logger_are_warned_of(flown):
+    sent = rows()
+    cut = next(place for place, row in enumerate(sent) if row[0] > 1_000_000)
+    begin, end = (b"".join(data(*row) for row in part) for part in (sent[:cut], sent[cut:]))
+    dropouts = message("O", struct.pack("<H", 40)) + message("O", struct.pack("<H", 120))
+    # The clock begins with the first stamp of the body rates, 1 ms after the log.
+    _, _, stderr = flown(header() + definitions() + begin + dropouts + end)
+    words = " ".join(stderr.split())
+    assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 0.999 s" in words
+
+
+def test_a_pause_of_one_topic_is_a_gap(wrong):
+    sent = [row for row in rows() if row[1] != 0 or not 1_000_000 < row[0] < 1_300_000]
+    (line,) = wrong(ulog(sent))
+    assert line.startswith("LOG: the log has a gap of 0.304 s at 0.996 s, longer than import.gap_s = 0.1")
+
+
+def test_the_longest_part_beside_the_pause_can_be_kept(flown):
+    sent = [row for row in rows() if row[1] != 2 or not 500_000 < row[0] < 900_000]
+    summary, flight, _ = flown(ulog(sent), "--set", "import.gap_rule=longest-part")
+    assert 1.05 < flight["time"][-1] < 1.1
+    assert summary["span_s"][0] > 0.89
+
+
+def test_an_end_that_is_cut_off_is_read_up_to_it(flown):
+    summary, _, _ = flown(ulog()[:-9])
+    assert 480 < summary["samples"] <= 500
+
+
+def test_bytes_that_are_broken_are_warned_of(flown):
+    content = bytearray(ulog())
+    place = content.find(data(*rows()[300]))
+    content[place + 3 : place + 5] = b"\xff\xff"
+    _, _, stderr = flown(bytes(content))
+    assert "the file is broken in places" in " ".join(stderr.split())
+
+
+def test_other_topics_are_not_in_the_way(flown):
+    fields = FIELDS | {"battery_status": "uint64_t timestamp;float voltage_v;uint8_t[3] _padding0"}
+    sent = sorted([*rows(), *((stamp, 3, [16.0]) for stamp in range(0, 2_000_000, 200_000))], key=lambda row: row[:2])
+    assert flown(ulog(sent, fields))[0]["samples"] == flown(ulog(), "--force")[0]["samples"]
+
+
+def test_a_topic_that_is_not_there_is_named_with_those_that_are(wrong, config):
+    config.write_text(CONFIG.replace("vehicle_attitude.q[2]", "vehicle_atitude.q[2]").replace(".xyz[1]", ".rates[1]"))
+    lines = wrong(ulog())
+    assert lines[0].startswith(
+        "LOG: import.signals.quaternion.columns: the log has no column 'vehicle_atitude.q[2]'"
+        " (nearest: vehicle_attitude.q[2], "
+    )
+    assert "no column 'vehicle_angular_velocity.rates[1]' (nearest: vehicle_angular_velocity.xyz[1]" in lines[1]
+    config.write_text(CONFIG.replace('"vehicle_torque_setpoint.xyz[0]"', '"?!"'))
+    (line,) = wrong(ulog())
+    topics = "(topics: vehicle_angular_velocity, vehicle_attitude, vehicle_torque_setpoint)"
+    assert line == f"LOG: import.signals.body_torque.columns: the log has no column '?!' {topics}"
+
+
+@pytest.mark.parametrize("column", ["t", "timestamp", "vehicle_attitude", "sensor_gyro.timestamp"])
+def test_a_clock_that_is_none_is_told_what_one_is(wrong, column):
+    (line,) = wrong(ulog(), "--set", f"import.time_column={column}")
+    assert line == (
+        f"LOG: import.time_column = {column!r}: in a .ulg every topic has stamps; name those of the fastest one that is"
+        " mapped, such as vehicle_angular_velocity.timestamp (topics: vehicle_angular_velocity, vehicle_attitude,"
+        " vehicle_torque_setpoint)"
+    )
+
+
+def test_a_slow_topic_is_named(wrong):
+    sent = [row for row in rows() if row[1] != 0 or row[0] % 200_000 == 0]
+    (line,) = wrong(ulog(sent))
+    assert line.startswith(
+        "LOG: topic vehicle_attitude has a sample only every 0.2 s (median), longer than import.gap_s"
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "LOG: not a ULog file: it does not begin as one"),
+        (b"t,roll\n0,1\n", "LOG: not a ULog file: it does not begin as one"),
+        (header()[:10], "LOG: a broken ULog file: "),
+        (header(), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in a .ulg"),
+        (header() + definitions(), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in a .ulg"),
+        (header() + message("B", bytes(8) + b"\x80" + bytes(31)), "LOG: a broken ULog file: "),
+    ],
+    ids=["empty", "text", "header-cut", "header-only", "no-data", "unknown-flag"],
+)
+def test_what_is_no_ulog(wrong, content, message):
+    (line,) = wrong(content)
+    assert line.startswith(message)
+
+
+def test_without_the_package(wrong, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyulog", None)
+    assert wrong(ulog()) == ['LOG: reading .ulg needs the package pyulog; pip install "cpfls[ulog]"']

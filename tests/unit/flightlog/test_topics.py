@@ -1,0 +1,144 @@
+"""Topics with clocks of their own, put on the clock of one: what is interpolated, what is held, what is absent."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog import ImportSettings, SignalMap
+from cpfls_cli.flightlog.resampling import held, interpolated
+from cpfls_cli.flightlog.topics import on_one_clock, topic_and_field
+
+GYRO = 0.004 * np.arange(500)
+SLOW = 0.001 + 0.02 * np.arange(100)
+
+
+def between_samples(time):
+    """Where a stamp lies between the first and the last of the slow topic; none falls on one of them."""
+    return np.searchsorted(SLOW, time) % len(SLOW) > 0
+
+
+def signals(**columns):
+    units = {"quaternion": "1", "attitude": "deg", "body_torque": "N m", "body_rate": "rad/s", "voltage": "V"}
+    return {name: SignalMap(columns=tuple(own), unit=units[name]) for name, own in columns.items()}
+
+
+def put(topics, gap_s=0.1, time_column="gyro.timestamp", **columns):
+    settings = ImportSettings(time_column=time_column, torque_source=None, gap_s=gap_s, signals=signals(**columns))
+    return on_one_clock(topics, settings)
+
+
+def gyro(**fields):
+    return {"timestamp": GYRO, "x": np.sin(GYRO), "y": np.cos(GYRO), "z": 0 * GYRO} | fields
+
+
+RATE = ("gyro.x", "gyro.y", "gyro.z")
+
+
+@pytest.mark.parametrize(
+    ("column", "parts"),
+    [
+        ("vehicle_attitude.q[0]", ("vehicle_attitude", "q[0]")),
+        ("vehicle_attitude[0].q[0]", ("vehicle_attitude", "q[0]")),
+        ("sensor_gyro[2].x", ("sensor_gyro[2]", "x")),
+        ("esc_status.esc[1].esc_rpm", ("esc_status", "esc[1].esc_rpm")),
+        ("t", ("t", "")),
+    ],
+)
+def test_names_of_columns(column, parts):
+    assert topic_and_field(column) == parts
+
+
+def test_own_topic_is_taken_as_it_is():
+    columns, warnings = put({"gyro": gyro()}, body_rate=RATE)
+    np.testing.assert_array_equal(columns["gyro.x"], np.sin(GYRO))
+    np.testing.assert_array_equal(columns["gyro.timestamp"], GYRO)
+    assert warnings == ()
+
+
+def test_setpoints_keep_the_previous_value_and_states_are_linear():
+    level = np.arange(100.0)
+    topics = {"gyro": gyro(), "slow": {"timestamp": SLOW, "a": level, "b": level, "c": level}}
+    names = ("slow.a", "slow.b", "slow.c")
+    torque = put(topics, body_rate=RATE, body_torque=names)[0]["slow.a"]
+    state = put(topics, attitude=names)[0]["slow.a"]
+    inside = between_samples(GYRO)
+    np.testing.assert_array_equal(torque[inside], np.floor((GYRO[inside] - SLOW[0]) / 0.02 + 1e-9))
+    np.testing.assert_allclose(state[inside], (GYRO[inside] - SLOW[0]) / 0.02, atol=1e-9)
+    for values in (torque, state):
+        assert np.isnan(values[~inside]).all()
+
+
+def test_angles_and_quaternions_do_not_pass_through_their_jumps():
+    yaw = 100 * SLOW
+    half = np.deg2rad(yaw) / 2
+    flips = np.where(np.arange(100) % 3, 1.0, -1.0)
+    topics = {
+        "gyro": gyro(),
+        "angles": {"timestamp": SLOW, "r": 0 * SLOW, "p": 0 * SLOW, "y": (yaw + 180) % 360 - 180},
+        "turn": {"timestamp": SLOW, "w": flips * np.cos(half), "z": flips * np.sin(half), "0": 0 * SLOW, "1": 0 * SLOW},
+    }
+    inside = between_samples(GYRO)
+    angles = put(topics, attitude=("angles.r", "angles.p", "angles.y"))[0]["angles.y"]
+    np.testing.assert_allclose(angles[inside], 100 * GYRO[inside], atol=1e-9)
+    columns = put(topics, quaternion=("turn.w", "turn.0", "turn.1", "turn.z"))[0]
+    turned = 2 * np.rad2deg(np.unwrap(np.arctan2(columns["turn.z"], columns["turn.w"])[inside]))
+    np.testing.assert_allclose(turned - turned[0], 100 * (GYRO[inside] - GYRO[inside][0]), atol=0.05)
+
+
+def test_instances_are_kept_apart():
+    topics = {
+        "gyro": gyro(),
+        "bat": {"timestamp": SLOW, "v": 0 * SLOW + 12},
+        "bat[1]": {"timestamp": SLOW, "v": 0 * SLOW + 7},
+    }
+    assert np.nanmax(put(topics, body_rate=RATE, voltage=("bat[1].v",))[0]["bat[1].v"]) == 7
+    assert np.nanmax(put(topics, body_rate=RATE, voltage=("bat[0].v",))[0]["bat[0].v"]) == 12
+
+
+def test_another_stamp_is_used_by_the_topics_that_have_it():
+    late = {"timestamp": GYRO + 5.0, "timestamp_sample": GYRO}
+    topics = {"gyro": gyro() | late, "slow": {"timestamp": SLOW + 5.0, "timestamp_sample": SLOW, "v": SLOW}}
+    sampled = put(topics, time_column="gyro.timestamp_sample", body_rate=RATE, voltage=("slow.v",))[0]
+    inside = np.isfinite(sampled["slow.v"])
+    np.testing.assert_allclose(sampled["slow.v"][inside], GYRO[inside], atol=1e-12)
+    assert inside.sum() > 480
+
+
+def test_what_is_not_there_is_only_named():
+    topics = {"gyro": gyro()}
+    columns, _ = put(topics, body_rate=("gyro.x", "gyro.y", "other.z"))
+    assert "other.z" not in columns
+    assert columns["gyro.z"].size == 0
+    assert put(topics, time_column="t", body_rate=RATE)[0].keys() == {"gyro.timestamp", *RATE}
+
+
+def test_topic_that_is_too_slow_is_named():
+    slow = {"timestamp": np.arange(10.0), "v": np.arange(10.0)}
+    with pytest.raises(InputError, match=r"topic slow has a sample only every 1 s \(median\).* import.gap_s = 0.1"):
+        put({"gyro": gyro(), "slow": slow}, body_rate=RATE, voltage=("slow.v",))
+
+
+def test_clock_that_is_too_slow_is_warned_of():
+    topics = {"gyro": gyro(), "slow": {"timestamp": SLOW, "v": SLOW}}
+    _, warnings = put(topics, time_column="slow.timestamp", body_rate=RATE, voltage=("slow.v",))
+    assert len(warnings) == 1
+    assert warnings[0].startswith("topic gyro (250 Hz) is thinned to the clock of slow (50 Hz)")
+
+
+@pytest.mark.parametrize("between", [interpolated, held])
+def test_pauses_are_absent_and_absent_values_are_passed_over(between):
+    time = np.array([0.0, 0.1, 0.2, 0.9, 1.0, 1.1])
+    values = np.array([1.0, np.nan, 3.0, 4.0, 5.0, 5.0])
+    target = np.array([-0.05, 0.0, 0.1, 0.2, 0.3, 0.9, 0.95, 1.1, 1.2])
+    result = between(time, values, target, 0.2)
+    np.testing.assert_array_equal(np.isnan(result), [True, False, False, False, True, False, False, False, True])
+    assert result[2] == (2.0 if between is interpolated else 1.0)
+    assert result[6] == pytest.approx(4.5 if between is interpolated else 4.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("between", [interpolated, held])
+def test_stamps_that_go_back_or_repeat_are_passed_over_and_nothing_gives_nothing(between):
+    time = np.array([0.0, 0.1, 0.1, 0.05, 0.2])
+    values = np.array([0.0, 1.0, 9.0, 9.0, 2.0])
+    np.testing.assert_allclose(between(time, values, np.array([0.1, 0.2]), 1.0), [1.0, 2.0])
+    assert np.isnan(between(time, np.full(5, np.nan), time, 1.0)).all()
