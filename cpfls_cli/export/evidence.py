@@ -59,6 +59,7 @@ def _judged(artifact: Artifact) -> Mapping[str, Any]:
 def _verdict(artifact: Artifact) -> Verdict:
     data = artifact.data
     reasons = [str(reason) for reason in data.get("verdict/reason", ())]
+    # Each of these datasets is optional by itself.
     speaks = np.asarray(data.get("verdict/speaks", np.zeros(len(reasons))), dtype=float)
-    weighed = tuple(zip(reasons, speaks.tolist(), strict=True))
+    weighed = tuple(zip(reasons, speaks.tolist(), strict=False))
     return Verdict(artifact.text("verdict/label"), str(data.get("verdict/region", "")), weighed)

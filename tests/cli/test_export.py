@@ -1,0 +1,239 @@
+"""`cpfls export`: the files it writes, what it refuses, and that nothing in a model can break into its code."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+HOSTILE = '*/ int main(void) { return 7; } /* ??/\n"""\nraise SystemExit(7)\n#error " \\ \u202e'
+ENDINGS = {"json": "json", "c": "c", "python": "py"}
+
+
+@pytest.fixture
+def model(pipeline, tmp_path):
+    """A model to change."""
+    path = tmp_path / "model.h5"
+    shutil.copy(pipeline.model, path)
+    return path
+
+
+def change(path, **values):
+    with h5py.File(path, "r+") as file:
+        for name, value in values.items():
+            place = name.replace("__", "/")
+            if place in file:
+                del file[place]
+            if value is not None:
+                file[place] = np.char.encode(value, "utf-8") if np.asarray(value).dtype.kind == "U" else value
+
+
+def compile_and_test(source, folder):
+    if shutil.which("gcc") is None:
+        pytest.skip("no gcc on this machine")
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    command = ["gcc", *strict, "-DCPFLS_SELF_TEST", source, "-lm", "-o", folder / "self-test"]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    return subprocess.run([folder / "self-test"], capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("form", ENDINGS)
+def test_the_model_of_a_study_is_exported(cpfls, pipeline, tmp_path, form):
+    output = tmp_path / f"quad.{ENDINGS[form]}"
+    result = cpfls("export", pipeline.model, "--format", form, "-o", output, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert result.stderr == ""
+    summary = json.loads(result.stdout)
+    files = sorted(path.name for path in tmp_path.iterdir())
+    assert files == (["quad.c", "quad.h"] if form == "c" else [output.name])
+    assert sorted(summary["output"]) == [str(tmp_path / name) for name in files]
+    assert summary["bytes"] == sum(path.stat().st_size for path in tmp_path.iterdir())
+    assert (summary["format"], summary["name"], summary["complete"]) == (form, "quad", True)
+    if form == "json":
+        document = json.loads(output.read_text())
+        assert document["provenance"]["config"]["identification"]["membership_functions"] == 5
+        assert document["provenance"]["inputs"]["flight"]["name"] == "flight.h5"
+        assert set(document["judged"]["models"]) >= {"model", "rigid-body"}
+    if form == "c":
+        done = compile_and_test(output, tmp_path)
+        assert done.returncode == 0, done.stdout
+    if form == "python":
+        done = subprocess.run([sys.executable, "-I", output], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout
+
+
+def test_exported_torque_is_that_of_predict(cpfls, pipeline, tmp_path):
+    assert cpfls("export", pipeline.model, "--format", "python", "-o", tmp_path / "quad.py").exit_code == 0
+    names = {"__name__": "quad"}
+    exec((tmp_path / "quad.py").read_text(), names)
+    with h5py.File(pipeline.flight) as flight, h5py.File(pipeline.prediction) as prediction:
+        motion = [flight[name][:] for name in ("attitude", "attitude_rate", "attitude_acceleration")]
+        torque, body = names["torque"](*motion)
+        assert np.max(np.abs(torque - prediction["torque"][:])) < 1e-12 * np.max(np.abs(torque))
+        assert np.max(np.abs(body - prediction["body_torque"][:])) < 1e-12 * np.max(np.abs(body))
+        assert np.array_equal(~names["inside"](motion[0]), prediction["outside"][:].astype(bool))
+
+
+def test_equal_models_give_equal_files(cpfls, pipeline, tmp_path):
+    for form, ending in ENDINGS.items():
+        for folder in ("one", "two"):
+            (tmp_path / folder).mkdir(exist_ok=True)
+            assert (
+                cpfls("export", pipeline.model, "--format", form, "-o", tmp_path / folder / f"m.{ending}").exit_code
+                == 0
+            )
+    for path in (tmp_path / "one").iterdir():
+        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
+
+
+@pytest.mark.parametrize("form", ENDINGS)
+def test_an_incomplete_model_is_refused_and_marked_with_force(cpfls, refuse, model, tmp_path, form):
+    change(model, search__complete=np.uint8(0), search__stop_reason=np.array("time-limit"))
+    output = tmp_path / f"m.{ENDINGS[form]}"
+    words = ("export", model, "--format", form, "-o", output)
+    (line,) = refuse(*words)
+    assert line == (
+        f"{model}: the search for this model did not come to its end (time-limit); `cpfls identify ... --resume` goes "
+        "on, --force exports the model as it is, marked as incomplete"
+    )
+    result = cpfls(*words, "--force", "--json")
+    assert result.exit_code == 0
+    assert json.loads(result.stdout)["complete"] is False
+    assert result.stderr == "cpfls: note: the model is incomplete, and marked as such: do not fly with it\n"
+    text = output.read_text()
+    if form == "json":
+        assert json.loads(text)["complete"] is False
+    else:
+        assert "INCOMPLETE MODEL: its search did not come to its end (time-limit)." in text[:400]
+        assert "\nCOMPLETE = False\n" in text if form == "python" else True
+    if form == "c":
+        assert "#define M_COMPLETE 0\n" in output.with_suffix(".h").read_text()
+
+
+@pytest.mark.parametrize("form", ENDINGS)
+def test_hostile_text_in_a_model_stays_text(cpfls, model, tmp_path, form):
+    hostile = tmp_path / ("x*" + "' \"; raise SystemExit(8)\n#.h5")
+    change(
+        model,
+        findings=np.array([HOSTILE]),
+        verdict__label=np.array(HOSTILE),
+        verdict__region=np.array(HOSTILE),
+        verdict__reason=np.array([HOSTILE]),
+        verdict__speaks=np.array([-1]),
+        search__stop_reason=np.array(HOSTILE),
+        search__complete=np.uint8(0),
+    )
+    with h5py.File(model, "r+") as file:
+        file["inputs/flight"].attrs["name"] = HOSTILE
+    model.rename(hostile)
+    output = tmp_path / f"m.{ENDINGS[form]}"
+    result = cpfls("export", hostile, "--format", form, "-o", output, "--force")
+    assert result.exit_code == 0, result.stderr
+    if form == "json":
+        document = json.loads(output.read_text())
+        assert document["verdict"]["label"] == document["findings"][0] == HOSTILE
+        assert document["provenance"]["model"]["name"] == hostile.name
+    elif form == "c":
+        assert compile_and_test(output, tmp_path).returncode == 0
+    else:
+        done = subprocess.run([sys.executable, "-I", output], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
+    words = ("--format", "json", "-o", tmp_path / "m.json")
+    (line,) = refuse("export", pipeline.flight, *words)
+    assert line == f"{pipeline.flight}: is a cpfls/flight; this command needs a cpfls/model (made by `cpfls identify`)"
+    (line,) = refuse("export", study, *words)
+    assert line == f"{study}: cannot be read as an artifact: not an HDF5 file, or damaged"
+    assert refuse("export", tmp_path / "none.h5", *words) == [f"{tmp_path / 'none.h5'}: no such file"]
+    with h5py.File(model, "r+") as file:
+        file.attrs["schema_version"] = 99
+    (line,) = refuse("export", model, *words, "--dry-run")
+    assert line == f"{model}: schema_version = 99: written by a newer cpfls; this one reads up to 1"
+    with h5py.File(model, "r+") as file:
+        file.attrs["schema_version"] = 1
+        file.attrs["format"] = "cpfls/extended"
+    (line,) = refuse("export", model, *words)
+    assert line.startswith(f"{model}: is a model with effects (made by `cpfls extend` or `cpfls gap`), which export")
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"model__weights": np.zeros(24)}, "model/weights: those of D13(pitch) make no partition; identify it again"),
+        (
+            {"model__weights": -np.arange(24.0)},
+            "model/weights: those of D13(pitch) make no partition; identify it again",
+        ),
+        ({"model__visited": np.zeros((71, 71))}, "model/visited: is (71, 71), not (72, 72); identify it again"),
+        ({"model__coefficients": np.full(113, np.inf)}, "model/coefficients: 113 samples are not finite"),
+        ({"model__rigid_body": None}, "the cpfls/model lacks model/rigid_body; make it again"),
+    ],
+)
+def test_a_model_of_wrong_content(refuse, model, tmp_path, values, message):
+    change(model, **values)
+    lines = refuse("export", model, "--format", "c", "-o", tmp_path / "m.c")
+    assert lines[0].startswith(f"{model}: {message}")
+
+
+def test_output_rules(cpfls, refuse, model, tmp_path):
+    words = ("export", model, "--format", "c", "-o", tmp_path / "m.c")
+    (tmp_path / "m.h").write_text("precious")
+    assert refuse(*words) == [f"{tmp_path / 'm.h'}: exists already; --force replaces it"]
+    assert refuse(*words, "--dry-run") == [f"{tmp_path / 'm.h'}: exists already; --force replaces it"]
+    assert cpfls(*words, "--force", "-q").stdout == ""
+    assert "precious" not in (tmp_path / "m.h").read_text()
+    assert refuse(*words) == [f"{tmp_path / 'm.h'}: exists already; --force replaces it"]
+    missing = tmp_path / "none" / "m.json"
+    (line,) = refuse("export", model, "--format", "json", "-o", missing)
+    assert line == f"{missing}: cannot write into the folder {missing.parent}: No such file or directory"
+    for form, name, ending in (("c", "m.h", ".c"), ("json", "m.h5", ".json"), ("python", "m", ".py")):
+        (line,) = refuse("export", model, "--format", form, "-o", tmp_path / name)
+        assert line == f"{tmp_path / name}: --format {form} writes a file that ends in {ending}; name it so"
+    (line,) = refuse("export", model, "--format", "c", "-o", tmp_path / 'a"b.c')
+    assert line.endswith("C includes its header by name; use letters, digits and any of _ . + - in it")
+
+
+def test_an_input_is_never_the_output(refuse, model, tmp_path):
+    for name, form in (("m.json", "json"), ("m.h", "c")):
+        given = tmp_path / name
+        shutil.copy(model, given)
+        output = given if form == "json" else given.with_suffix(".c")
+        (line,) = refuse("export", given, "--format", form, "-o", output, "--force")
+        assert line == f"{given}: is an input of this command; -o must name another file"
+
+
+def test_dry_run_writes_nothing(cpfls, pipeline, tmp_path):
+    output = tmp_path / "m.c"
+    result = cpfls("export", pipeline.model, "--format", "c", "-o", output, "--dry-run")
+    assert result.exit_code == 0
+    assert result.stdout.startswith(f"{tmp_path / 'm.h'}: would be written")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names(cpfls, refuse, pipeline, tmp_path):
+    words = ("export", pipeline.model, "--format", "c", "-o", tmp_path / "2-m.c")
+    assert cpfls(*words).exit_code == 0
+    assert "unsigned model_2_m_inertia(" in (tmp_path / "2-m.h").read_text()
+    assert cpfls(*words, "--force", "--name", "Quad_7").exit_code == 0
+    assert "#define QUAD_7_OUTSIDE 1u" in (tmp_path / "2-m.h").read_text()
+    (line,) = refuse(*words, "--force", "--name", "x; int y")
+    assert line == "--name x; int y: is no identifier; use letters, digits and underscores, a letter first"
+
+
+def test_formats_are_named(cpfls, pipeline, tmp_path):
+    result = cpfls("export", pipeline.model, "--format", "rust", "-o", tmp_path / "m.rs")
+    assert result.exit_code == 2
+    assert "'rust' is not one of 'json', 'c', 'python'" in result.stderr
+
+
+def test_verbose_says_what_is_read_and_written(cpfls, pipeline, tmp_path):
+    result = cpfls("export", pipeline.model, "--format", "json", "-o", tmp_path / "m.json", "-v")
+    said = [line for line in result.stderr.splitlines() if line.startswith("export: ")]
+    assert said[0].startswith(f"export: reads {pipeline.model}")
+    assert said[-1].startswith(f"export: wrote {tmp_path / 'm.json'}")

@@ -1,0 +1,91 @@
+"""Whatever a file says of itself, the exported source stays the source it was."""
+
+import ast
+import json
+import re
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cpfls_cli.export import Verdict, c_source, json_text, python_source, reference_points
+from cpfls_cli.export.tables import number
+from cpfls_cli.export.text import checked_identifier, comment_text, identifier
+from tests.unit.export.cases import CASES, model_of, sheet_of
+
+MODEL = model_of(CASES["seesaw, one function"])
+POINTS = reference_points(MODEL, np.random.default_rng(1))
+
+nasty = st.lists(
+    st.one_of(
+        st.sampled_from(["*/", "/*", "//", "??/", "\\", "\n", '"', "'", '"""', "#endif", "*", "/", "?"]), st.text()
+    ),
+    max_size=8,
+).map("".join)
+
+
+@given(nasty)
+def test_no_comment_ends_or_begins_within_a_comment(text):
+    safe = comment_text(text)
+    assert not re.search(r"\*/|/\*|\?\?|\\|[^ -~]", safe)
+    # Broken into lines it stands behind a star.
+    assert "*/" not in f" * {safe}"
+
+
+@given(nasty)
+def test_any_file_name_gives_an_identifier(text):
+    assert checked_identifier(identifier(text))
+
+
+def without_comments(code):
+    """C with its comments and literals taken out, as the compiler sees it."""
+    assert "??" not in code
+    return re.sub(r'"[^"\n]*"', '""', re.sub(r"/\*.*?\*/", "", code, flags=re.DOTALL))
+
+
+def hostile(*texts):
+    verdict = Verdict(texts[0], texts[1], ((texts[2], -1.0),))
+    return sheet_of(
+        MODEL, file=texts[3], source=texts[4], findings=texts[:2], stop_reason=texts[5], complete=False, verdict=verdict
+    )
+
+
+plain = c_source(hostile(*["x"] * 6), POINTS, "vehicle")
+texts = st.tuples(*[nasty] * 6)
+few = settings(max_examples=25, deadline=None)
+
+
+@few
+@given(texts)
+def test_the_code_of_c_is_the_same_whatever_the_text(given_texts):
+    source = c_source(hostile(*given_texts), POINTS, "vehicle")
+    assert without_comments(source.source) == without_comments(plain.source)
+    assert without_comments(source.header) == without_comments(plain.header)
+
+
+@few
+@given(texts)
+def test_python_still_parses_to_the_same_statements(given_texts):
+    code = python_source(hostile(*given_texts), POINTS, given_texts[3])
+    assert code.isascii()
+    body, wanted = (ast.parse(text).body for text in (code, python_source(hostile(*["x"] * 6), POINTS, "x")))
+    verdicts = [node for node in body if isinstance(node, ast.Assign) and node.targets[0].id == "VERDICT"]
+    assert ast.literal_eval(verdicts[0].value) == given_texts[0]
+    rest, same = ([ast.dump(node) for node in tree if node not in verdicts] for tree in (body, wanted))
+    same = [line for line in same if "id='VERDICT'" not in line]
+    assert rest == same
+
+
+@few
+@given(texts)
+def test_json_gives_the_text_back(given_texts):
+    document = json.loads(json_text(hostile(*given_texts), POINTS))
+    assert document["findings"] == list(given_texts[:2])
+    assert document["provenance"]["model"]["name"] == given_texts[3]
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_numbers_come_back(value):
+    assert float(number(value)) == value
+    assert re.fullmatch(r"-?\d+(\.\d+)?(e[+-]\d+)?", number(value))
+    assert re.search(r"[.e]", number(value))
