@@ -54,6 +54,14 @@ class Curves:
     rigid_body: Array
     outside: BoolArray
 
+    @property
+    def relative_width(self) -> Array:
+        """Widest band of D11, D22 and D33 over the value itself, where training was, shape (3,)."""
+        of = np.diagonal(self.inertia, axis1=2, axis2=3)
+        width = np.diagonal(self.high - self.low, axis1=2, axis2=3)
+        ratio = np.divide(width, np.abs(of), out=np.full_like(width, np.inf), where=of != 0)
+        return np.asarray(np.max(ratio[~self.outside], axis=0, initial=0.0))
+
 
 def curves(model: Model, draws: Draws, best_rigid_body: Array, training: TorqueSource) -> Curves:
     """Evaluate a model over roll, at the median pitch of the training data, and over pitch, at their median roll.

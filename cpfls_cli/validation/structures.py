@@ -88,13 +88,14 @@ class _Folds:
     @classmethod
     def of(cls, training: TorqueSource, learned: TorqueSource, settings: IdentificationSettings) -> _Folds:
         """Take some of the samples where there are many, and label them."""
-        validation, scale = settings.validation, 1.0 / axis_scale(learned)
+        validation = settings.validation
         structure = model_structure(_RIGID_ONLY)
         judges = _pieces(training, validation.samples)
         learns = judges if len(learned) == len(training) else _pieces(learned, validation.samples)
         ranges = data_ranges(structure, judges.motion.attitude)
         part, whole = (Samples.of(Ready(source, rigid=True), structure, ranges) for source in (learns, judges))
         part, choice = with_folds(part, whole, replace(settings.ridge, folds=validation.folds))
+        scale = 1.0 / axis_scale(learns)
         own_scale = scale if settings.base == "rigid-body" else np.ones(3)
         judged = replace(choice.judged, scale=scale)
         return cls(replace(part, scale=own_scale), judged, choice, settings.base, settings.rank_tolerance)

@@ -1,0 +1,108 @@
+"""Bands hold their estimate, follow the noise, and are the spread of the draws whatever the structure."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.identification.chromosome import decode
+from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.regressor import Motion
+from cpfls_cli.validation import bands
+from cpfls_cli.validation.bands import band, inertia_band, torque_band
+from cpfls_cli.validation.bootstrap import bootstrap
+
+SAMPLES = 240
+STRUCTURES = [
+    {"consequents": "seesaw", "products": "additive", "membership_functions": 3, "input_map": "data-range"},
+    {"consequents": "seesaw", "products": "tensor", "membership_functions": (1, 2, 3, 4, 3, 2)},
+    {"consequents": "seesaw", "structure": "fls", "membership_functions": 2, "products": "additive"},
+    {"harmonic_order": 1},
+]
+
+
+def motion(rng):
+    return Motion(rng.uniform(-np.pi, np.pi, (SAMPLES, 3)), *rng.standard_normal((2, SAMPLES, 3)))
+
+
+def case(keys, base, seed, noise):
+    """Fit a random model of a structure to its own torque and noise."""
+    rng = np.random.default_rng(seed)
+    chosen, m = IdentificationSettings(**keys, base=base), motion(rng)
+    shape = model_evaluator(data := TorqueData(0.01 * np.arange(SAMPLES), m, np.ones((SAMPLES, 3))), data, chosen)
+    partitions = decode(shape.structure, rng.uniform(0.2, 1.0, shape.structure.genes))
+    truth = Model(
+        shape.structure,
+        shape.judge.ranges,
+        partitions,
+        rng.standard_normal(shape.structure.parameters),
+        np.zeros(6),
+        np.zeros((72, 72), dtype=bool),
+    )
+    training = replace(data, torque=truth.torque(m) + noise * rng.standard_normal((SAMPLES, 3)))
+    evaluator = model_evaluator(training, training, chosen)
+    fit = evaluator.solver.fit(partitions)
+    model = replace(truth, coefficients=fit.coefficients, rigid_body=fit.rigid_body)
+    drawn = bootstrap(evaluator, training, model, fit, ValidationSettings(draws=40), np.random.default_rng(seed))
+    return model, drawn, m
+
+
+@settings(max_examples=10, deadline=None)
+@given(keys=st.sampled_from(STRUCTURES), base=st.sampled_from(["none", "rigid-body"]), seed=st.integers(0, 100))
+def test_a_band_holds_the_model_and_is_the_spread_of_models(keys, base, seed):
+    """Each draw as a model of its own: its inertia and its torque, evaluated one after the other."""
+    model, draws, m = case(keys, base, seed, noise=0.1)
+    some = m[slice(0, 20)]
+    models = [
+        replace(model, coefficients=coefficients, rigid_body=rigid_body)
+        for coefficients, rigid_body in zip(draws.coefficients, draws.rigid_body, strict=True)
+    ]
+    quantile = stats.t.ppf(0.975, draws.blocks - 1)
+    for (low, high), value, drawn in (
+        (
+            inertia_band(model, draws, some.attitude),
+            model.inertia(some.attitude).value,
+            [other.inertia(some.attitude).value for other in models],
+        ),
+        (torque_band(model, draws, some), model.torque(some), [other.torque(some) for other in models]),
+    ):
+        assert low.shape == high.shape == value.shape
+        assert np.all(low <= value)
+        assert np.all(value <= high)
+        half = quantile * np.sqrt(np.mean((np.array(drawn) - value) ** 2, axis=0))
+        np.testing.assert_allclose(high - value, half, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(value - low, half, rtol=1e-6, atol=1e-9)
+
+
+@settings(max_examples=10, deadline=None)
+@given(keys=st.sampled_from(STRUCTURES), seed=st.integers(0, 100))
+def test_twice_the_noise_gives_bands_twice_as_wide(keys, seed):
+    widths = []
+    for noise in (0.1, 0.2):
+        model, draws, m = case(keys, "none", seed, noise)
+        widths.append(
+            [np.subtract(*inertia_band(model, draws, m.attitude)), np.subtract(*torque_band(model, draws, m))]
+        )
+    for single, double in zip(*widths, strict=True):
+        np.testing.assert_allclose(double, 2 * single, rtol=1e-5, atol=1e-9)
+
+
+def test_batches_change_nothing(monkeypatch):
+    model, draws, m = case(STRUCTURES[0], "rigid-body", 1, noise=0.1)
+    whole = *inertia_band(model, draws, m.attitude), *torque_band(model, draws, m)
+    monkeypatch.setattr(bands, "_BATCH", 7)
+    parts = *inertia_band(model, draws, m.attitude), *torque_band(model, draws, m)
+    for one, other in zip(whole, parts, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("blocks", "quantile"), [(1, 12.706), (2, 12.706), (10, 2.262), (10**6, 1.960)])
+def test_few_blocks_widen_a_band(blocks, quantile):
+    low, high = band(np.array([1.0]), np.array([[0.0], [2.0]]), blocks)
+    assert (low[0], high[0]) == pytest.approx((1 - quantile, 1 + quantile), abs=2e-3)

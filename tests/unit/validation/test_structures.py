@@ -1,0 +1,120 @@
+"""Cross-validation of structures against refits of rows written out, and what it tells apart."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import linalg
+
+from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.identification.cross_validation import contiguous_blocks
+from cpfls_cli.identification.data import axis_scale
+from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.rigid_columns import rigid_columns
+from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.validation.candidates import candidates
+from cpfls_cli.validation.structures import RIGID_BODY, compare_structures
+from cpfls_cli.vehicle import newton_euler_torque
+
+SAMPLES = 300
+VALIDATION = ValidationSettings(folds=4)
+
+
+def flight(bent=0.0, noise=0.05, samples=SAMPLES):
+    """Torque of a rigid body, or of one with 0.5 cos(roll) added to D22."""
+    rng = np.random.default_rng(11)
+    m = Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
+    torque = newton_euler_torque(m.attitude, m.rate, m.acceleration, np.diag([0.6, 0.7, 1.2]))
+    roll = m.attitude[:, 0]
+    torque[:, 0] += bent * 0.25 * np.sin(roll) * m.rate[:, 1] ** 2
+    torque[:, 1] += bent * 0.5 * (np.cos(roll) * m.acceleration[:, 1] - np.sin(roll) * m.rate[:, 0] * m.rate[:, 1])
+    return TorqueData(0.01 * np.arange(samples), m, torque + noise * rng.standard_normal(torque.shape))
+
+
+def settings(base, **keys):
+    return IdentificationSettings(**keys, base=base, validation=VALIDATION)
+
+
+@pytest.mark.parametrize("every", [1, 2], ids=["all", "selection"])
+def test_without_a_rigid_body_errors_are_those_of_refits(every):
+    training = flight()
+    learned = training[::every]
+    keys = {"harmonic_order": 1, "products": "additive"}
+    compared = compare_structures(training, learned, settings("none", **keys))
+    blocks = contiguous_blocks(training.time, learned.time, 4, IdentificationSettings().ridge.embargo_s)
+    scale = 1 / axis_scale(learned)
+
+    def errors(columns):
+        found = []
+        for judged, left_out in zip(blocks.validation, blocks.left_out, strict=True):
+            part, rest = learned[np.flatnonzero(~left_out)], training[np.flatnonzero(judged)]
+            A = columns(part.motion)
+            x = linalg.lstsq(A.reshape(part.torque.size, -1), part.torque.ravel())[0]
+            found.append(np.mean(((rest.torque - columns(rest.motion) @ x) * scale) ** 2))
+        return np.mean(found), np.std(found, ddof=1) / 2
+
+    def fuzzy(m):
+        ranges = data_ranges(structure, training.motion.attitude)
+        return Regressor(structure, m, ranges).matrix(uniform_breakpoints(structure))
+
+    structure = model_structure(candidates(settings("none", **keys))[0])
+    own = int(np.flatnonzero(compared.own)[0])
+    for place, columns in ((0, rigid_columns), (own, fuzzy)):
+        assert (compared.error[place], compared.standard_error[place]) == pytest.approx(errors(columns), rel=1e-8)
+    assert compared.name[0] == RIGID_BODY
+    assert compared.parameters[[0, own]].tolist() == [0, structure.parameters]
+    assert np.isinf(compared.ridge_weight[0])
+    assert np.all(compared.ridge_weight[1:] == 0)
+
+
+def test_over_a_rigid_body_it_is_the_ridge_curve_of_the_structure():
+    training, chosen = flight(bent=1.0), settings("rigid-body", harmonic_order=1)
+    compared = compare_structures(training, training, chosen)
+    with_folds = replace(chosen, ridge=replace(chosen.ridge, folds=4))
+    evaluator = model_evaluator(training, training, with_folds)
+    curve = evaluator.solver.curve(uniform_breakpoints(evaluator.structure))
+    own = int(np.flatnonzero(compared.own)[0])
+    assert compared.error[own] == pytest.approx(curve.error[curve.chosen])
+    assert compared.standard_error[own] == pytest.approx(curve.standard_error[curve.chosen])
+    assert compared.ridge_weight[own] == pytest.approx(curve.weight[curve.chosen])
+    assert compared.error[0] == pytest.approx(curve.error[-1])
+
+
+@pytest.mark.parametrize("base", ["none", "rigid-body"])
+def test_what_the_flight_holds_decides(base):
+    """A rigid vehicle leaves nothing to gain; one that bends does, for harmonics of one rule."""
+    for bent in (0.0, 1.0):
+        data = flight(bent, samples=1500)
+        compared = compare_structures(data, data, settings(base))
+        best = int(np.argmin(compared.error))
+        gain = compared.error[0] - compared.error[best]
+        assert (gain > 3 * compared.standard_error[best]) == bool(bent)
+        assert np.sum(compared.own) == 1
+    assert compared.name[best].startswith("harmonic")
+
+
+def test_structures_that_the_samples_cannot_tell_are_left_out():
+    compared = compare_structures(flight(samples=60), flight(samples=60), settings("none"))
+    assert compared.name[0] == RIGID_BODY
+    assert np.max(compared.parameters) <= 3 * 45
+    assert np.isfinite(compared.error).all()
+    shipped = compare_structures(flight(), flight(), settings("none", harmonic_order=8, membership_functions=9))
+    assert not shipped.own.any()
+
+
+@pytest.mark.parametrize("base", ["none", "rigid-body"])
+def test_too_few_samples_for_the_folds_compare_nothing(base):
+    few = flight(samples=7)
+    compared = compare_structures(few, few, settings(base))
+    assert compared.name == ()
+    assert all(len(values) == 0 for values in vars(compared).values())
+
+
+def test_a_long_flight_is_compared_on_pieces_of_it():
+    data = flight(samples=4000)
+    few = replace(settings("none"), validation=ValidationSettings(samples=400))
+    pieces = (np.arange(20)[:, None] * 200 + np.arange(20)).ravel()
+    whole, part = compare_structures(data, data, few), compare_structures(data[pieces], data[pieces], few)
+    np.testing.assert_allclose(whole.error, part.error)
+    assert whole.name == part.name
