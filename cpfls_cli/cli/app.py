@@ -36,12 +36,12 @@ FlightArgument = Annotated[Path, typer.Argument(metavar="FLIGHT", help="Made by 
 TrainingArgument = Annotated[
     list[Path], typer.Argument(metavar="FLIGHT...", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
 ]
-LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help="Flight log, .csv or .csv.gz.")]
+LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help="Flight log: .csv, .csv.gz, .parquet or .ulg.")]
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`.")]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
 FlightsArgument = Annotated[
-    list[Path], typer.Argument(metavar="FLIGHT...", help="Flights, or logs (.csv, .csv.gz) that the config describes.")
+    list[Path], typer.Argument(metavar="FLIGHT...", help="Flights, or logs (as `cpfls import` takes) that the config describes.")
 ]
 DisagreementArgument = Annotated[Path, typer.Argument(metavar="DISAGREEMENT", help="Made by `cpfls compare`.")]
 DiagnosisArgument = Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="Made by `cpfls diagnose`.")]
