@@ -41,7 +41,8 @@ ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Made by `c
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
 FlightsArgument = Annotated[
-    list[Path], typer.Argument(metavar="FLIGHT...", help="Flights, or logs (as `cpfls import` takes) that the config describes.")
+    list[Path],
+    typer.Argument(metavar="FLIGHT...", help="Flights, or logs (CSV, Parquet, ULog) that the config describes."),
 ]
 DisagreementArgument = Annotated[Path, typer.Argument(metavar="DISAGREEMENT", help="Made by `cpfls compare`.")]
 DiagnosisArgument = Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="Made by `cpfls diagnose`.")]
