@@ -3,12 +3,17 @@
 import json
 import struct
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
+from cpfls_cli.config.load import load_study
 from cpfls_cli.rotations import rotation_matrix
+from cpfls_cli.stages.recordings import read_flights
+
+EXAMPLE = Path(__file__).parents[2] / "configs" / "px4.yaml"
 
 CONFIG = """\
 import:
@@ -236,3 +241,37 @@ def test_what_is_no_ulog(wrong, content, message):
 def test_without_the_package(wrong, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyulog", None)
     assert wrong(ulog()) == ['LOG: reading .ulg needs the package pyulog; pip install "cpfls[ulog]"']
+
+
+def test_the_example_gives_torques_in_the_directions_of_px4(cpfls, write, tmp_path):
+    """Roll to the right takes the left motors, nose up the front ones, nose to the right the counter-clockwise ones."""
+    fields = {
+        ATTITUDE: FIELDS[ATTITUDE],
+        RATE: FIELDS[RATE],
+        "actuator_motors": "uint64_t timestamp;float[12] control",
+    }
+    push = {"roll": (-1, 1, 1, -1), "pitch": (1, -1, 1, -1), "yaw": (1, 1, -1, -1)}
+    moves = [0.6 + 0.1 * np.array(motors) for motors in push.values()]
+    sent = [row for row in rows() if row[1] != 2]
+    for stamp in range(200_000, 1_900_000, 4_000):
+        control = np.full(12, np.nan)
+        control[:4] = moves[min(2, (stamp - 200_000) // 600_000)]
+        sent.append((stamp, 2, control))
+    log, flight = write(ulog(sorted(sent, key=lambda row: row[:2]), fields)), tmp_path / "flight.h5"
+    words = ["--set", "import.delay_s=0", "--set", "import.lowpass_hz=null"]
+    result = cpfls("import", EXAMPLE, log, "-o", flight, *words)
+    assert result.exit_code == 0, result.stderr
+    with h5py.File(flight) as file:
+        torque = file["body_torque"][()]
+        assert "position" not in file
+    # In FLU, whose y and z are those of FRD turned round.
+    middle = [torque[50], torque[200], torque[350]]
+    for axis, (own, sign) in enumerate(zip(middle, (1, -1, -1), strict=True)):
+        assert sign * own[axis] > 0
+        np.testing.assert_allclose(np.delete(own, axis), 0.0, atol=1e-9)
+
+
+def test_the_gap_workflow_takes_it_as_well(config, write):
+    flights = read_flights([write(ulog())], load_study(config))
+    assert [recording.name for recording in flights.recordings] == ["log.ulg"]
+    assert len(flights.recordings[0].signals.time) == pytest.approx(500, abs=10)
