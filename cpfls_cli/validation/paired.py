@@ -31,24 +31,27 @@ class Comparison:
     ----------
     ours, theirs : float
         Mean squared errors.
-    change : float
-        ``ours / theirs - 1``; 0 where both are rounding.
+    ratio : float
+        ``ours / theirs``; 1 where they differ by no more than rounding, infinite where theirs alone are rounding.
     lower, higher : bool
-        Whether ours are lower, or higher, by more than chance: outside the 95 % interval of the mean of the paired
-        differences over blocks.
+        Whether ours are lower, or higher, by more than chance: so is the mean over all blocks, and the mean logarithm
+        of the ratio by block is outside its 95 % interval about 0.
     blocks : int
     """
 
     ours: float
     theirs: float
-    change: float
+    ratio: float
     lower: bool
     higher: bool
     blocks: int
 
 
 def compare(ours: Array, theirs: Array, size: float) -> Comparison:
-    """Compare mean squared errors by Student's test of the paired differences.
+    """Compare mean squared errors by Student's test of the paired logarithms.
+
+    Logarithms, since errors differ from block to block by orders of magnitude, and one bad block should neither decide
+    nor, by the scatter that it makes, hide that all the others agree.
 
     Parameters
     ----------
@@ -63,21 +66,23 @@ def compare(ours: Array, theirs: Array, size: float) -> Comparison:
         Neither lower nor higher with fewer than four blocks, which can prove nothing.
     """
     if len(ours) == 0:
-        return Comparison(float("nan"), float("nan"), 0.0, False, False, 0)
-    mean, rival = float(np.mean(ours)), float(np.mean(theirs))
+        return Comparison(float("nan"), float("nan"), 1.0, False, False, 0)
+    mean, rival, rounding = float(np.mean(ours)), float(np.mean(theirs)), _ROUNDING * size
     apart = mean - rival
-    if abs(apart) <= _SAME * rival + _ROUNDING * size:
-        return Comparison(mean, rival, 0.0, False, False, len(ours))
-    change, chance = (apart / rival if rival > 0 else float("inf")), _chance(ours - theirs)
-    return Comparison(mean, rival, change, apart < -chance, apart > chance, len(ours))
+    if abs(apart) <= _SAME * rival + rounding:
+        return Comparison(mean, rival, 1.0, False, False, len(ours))
+    least = max(rounding, np.finfo(float).tiny)
+    logarithm = np.log(np.maximum(ours, least) / np.maximum(theirs, least))
+    typical, chance = float(np.mean(logarithm)), _chance(logarithm)
+    ratio = mean / rival if rival > rounding else float("inf")
+    return Comparison(mean, rival, ratio, apart < 0 and typical < -chance, apart > 0 and typical > chance, len(ours))
 
 
-def _chance(difference: Array) -> float:
+def _chance(values: Array) -> float:
     """Half the width of the 95 % interval of a mean; infinite for too few."""
-    if len(difference) < _FEWEST_BLOCKS:
+    if len(values) < _FEWEST_BLOCKS:
         return float("inf")
-    standard_error = np.std(difference, ddof=1) / np.sqrt(len(difference))
-    return float(student.ppf(_CONFIDENCE, len(difference) - 1) * standard_error)
+    return float(student.ppf(_CONFIDENCE, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
 def compare_torque(

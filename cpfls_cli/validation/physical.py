@@ -60,7 +60,7 @@ def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
     attitude = _centres(model)
     if len(attitude) == 0:
         return Physics(0, 0, float("nan"), np.full(2, np.nan), 0.0)
-    values = model.inertia(attitude)
+    values, rate = model.inertia(attitude), rng.standard_normal(attitude.shape)
     smallest = np.linalg.eigvalsh(values.value)[:, 0]
     worst = int(np.argmin(smallest))
     return Physics(
@@ -68,16 +68,18 @@ def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
         indefinite=int(np.sum(not_positive_definite(values.value, attitude))),
         smallest_eigenvalue=float(smallest[worst]),
         worst_attitude=attitude[worst, :2],
-        energy=energy_share(values, rng.standard_normal(attitude.shape)),
+        energy=energy_share(values, coriolis_matrix(values, rate), rate),
     )
 
 
-def energy_share(values: InertiaValues, rate: Array) -> float:
+def energy_share(values: InertiaValues, coriolis: Array, rate: Array) -> float:
     """Measure the power of ``dD/dt - 2 C`` against the sizes of its terms.
 
     Parameters
     ----------
     values : InertiaValues
+    coriolis : array, shape (samples, 3, 3), kg m^2/s
+        C.
     rate : array, shape (samples, 3), rad/s
         Euler rates.
 
@@ -88,7 +90,7 @@ def energy_share(values: InertiaValues, rate: Array) -> float:
     """
     along = np.einsum("nkij,nk->nij", values.gradient, rate)
     outer = rate[:, :, None] * rate[:, None, :]
-    terms = np.stack([along * outer, -2.0 * coriolis_matrix(values, rate) * outer], axis=1)
+    terms = np.stack([along * outer, -2.0 * coriolis * outer], axis=1)
     power, size = np.abs(np.sum(terms, axis=(1, 2, 3))), np.sum(np.abs(terms), axis=(1, 2, 3))
     return float(np.max(power / np.where(size > 0, size, 1.0)))
 

@@ -107,9 +107,13 @@ def _beside_rigid_body(grounds: Grounds) -> Iterator[Reason]:
 
 
 def _compared(what: str, found: Comparison) -> Reason:
-    if found.change == 0:
+    if not found.blocks:
+        return Reason(f"{what}: nothing to compare, all windows were lost", AGAINST)
+    if found.ratio == 1:
         return Reason(f"{what}: the same as that of the rigid body", AGAINST)
-    text = f"{what}: {abs(100 * found.change):.3g} % {'below' if found.change < 0 else 'above'} that of the rigid body"
+    if np.isinf(found.ratio):
+        return Reason(f"{what}: that of the rigid body is rounding, the model's is not", AGAINST)
+    text = f"{what}: {found.ratio:.3g} times that of the rigid body"
     if found.lower or found.higher:
         return Reason(f"{text}, by more than chance over {found.blocks} blocks", FOR if found.lower else AGAINST)
     return Reason(f"{text}, which may be chance over {found.blocks} blocks", AGAINST)

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from cpfls_cli.arrays import BoolArray
+from cpfls_cli.identification.findings import AXES
 from cpfls_cli.identification.physics import why_unphysical
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.reasons import AGAINST, NEITHER, Reason, numbers, reasons
@@ -125,9 +126,11 @@ def _beside_rigid_body(grounds: Grounds) -> tuple[Label, Reason]:
     use = "use the rigid body: it is simpler, and the model is not better by more than chance on held-out data"
     if why is not None:
         return "not-better-than-rigid-body", Reason(f"{use}; yet the rigid body {why}", AGAINST)
-    if np.all(good_axes(grounds, RIGID_BODY)):
+    good = good_axes(grounds, RIGID_BODY)
+    if np.all(good):
         return "not-better-than-rigid-body", Reason(f"{use}; it is itself good for control ({explains})", NEITHER)
-    text = f"{use}; yet it is not good enough for control itself ({explains}; {grounds.r2_min:g} is asked for)"
+    bad = ", ".join(np.array(AXES)[~good])
+    text = f"{use}; yet about {bad} it is not good enough for control ({explains}; {grounds.r2_min:g} is asked for)"
     return "not-better-than-rigid-body", Reason(text, AGAINST)
 
 

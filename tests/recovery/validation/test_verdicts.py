@@ -1,0 +1,233 @@
+"""Verdicts on vehicles whose nature is known, and on evidence that is changed by hand."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
+from cpfls_cli.identification.settings import LocalSearchSettings
+from cpfls_cli.inertia import symmetric
+from cpfls_cli.regressor import Motion
+from cpfls_cli.trajectory import full_rotation
+from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.validation.grounds import Grounds
+from cpfls_cli.validation.paired import Comparison, compare_torque
+from cpfls_cli.validation.physical import physical_sense
+from cpfls_cli.validation.residuals import examine_residuals
+from cpfls_cli.validation.steps import replay_steps
+from cpfls_cli.validation.verdict import good_axes, verdict
+from cpfls_cli.vehicle import newton_euler_torque
+
+INERTIA = symmetric([0.6, 0.8, 1.2])
+UNSEARCHED = {"population": 2, "generations": 0, "local_search": LocalSearchSettings(enabled=False)}
+PAPER = {"consequents": "seesaw", "products": "additive", "membership_functions": 5, "base": "none"}
+
+
+def rigid(m):
+    return newton_euler_torque(m.attitude, m.rate, m.acceleration, INERTIA)
+
+
+def bent(m):
+    """A rigid body with 0.3 cos(roll) on top of D22, which no rigid body has, from its Lagrangian by hand."""
+    f, slope = 0.3 * np.cos(m.attitude[:, 0]), -0.3 * np.sin(m.attitude[:, 0])
+    torque = rigid(m)
+    torque[:, 0] -= 0.5 * slope * m.rate[:, 1] ** 2
+    torque[:, 1] += f * m.acceleration[:, 1] + slope * m.rate[:, 0] * m.rate[:, 1]
+    return torque
+
+
+def mirrored(m):
+    return rigid(m) * [1, -1, 1]
+
+
+def flight(torque_of, noise, seed, samples=1200, duration=24.0):
+    path = full_rotation(RotationSettings(), duration, np.random.default_rng(seed))
+    time = path.times(samples)
+    m = Motion(*vars(path.sample(time)).values())
+    torque = torque_of(m)
+    drawn = np.random.default_rng(seed + 1).standard_normal(torque.shape)
+    return TorqueData(time, m, torque + noise * torque.std(axis=0) * drawn)
+
+
+@cache
+def grounds(torque_of, noise=0.0, structure=(), *, held_out=True, seeds=(3, 53)):
+    """All evidence on a model of a flight, judged on another."""
+    training, other = (flight(torque_of, noise, seed) for seed in seeds)
+    parts = {"other": other} if held_out else {}
+    settings = IdentificationSettings(**dict(structure), **UNSEARCHED)
+    found = identify(training, training, parts, settings, np.random.default_rng(1))
+    part, data = ("other", other) if held_out else ("training", training)
+    rigid_body = found.baselines[0]
+    return Grounds(
+        identification=found,
+        torque=compare_torque(parts, found.model.torque, rigid_body.torque),
+        steps=replay_steps(part, data, {"model": found.model, "rigid-body": rigid_body.parameters}, 25, 100),
+        residuals=examine_residuals(part, data, found.model.torque, 20),
+        physics=physical_sense(found.model, np.random.default_rng(2)),
+        r2_min=0.8,
+    )
+
+
+def said(judged, words):
+    """Give what the reason with these words speaks for."""
+    own = [speaks for text, speaks in zip(judged.reasons, judged.speaks, strict=True) if words in text]
+    assert len(own) == 1, (words, judged.reasons)
+    return own[0]
+
+
+def with_r2(evidence, model, rigid_body):
+    """The same evidence with other held-out R2 of body torque."""
+    found = evidence.identification
+    other = dict(found.scores["other"])
+    for name, r2 in (("model", model), ("rigid-body", rigid_body)):
+        other[name] = replace(other[name], r2_body=np.array(r2, dtype=float))
+    return replace(evidence, identification=replace(found, scores={**found.scores, "other": other}))
+
+
+def with_still_yaw(evidence):
+    found = evidence.identification
+    axes = replace(found.axes, acceleration=np.array([3.0, 3.0, 0.5]))
+    return replace(evidence, identification=replace(found, axes=axes))
+
+
+@pytest.fixture(scope="module")
+def better():
+    """A model that wins over the rigid body."""
+    return grounds(bent, 0.05)
+
+
+@pytest.mark.parametrize("structure", [(("base", "none"),), ()], ids=["base none", "default"])
+def test_of_an_exact_rigid_vehicle_the_rigid_body_is_the_model(structure):
+    judged = verdict(grounds(rigid, 0.0, structure))
+    assert judged.label == "not-better-than-rigid-body"
+    assert said(judged, "it is itself good for control") == 0
+    assert said(judged, "squared error of held-out torque: the same") == -1
+    assert said(judged, "met to rounding") == 1
+
+
+def test_noisy_rotations_of_a_rigid_vehicle_switch_the_fuzzy_part_off():
+    judged = verdict(grounds(rigid, 0.05))
+    assert judged.label == "not-better-than-rigid-body"
+    assert said(judged, "switched the fuzzy part off") == -1
+    assert said(judged, "white noise") == 1
+
+
+def test_the_paper_s_coefficients_on_noisy_rotations_are_no_body():
+    judged = verdict(grounds(rigid, 0.05, tuple(PAPER.items())))
+    assert judged.label == "do-not-use"
+    assert "D(q) is not positive definite" in judged.reasons[0]
+    assert "the rigid body is good for control" in judged.reasons[0]
+
+
+def test_inertia_that_depends_on_attitude_is_worth_a_model(better):
+    judged = verdict(better)
+    assert (judged.label, judged.region) == ("good-for-control", "every roll and pitch")
+    assert said(judged, "squared error of held-out torque") == 1
+    assert said(judged, "squared error of the body rate replayed") == 1
+    assert said(judged, "is positive definite in all") == 1
+    assert set(judged.speaks) <= {-1, 0, 1}
+    assert len(judged.speaks) == len(judged.reasons)
+
+
+def test_without_held_out_data_no_model_is_good():
+    judged = verdict(grounds(bent, 0.05, held_out=False))
+    assert judged.label == "not-better-than-rigid-body"
+    assert "nothing was held out" in judged.reasons[0]
+    assert said(judged, "its own training data alone") == -1
+    assert said(judged, "body rate replayed (training)") == 0
+
+
+def test_signs_that_are_wrong_give_no_body():
+    judged = verdict(grounds(mirrored, 0.05))
+    assert (judged.label, judged.speaks[0]) == ("do-not-use", -1)
+
+
+def test_more_rules_are_good_inside_the_region_alone(better):
+    """The same numbers with coefficients that the flight leaves open."""
+    excitation = better.identification.excitation
+    open_ones = replace(excitation, determined=0.7 * excitation.determined)
+    judged = verdict(replace(better, identification=replace(better.identification, excitation=open_ones)))
+    assert judged.label == "good-inside-region"
+    assert judged.region.startswith("roll ")
+    assert said(judged, "70 % of what the rules could say") == -1
+
+
+@pytest.mark.parametrize(("r2", "label"), [(0.81, "good-for-control"), (0.79, "do-not-use")])
+def test_r2_asked_for(better, r2, label):
+    judged = verdict(with_r2(better, [0.9, r2, 0.9], [0.5, 0.5, 0.5]))
+    assert judged.label == label
+    assert (said(judged, "R2 of body torque, held out") == 1) == (label == "good-for-control")
+
+
+def test_an_axis_that_hardly_moves_is_judged_by_its_rate_replayed(better):
+    quiet = with_still_yaw(with_r2(better, [0.9, 0.9, 0.1], [0.5, 0.5, 0.1]))
+    judged = verdict(quiet)
+    assert judged.label == "good-for-control"
+    assert said(judged, "yaw hardly moves") == 0
+    rate = quiet.steps.body_rate.copy()
+    rate[0, :, 2] = 1.1 * rate[2, :, 2]
+    worse = replace(quiet, steps=replace(quiet.steps, body_rate=rate))
+    assert verdict(worse).label == "do-not-use"
+    assert said(verdict(worse), "yaw hardly moves") == -1
+    np.testing.assert_array_equal(good_axes(worse, "model"), [True, True, False])
+    rate[0, :, 2] = np.nan
+    lost = replace(quiet, steps=replace(quiet.steps, body_rate=rate))
+    np.testing.assert_array_equal(good_axes(lost, "model"), [True, True, False])
+
+
+def compared(*, lower=False, higher=False):
+    return Comparison(1.0, 1.0, 0.9 if lower else 1.1, lower, higher, 20)
+
+
+@pytest.mark.parametrize(
+    ("torque", "steps", "label"),
+    [
+        (compared(lower=True), "lower", "good-for-control"),
+        (compared(lower=True), "same", "good-for-control"),
+        (compared(), "lower", "good-for-control"),
+        (compared(), "same", "not-better-than-rigid-body"),
+        (compared(lower=True), "higher", "not-better-than-rigid-body"),
+        (compared(higher=True), "lower", "not-better-than-rigid-body"),
+    ],
+)
+def test_better_is_lower_beyond_chance_in_one_and_higher_in_none(better, torque, steps, label):
+    errors = better.steps.window_error.copy()
+    errors[0] = {"lower": 0.5, "same": 1.0, "higher": 2.0}[steps] * errors[1]
+    changed = replace(better, torque=torque, steps=replace(better.steps, window_error=errors))
+    assert verdict(changed).label == label
+
+
+def test_a_rigid_body_that_is_not_good_either_is_said_to_be_so(better):
+    evidence = replace(with_r2(better, [0.7, 0.9, 0.9], [0.7, 0.9, 0.9]), torque=compared(higher=True))
+    judged = verdict(evidence)
+    assert judged.label == "not-better-than-rigid-body"
+    assert "yet about roll it is not good enough for control" in judged.reasons[0]
+    useless = verdict(with_r2(evidence, [-0.1, 0.9, 0.9], [-0.1, 0.9, 0.9]))
+    assert useless.label == "do-not-use"
+    assert "than a constant does" in useless.reasons[0]
+
+
+def test_one_cell_without_a_body_is_enough_to_refuse(better):
+    physics = replace(better.physics, indefinite=1, worst_attitude=np.radians([30.0, -10.0]))
+    judged = verdict(replace(better, physics=physics))
+    assert judged.label == "do-not-use"
+    assert "worst at roll and pitch of 30 and -10 degrees" in judged.reasons[0]
+
+
+def test_what_does_not_decide_is_told(better):
+    stopped = replace(better.identification, stop_reason="time-limit")
+    steps = replace(better.steps, lost=better.steps.lost + np.array([[3], [0], [0]]))
+    evidence = replace(better, identification=stopped, steps=steps, band=np.array([0.2, 1.4, 0.3]))
+    judged = verdict(evidence)
+    assert judged.label == "good-for-control"
+    assert said(judged, "the search stopped before its end (time-limit") == -1
+    assert said(judged, "widest 95 % band of a moment of inertia is 140 %") == -1
+    assert said(judged, "3 of 100 windows replayed do not come to their end") == -1
+    assert said(verdict(replace(better, band=np.array([0.2, 0.4, 0.3]))), "widest 95 % band") == 1
+
+
+def test_coloured_errors_are_told_and_speak_neither_way(better):
+    residuals = replace(better.residuals, ljung_box=np.array([0.5, 1e-9, 0.4]))
+    assert said(verdict(replace(better, residuals=residuals)), "torque errors about pitch are not white") == 0
