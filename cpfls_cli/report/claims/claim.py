@@ -21,6 +21,8 @@ class Claim:
 
     Attributes
     ----------
+    name : str
+        In a few words.
     where : str
         Section of the paper.
     words : str
@@ -35,6 +37,7 @@ class Claim:
         One or two sentences.
     """
 
+    name: str
     where: str
     words: str
     rule: str

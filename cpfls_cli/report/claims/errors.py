@@ -15,6 +15,7 @@ from cpfls_cli.report.source import Sources
 from cpfls_cli.report.swept import joined_sweeps
 
 _CLAIM = Claim(
+    name="Relative error",
     where="Sections 10, 11",
     words="typical torque identification error is <10% … the relative torque error being uniformly <10%",
     rule="Largest error over largest torque, worst axis, on the flight learned from. Pass: below 10 % for every cpFLS "

@@ -16,6 +16,7 @@ from cpfls_cli.report.source import Source
 _TOLERANCE = 0.01
 _PRINTED = PRINTED_PEAKS | {"time": PRINTED_MOVE_S, "integral of jerk": PRINTED_JERK_INTEGRAL}
 _CLAIM = Claim(
+    name="Base move",
     where="Section 10",
     words="maximum … pop = 2π … crackle = 2 … snap = 1 … jerk = 1 … acceleration = 2 … velocity = 8 … displacement = "
     "64[m], within time = 16[sec]. The integral of absolute jerk is 8",

@@ -13,6 +13,7 @@ from cpfls_cli.report.source import Source
 
 _FEWEST = TABLE_4[-1]
 _CONTRIBUTION = Claim(
+    name="A fifth of the samples",
     where="Section 10",
     words="less than 20% of data points give more than 80% of contribution to the system condition number",
     rule="Condition number of all samples over that of a reduced set with fewer than 20 % of them. Pass: above 80 %. "
@@ -21,6 +22,7 @@ _CONTRIBUTION = Claim(
     f"{percent(_FEWEST.samples / TABLE_4[0].samples)} of the samples",
 )
 _FLOOR = Claim(
+    name="Floor of the condition number",
     where="Section 8",
     words="The target condition number of the ReducedTrainingSet cannot be set to lower than the reference condition "
     "number of the full FullTrainingSet data set",

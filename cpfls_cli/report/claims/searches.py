@@ -55,9 +55,10 @@ def search_claims(sweeps: Sequence[Sweep]) -> list[Claim]:
 def _reduced(column: PrintedColumn, sweeps: Sequence[Sweep]) -> Claim:
     share = f"{column.samples} of {_FULL.samples} samples"
     claim = Claim(
+        name=f"{column.samples} samples",
         where="Section 10",
         words="In average there is no significant difference in the identification quality for any of the reduced or "
-        f"the full data set ({share})",
+        "the full data set",
         rule=_RULE,
         paper=number(_printed_ratio(column, _FULL), 3),
     )
@@ -74,6 +75,7 @@ def _reduced(column: PrintedColumn, sweeps: Sequence[Sweep]) -> Claim:
 
 def _smaller_search(sweeps: Sequence[Sweep]) -> Claim:
     claim = Claim(
+        name="Smaller search",
         where="Section 10",
         words="The identification result is still very good when reducing the population size to 75 and generations "
         "evaluated to 25",
@@ -97,6 +99,7 @@ def _smaller_search(sweeps: Sequence[Sweep]) -> Claim:
 
 def _classic(sweeps: Sequence[Sweep]) -> Claim:
     claim = Claim(
+        name="cpFLS and FLS",
         where="Section 10",
         words="There is neither significant quality, nor identification performance degradation when using the new "
         "cpFLS compared to the simple FLS method described in [14]",

@@ -16,6 +16,7 @@ _TOLERANCE, _LEAST_R2 = 0.1, 0.98
 _FEWEST = 3
 _COMMAND = "make reproduce, which measures them with benchmarks/reproduction_time.py"
 _PROPORTIONAL = Claim(
+    name="Time of an evaluation",
     where="Section 10",
     words="the time required for evaluation, which is proportional to the increased speed of singular value "
     "decompositions of different sized samples",
@@ -24,6 +25,7 @@ _PROPORTIONAL = Claim(
     paper="proportional (slope 1)",
 )
 _EXPONENTIAL = Claim(
+    name="Time of a decomposition",
     where="Section 8",
     words="calculating SVD decomposition for large matrices is [a] very processor and memory demanding task, which "
     "increases exponentially with the data set size",

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from cpfls_cli.report.claims import Claim, Verdict, claims_of
 from cpfls_cli.report.claims.compared import ComparedFigure
 from cpfls_cli.report.claims.figures import compared_figures
-from cpfls_cli.report.content import Block, Cell, Section, Table, Text, Tone
+from cpfls_cli.report.content import Block, Cell, Folded, Section, Table, Text, Tone
 from cpfls_cli.report.figures.seesaw import seesaw_figure
 from cpfls_cli.report.source import Sources
 
@@ -39,8 +39,14 @@ def reproduction_section(sources: Sources) -> Section | None:
     if not sources.settings.paper or sources.only_gap:
         return None
     claims = claims_of(sources)
-    blocks: list[Block] = [Text(_count(claims), "note"), _claims(claims), _figures(compared_figures(sources))]
-    return Section("reproduction", "Reproduction of the paper", [*blocks, seesaw_figure("figure-1-seesaw")])
+    blocks: list[Block] = [
+        Text(_count(claims), "note"),
+        _claims(claims),
+        _rules(claims),
+        _figures(compared_figures(sources)),
+        seesaw_figure("figure-1-seesaw"),
+    ]
+    return Section("reproduction", "Reproduction of the paper", blocks)
 
 
 def _count(claims: Sequence[Claim]) -> str:
@@ -54,11 +60,23 @@ def _count(claims: Sequence[Claim]) -> str:
 
 def _claims(claims: Sequence[Claim]) -> Table:
     rows: list[list[str | Cell]] = [
-        [f"“{c.words}” ({c.where})", Cell(c.verdict, _TONES[c.verdict]), c.ours, c.paper, c.rule, c.why] for c in claims
+        [c.name, f"“{c.words}” ({c.where})", Cell(c.verdict, _TONES[c.verdict]), c.ours, c.paper, c.why] for c in claims
     ]
-    header = ("Claim of the paper", "Verdict", "Ours", "Paper's", "Measured, and what passes", "Why")
+    header = ("Claim", "In the paper's words", "Verdict", "Ours", "Paper's", "Why")
     every = frozenset(range(len(header)))
-    return Table("claims", "The claims of the paper, one by one.", header, rows, every, every - {1})
+    return Table("claims", "The claims of the paper, one by one.", header, rows, every, every - {2})
+
+
+def _rules(claims: Sequence[Claim]) -> Folded:
+    table = Table(
+        "claim-rules",
+        "How each claim is measured. Mean squared errors are of the whole training part.",
+        ("Claim", "Measured, and what passes"),
+        [[claim.name, claim.rule] for claim in claims],
+        frozenset({0, 1}),
+        frozenset({1}),
+    )
+    return Folded("What is measured for each claim, and what passes", [table])
 
 
 def _figures(figures: Sequence[ComparedFigure]) -> Table:
