@@ -60,7 +60,7 @@ def _reduced(column: PrintedColumn, sweeps: Sequence[Sweep]) -> Claim:
         words="In average there is no significant difference in the identification quality for any of the reduced or "
         "the full data set",
         rule=_RULE,
-        paper=number(_printed_ratio(column, _FULL), 3),
+        paper=_times(_printed_ratio(column, _FULL)),
     )
 
     def pairs(settings: Sequence[SweptSetting]) -> Iterator[_Pair]:
@@ -80,7 +80,7 @@ def _smaller_search(sweeps: Sequence[Sweep]) -> Claim:
         words="The identification result is still very good when reducing the population size to 75 and generations "
         "evaluated to 25",
         rule=f"{_RULE} The other search must have ten times as many chromosomes (the paper's: 53 times).",
-        paper=number(_printed_ratio(_SMALL, _LARGE), 3),
+        paper=_times(_printed_ratio(_SMALL, _LARGE)),
     )
 
     def pairs(settings: Sequence[SweptSetting]) -> Iterator[_Pair]:
@@ -104,7 +104,7 @@ def _classic(sweeps: Sequence[Sweep]) -> Claim:
         words="There is neither significant quality, nor identification performance degradation when using the new "
         "cpFLS compared to the simple FLS method described in [14]",
         rule=_RULE,
-        paper=number(_printed_ratio(_FULL, _FLS), 3),
+        paper=_times(_printed_ratio(_FULL, _FLS)),
     )
 
     def pairs(settings: Sequence[SweptSetting]) -> Iterator[_Pair]:
@@ -139,8 +139,8 @@ def _judged(claim: Claim, found: PairedRatio, pair: _Pair) -> Claim:
     sizes = f"{_size(pair[0])} against {_size(pair[1])}" if pair[0].size != pair[1].size else _size(pair[0])
     searched = f"{seeds} of {sizes} (population × generations)."
     if found.seeds == 1:
-        return claim.undecided(number(found.ratio, 3), f"{searched} One seed says nothing about the next.")
-    ours = f"{number(found.ratio, 3)} ({number(found.low, 3)} to {number(found.high, 3)})"
+        return claim.undecided(_times(found.ratio), f"{searched} One seed says nothing about the next.")
+    ours = f"{_times(found.ratio)} ({number(found.low, 3)} to {number(found.high, 3)})"
     tested = f"{searched} Wilcoxon p that neither is better: {number(found.p_value, 2)}."
     if found.low <= AS_GOOD < found.high:
         return claim.undecided(ours, f"{tested} So few seeds cannot tell: the interval holds the bound.")
@@ -148,6 +148,10 @@ def _judged(claim: Claim, found: PairedRatio, pair: _Pair) -> Claim:
         return claim.decided(False, ours, f"{tested} Worse than the paper's own margin.")
     lower = " The error is even lower." if found.high < 1.0 else ""
     return claim.decided(True, ours, f"{tested}{lower}")
+
+
+def _times(ratio: float) -> str:
+    return f"{number(ratio, 3)} times the MSE"
 
 
 def _size(setting: SweptSetting) -> str:

@@ -60,11 +60,12 @@ def _count(claims: Sequence[Claim]) -> str:
 
 def _claims(claims: Sequence[Claim]) -> Table:
     rows: list[list[str | Cell]] = [
-        [c.name, f"“{c.words}” ({c.where})", Cell(c.verdict, _TONES[c.verdict]), c.ours, c.paper, c.why] for c in claims
+        [f"{c.name}: “{c.words}” ({c.where})", Cell(c.verdict, _TONES[c.verdict]), c.ours, c.paper, c.why]
+        for c in claims
     ]
-    header = ("Claim", "In the paper's words", "Verdict", "Ours", "Paper's", "Why")
+    header = ("Claim, in the paper's words", "Verdict", "Ours", "Paper's", "Why")
     every = frozenset(range(len(header)))
-    return Table("claims", "The claims of the paper, one by one.", header, rows, every, every - {2})
+    return Table("claims", "The claims of the paper, one by one.", header, rows, every, every - {1})
 
 
 def _rules(claims: Sequence[Claim]) -> Folded:
