@@ -17,6 +17,7 @@ FOR, NEITHER, AGAINST = 1, 0, -1
 
 # White errors fall below it once in a hundred times an axis.
 _NOT_WHITE = 0.01
+_SMALLEST_P = 1e-16
 
 
 class Reason(NamedTuple):
@@ -86,14 +87,14 @@ def _held_out(grounds: Grounds) -> Iterator[Reason]:
 def _hardly_excited(grounds: Grounds) -> Iterator[Reason]:
     for axis in np.flatnonzero(grounds.hardly_excited):
         ours, still = grounds.rate_error(MODEL)[axis], grounds.rate_error(NOTHING_MOVES)[axis]
-        # Also where a run was lost and there is no number.
-        worse = not ours <= still
-        yield Reason(
-            f"{AXES[axis]} hardly moves in training: its rate is predicted with an error of {ours:.3g} rad/s, "
-            f"{still:.3g} if nothing moved"
-            + ("" if worse else ", which neither confirms the model there nor refutes it"),
-            AGAINST if worse else NEITHER,
-        )
+        text = f"{AXES[axis]} hardly moves in training: its rate is predicted with an error of {ours:.3g} rad/s"
+        if not np.isfinite(ours):
+            yield Reason(f"{AXES[axis]} hardly moves in training, and windows of it cannot be replayed", AGAINST)
+        elif ours > still:
+            yield Reason(f"{text}, {still:.3g} if nothing moved", AGAINST)
+        else:
+            neither = "which neither confirms the model there nor refutes it"
+            yield Reason(f"{text}, {still:.3g} if nothing moved, {neither}", NEITHER)
 
 
 def _beside_rigid_body(grounds: Grounds) -> Iterator[Reason]:
@@ -207,10 +208,14 @@ def _white(grounds: Grounds) -> Iterator[Reason]:
     coloured = [AXES[axis] for axis in told if errors.ljung_box[axis] < _NOT_WHITE]
     if coloured:
         smallest = float(np.min(errors.ljung_box[told]))
-        text = f"torque errors about {', '.join(coloured)} are not white ({errors.part}, p {smallest:.2g})"
+        text = f"torque errors about {', '.join(coloured)} are not white ({errors.part}, p {_printed(smallest)})"
         yield Reason(f"{text}: filters of the log do that, and so does an effect that has no term", NEITHER)
     elif len(told):
         text = f"torque errors are white noise as far as {errors.samples} samples of {errors.part} tell"
-        yield Reason(f"{text} (p {np.min(errors.ljung_box[told]):.2g})", FOR)
+        yield Reason(f"{text} (p {_printed(float(np.min(errors.ljung_box[told])))})", FOR)
     elif np.all(errors.exact):
         yield Reason(f"the torque of {errors.part} is met to rounding", FOR)
+
+
+def _printed(p_value: float) -> str:
+    return f"{p_value:.2g}" if p_value > _SMALLEST_P else f"below {_SMALLEST_P:g}"

@@ -63,7 +63,7 @@ def grounds(torque_of, noise=0.0, structure=(), *, held_out=True, seeds=(3, 53))
     return Grounds(
         identification=found,
         torque=compare_torque(parts, found.model.torque, rigid_body.torque),
-        steps=replay_steps(part, data, {"model": found.model, "rigid-body": rigid_body.parameters}, 25, 100),
+        steps=replay_steps(part, data, {"model": found.model, "rigid-body": rigid_body.parameters}, 10, 100),
         residuals=examine_residuals(part, data, found.model.torque, 20),
         physics=physical_sense(found.model, np.random.default_rng(2)),
         r2_min=0.8,
