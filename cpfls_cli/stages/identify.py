@@ -31,6 +31,9 @@ from cpfls_cli.stages.same_vehicle import other_vehicles
 from cpfls_cli.stages.stopped import stopped, without_model
 from cpfls_cli.stages.study import generator, settings_of
 from cpfls_cli.stages.training import TrainingData, flight_roles, read_training
+from cpfls_cli.stages.validating import evidence_on, verdict_lines, verdict_summary
+from cpfls_cli.stages.validation_file import validation_data
+from cpfls_cli.validation.verdict import Verdict
 from cpfls_cli.workers.worker_error import WorkerError
 
 
@@ -78,9 +81,12 @@ def run(
         search.end(result.stop_reason)
         raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
     with search.kept():
-        finish(job, MODEL, model_data(result, job.study.identification.base, data.indices), started.inputs)
+        evidence = evidence_on(job, result, data, held_out)
+        model = model_data(result, job.study.identification.base, data.indices)
+        finish(job, MODEL, model | (validation_data(evidence) if evidence else {}), started.inputs)
     search.end(result.stop_reason)
-    outcome = _outcome(job, result, len(data.learned), time.perf_counter() - clock, others)
+    verdict = evidence.verdict if evidence else None
+    outcome = _outcome(job, result, verdict, len(data.learned), time.perf_counter() - clock, others)
     return stopped(outcome, result.stop_reason, watch.signal, job.output)
 
 
@@ -198,7 +204,14 @@ def _note(step: SearchStep) -> str:
     return f"{generation}  best error {step.best[0]:.3g}, max {step.best[1]:.3g} N m, cond {step.best[2]:.4g}"
 
 
-def _outcome(job: Job, result: Identification, learned: int, seconds: float, others: tuple[str, ...]) -> Outcome:
+def _outcome(
+    job: Job,
+    result: Identification,
+    verdict: Verdict | None,
+    learned: int,
+    seconds: float,
+    others: tuple[str, ...],
+) -> Outcome:
     training = result.scores["training"]
     held_out = {part: scores for part, scores in result.scores.items() if part != "training"}
     baselines = [name for name in training if name != "model"]
@@ -235,10 +248,12 @@ def _outcome(job: Job, result: Identification, learned: int, seconds: float, oth
             for part, scores in held_out.items()
         },
         "findings": list(result.findings),
+        "verdict": verdict_summary(verdict),
         "seconds": round(seconds, 3),
     }
     stall = job.study.identification.stall_generations
-    return Outcome(summary, tuple(_lines(result, learned, stall)), (*others, *result.findings))
+    lines = [*_lines(result, learned, stall), *verdict_lines(verdict)]
+    return Outcome(summary, tuple(lines), (*others, *result.findings))
 
 
 def _score_summary(score: Score) -> dict[str, Any]:

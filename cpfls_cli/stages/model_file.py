@@ -17,6 +17,8 @@ from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.regressor.structure import ModelStructure, model_structure
 
+_MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")
+
 
 def model_data(result: Identification, base: str, learned: IntArray) -> dict[str, Any]:
     """Arrange an identification as the datasets of a model artifact.
@@ -152,7 +154,7 @@ def _judged(result: Identification) -> dict[str, Any]:
         "judged/parts": np.array(parts),
         "judged/samples": np.array([result.samples[part] for part in parts]),
         "judged/outside": np.array([result.outside[part] for part in parts]),
-        **{f"judged/{measure}": table(measure) for measure in ("mse", "max_error", "relative_error", "r2", "r2_body")},
+        **{f"judged/{measure}": table(measure) for measure in _MEASURES},
         "baselines/rigid_body": by_name["rigid-body"],
         "baselines/constant_inertia": by_name["constant-inertia"],
     }

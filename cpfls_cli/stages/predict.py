@@ -21,6 +21,9 @@ from cpfls_cli.stages.job import Job, Outcome, begin, finish
 from cpfls_cli.stages.model_file import read_model
 from cpfls_cli.stages.predict_extended import extended_prediction
 from cpfls_cli.stages.sources import read_good, read_with
+from cpfls_cli.stages.validation_file import read_draws
+from cpfls_cli.validation.bands import inertia_band, torque_band
+from cpfls_cli.validation.bootstrap import Draws
 
 _NO_TRUST = "do not trust the model there"
 _WELL_CONDITIONED = 100.0
@@ -51,12 +54,12 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     source = read_with(flight, FLIGHT, "time", *MOTION)
     if started.dry_run is not None:
         return started.dry_run
-    data = _predict(identified, source)
+    data = _predict(identified, source, read_draws(artifact))
     finish(job, PREDICTION, data, started.inputs)
     return _outcome(data, _trust_outside(identified, artifact))
 
 
-def _predict(model: Model, flight: Artifact) -> dict[str, Any]:
+def _predict(model: Model, flight: Artifact, draws: Draws | None) -> dict[str, Any]:
     motion = flight_motion(flight)
     torque = model.torque(motion)
     data = {
@@ -68,6 +71,9 @@ def _predict(model: Model, flight: Artifact) -> dict[str, Any]:
         "coriolis": model.coriolis(motion.attitude, motion.rate),
         "outside": model.outside(motion.attitude).astype(np.uint8),
     }
+    if draws is not None:
+        data["inertia_low"], data["inertia_high"] = inertia_band(model, draws, motion.attitude)
+        data["torque_low"], data["torque_high"] = torque_band(model, draws, motion)
     if "torque" in flight.data:
         data |= {"measured_torque": flight.array("torque"), "error": flight.array("torque") - torque}
     return data

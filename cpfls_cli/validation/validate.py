@@ -1,0 +1,114 @@
+"""Gather the evidence on how far to trust an identified model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.identify import TRAINING, model_evaluator
+from cpfls_cli.identification.results import Identification
+from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.validation.bootstrap import Draws, bootstrap
+from cpfls_cli.validation.curves import Curves, curves
+from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
+from cpfls_cli.validation.paired import compare_torque
+from cpfls_cli.validation.period import PeriodErrors, one_period_away
+from cpfls_cli.validation.physical import Physics, physical_sense
+from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
+from cpfls_cli.validation.round_trip import RoundTrip, round_trip
+from cpfls_cli.validation.steps import StepErrors, replay_steps
+from cpfls_cli.validation.structures import StructureComparison, compare_structures
+from cpfls_cli.validation.turning import Predictor
+from cpfls_cli.validation.verdict import Verdict, verdict
+
+Tell = Callable[[str], None]
+"""Takes what comes next, in words."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """The evidence on one model.
+
+    Attributes
+    ----------
+    structures : StructureComparison or None
+        Other structures by cross-validation; None where not asked for.
+    residuals : ResidualAnalysis
+        What the model leaves of the torque on held-out data, or in training where nothing was held out.
+    draws : Draws
+        Of the block bootstrap.
+    curves : Curves
+        D_ij(q) with their bands.
+    round_trip : RoundTrip
+        What is identified from a simulation of the model.
+    steps : StepErrors
+        Measured torques replayed, on the same part as the residuals.
+    physics : Physics
+    period : PeriodErrors or None
+        None where inputs do not go all the way round.
+    verdict : Verdict
+    """
+
+    structures: StructureComparison | None
+    residuals: ResidualAnalysis
+    draws: Draws
+    curves: Curves
+    round_trip: RoundTrip
+    steps: StepErrors
+    physics: Physics
+    period: PeriodErrors | None
+    verdict: Verdict
+
+
+def validate(
+    training: TorqueSource,
+    learned: TorqueSource,
+    held_out: Mapping[str, TorqueSource],
+    settings: IdentificationSettings,
+    result: Identification,
+    rng: np.random.Generator,
+    tell: Tell = lambda _: None,
+) -> Validation:
+    """Gather the evidence on a model.
+
+    Residuals and prediction by horizon are examined on the first part that was held out, in training where none was.
+
+    Parameters
+    ----------
+    training, learned : TorqueSource
+        What the model was identified from: the whole training part, and the samples of it that parameters were
+        learned from.
+    held_out : mapping of str to TorqueSource
+        Data that nothing was learned from, by name.
+    settings : IdentificationSettings
+    result : Identification
+    rng : numpy.random.Generator
+    tell : callable, optional
+        Told what comes next.
+
+    Returns
+    -------
+    Validation
+    """
+    asked, model = settings.validation, result.model
+    part, source = next(iter(held_out.items()), (TRAINING, training))
+    drawing, examining, simulating = rng.spawn(3)
+    tell("compares structures")
+    structures = compare_structures(training, learned, settings) if asked.structures else None
+    tell("draws bands")
+    draws = bootstrap(model_evaluator(training, learned, settings), training, model, result.fit, asked, drawing)
+    drawn = curves(model, draws, result.rigid_body, training)
+    tell("identifies its own simulation")
+    again = round_trip(training, learned, settings, model, drawn, simulating)
+    tell("replays measured torques")
+    predictors: dict[str, Predictor] = {MODEL: model, RIGID_BODY: result.rigid_body}
+    steps = replay_steps(part, source, predictors, asked.horizon_samples, asked.windows)
+    residuals = examine_residuals(part, source, model.torque, asked.lags)
+    physics = physical_sense(model, examining)
+    period = one_period_away(model, {TRAINING: training, **held_out})
+    compared = compare_torque(held_out, model.torque, result.baselines[0].torque)
+    judged = verdict(Grounds(result, compared, steps, residuals, physics, asked.r2_min, drawn.relative_width))
+    return Validation(structures, residuals, draws, drawn, again, steps, physics, period, judged)
