@@ -21,12 +21,16 @@ from cpfls_cli.report.sections.provenance import provenance_section
 from cpfls_cli.report.sections.reduction import reduction_section
 from cpfls_cli.report.sections.replicates import replicates_section
 from cpfls_cli.report.sections.reproduction import reproduction_section
+from cpfls_cli.report.sections.residuals import residuals_section
 from cpfls_cli.report.sections.rules import rules_section
 from cpfls_cli.report.sections.search import search_section
 from cpfls_cli.report.sections.sensors import sensors_section
+from cpfls_cli.report.sections.steps import steps_section
 from cpfls_cli.report.sections.summary import summary_section
 from cpfls_cli.report.sections.tracking import tracking_section
+from cpfls_cli.report.sections.uncertainty import uncertainty_section
 from cpfls_cli.report.sections.unseen import unseen_section
+from cpfls_cli.report.sections.validation import validation_section
 from cpfls_cli.report.sections.vehicle import vehicle_section
 from cpfls_cli.report.source import Sources
 
@@ -43,6 +47,10 @@ _SECTIONS = (
     flight_section,
     reduction_section,
     identification_section,
+    validation_section,
+    residuals_section,
+    uncertainty_section,
+    steps_section,
     replicates_section,
     search_section,
     partitions_section,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from cpfls_cli.report.canvas import legend_above, line, plot, stacked, style_of
+from cpfls_cli.report.canvas import band, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.figures.prediction import shade_outside
 from cpfls_cli.report.source import Source
@@ -30,6 +30,7 @@ def inertia_figure(name: str, prediction: Source) -> Plot:
     """
     artifact = prediction.artifact
     time, inertia = artifact.array("time"), artifact.array("inertia")
+    banded = {"inertia_low", "inertia_high"} <= set(artifact.data)
 
     def draw(figure: Figure) -> None:
         panels = stacked(figure, len(_PANELS))
@@ -37,6 +38,9 @@ def inertia_figure(name: str, prediction: Source) -> Plot:
             for index, entry in enumerate(entries):
                 row, column = int(entry[1]) - 1, int(entry[2]) - 1
                 line(axes, time, inertia[:, row, column], label=entry, **style_of(index))
+                if banded:
+                    ends = (artifact.array(f"inertia_{end}")[:, row, column] for end in ("low", "high"))
+                    band(axes, time, *ends, color=style_of(index)["color"], alpha=0.22, label=f"95 % band of {entry}")
             shade_outside(axes, time, artifact.array("outside"))
             axes.set_ylabel("kg m²")
             legend_above(axes)
@@ -44,6 +48,6 @@ def inertia_figure(name: str, prediction: Source) -> Plot:
 
     caption = (
         f"Entries of the inertia matrix D(q) of {prediction.input_name('model')} that depend on attitude, along "
-        f"{prediction.input_name('flight')}."
+        f"{prediction.input_name('flight')}{', with 95 % bands' if banded else ''}."
     )
     return plot(name, caption, "Entries 22, 33, 13 and 23 of the inertia matrix over time", 3.8, draw)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
+from cpfls_cli.report.canvas import BASELINE, band, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.decimation import runs
 from cpfls_cli.report.source import Source
@@ -62,11 +62,15 @@ def torques_figure(name: str, prediction: Source) -> Plot:
     """
     artifact = prediction.artifact
     time, model = artifact.array("time"), artifact.array("torque")
+    banded = {"torque_low", "torque_high"} <= set(artifact.data)
     measured = artifact.array("measured_torque") if "measured_torque" in artifact.data else None
 
     def draw(figure: Figure) -> None:
         panels = stacked(figure, 3)
         for index, (axes, axis) in enumerate(zip(panels, AXES, strict=True)):
+            if banded:
+                ends = (artifact.array(f"torque_{end}")[:, index] for end in ("low", "high"))
+                band(axes, time, *ends, color=style_of(0)["color"], alpha=0.25, label="95 % band of the model")
             line(axes, time, model[:, index], label="model", **style_of(0))
             if measured is not None:
                 line(axes, time, measured[:, index], label="flight", **BASELINE)
@@ -76,7 +80,8 @@ def torques_figure(name: str, prediction: Source) -> Plot:
         legend_above(panels[0])
         panels[-1].set_xlabel("time, s")
 
-    caption = f"Generalised torque of {_pair(prediction)}.{_shaded(prediction)}"
+    told = ", with the 95 % band of the prediction; a measured torque has its own noise beside it" if banded else ""
+    caption = f"Generalised torque of {_pair(prediction)}{told}.{_shaded(prediction)}"
     return plot(name, caption, "Torque of the model and of the flight over time", 4.8, draw)
 
 

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.report.content import Block, Heading, Section, Text
+from cpfls_cli.report.evidence import known_everywhere
 from cpfls_cli.report.figures.inertia import inertia_figure
 from cpfls_cli.report.figures.prediction import error_figure, torques_figure
 from cpfls_cli.report.sections.each import section_of_each
@@ -43,11 +45,13 @@ def _prediction(prediction: Source, index: int, sources: Sources) -> Iterator[Bl
     yield Text(_seen(prediction, sources))
     outside, samples = int(np.sum(artifact.array("outside") != 0)), len(artifact.array("time"))
     if outside:
-        yield Text(
-            f"{outside} of {samples} samples lie outside the attitudes that training visited: the model extrapolates "
-            "there.",
-            "warning",
-        )
+        visited = f"{outside} of {samples} samples lie outside the attitudes that training visited"
+        model = sources.by_hash(prediction.made_from("model"))
+        if model is not None and model.artifact.spec == MODEL and known_everywhere(model):
+            known = "one rule holds everywhere and all its coefficients are known"
+            yield Text(f"{visited}: {known}, so it holds there too, if the structure does.", "note")
+        else:
+            yield Text(f"{visited}: the model extrapolates there.", "warning")
     if "error" in artifact.data:
         yield error_figure(f"figure-7-error-{index}", prediction)
     else:

@@ -1,4 +1,4 @@
-"""The search: convergence, Pareto front, ridge curve."""
+"""The search: convergence and Pareto front."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from cpfls_cli.report.content import Block, Section, Text
 from cpfls_cli.report.figures.convergence import convergence_figure
 from cpfls_cli.report.figures.front import front_figure
-from cpfls_cli.report.figures.ridge import ridge_figure
 from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.report.verdict import fuzzy_part_off
@@ -36,8 +35,6 @@ def _search(model: Source, index: int) -> Iterator[Block]:
             f"No search: one chromosome. {model.label} has one rule per input, so there is no partition to search for.",
             "note",
         )
-    if "ridge/weight" in model.artifact.data:
-        yield ridge_figure(f"ridge-curve-{index}", model)
 
 
 def _found(model: Source, index: int) -> Iterator[Block]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from cpfls_cli.report.content import Block, Cell, Facts, Heading, Section, Table, Text
+from cpfls_cli.report.evidence import complete, has, verdict_words
 from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, Judged, judged
 from cpfls_cli.report.missing import missing
 from cpfls_cli.report.numbers import ROUNDING, count, percent, plain, r_squared
@@ -28,6 +29,7 @@ def summary_section(sources: Sources) -> Section:
     """
     blocks: list[Block] = [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
+    blocks += [_line(model) for model in sources.models]
     for number, model in enumerate(sources.models, start=1):
         blocks += _model(model, sources, number)
     if not sources.models and not sources.only_gap:
@@ -36,6 +38,22 @@ def summary_section(sources: Sources) -> Section:
         blocks += _flight_warnings(flight)
     blocks += [Text(sentence, "note") for sentence in missing(sources).values()]
     return Section("summary", "Summary", blocks)
+
+
+def _line(model: Source) -> Text:
+    """Say the verdict on a model in one line."""
+    if not complete(model):
+        reason = model.artifact.text("search/stop_reason") if "search/stop_reason" in model.artifact.data else "stopped"
+        incomplete = f" The search is incomplete ({reason}): this is the best so far, and --resume goes on."
+    else:
+        incomplete = ""
+    if not has(model, "verdict"):
+        told = "no verdict, because the evidence was not gathered (identification.validation.enabled)"
+        return Text(f"{model.label}: {told}.{incomplete}", "warning" if incomplete else "note")
+    words, tone = verdict_words(model)
+    region = model.artifact.text("verdict/region") if "verdict/region" in model.artifact.data else ""
+    where = f" Region: {region.rstrip('.')}." if region else ""
+    return Text(f"{model.label}: {words}.{where}{incomplete}", "warning" if incomplete else tone)
 
 
 def _model(model: Source, sources: Sources, number: int) -> Iterator[Block]:

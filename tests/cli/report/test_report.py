@@ -32,12 +32,13 @@ identification:
   subpopulations: 2
   training_share: 0.7
   local_search: {enabled: false}
+  validation: {enabled: false}
 report: {title: "<script>alert(1)</script> & a study", paper: true}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
-    "summary", "vehicle", "path", "flights", "reduction", "identification", "replicates", "search", "partitions",
-    "prediction", "rules", "provenance",
+    "summary", "reproduction", "vehicle", "path", "flights", "reduction", "identification", "validation", "replicates",
+    "search", "partitions", "prediction", "rules", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -141,7 +142,7 @@ def test_no_id_stands_twice_and_every_element_is_closed(full):
 
 def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_path):
     summary, html, _ = report(study, tmp_path, study.noisy)
-    assert summary["sections"] == ["summary", "vehicle", "flights", "provenance"]
+    assert summary["sections"] == ["summary", "reproduction", "vehicle", "flights", "provenance"]
     assert summary["missing"] == ["trajectory", "selection", "model", "prediction", "sweep"]
     for command in ("trajectory CONFIG", "reduce CONFIG", "identify CONFIG", "predict CONFIG"):
         assert f"cpfls {command}" in html

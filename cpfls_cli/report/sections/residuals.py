@@ -1,0 +1,96 @@
+"""What models leave of the torque: white or not, related to their inputs or not, normal or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cpfls_cli.report.content import Block, Cell, Heading, Section, Table, Text
+from cpfls_cli.report.evidence import has
+from cpfls_cli.report.figures.autocorrelation import autocorrelation_figure
+from cpfls_cli.report.figures.cross_correlation import cross_correlation_figure, strongest
+from cpfls_cli.report.figures.distribution import distribution_figure
+from cpfls_cli.report.gap_words import probability
+from cpfls_cli.report.judged import AXES
+from cpfls_cli.report.numbers import UNKNOWN, number, percent
+from cpfls_cli.report.sections.each import section_of_each
+from cpfls_cli.report.source import Source, Sources
+
+_SIGNIFICANT = 0.05
+
+
+def residuals_section(sources: Sources) -> Section | None:
+    """Show the residuals of the models that hold them.
+
+    Parameters
+    ----------
+    sources : Sources
+
+    Returns
+    -------
+    Section or None
+        None where no model holds any.
+    """
+    models = [model for model in sources.models if has(model, "residuals")]
+    return section_of_each("residuals", "What the model leaves over", models, _residuals)
+
+
+def _residuals(model: Source, index: int) -> Iterator[Block]:
+    yield Heading(model.label)
+    exact = np.isnan(model.artifact.array("residuals/autocorrelation")).all(axis=0)
+    if exact.all():
+        yield Text("Nothing but rounding is left over, so there is nothing to examine.", "good")
+        return
+    yield _whiteness(model, index)
+    yield autocorrelation_figure(f"autocorrelation-{index}", model)
+    yield cross_correlation_figure(f"cross-correlation-{index}", model)
+    yield _followed(model, index)
+    yield distribution_figure(f"error-distribution-{index}", model)
+
+
+def _whiteness(model: Source, index: int) -> Table:
+    artifact = model.artifact
+    values, band = artifact.array("residuals/autocorrelation"), artifact.number("residuals/band")
+    chance = artifact.array("residuals/ljung_box")
+    rows: list[list[str | Cell]] = []
+    for axis, word in enumerate(AXES):
+        known = values[np.isfinite(values[:, axis]), axis]
+        outside = float(np.mean(np.abs(known) > band)) if known.size else float("nan")
+        if not known.size:
+            rows.append([word, UNKNOWN, UNKNOWN, UNKNOWN, "only rounding is left"])
+            continue
+        white = chance[axis] >= _SIGNIFICANT
+        told = Cell("white" if white else "not white", "plain" if white else "warning")
+        rows.append([word, number(float(known[0]), 3), percent(outside), probability(float(chance[axis])), told])
+    caption = (
+        f"Whether the torque error of {model.label} is white on {artifact.text('residuals/part')}, "
+        f"{int(artifact.number('residuals/samples'))} samples. Of white noise 5 % of the lags lie outside the band; p "
+        "is the chance that white noise has autocorrelations as large (Ljung and Box). Filtered signals are never "
+        "quite white."
+    )
+    header = ("Axis", "At one sample", "Lags outside the band", "p", "So it is")
+    return Table(f"whiteness-of-errors-{index}", caption, header, rows, frozenset({0, 4}))
+
+
+def _followed(model: Source, index: int) -> Table:
+    artifact = model.artifact
+    values, band = artifact.array("residuals/correlation"), artifact.number("residuals/band")
+    lag, largest = artifact.array("residuals/input_lag"), strongest(values)
+    rows: list[list[str | Cell]] = [
+        [name, *(_strength(values[place, :, axis], lag, largest[place, axis], band) for axis in range(len(AXES)))]
+        for place, name in enumerate(artifact.texts("residuals/input"))
+    ]
+    caption = (
+        "Largest correlation of the error with each signal, and the lag where it is (s). Marked: more than twice the "
+        f"band of ±{number(band, 2)}."
+    )
+    return Table(f"followed-{index}", caption, ("Signal", *(f"Error on {axis}" for axis in AXES)), rows)
+
+
+def _strength(values: np.ndarray, lag: np.ndarray, largest: float, band: float) -> Cell:
+    if not np.isfinite(largest):
+        return Cell(UNKNOWN)
+    place = int(np.nanargmax(np.abs(values)))
+    text = f"{values[place]:+.2f} at {lag[place]:.2g}".replace("-", "−")
+    return Cell(f"{text} ◂", "warning") if largest > 2 * band else Cell(text)

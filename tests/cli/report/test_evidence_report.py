@@ -1,0 +1,228 @@
+"""The evidence on a model as the report shows it, from artifacts with known numbers."""
+
+import json
+import re
+from dataclasses import replace
+from html import unescape
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts import check_artifact, read_artifact, write_artifact
+from tests.cli.report.evidence_artifacts import REASONS, with_evidence
+
+EVIDENCE = ["validation", "residuals", "uncertainty", "steps"]
+FIGURES = [
+    "autocorrelation-1", "cross-correlation-1", "error-distribution-1", "inertia-curves-1-1", "inertia-curves-1-2",
+    "steps-1",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def report(cpfls, study, tmp_path_factory):
+    def write(*artifacts, form="html"):
+        output = tmp_path_factory.mktemp("report") / f"report.{form}"
+        result = cpfls("report", study, *artifacts, "-o", output, "--json")
+        assert result.exit_code == 0, result.stderr
+        text = output.read_text(encoding="utf-8")
+        return SimpleNamespace(text=text, words=words(text), **json.loads(result.stdout))
+
+    return write
+
+
+def words(html):
+    """Give the text of a page in one line."""
+    return " ".join(unescape(re.sub(r"<[^>]*>", " ", re.sub(r"<style>.*?</style>", "", html, flags=re.DOTALL))).split())
+
+
+def section(page, name):
+    return words(page.text[page.text.index(f'<section id="{name}"') :].split("</section>")[0])
+
+
+@pytest.fixture(scope="module")
+def model(pipeline, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("models")
+    return lambda **changed: with_evidence(
+        pipeline.model, folder / f"model-{len(list(folder.iterdir()))}.h5", **changed
+    )
+
+
+@pytest.fixture(scope="module")
+def bare(pipeline, tmp_path_factory):
+    """A model without any evidence."""
+    artifact, output = read_artifact(pipeline.model), tmp_path_factory.mktemp("bare") / "bare.h5"
+    optional = {spec.path for spec in artifact.spec.datasets if not spec.required}
+    kept = {path: values for path, values in artifact.data.items() if path not in optional}
+    write_artifact(output, replace(artifact, data=kept))
+    return output
+
+
+@pytest.fixture(scope="module")
+def page(report, model):
+    return report(model())
+
+
+def test_the_made_evidence_keeps_to_the_format(model):
+    assert check_artifact(read_artifact(model())) == []
+
+
+def test_all_evidence_is_shown(page):
+    assert [name for name in page.sections if name in EVIDENCE] == EVIDENCE
+    assert [name for name in page.figures if name in FIGURES] == FIGURES
+    assert page.text.count('<details class="data">') == len(page.figures)
+
+
+def test_a_model_without_evidence_names_the_command_that_adds_it(report, bare):
+    page = report(bare)
+    assert [name for name in page.sections if name in EVIDENCE] == ["validation"]
+    assert page.words.count("--set identification.validation.enabled=true") == 1
+    assert "bare.h5: no verdict" in section(page, "summary")
+
+
+@pytest.mark.parametrize(
+    ("label", "told", "tone"),
+    [
+        ("good-for-control", "Good for control", "good"),
+        ("good-inside-region", "Good inside the region that training visited", "note"),
+        ("not-better-than-rigid-body", "Not better than the rigid body", "warning"),
+        ("do-not-use", "Do not use it", "warning"),
+        ("of-a-newer-version", "of-a-newer-version", "note"),
+    ],
+)
+def test_the_verdict_comes_first_and_with_its_reasons(report, model, label, told, tone):
+    page = report(model(label=label))
+    summary, evidence = section(page, "summary"), section(page, "validation")
+    assert re.match(rf"Summary model-\d+\.h5: {told}.* Region: roll and pitch within 32 degrees\.", summary)
+    assert f'<div class="box {tone}">' in page.text
+    for sign, reason in zip(("For it", "Against it", "To know"), REASONS, strict=True):
+        assert f"{sign}: {reason[0].upper()}{reason[1:]}." in evidence
+
+
+def test_an_incomplete_search_is_told_in_the_summary(report, model):
+    stopped = {"search/complete": 0, "search/stop_reason": np.array("time-limit")}
+    assert "The search is incomplete (time-limit)" in section(report(model(**stopped)), "summary")
+    assert "incomplete" not in section(report(model(**{"search/complete": 1})), "summary")
+
+
+def test_scores_are_those_of_the_artifact(page, pipeline):
+    judged = read_artifact(pipeline.model)
+    mse = judged.array("judged/mse")[judged.texts("judged/models").index("model"), 0]
+    nothing = judged.array("judged/mse")[judged.texts("judged/models").index("torque-zero"), 0]
+    shown = section(page, "validation")
+    for own, all_of_it in zip(mse, nothing, strict=True):
+        assert f"{100 * np.sqrt(own / all_of_it):.3g}".rstrip("0") in shown
+    assert "RMSE one period away" in shown
+    assert "not in 3 of 120 cells" in shown
+    assert "at roll 12°, pitch −34°" in shown
+
+
+def test_structures_are_compared_and_the_least_error_is_marked_in_words(page):
+    shown = section(page, "validation")
+    assert "rigid body 0 0.05000 ± 0.0040 fuzzy part off" in shown
+    assert "5 functions | harmonic 60 0.03100 ± 0.0030 ◂ least" in shown
+    assert "7 functions (this model)" in shown
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        ((0.9, 0.5, 1.0), "takes 50.0 % off the error of the rigid body, 5.0 standard errors"),
+        ((0.99, 0.95, 1.0), "within one standard error: the flight holds hardly any evidence"),
+        ((1.2, 1.1, 1.0), "this flight holds no evidence"),
+    ],
+)
+def test_the_ridge_curve_says_whether_there_is_evidence_for_a_fuzzy_part(report, model, error, told):
+    ridge = {
+        "ridge/weight": np.array([1e-3, 1.0, np.inf]),
+        "ridge/error": np.array(error),
+        "ridge/standard_error": np.full(3, 0.1),
+    }
+    page = report(model(**ridge))
+    assert told in section(page, "validation")
+    assert "ridge-curve-1" in page.figures
+
+
+def test_residuals_are_called_white_where_they_are(page):
+    shown = section(page, "residuals")
+    assert re.search(r"roll 0\.700 2\d\.\d % < 10⁻⁶ not white", shown)
+    assert re.search(r"pitch 0\.140 \S+ % 0\.40 white", shown)
+    assert "yaw — — — only rounding is left" in shown
+    assert re.search(r"roll \+0\.4\d at 0\.0\d ◂", shown)
+    assert "a|b <i>" in shown
+
+
+def test_residuals_that_are_rounding_are_not_drawn(report, model):
+    exact = {"residuals/autocorrelation": np.full((40, 3), np.nan), "residuals/ljung_box": np.full(3, np.nan)}
+    page = report(model(**exact))
+    assert "Nothing but rounding is left over" in section(page, "residuals")
+    assert not set(FIGURES[:3]) & set(page.figures)
+
+
+def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipeline):
+    artifact = read_artifact(pipeline.model)
+    value = artifact.array("baselines/rigid_body")
+    spread = np.tile([-1.0, 1.0], 30)[:, None] * np.array([1.0, 1e-9, 1.0, 1.0, 1.0, 1.0])
+    moved = value + np.array([0.0, 1.0, 0, 0, 0, 0])
+    drawn = {"uncertainty/best_rigid_body": moved + 0.01 * spread, "baselines/rigid_body": moved}
+    rows = re.findall(r'<th scope="row" class="words">(I..)</th>(.*?)</tr>', report(model(**drawn)).text, re.DOTALL)
+    last = {name: words(row).split()[-1] for name, row in rows if "inside" in row or "outside" in row}
+    assert last["Ixx"] == "inside"
+    assert "Iyy" in last
+    assert last["Iyy"] == "◂"
+
+
+def test_the_round_trip_is_told_with_its_share(page, report, model):
+    assert "D22 96.0 %, D33 96.0 %, D11 96.0 %" in section(page, "uncertainty")
+    without = report(model(**{"round_trip/inertia": None, "round_trip/inside": None}))
+    assert "Round trip" not in section(without, "uncertainty")
+
+
+def test_a_prediction_that_is_lost_is_a_dash_and_the_least_error_is_marked(page):
+    shown = section(page, "steps")
+    assert re.search(r"rigid body \S+ — nothing moves", shown)
+    assert re.search(r"0\.500 s 50 model \S+ ◂ \S+ ◂", shown)
+
+
+def test_each_part_of_the_evidence_stands_alone(report, bare, tmp_path, model):
+    whole, alone = read_artifact(model()), read_artifact(bare)
+    groups = ("structures", "residuals", "uncertainty", "curves", "steps", "physics", "period", "verdict")
+    for group in groups:
+        output = tmp_path / f"{group}.h5"
+        own = {path: values for path, values in whole.data.items() if path.startswith(f"{group}/")}
+        write_artifact(output, replace(alone, data={**alone.data, **own}))
+        assert "holds its scores only" not in report(output).words
+
+
+def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
+    prediction, output = read_artifact(pipeline.prediction), tmp_path / "banded.h5"
+    bands = {
+        f"{key}_{end}": prediction.array(key) + sign * 0.25
+        for key in ("inertia", "torque")
+        for end, sign in (("low", -1), ("high", 1))
+    }
+    write_artifact(output, replace(prediction, data={**prediction.data, **bands}))
+    page = json.loads(report(output, form="json").text)
+    figures = {
+        block["name"]: block for part in page["sections"] for block in part["blocks"] if block["kind"] == "figure"
+    }
+    drawn = [
+        series for panel in figures["torques-1"]["panels"] for series in panel["series"] if series["form"] == "band"
+    ]
+    assert len(drawn) == 3
+    assert np.array(drawn[0]["high"]) - np.array(drawn[0]["low"]) == pytest.approx(0.5, rel=1e-3)
+    forms = [series["form"] for panel in figures["inertia-matrix-1"]["panels"] for series in panel["series"]]
+    assert forms.count("band") == 4
+
+
+@pytest.mark.parametrize(("condition", "told"), [(3.0, "one rule holds everywhere"), (1e4, "the model extrapolates")])
+def test_one_rule_that_training_determined_holds_everywhere(cpfls, report, pipeline, study, tmp_path, condition, told):
+    single, known, prediction = (tmp_path / f"{name}.h5" for name in ("single", "known", "prediction"))
+    options = ("--set", "identification.membership_functions=1", "--set", "identification.validation.enabled=false")
+    cpfls("identify", study, pipeline.flight, "-o", single, *options)
+    model = read_artifact(single)
+    all_round = {"model/visited": np.eye(len(model.array("model/visited")), dtype=np.uint8)}
+    full = {"solve/rank": model.number("solve/parameters"), "solve/condition_number": condition}
+    write_artifact(known, replace(model, data={**model.data, **all_round, **full}))
+    cpfls("predict", study, known, pipeline.flight, "-o", prediction)
+    assert told in section(report(known, prediction), "prediction")
