@@ -1,9 +1,12 @@
 """`cpfls export`: the files it writes, what it refuses, and that nothing in a model can break into its code."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
+import warnings
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -237,3 +240,62 @@ def test_verbose_says_what_is_read_and_written(cpfls, pipeline, tmp_path):
     said = [line for line in result.stderr.splitlines() if line.startswith("export: ")]
     assert said[0].startswith(f"export: reads {pipeline.model}")
     assert said[-1].startswith(f"export: wrote {tmp_path / 'm.json'}")
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "export.md"
+FLIGHT = """
+#include <stdio.h>
+unsigned control(const double q[3], const double qd[3], const double wanted[3][3], double body[3]);
+int main(void)
+{
+    const double q[3] = {0.1, 0.1, 6.2}, qd[3] = {0.1, 0.2, 0.3};
+    const double there[3][3] = {{0.1, 0.1, 6.2}, {0.1, 0.2, 0.3}, {1.0, 2.0, 3.0}};
+    const double turned[3][3] = {{0.1, 0.1, -0.0831853071795864769}, {0.1, 0.2, 0.3}, {1.0, 2.0, 3.0}};
+    double body[3], again[3];
+    const unsigned status = control(q, qd, there, body);
+    control(q, qd, turned, again);
+    printf("%u %.17g %.17g %.17g %.17g\\n", status, body[0], body[1], body[2], again[2]);
+    return 0;
+}
+"""
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_the_controller_of_the_page_compiles_and_asks_for_the_torque_of_the_model(cpfls, pipeline, tmp_path):
+    if shutil.which("gcc") is None:
+        pytest.skip("no gcc on this machine")
+    for form, name in (("c", "quad.c"), ("python", "quad.py")):
+        assert cpfls("export", pipeline.model, "--format", form, "-o", tmp_path / name).exit_code == 0
+    (code,) = blocks("c")
+    (tmp_path / "control.c").write_text(code)
+    (tmp_path / "main.c").write_text(FLIGHT)
+    files = [tmp_path / name for name in ("quad.c", "control.c", "main.c")]
+    command = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", *files, "-lm", "-o", tmp_path / "fly"]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    said = subprocess.run([tmp_path / "fly"], capture_output=True, text=True, check=True).stdout.split()
+    names = {"__name__": "quad"}
+    exec((tmp_path / "quad.py").read_text(), names)
+    q, qd, qdd = np.array([[0.1, 0.1, 6.2], [0.1, 0.2, 0.3], [1.0, 2.0, 3.0]])
+    assert int(said[0]) == (0 if names["inside"](q) else 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        body = names["torque"](q, qd, qdd)[1]
+    assert np.allclose([float(word) for word in said[1:4]], body, rtol=1e-12)
+    # One turn further is no error at all.
+    assert float(said[4]) == pytest.approx(body[2], rel=1e-9)
+
+
+def test_the_commands_of_the_page_run(cpfls, pipeline, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(pipeline.model, tmp_path / "model.h5")
+    first, self_test = blocks("sh")
+    for line in first.splitlines():
+        words = line.split("#")[0].split()
+        assert cpfls(*words[1:], "--force").exit_code == 0
+    assert "uav_torque" in (tmp_path / "quad.h").read_text()
+    if shutil.which("cc"):
+        assert subprocess.run(self_test, shell=True, check=False, capture_output=True).returncode == 0

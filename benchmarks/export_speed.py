@@ -1,0 +1,203 @@
+"""One evaluation of an exported model in C (gcc -O2) beside the library, in a batch and one at a time; processor time.
+
+python benchmarks/export_speed.py
+"""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+from time import process_time
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, ratio_of, table
+
+pin_threads()
+
+import numpy as np
+
+from cpfls_cli.artifacts.records import Header
+from cpfls_cli.export import Evidence, Provenance, Sheet, c_source, reference_points
+from cpfls_cli.fuzzy import InputRange
+from cpfls_cli.identification.excitation import CELLS
+from cpfls_cli.identification.model import Model
+from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
+
+BATCH, PASSES, SINGLES = 4096, 50, 50
+BUDGET_NS = 10_000
+PAPER = StructureSettings(consequents="seesaw", products="additive", membership_functions=5, input_map="data-range")
+CASES = (
+    ("the paper's: seesaw, 5 functions", PAPER),
+    ("default: harmonic 2, tensor, 1 function", StructureSettings()),
+    ("harmonic 2, tensor, 7 functions", StructureSettings(membership_functions=7)),
+)
+LOOPS = """
+#include "m.h"
+void inertia(const m_real *in, long n, m_real *sink) {
+    m_real D[3][3];
+    for (long i = 0; i < n; ++i) { m_inertia(in + 9 * i, D); *sink += D[2][2]; }
+}
+void coriolis(const m_real *in, long n, m_real *sink) {
+    m_real C[3][3];
+    for (long i = 0; i < n; ++i) { m_coriolis(in + 9 * i, in + 9 * i + 3, C); *sink += C[2][2]; }
+}
+void torque(const m_real *in, long n, m_real *sink) {
+    m_real t[3], b[3];
+    for (long i = 0; i < n; ++i) { m_torque(in + 9 * i, in + 9 * i + 3, in + 9 * i + 6, t, b); *sink += b[2]; }
+}
+"""
+
+
+def main() -> None:
+    rows, sizes = [], []
+    for name, settings in CASES:
+        model = random_model(settings)
+        with tempfile.TemporaryDirectory() as folder:
+            write(model, Path(folder))
+            rows += [timed(name, model, Path(folder), call) for call in ("inertia", "coriolis", "torque")]
+            sizes.append((name, *size(model, Path(folder))))
+    print("One evaluation, processor time; the library takes states in batches of 4096 or one at a time:\n")
+    columns = (
+        "structure",
+        "function",
+        "C, ns",
+        "C, float, ns",
+        "library, batch, ns",
+        "over C (range)",
+        "library, one at a time, ns",
+        "one at a time over C (range)",
+        f"C, share of {BUDGET_NS // 1000} us",
+    )
+    table("export_speed", columns, rows)
+    print("\nWhat is stored, and roughly the arithmetic of one torque with two rules firing along each input:\n")
+    stored = ("structure", "parameters", "tables, bytes", "the same, float", "object file, bytes", "flops of a torque")
+    table("export_size", stored, sizes)
+
+
+def random_model(settings: StructureSettings) -> Model:
+    """Draw coefficients; every angle lies in the range of the inputs, where most rules fire."""
+    rng, structure = np.random.default_rng(1), model_structure(settings)
+    ranges = (InputRange(-1.0, 1.0), InputRange(-1.0, 1.0))
+    coefficients = rng.normal(0.0, 1.0, structure.parameters)
+    visited = np.ones((CELLS, CELLS), dtype=bool)
+    return Model(structure, ranges, uniform_breakpoints(structure), coefficients, np.zeros(6), visited)
+
+
+def write(model: Model, folder: Path) -> None:
+    """Export a model, and compile it in both precisions."""
+    provenance = Provenance("none", "", Header("0", 0, ""), {}, "0")
+    sheet = Sheet("m", model, "none", provenance, Evidence(True, "", {"parts": {}, "models": {}}, (), None))
+    source = c_source(sheet, reference_points(model, np.random.default_rng(1)), "m")
+    (folder / "m.c").write_text(source.source)
+    (folder / "m.h").write_text(source.header)
+    (folder / "loops.c").write_text(LOOPS)
+    for kind, flags in (("double", []), ("float", ["-DCPFLS_FLOAT"])):
+        both = [folder / "m.c", folder / "loops.c"]
+        gcc("-shared", "-fPIC", *flags, *both, "-lm", "-o", folder / f"{kind}.so")
+        gcc("-c", *flags, folder / "m.c", "-o", folder / f"{kind}.o")
+
+
+def gcc(*words: str | Path) -> None:
+    subprocess.run(["gcc", "-std=c99", "-O2", *words], check=True)
+
+
+def timed(name: str, model: Model, folder: Path, call: str) -> tuple:
+    """Time one function in C and in the library, in turn."""
+    rng = np.random.default_rng(2)
+    states = np.hstack([rng.uniform(-np.pi, np.pi, (BATCH, 3)), rng.normal(0, 3, (BATCH, 6))])
+    double = compiled(folder / "double.so", call, states)
+    single = compiled(folder / "float.so", call, states.astype(np.float32))
+    many, one = in_turn(library(model, call, states), double), in_turn(ones(model, call, states), double)
+    in_float = in_turn(double, single)
+    c = 1e9 * many.fast_s / (PASSES * BATCH)
+    batch, alone = 1e9 * many.slow_s / BATCH, 1e9 * one.slow_s / SINGLES
+    shares = (scaled(many, PASSES), scaled(one, PASSES * BATCH / SINGLES))
+    return (
+        name,
+        call,
+        c,
+        1e9 * in_float.fast_s / (PASSES * BATCH),
+        batch,
+        shares[0],
+        alone,
+        shares[1],
+        f"{c / BUDGET_NS:.1%}",
+    )
+
+
+def in_turn(slow, fast, repeats: int = 5):
+    """Time two things in turn by the processor's clock, which other programs on the machine disturb least."""
+    slow(), fast()
+    return ratio_of([(processor_seconds(slow), processor_seconds(fast)) for _ in range(repeats)])
+
+
+def processor_seconds(work) -> float:
+    start = process_time()
+    work()
+    return process_time() - start
+
+
+def scaled(ratio, factor: float) -> str:
+    """Compare single evaluations where the two did different numbers of them."""
+    return f"{factor * ratio.ratio:.3g} ({factor * ratio.lowest:.3g} to {factor * ratio.highest:.3g})"
+
+
+def compiled(path: Path, call: str, states: np.ndarray):
+    """Evaluate all states, several times."""
+    function = getattr(ctypes.CDLL(str(path)), call)
+    function.argtypes = [ctypes.c_void_p, ctypes.c_long, ctypes.c_void_p]
+    function.restype = None
+    states, sink = np.ascontiguousarray(states), np.zeros(1, states.dtype)
+
+    def run() -> None:
+        for _ in range(PASSES):
+            function(states.ctypes.data, len(states), sink.ctypes.data)
+
+    return run
+
+
+def library(model: Model, call: str, states: np.ndarray):
+    """Evaluate states together."""
+    q, qd, qdd = np.split(states, 3, axis=1)
+    if call == "torque":
+        return partial(model.torque, Motion(q, qd, qdd))
+    return partial(model.inertia, q) if call == "inertia" else partial(model.coriolis, q, qd)
+
+
+def ones(model: Model, call: str, states: np.ndarray):
+    """Evaluate states one after the other."""
+    calls = [library(model, call, states[i : i + 1]) for i in range(SINGLES)]
+
+    def run() -> None:
+        for one in calls:
+            one()
+
+    return run
+
+
+def size(model: Model, folder: Path) -> tuple[int, int, int, int, int]:
+    """Count numbers of the tables, the bytes of the object file and, roughly, the arithmetic of a torque."""
+    structure = model.structure
+    used = any(block.rules > 1 for block in structure.blocks)
+    numbers = structure.parameters + (sum(p.functions for p in structure.partitions) if used else 0)
+    region = CELLS * CELLS // 8
+    text = subprocess.run(["size", folder / "double.o"], capture_output=True, text=True, check=True).stdout
+    loaded = int(text.splitlines()[1].split()[0])
+    return structure.parameters, 8 * numbers + region, 4 * numbers + region, loaded, flops(structure, used)
+
+
+def flops(structure, used: bool) -> int:
+    """Multiplications and additions of the sums over rules and features, and of a torque from D and its slopes."""
+    one = next(block.features for block in structure.blocks if len(block.partitions) == 1)
+    rules = 2 if used else 1
+    pair = 4 * one**2 + 6 * one if structure.settings.products == "tensor" else 8 * (one - 1)
+    return 2 * rules * (4 * one + 6) + 2 * rules**2 * (pair + 12) + 9 * 14 + 60
+
+
+if __name__ == "__main__":
+    main()
