@@ -65,7 +65,7 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
     record = tracking_data(plan, names, scores(plan, tracked, loop.gains.settling_time), identified, exact["attitude"])
     signals, noise = logged_signals(exact, job.study, rng)
     finish(job, FLIGHT, {**signals, **noise_record(noise), **record}, started.inputs)
-    return tracking_outcome(signals, sorted(noise), record, _complete(artifact))
+    return tracking_outcome(signals, sorted(noise), record, _complete(artifact), identified.same_everywhere)
 
 
 def _identified(path: Path, study: Study) -> Artifact:

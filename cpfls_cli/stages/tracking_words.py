@@ -12,7 +12,7 @@ from cpfls_cli.stages.job import Outcome
 
 
 def tracking_outcome(
-    signals: Mapping[str, Array], noise: Sequence[str], record: Mapping[str, Any], complete: bool
+    signals: Mapping[str, Array], noise: Sequence[str], record: Mapping[str, Any], complete: bool, same_everywhere: bool
 ) -> Outcome:
     """Describe a comparison.
 
@@ -26,6 +26,8 @@ def tracking_outcome(
         Datasets of the comparison.
     complete : bool
         Whether the search for the model came to its end.
+    same_everywhere : bool
+        Whether the model has the same coefficients at all attitudes.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def tracking_outcome(
         "controllers": list(_controllers(record)),
     }
     lines = (_first_line(summary, record), _head(summary), *_table(summary["controllers"]), *_compared(record))
-    return Outcome(summary, lines, tuple(_warnings(summary, complete)))
+    return Outcome(summary, lines, tuple(_warnings(summary, complete, same_everywhere)))
 
 
 def _controllers(record: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
@@ -98,15 +100,15 @@ def _compared(record: Mapping[str, Any]) -> Iterator[str]:
         yield f"rms error with the model (roll pitch yaw): {', '.join(f'times {share}' for share in shares)}"
 
 
-def _warnings(summary: Mapping[str, Any], complete: bool) -> Iterator[str]:
+def _warnings(summary: Mapping[str, Any], complete: bool, same_everywhere: bool) -> Iterator[str]:
     samples = summary["samples"]
     if not complete:
         yield "the search for this model was stopped before its end; `cpfls identify --resume` goes on"
     if summary["outside"]:
-        yield (
-            f"{summary['outside']} of {samples} samples of the flight lie outside the attitudes that training visited: "
-            "the model is not to be trusted there"
+        trust = (
+            "the same coefficients hold there, if the structure does" if same_everywhere else "do not trust it there"
         )
+        yield f"{summary['outside']} of {samples} samples lie outside the attitudes that training visited: {trust}"
     if summary["not_positive_definite"]:
         bad = summary["not_positive_definite"]
         yield f"D(q) is not positive definite at {bad} of {samples} samples: no body moves like that"

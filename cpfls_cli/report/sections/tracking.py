@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.report.content import Block, Cell, Heading, Section, Table, Text, Tone
+from cpfls_cli.report.evidence import known_everywhere
 from cpfls_cli.report.figures.tracking import AXES, CONTROLLERS, tracking_figure
 from cpfls_cli.report.numbers import number, percent, plain
 from cpfls_cli.report.sections.each import section_of_each
@@ -38,14 +40,17 @@ def tracking_section(sources: Sources) -> Section | None:
         None where no flight was controlled with a model.
     """
     tracked = [flight for flight in sources.flights if "tracking/controller" in flight.artifact.data]
-    return section_of_each("tracking", "Control with the model", tracked, _tracking)
+    return section_of_each(
+        "tracking", "Control with the model", tracked, lambda flight, index: _tracking(flight, index, sources)
+    )
 
 
-def _tracking(flight: Source, index: int) -> Iterator[Block]:
+def _tracking(flight: Source, index: int, sources: Sources) -> Iterator[Block]:
     settings = flight.config["simulation"]["computed_torque"]
     yield Heading(flight.label)
     yield Text(_setting(flight, settings))
     yield from _judged(flight)
+    yield from _limits(flight, sources)
     yield _table(flight, index, settings)
     yield tracking_figure(f"tracking-error-{index}", flight)
 
@@ -71,10 +76,17 @@ def _judged(flight: Source) -> Iterator[Text]:
         yield Text("The controller with the identified model lost the vehicle.", "warning")
     for other, words in (("rigid-body", "of the rigid body fitted to the same samples"), ("pd", "of PD alone")):
         yield from _share(rms["model"], rms[other], words, "note" if other == "rigid-body" else "warning")
+
+
+def _limits(flight: Source, sources: Sources) -> Iterator[Text]:
+    artifact, model = flight.artifact, sources.by_hash(flight.made_from("model"))
     samples, outside = len(artifact.array("time")), int(np.sum(artifact.array("tracking/outside")))
     if outside:
         beyond = f"{outside} of {samples} samples of this flight lie outside the attitudes that training visited"
-        yield Text(f"{beyond}: the model extrapolates there.", "warning")
+        if model is not None and model.artifact.spec == MODEL and known_everywhere(model):
+            yield Text(f"{beyond}: one rule holds everywhere and all its coefficients are known.", "note")
+        else:
+            yield Text(f"{beyond}: the model extrapolates there.", "warning")
     indefinite = int(artifact.number("tracking/not_positive_definite"))
     if indefinite:
         impossible = f"D(q) is not positive definite at {indefinite} of {samples} samples"
