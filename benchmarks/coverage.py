@@ -1,0 +1,238 @@
+"""Print how often bands of 95 % hold the truth, in 200 simulated flights.
+
+    python benchmarks/coverage.py [--runs 200]
+
+Each flight has the same motion and new noise, 5 % of each torque's root mean square: white, or coloured (first-order
+autoregressive, time constant 5 samples). Bands are those of `cpfls identify`: 40 blocks, 200 draws. They are asked for
+D_ij(q) at 100 attitudes of the flight, and for the six parameters of the rigid body that fits best.
+
+The truth is the vehicle, which harmonics up to the second order contain. The structure of the paper does not: its
+flights have the torque of that structure fitted to the vehicle, which then is the truth, but for one line with the
+vehicle's own. The rigid body's truth is the rigid body that fits best without noise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import numpy as np
+from scipy import signal
+
+from benchmarks.shared.full_circle import random_flight
+from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
+from cpfls_cli.arrays import Array
+from cpfls_cli.identification.baselines import fit_baselines
+from cpfls_cli.identification.chromosome import decode, uniform_chromosome
+from cpfls_cli.identification.data import TorqueData, axis_scale
+from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.samples import Ready
+from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.inertia import INERTIA_PLACES, symmetric
+from cpfls_cli.validation.bands import band, inertia_band
+from cpfls_cli.validation.blocks import time_blocks
+from cpfls_cli.validation.bootstrap import bootstrap
+from cpfls_cli.validation.scores import POWER, BlockScores
+from cpfls_cli.validation.simulated import Missed
+from cpfls_cli.vehicle.rigid_body import inertia_matrix
+
+NOISE, TIME_CONSTANT, ATTITUDES = 0.05, 5.0, 100
+BENT = 0.3
+NOWHERE = np.zeros((72, 72), dtype=bool)
+POWERS = {"no correction": 0.0, "CR2": 0.5, "ours": POWER, "CR3, jackknife": 1.0}
+ROWS = tuple("".join(str(place + 1) for place in places) for places in INERTIA_PLACES)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A flight without noise, what is learned from it, and the truth of its inertia at attitudes."""
+
+    name: str
+    flight: TorqueData
+    learned: np.ndarray
+    settings: IdentificationSettings
+    truth: Callable[[Array], Array] | None = None
+
+    @property
+    def attitude(self) -> Array:
+        """Attitudes that are asked for."""
+        return self.flight.motion.attitude[np.linspace(0, len(self.flight) - 1, ATTITUDES).astype(int)]
+
+    def fitted(self, torque: Array) -> tuple:
+        """Fit equidistant partitions: evaluator, training part, model, fit."""
+        training = replace(self.flight, torque=torque)
+        evaluator = model_evaluator(training, training[self.learned], self.settings)
+        learned, chromosome = evaluator.solver.learned, uniform_chromosome(evaluator.structure)
+        fit = evaluator.fit(chromosome)
+        partitions = decode(learned.structure, chromosome.astype(float))
+        model = Model(learned.structure, learned.ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE)
+        return evaluator, training, model, fit
+
+    def inertia(self) -> Array:
+        """Give the true inertia at the attitudes."""
+        if self.truth is not None:
+            return self.truth(self.attitude)
+        return self.fitted(self.flight.torque)[2].inertia(self.attitude).value
+
+    def best(self, torque: Array, row_scale: Array) -> Array:
+        """Fit a rigid body."""
+        learned = replace(self.flight, torque=torque)[self.learned]
+        return fit_baselines(learned, row_scale, self.settings.rank_tolerance)[0].parameters
+
+
+def cases() -> list[Case]:
+    paper, path, turning = paper_study().identification, paper_flight(), random_flight(200)
+    every, selected = np.arange(len(path)), np.searchsorted(path.time, paper_selection().time)
+    bent = replace(turning, torque=turning.torque + bent_torque(turning))
+    alone, held = IdentificationSettings(base="none"), IdentificationSettings()
+    itself = replace(path, torque=Case("", path, every, paper).fitted(path.torque)[2].torque(path.motion))
+    return [
+        Case("paper's structure, its path, 5487 samples", itself, every, paper),
+        Case("the same, 685 samples selected", itself, selected, paper),
+        Case("the same, torque of the vehicle", path, selected, paper, vehicle),
+        Case("harmonic 2, no rigid body below, full rotations", turning, every, alone, vehicle),
+        Case("harmonic 2 over a rigid body, full rotations", turning, every, held, vehicle),
+        Case("the same, vehicle not rigid", bent, every, held, lambda q: vehicle(q) + bent_inertia(q)),
+    ]
+
+
+def vehicle(attitude: Array) -> Array:
+    return inertia_matrix(attitude, symmetric([0.6, 0.6, 1.2]))
+
+
+def bent_inertia(attitude: Array) -> Array:
+    """Add 0.3 cos(roll) to D22."""
+    added = np.zeros((len(attitude), 3, 3))
+    added[:, 1, 1] = BENT * np.cos(attitude[:, 0])
+    return added
+
+
+def bent_torque(flight: TorqueData) -> Array:
+    """Work out the torque of that from its Lagrangian, L = f(roll) pitch_rate^2 / 2."""
+    motion = flight.motion
+    f, slope = BENT * np.cos(motion.attitude[:, 0]), -BENT * np.sin(motion.attitude[:, 0])
+    pitch = f * motion.acceleration[:, 1] + slope * motion.rate[:, 0] * motion.rate[:, 1]
+    return np.column_stack([-0.5 * slope * motion.rate[:, 1] ** 2, pitch, np.zeros(len(flight))])
+
+
+def noise(rng: np.random.Generator, samples: int, coloured: bool) -> Array:
+    """Draw noise of unit variance."""
+    keep = np.exp(-1.0 / TIME_CONSTANT) if coloured else 0.0
+    settle = int(20 * TIME_CONSTANT)
+    white = rng.standard_normal((settle + samples, 3))
+    return signal.lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], white, axis=0)[settle:]
+
+
+def coverage(case: Case, coloured: bool, runs: int) -> tuple:
+    """Count how often the bands hold the truth: by entry of the inertia matrix, and by rigid-body parameter."""
+    rng, truth = np.random.default_rng(7), case.inertia()
+    strength = NOISE * axis_scale(case.flight)
+    inside, held, weights = [], [], []
+    for _ in range(runs):
+        torque = case.flight.torque + strength * noise(rng, len(case.flight), coloured)
+        evaluator, training, model, fit = case.fitted(torque)
+        draws = bootstrap(evaluator, training, model, fit, case.settings.validation, rng)
+        low, high = inertia_band(model, draws, case.attitude)
+        inside.append((low <= truth) & (truth <= high))
+        best_truth, best = (case.best(t, fit.row_scale) for t in (case.flight.torque, torque))
+        low, high = band(best, draws.best_rigid_body, draws.blocks)
+        held.append((low <= best_truth) & (best_truth <= high))
+        weights.append(fit.ridge_weight)
+    by_entry = np.mean(inside, axis=(0, 1))
+    entries = np.array([by_entry[place] for place in INERTIA_PLACES if np.any(truth[:, *place] != 0) or not free(case)])
+    return entries, np.mean(held, axis=0), np.min(np.mean(inside, axis=0)), np.median(weights)
+
+
+def free(case: Case) -> bool:
+    """Whether no rigid body lies below: then D12 is zero, and no band is asked for."""
+    return case.settings.base == "none"
+
+
+def compared(case: Case, coloured: bool, runs: int) -> dict[str, Array]:
+    """Count for other ways to draw blocks: coverage by attitude of all D_ij(q), without a ridge."""
+    rng, truth = np.random.default_rng(7), case.inertia()
+    strength, counts = NOISE * axis_scale(case.flight), {name: [] for name in ("pairs, percentiles", *POWERS)}
+    some = [place for place in INERTIA_PLACES if np.any(truth[:, *place] != 0)]
+    linear = unit_inertias(case.fitted(case.flight.torque)[2], case.attitude)
+    for _ in range(runs):
+        torque = case.flight.torque + strength * noise(rng, len(case.flight), coloured)
+        evaluator, training, model, _ = case.fitted(torque)
+        scores = block_scores(evaluator, training, model)
+        value, tolerance = model.inertia(case.attitude).value, case.settings.rank_tolerance
+        for name in counts:
+            if name in POWERS:
+                weights = rng.standard_normal((200, len(scores.gram)))
+                drawn = replace(scores, power=POWERS[name]).draws(weights, tolerance)
+                low, high = band(value, value + np.einsum("pnij,kp->knij", linear, drawn), len(scores.gram))
+            else:
+                drawn = pairs(scores, rng, tolerance)
+                low, high = np.quantile(value + np.einsum("pnij,kp->knij", linear, drawn), [0.025, 0.975], axis=0)
+            inside = (low <= truth) & (truth <= high)
+            counts[name].append(np.stack([inside[:, *place] for place in some]))
+    return {name: np.mean(inside, axis=0) for name, inside in counts.items()}
+
+
+def block_scores(evaluator, training: TorqueData, model: Model) -> BlockScores:
+    """Sum by block, without a ridge and without a rigid body."""
+    learned = evaluator.solver.learned
+    label = time_blocks(training, None).labels(learned.ready.source)
+    ready = Ready(Missed(learned.ready.source, model), rigid=False)
+    products = replace(learned, ready=ready, label=label, labels=int(label[-1]) + 1).products(model.partitions)
+    return BlockScores(products.gram, products.moment, np.zeros(len(model.coefficients)), model.coefficients)
+
+
+def unit_inertias(model: Model, attitude: Array) -> Array:
+    """Evaluate the inertia matrix of each coefficient by itself, shape (parameters, attitudes, 3, 3)."""
+    units = np.eye(len(model.coefficients))
+    return np.stack([replace(model, coefficients=unit).inertia(attitude).value for unit in units])
+
+
+def pairs(scores: BlockScores, rng: np.random.Generator, tolerance: float) -> Array:
+    """Draw blocks with replacement and solve anew: deviations, shape (draws, parameters)."""
+    blocks, found = len(scores.gram), []
+    for _ in range(200):
+        times = np.bincount(rng.integers(blocks, size=blocks), minlength=blocks)
+        drawn = replace(scores, gram=times[:, None, None] * scores.gram, score=times[:, None] * scores.score)
+        found.append(drawn.solution(tolerance))
+    return np.array(found)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=200)
+    runs, rows = parser.parse_args().runs, []
+    for case in cases():
+        for coloured in (False, True):
+            entries, held, lowest, weight = coverage(case, coloured, runs)
+            kind = "coloured" if coloured else "white"
+            rows.append((case.name, kind, weight, *map(percent, (entries, [lowest], held))))
+    columns = ("model", "noise", "median ridge weight", "D_ij, mean (by entry)", "worst D_ij(q)", "rigid body")
+    table("coverage", columns, rows, runs=runs)
+    print()
+    rows, fewer = [], max(runs // 4, 1)
+    for case in (part for part in cases() if free(part)):
+        for coloured in (False, True):
+            ways = compared(case, coloured, fewer)
+            counts = (f"{100 * way.mean():.1f} ({100 * way.min():.0f})" for way in ways.values())
+            rows.append((case.name, "coloured" if coloured else "white", *counts))
+    table("coverage_ways", ("model", "noise", *ways), rows, runs=fewer)
+
+
+def percent(shares) -> str:
+    """Write shares as per cent: the mean, and the smallest and largest where there are several."""
+    values = 100 * np.asarray(shares)
+    return f"{values.mean():.1f}" + (f" ({values.min():.1f} to {values.max():.1f})" if len(values) > 1 else "")
+
+
+if __name__ == "__main__":
+    main()
