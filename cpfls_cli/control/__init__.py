@@ -14,7 +14,7 @@ from cpfls_cli.control.laws import (
 from cpfls_cli.control.plan import Plan, plan_of
 from cpfls_cli.control.plants import Plant, model_plant, rigid_plant
 from cpfls_cli.control.scores import Scores, scores
-from cpfls_cli.control.track import Loop, Sensing, Tracked, track
+from cpfls_cli.control.track import Loop, Sensing, Tracked, start_of, track
 
 __all__ = [
     "Actuators",
@@ -36,5 +36,6 @@ __all__ = [
     "proportional_derivative",
     "rigid_plant",
     "scores",
+    "start_of",
     "track",
 ]

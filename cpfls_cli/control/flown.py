@@ -14,7 +14,8 @@ from cpfls_cli.control.track import Tracked
 def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: Plant) -> dict[str, Array]:
     """Take the motion of one vehicle at the samples of the plan, up to where it was lost.
 
-    Torques are those that act from each sample on, and accelerations what they do to the vehicle.
+    Torques are the mean of what acts before and after each command, and accelerations what they do to the vehicle: on
+    straight lines between samples they push as the torques do that are held from command to command.
 
     Parameters
     ----------
@@ -31,9 +32,10 @@ def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: Plant) -
     """
     known = np.isfinite(tracked.attitude[controller, :: plan.parts]).all(axis=1)
     kept = slice(0, int(np.sum(known)) * plan.parts, plan.parts)
-    attitude, body_rate, body_torque = (
-        values[controller, kept] for values in (tracked.attitude, tracked.body_rate, tracked.body_torque)
-    )
+    attitude, body_rate = tracked.attitude[controller, kept], tracked.body_rate[controller, kept]
+    body_torque = 0.5 * (tracked.body_torque + tracked.torque_before)[controller, kept]
+    # Nothing is known of what acted before the flight.
+    body_torque[0] = tracked.body_torque[controller, 0]
     rate = rotations.attitude_rate(attitude, body_rate)
     turning = rotations.multiply(rotations.euler_rate_matrix_derivative(attitude, rate), rate)
     return {

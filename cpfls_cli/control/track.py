@@ -14,6 +14,7 @@ from cpfls_cli.control.integrate import Actuators, advance, steps_of
 from cpfls_cli.control.laws import Controller, Gains
 from cpfls_cli.control.plan import Plan
 from cpfls_cli.control.plants import Plant
+from cpfls_cli.errors import SettingError
 
 _STEPS_BETWEEN_REPORTS = 100
 # Seen from the side of the plan: a vehicle that leapt over the vertical has a cosine below zero.
@@ -40,8 +41,8 @@ class Tracked:
     Attributes
     ----------
     attitude, body_rate : array, shape (controller, control, 3), rad and rad/s
-    body_torque : array, shape (controller, control, 3), N m, body frame
-        That acts from the instant on.
+    body_torque, torque_before : array, shape (controller, control, 3), N m, body frame
+        That acts from the instant on, and that acted up to it.
     clipped : array of bool, shape (controller, control)
         Where a command was larger than the actuators can do.
     """
@@ -49,6 +50,7 @@ class Tracked:
     attitude: Array
     body_rate: Array
     body_torque: Array
+    torque_before: Array
     clipped: BoolArray
 
 
@@ -94,20 +96,24 @@ def track(
     initial_error : array, shape (3,), rad
         Planned less flown angles at the start; the Euler rates are those of the plan.
     initial_torque : array, shape (3,), N m, body frame
-        That acts before the first command, for actuators with a lag.
+        That acts before the first command.
     progress : callable
         Takes steps done and steps in all.
 
     Returns
     -------
     Tracked
+
+    Raises
+    ------
+    SettingError
+        If the vehicle is lost before it starts.
     """
     vehicles, instants = len(controllers), len(plan)
-    start = (plan.attitude[:1] - initial_error, plan.rate[:1])
-    state = np.tile(np.concatenate([start[0], rotations.body_rate(*start)], axis=1), (vehicles, 1))
+    state = np.tile(start_of(plan, initial_error), (vehicles, 1))
     torque = np.tile(initial_torque, (vehicles, 1))
     steps = steps_of(plan.period, loop.integration_rate, loop.actuators.time_constant)
-    record = np.full((instants, vehicles, 9), np.nan)
+    record = np.full((instants, vehicles, 12), np.nan)
     clipped = np.zeros((instants, vehicles), dtype=bool)
     # A vehicle that is lost may reach infinity before the next instant, where it is told.
     with np.errstate(all="ignore"):
@@ -121,13 +127,42 @@ def track(
             command = loop.actuators.clipped(asked)
             clipped[instant, flown] = (command != asked).any(axis=1)
             acting = partial(loop.actuators.torque, before, command)
-            record[instant, flown] = np.concatenate([own, acting(0.0)], axis=1)
+            record[instant, flown] = np.concatenate([own, acting(0.0), before], axis=1)
             state[flown] = advance(loop.plant, own, acting, plan.period, steps)
             torque[flown] = acting(plan.period)
             if instant % _STEPS_BETWEEN_REPORTS == 0:
                 progress(instant, instants)
-    attitude, body_rate, body_torque = np.split(record.swapaxes(0, 1), 3, axis=2)
-    return Tracked(attitude, body_rate, body_torque, clipped.T)
+    attitude, body_rate, body_torque, torque_before = np.split(record.swapaxes(0, 1), 4, axis=2)
+    return Tracked(attitude, body_rate, body_torque, torque_before, clipped.T)
+
+
+def start_of(plan: Plan, initial_error: Array) -> Array:
+    """Find the state in which a flight begins, with the Euler rates of the plan.
+
+    Parameters
+    ----------
+    plan : Plan
+    initial_error : array, shape (3,), rad
+        Planned less flown angles.
+
+    Returns
+    -------
+    array, shape (1, 6)
+        Attitude in rad, body rate in rad/s.
+
+    Raises
+    ------
+    SettingError
+        If a vehicle would count as lost there.
+    """
+    attitude = plan.attitude[:1] - initial_error
+    state = np.concatenate([attitude, rotations.body_rate(attitude, plan.rate[:1])], axis=1)
+    if _lost(state, plan.attitude[0]).any():
+        raise SettingError(
+            "computed_torque.initial_error_rad",
+            "a vehicle that is off by 90 degrees, or has a vertical pitch, is lost before it starts; make it smaller",
+        )
+    return np.asarray(state)
 
 
 def wrapped(angle: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from cpfls_cli.artifacts.formats import FLIGHT, TRAJECTORY
 from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.config.study import Study
-from cpfls_cli.control import Plan, flown_signals, plan_of, scores, track
+from cpfls_cli.control import Plan, flown_signals, plan_of, scores, start_of, track
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.stages.base_file import model_base
 from cpfls_cli.stages.extended_file import is_extended
@@ -44,7 +44,7 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
     InputError
         If the model has effects, or is of another vehicle.
     ConfigError
-        If the control rate is lower than that of the trajectory.
+        If the control rate is lower than that of the trajectory, or the vehicle is lost before it starts.
     ComputationError
         If the planned pitch comes near the vertical.
     """
@@ -85,7 +85,10 @@ def _plan(trajectory: Path, study: Study) -> Plan:
     source = read_with(trajectory, TRAJECTORY, "time", *_TURNED)
     planned = {name: source.array(name) for name in _TURNED}
     with settings_of("simulation", study):
+        settings = study.simulation.computed_torque
         try:
-            return plan_of(source.array("time"), planned, study.simulation.computed_torque.control_rate_hz)
+            plan = plan_of(source.array("time"), planned, settings.control_rate_hz)
+            start_of(plan, np.array(settings.initial_error_rad))
+            return plan
         except ComputationError as error:
             raise ComputationError(f"{trajectory}: {error}") from None

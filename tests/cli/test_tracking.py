@@ -156,6 +156,10 @@ def test_an_unfinished_search_is_said(control, made):
             ["--set", "simulation.computed_torque.control_rate_hz=40"],
             "simulation.computed_torque.control_rate_hz = 40.0: lower than the 50 samples in a second",
         ),
+        (
+            ["--set", "simulation.computed_torque.initial_error_rad=[2, 0, 0]"],
+            "simulation.computed_torque.initial_error_rad = [2.0, 0.0, 0.0]: a vehicle that is off by 90 degrees",
+        ),
         (["--set", "simulation.computed_torque.damping=0"], "simulation.computed_torque.damping = 0: must be"),
         (["--set", "simulation.computed_torque.plant=rigid"], "must be 'vehicle' or 'model'"),
     ],

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import solve_ivp, trapezoid
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
@@ -20,6 +20,7 @@ from cpfls_cli.control import (
     scores,
     track,
 )
+from cpfls_cli.errors import SettingError
 from cpfls_cli.vehicle.rigid_body import torque
 
 START = np.array([0.1, -0.15, 0.2])
@@ -109,7 +110,23 @@ def test_signals_of_the_flight_fit_each_other(make_plan, make_loop, inertia):
     np.testing.assert_allclose(rotations.body_torque(q, signals["torque"]), signals["body_torque"], atol=1e-12)
     np.testing.assert_allclose(rotations.body_rate(q, qd), signals["body_rate"], atol=1e-12)
     np.testing.assert_allclose(np.gradient(q, signals["time"], axis=0)[1:-1], qd[1:-1], atol=0.02)
+    np.testing.assert_array_equal(signals["body_torque"][0], tracked.body_torque[0, 0])
     np.testing.assert_array_equal(signals["time"], plan.time[::4])
+
+
+def test_torques_of_the_log_push_like_those_that_are_held(make_plan, make_loop, inertia):
+    """The trapezoids of the logged torque give the momentum about axes at rest to second order in the period."""
+    missing = []
+    for rate in (50.0, 100.0):
+        plan, loop = make_plan(rate=rate), make_loop()
+        tracked = track(plan, [exact(inertia)], loop, NOTHING, NOTHING)
+        signals = flown_signals(plan, tracked, 0, loop.plant)
+        turned = rotations.rotation_matrix(signals["attitude"])
+        momentum = rotations.multiply(turned, signals["body_rate"] @ inertia)
+        push = trapezoid(rotations.multiply(turned, signals["body_torque"]), signals["time"], axis=0)
+        missing.append(np.abs(momentum[-1] - momentum[0] - push).max())
+    assert missing[0] < 2e-3
+    assert missing[0] / missing[1] > 2.5
 
 
 def test_a_model_in_the_place_of_the_vehicle_turns_as_it_says(make_plan, make_loop, inertia):
@@ -186,12 +203,27 @@ def test_a_plant_without_inertia_is_lost_at_once(make_plan, make_loop, inertia):
     assert np.isnan(found.attitude[0, 1:]).all()
 
 
-def test_a_vehicle_that_leaps_over_the_vertical_is_lost(make_loop, inertia):
-    """Euler angles beyond a vertical pitch belong to another branch, even if no angle is off by 90 degrees."""
+def steep(pitch):
     time = np.arange(51) / 50
-    steady = np.tile([0.0, 1.3, 0.0], (51, 1))
+    steady = np.tile([0.0, pitch, 0.0], (51, 1))
     still = {"attitude": steady, "attitude_rate": 0 * steady, "attitude_acceleration": 0 * steady}
-    plan = plan_of(time, still, 50.0)
-    tracked = track(plan, [exact(inertia)], make_loop(), np.array([0.0, -0.4, 0.0]), NOTHING)
-    assert np.isnan(tracked.attitude).all()
-    assert scores(plan, tracked, 1.0).lost[0] == 0.0
+    return plan_of(time, still, 50.0)
+
+
+def test_a_vehicle_that_goes_over_the_vertical_is_lost(make_loop):
+    """Euler angles beyond a vertical pitch belong to another branch, even if no angle is off by 90 degrees."""
+    plan = steep(1.3)
+    push = Controller("push", lambda *_: np.array([0.0, 3.0, 0.0]))
+    tracked = track(plan, [push], make_loop(plant=rigid_plant(np.eye(3))), NOTHING, NOTHING)
+    found = scores(plan, tracked, 1.0)
+    flown = tracked.attitude[0, np.isfinite(tracked.attitude[0]).all(axis=1)]
+    assert np.cos(flown[:, 1]).min() > 0.02
+    # Half the acceleration times the square of the time is what lacks to the vertical.
+    assert found.lost[0] == pytest.approx(np.sqrt(2 * (np.pi / 2 - 1.3) / 3.0), abs=0.03)
+
+
+@pytest.mark.parametrize("error", [[0.0, -0.4, 0.0], [1.6, 0.0, 0.0]])
+def test_a_vehicle_that_is_lost_before_it_starts_is_refused(make_loop, inertia, error):
+    with pytest.raises(SettingError, match="lost before it starts") as caught:
+        track(steep(1.3), [exact(inertia)], make_loop(), np.array(error), NOTHING)
+    assert caught.value.key == "computed_torque.initial_error_rad"
