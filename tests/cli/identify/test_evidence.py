@@ -1,0 +1,88 @@
+"""The evidence on a model in its artifact: what `identify` writes and says, and what `predict` makes of it."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.validation_formats import VALIDATION
+
+LABELS = {"good-for-control", "good-inside-region", "not-better-than-rigid-body", "do-not-use"}
+
+
+@pytest.fixture(scope="module")
+def validated(cpfls, study, pipeline, tmp_path_factory):
+    """A model of a flight that is judged on its own rest, and what the command printed."""
+    output = tmp_path_factory.mktemp("validated") / "model.h5"
+    words = ("identify", study, pipeline.flight, "--set", "identification.training_share=0.6", "-o", output)
+    text, summary = cpfls(*words), cpfls(*words, "--force", "--json")
+    assert text.exit_code == summary.exit_code == 0, text.stderr
+    return output, text.stdout, json.loads(summary.stdout)
+
+
+def test_every_dataset_is_there_and_good(validated, cpfls):
+    with h5py.File(validated[0]) as file:
+        # The input map of the study is data-range: one period away there is nothing to judge.
+        missing = {spec.path for spec in VALIDATION if spec.path not in file}
+        assert missing == {"period/parts", "period/mse", "period/max_error"}
+        assert file["judged/vaf"].shape == file["judged/r2"].shape
+        assert file["steps/part"][()] == file["residuals/part"][()] == b"held-out rest"
+    assert cpfls("check", validated[0]).exit_code == 0
+
+
+def test_one_period_away_where_inputs_go_all_the_way_round(cpfls, study, pipeline, tmp_path):
+    output = tmp_path / "model.h5"
+    result = cpfls("identify", study, pipeline.flight, "--set", "identification.input_map=full-circle", "-o", output)
+    assert result.exit_code == 0, result.stderr
+    with h5py.File(output) as file:
+        here = file["judged/mse"][list(file["judged/models"]).index(b"model"), 0]
+        np.testing.assert_allclose(file["period/mse"][0], here, rtol=1e-6)
+
+
+def test_the_verdict_is_printed_with_its_reasons(validated):
+    _, text, summary = validated
+    verdict = summary["verdict"]
+    assert verdict["label"] in LABELS
+    assert f"verdict: {verdict['label'].replace('-', ' ')}; {verdict['region']}" in text
+    for reason in verdict["reasons"]:
+        assert reason["text"] in text
+        assert reason["speaks"] in (-1, 0, 1)
+
+
+def test_bands_go_with_a_prediction_and_hold_the_model(validated, cpfls, study, pipeline, tmp_path):
+    output = tmp_path / "prediction.h5"
+    assert cpfls("predict", study, validated[0], pipeline.flight, "-o", output).exit_code == 0
+    with h5py.File(output) as file:
+        for name in ("inertia", "torque"):
+            low, value, high = (file[f"{name}{end}"][()] for end in ("_low", "", "_high"))
+            assert np.all(low <= value)
+            assert np.all(value <= high)
+            assert np.any(low < high)
+    assert cpfls("check", output).exit_code == 0
+
+
+def test_without_evidence_a_model_and_its_prediction_are_the_same_but_for_it(
+    validated, cpfls, study, pipeline, tmp_path
+):
+    model, prediction = tmp_path / "model.h5", tmp_path / "prediction.h5"
+    words = ("identify", study, pipeline.flight, "--set", "identification.training_share=0.6")
+    result = cpfls(*words, "--set", "identification.validation.enabled=false", "-o", model, "--json")
+    assert json.loads(result.stdout)["verdict"] is None
+    with h5py.File(model) as plain, h5py.File(validated[0]) as whole:
+        assert not any(spec.path in plain for spec in VALIDATION)
+        for name in ("model/coefficients", "model/weights", "judged/mse", "history/best"):
+            np.testing.assert_array_equal(plain[name][()], whole[name][()])
+    assert cpfls("predict", study, model, pipeline.flight, "-o", prediction).exit_code == 0
+    with h5py.File(prediction) as file:
+        assert "inertia_low" not in file
+
+
+def test_equal_seeds_draw_equal_evidence_and_others_do_not(validated, cpfls, study, pipeline, tmp_path):
+    again, other = tmp_path / "again.h5", tmp_path / "other.h5"
+    words = ("identify", study, pipeline.flight, "--set", "identification.training_share=0.6", "-o")
+    assert cpfls(*words, again).exit_code == 0
+    assert again.read_bytes() == validated[0].read_bytes()
+    assert cpfls(*words, other, "--seed", 2).exit_code == 0
+    with h5py.File(other) as theirs, h5py.File(again) as ours:
+        assert not np.array_equal(theirs["uncertainty/best_rigid_body"][()], ours["uncertainty/best_rigid_body"][()])
