@@ -3,7 +3,7 @@
 import warnings
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli.export import python_source, reference_points
@@ -22,7 +22,7 @@ structures = st.fixed_dictionaries(
 ).filter(lambda s: s["structure"] == "cpfls" or s["consequents"] == "seesaw")
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=50, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(structures, st.booleans(), st.booleans(), st.booleans(), st.integers(0, 1000))
 def test_any_structure(structure, rigid, zero_width, still, seed):
     model = model_of(Case(structure, rigid=rigid, zero_width=zero_width, still=still), seed)

@@ -40,6 +40,7 @@ CASES = {
     "seesaw, full-circle, tensor": Case({"consequents": "seesaw", "membership_functions": 4}),
     "seesaw, one function": Case({"consequents": "seesaw", "membership_functions": 1}),
     "harmonic, data-range": Case({"input_map": "data-range", "membership_functions": 7, "products": "additive"}),
+    "harmonic, data-range, one rule": Case({"input_map": "data-range", "membership_functions": 2}),
     "harmonic, two functions": Case({"harmonic_order": 1, "membership_functions": 2, "products": "additive"}),
     "harmonic 8": Case({"harmonic_order": 8, "membership_functions": 3}),
     "zero width": Case({**PAPER, "membership_functions": (3, 4, 5, 6, 7, 8)}, zero_width=True),

@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.export import c_source, reference_points
 from cpfls_cli.identification.physics import vertical
 from cpfls_cli.regressor import Motion
-from tests.unit.export.cases import CASES, errors, model_of, sheet_of, states, wanted_of
+from tests.unit.export.cases import CASES, Case, errors, model_of, sheet_of, states, wanted_of
 from tests.unit.export.compiled import CHECKS, build, drive, driver, evaluate, require_gcc, written
 
 OUTSIDE, NOT_FINITE, VERTICAL = 1, 2, 4
@@ -67,6 +67,22 @@ def test_self_test_passes_and_names_the_largest_error(tmp_path, name, flags):
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.startswith("vehicle: largest relative error ")
     assert done.stdout.endswith(" at 8 states, 0 wrong flags\n")
+
+
+COMBINATIONS = [
+    {"structure": structure, "input_map": inputs, "consequents": consequents, "products": products, **functions}
+    for structure, consequents in (("cpfls", "seesaw"), ("cpfls", "harmonic"), ("fls", "seesaw"))
+    for inputs in ("full-circle", "data-range")
+    for products in ("additive", "tensor")
+    for functions in ({"membership_functions": 1}, {"membership_functions": 3})
+]
+
+
+def test_every_combination_of_settings_compiles_and_passes_its_self_test(tmp_path):
+    for index, settings in enumerate(COMBINATIONS):
+        exported(tmp_path, model_of(Case(settings, rigid=index % 3 == 0), index))
+        program = build(tmp_path, ["vehicle.c"], "-DCPFLS_SELF_TEST", output=f"program-{index}")
+        assert subprocess.run([program], check=False).returncode == 0, settings
 
 
 @pytest.mark.parametrize(
