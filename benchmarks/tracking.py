@@ -17,7 +17,7 @@ from statistics import mean
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.shared.measure import seconds, table
+from benchmarks.shared.measure import table
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 QUICK_FASTER = ("trajectory.period_s=0.6", "trajectory.duration_s=40")
@@ -40,7 +40,7 @@ CASES = (
     ("hexarotor, training path", "hexarotor", "hexarotor", (), (RATE,)),
     ("hexarotor, faster path", "hexarotor", "hexarotor", HEXAROTOR_FASTER, (RATE,)),
 )
-COLUMNS = ("flight", "controller", "roll", "pitch", "yaw", "largest", "torque rms / N m", "outside", "seconds")
+COLUMNS = ("flight", "controller", "roll", "pitch", "yaw", "largest", "torque rms / N m", "outside")
 
 
 def main() -> None:
@@ -55,7 +55,6 @@ def main() -> None:
 def compared(folder: Path, title: str, study: str, learned: str, changes: tuple[str, ...], control: tuple[str, ...]):
     """Run one case, and make a row of each controller."""
     model, path = identified(folder, learned), trajectory(folder, study, changes)
-    said = folder / "said.json"
     words = (
         "simulate",
         config(study),
@@ -66,15 +65,14 @@ def compared(folder: Path, title: str, study: str, learned: str, changes: tuple[
         "--set",
         "simulation.relative_noise={}",
     )
-    took = seconds(lambda: said.write_text(run(*words, "-o", folder / "tracked.h5", "--force", "--json", "-q")))
-    summary = json.loads(said.read_text())
+    summary = json.loads(run(*words, "-o", folder / "tracked.h5", "--force", "--json", "-q"))
     for one in summary["controllers"]:
         if one["lost_at_s"] is not None:
-            yield (title, one["name"], *("lost",) * 4, one["lost_at_s"], summary["outside"] / summary["samples"], took)
+            yield (title, one["name"], *("lost",) * 4, one["lost_at_s"], summary["outside"] / summary["samples"])
             continue
         rms, largest = ([degrees(value) for value in one[f"settled_{kind}_rad"]] for kind in ("rms", "max"))
         effort = mean(value**2 for value in one["torque_rms_n_m"]) ** 0.5
-        yield (title, one["name"], *rms, max(largest), effort, summary["outside"] / summary["samples"], took)
+        yield (title, one["name"], *rms, max(largest), effort, summary["outside"] / summary["samples"])
 
 
 def identified(folder: Path, study: str) -> Path:
