@@ -34,6 +34,14 @@ VERDICTS: dict[str, tuple[str, Tone]] = {
 }
 """Labels of a verdict in words."""
 
+SHORT_VERDICTS = {
+    "good-for-control": "good for control",
+    "good-inside-region": "good inside its region",
+    "not-better-than-rigid-body": "no better than a rigid body",
+    "do-not-use": "do not use",
+}
+"""The same for a cell of a table."""
+
 
 def has(model: Source, part: Part) -> bool:
     """Tell whether a model holds a part of the evidence.

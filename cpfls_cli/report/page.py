@@ -9,6 +9,7 @@ from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
 from cpfls_cli.report.markdown import markdown_page
 from cpfls_cli.report.missing import missing
+from cpfls_cli.report.sections.comparison import comparison_section
 from cpfls_cli.report.sections.diagnosis import diagnosis_section
 from cpfls_cli.report.sections.disagreement import disagreement_section
 from cpfls_cli.report.sections.extension import extension_section
@@ -36,6 +37,7 @@ from cpfls_cli.report.source import Sources
 
 _SECTIONS = (
     summary_section,
+    comparison_section,
     reproduction_section,
     diagnosis_section,
     extension_section,

@@ -9,6 +9,8 @@ from xml.etree import ElementTree
 from matplotlib.figure import Figure
 
 _NAMESPACE = "http://www.w3.org/2000/svg"
+_PLACES = {"d", "x", "y"}
+_LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}(?!\d*e)")
 _REFERENCE = re.compile(r"url\(#([^)]+)\)")
 
 
@@ -32,6 +34,7 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     root = ElementTree.fromstring(stream.getvalue())
     _strip(root)
     _rename_ids(root, name)
+    _shorten(root)
     for attribute in ("width", "height", "version"):
         root.attrib.pop(attribute, None)
     root.attrib |= {"xmlns": _NAMESPACE, "role": "img", "aria-label": description}
@@ -62,6 +65,14 @@ def _rename_ids(root: ElementTree.Element, name: str) -> None:
                 element.set(key, f"#{name}-{value[1:]}")
             elif "url(#" in value:
                 element.set(key, _REFERENCE.sub(rf"url(#{name}-\1)", value))
+
+
+def _shorten(root: ElementTree.Element) -> None:
+    """Write places with two decimals, a fiftieth of a pixel on a screen: most of a page would be digits else."""
+    for element in root.iter():
+        for key in _PLACES & set(element.attrib):
+            words = " ".join(element.attrib[key].split())
+            element.set(key, _LONG_NUMBER.sub(lambda digits: f"{float(digits[0]):.2f}", words))
 
 
 def _references(element: ElementTree.Element) -> list[str]:

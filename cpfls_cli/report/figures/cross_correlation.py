@@ -46,7 +46,8 @@ def cross_correlation_figure(name: str, model: Source) -> Plot:
     caption = (
         f"Correlation of the torque error of {model.label} with the signals that go into the model, on "
         f"{artifact.text('residuals/part')}; the three strongest of each axis are named, the others are grey lines. "
-        "Outside the grey band the error follows a signal, so that a better model could explain it."
+        "Far outside the grey band the error follows a signal, so that a better model could explain it; slow signals "
+        "leave the band by chance too."
     )
     return plot(name, caption, "Correlation of the torque error with each input over the lag", 5.6, draw)
 

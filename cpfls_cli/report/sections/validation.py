@@ -62,7 +62,11 @@ def _verdict(model: Source) -> Box:
     artifact = model.artifact
     words, tone = verdict_words(model)
     region = artifact.text("verdict/region") if "verdict/region" in artifact.data else ""
-    told = zip(artifact.texts("verdict/reason"), artifact.array("verdict/speaks"), strict=True)
+    told = (
+        zip(artifact.texts("verdict/reason"), artifact.array("verdict/speaks"), strict=True)
+        if "verdict/reason" in artifact.data
+        else ()
+    )
     reasons = [f"{_SPEAKS.get(int(speaks), 'To know')}: {sentence(reason)}" for reason, speaks in told]
     return Box("VERDICT", words, [*([sentence(f"Region: {region}")] if region else []), *reasons], tone)
 

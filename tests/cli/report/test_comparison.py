@@ -1,0 +1,163 @@
+"""Models beside each other, from artifacts with known numbers."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts import InputFile, read_artifact, write_artifact
+from cpfls_cli.report.differences import differences
+from tests.cli.report.evidence_artifacts import curves, verdict
+
+
+@pytest.fixture(scope="module")
+def bare(pipeline):
+    artifact = read_artifact(pipeline.model)
+    optional = {spec.path for spec in artifact.spec.datasets if not spec.required}
+    return replace(artifact, data={path: own for path, own in artifact.data.items() if path not in optional})
+
+
+@pytest.fixture
+def write(bare, tmp_path):
+    """Write a model whose errors are scaled, with another flight or another config where that is asked for."""
+
+    def make(name, scale=(1.0, 1.0, 1.0), flight=None, config=None, **data):
+        index = bare.texts("judged/models").index("model")
+        mse = bare.array("judged/mse").copy()
+        mse[index] *= np.square(scale)
+        header = bare.header
+        if flight:
+            inputs = {role: replace(file, sha256=flight) for role, file in header.inputs.items() if role == "flight"}
+            header = replace(header, inputs={**header.inputs, **inputs})
+        if config:
+            assert config[0] in header.config
+            header = replace(header, config=header.config.replace(*config))
+        path = tmp_path / name
+        write_artifact(path, replace(bare, header=header, data={**bare.data, "judged/mse": mse, **data}))
+        return path
+
+    return make
+
+
+@pytest.fixture
+def compared(cpfls, study, tmp_path):
+    def call(*models):
+        output = tmp_path / "report.json"
+        result = cpfls("report", study, *models, "-o", output, "--force")
+        assert result.exit_code == 0, result.stderr
+        page = json.loads(output.read_text(encoding="utf-8"))
+        names = [section["name"] for section in page["sections"]]
+        return names, next((part["blocks"] for part in page["sections"] if part["name"] == "comparison"), [])
+
+    return call
+
+
+def parsed(cell):
+    """Read the number before the bracket, as it is written for people."""
+    return float(cell.split(" (")[0].replace(" × 10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
+
+
+def named(blocks, name):
+    return next(block for block in blocks if block.get("name") == name)
+
+
+def test_one_model_is_compared_with_nothing(compared, write):
+    names, _ = compared(write("one.h5"))
+    assert "comparison" not in names
+
+
+def test_two_models_stand_right_after_the_summary_and_the_best_of_each_column_is_marked(compared, write):
+    names, blocks = compared(write("one.h5"), write("two.h5", (0.5, 2.0, 1.0)))
+    assert names[:2] == ["summary", "comparison"]
+    table = named(blocks, "comparison-1")
+    assert [row[0] for row in table["rows"]] == ["one.h5", "two.h5", "rigid body of one.h5 and two.h5"]
+    column = {title.split(",")[0]: place for place, title in enumerate(table["header"])}
+    shown = {axis: [row[column[f"RMSE (NRMSE) {axis}"]] for row in table["rows"]] for axis in ("roll", "pitch", "yaw")}
+    rigid_wins = all("◂" in cells[2] for cells in shown.values())
+    assert rigid_wins, "the flight is simulated without noise by a rigid body"
+    one, two = (parsed(shown["roll"][row]) for row in (0, 1))
+    assert two == pytest.approx(one / 2, rel=1e-2)
+    marked = {(mark["row"], mark["column"]) for mark in table["marked"]}
+    assert marked == {
+        (row, place) for row, cells in enumerate(table["rows"]) for place, cell in enumerate(cells) if "◂" in cell
+    }
+
+
+def test_among_models_the_smaller_error_is_marked(compared, write, bare):
+    mse = bare.array("judged/mse").copy()
+    mse[bare.texts("judged/models").index("rigid-body")] = 1.0
+    paths = []
+    for name, scale in (("one.h5", (1.0, 4.0, 1.0)), ("two.h5", (4.0, 1.0, 1.0))):
+        own = mse.copy()
+        own[bare.texts("judged/models").index("model")] *= np.square(scale)
+        paths.append(write(name, **{"judged/mse": own}))
+    rows = named(compared(*paths)[1], "comparison-1")["rows"]
+    places = range(4, 7)
+    assert [["◂" in row[place] for place in places] for row in rows] == [
+        [True, False, True],
+        [False, True, True],
+        [False, False, False],
+    ]
+
+
+def test_models_of_different_flights_are_not_ranked(compared, write):
+    _, blocks = compared(write("one.h5"), write("two.h5", flight="f" * 64))
+    texts = " ".join(block["text"] for block in blocks if block["kind"] == "text")
+    assert "judged on different flights: their errors cannot be ranked" in texts
+    assert "one.h5 on training" in texts
+    assert "two.h5 on training (sha256 ffffffffffff)" in texts
+    tables = [block for block in blocks if block["kind"] == "table" and block["name"] != "comparison-keys"]
+    assert len(tables) == 2
+    assert not any(table["marked"] for table in tables)
+    assert not [block for block in blocks if block["kind"] == "figure"]
+
+
+def test_a_flight_of_another_name_with_equal_content_is_the_same_flight(compared, write):
+    path = write("two.h5")
+    artifact = read_artifact(path)
+    flight = artifact.header.inputs["flight"]
+    renamed = {**artifact.header.inputs, "flight": InputFile("other.h5", flight.sha256, flight.format)}
+    write_artifact(path, replace(artifact, header=replace(artifact.header, inputs=renamed)))
+    _, blocks = compared(write("one.h5"), path)
+    assert len(named(blocks, "comparison-1")["rows"]) == 3
+
+
+def test_another_split_of_one_flight_is_other_data(compared, write):
+    other = ("training_share: 1.0", "training_share: 0.9")
+    _, blocks = compared(write("one.h5"), write("two.h5", config=other))
+    assert any("cannot be ranked" in block.get("text", "") for block in blocks)
+    keys = named(blocks, "comparison-keys")
+    assert keys["rows"] == [["identification.training_share", "1.0", "0.9"]]
+
+
+def test_equal_configs_are_called_equal(compared, write):
+    _, blocks = compared(write("one.h5"), write("two.h5", (2.0, 1.0, 1.0)))
+    assert any("Nothing: the same config" in block.get("text", "") for block in blocks)
+
+
+def test_inertia_curves_and_verdicts_stand_side_by_side(compared, write):
+    own = {path: values for path, values in curves().items() if path.startswith("curves/")}
+    models = [write(name, **own, **verdict(label)) for name, label in (("one.h5", "do-not-use"), ("two.h5", "new"))]
+    _, blocks = compared(*models, write("bare.h5", (3.0, 1.0, 1.0)))
+    assert [block["name"] for block in blocks if block["kind"] == "figure"] == [
+        "comparison-errors",
+        "comparison-curves-1",
+        "comparison-curves-2",
+    ]
+    panel = named(blocks, "comparison-curves-1")["panels"][0]
+    labels = [series["label"] for series in panel["series"]]
+    assert {"one.h5", "two.h5", "rigid body", "95 % band of one.h5", "95 % band of two.h5"} == set(labels)
+    rows = named(blocks, "comparison-1")["rows"]
+    assert [row[1] for row in rows] == ["do not use", "new", "—", ""]
+
+
+def test_differences_are_found_at_every_depth_and_long_values_are_cut():
+    first = {"a": {"b": 1, "c": {"d": None}}, "report": {"title": "x"}, "same": [1]}
+    second = {"a": {"b": True, "c": {"d": "y" * 99}}, "report": {"title": "z"}, "same": [1], "new": 2}
+    found = dict(differences([first, second]))
+    assert set(found) == {"a.b", "a.c.d", "new"}
+    assert found["a.b"] == ["1", "true"]
+    assert found["a.c.d"][0] == "null"
+    assert len(found["a.c.d"][1]) == 60
+    assert found["new"] == ["not there", "2"]
