@@ -112,16 +112,19 @@ class Plot:
 
 @dataclass(frozen=True)
 class Listing:
-    """Verbatim text, folded away.
+    """Verbatim text that can be folded away.
 
     Attributes
     ----------
     summary : str
     text : str
+    shown : bool
+        Whether it is folded out from the start.
     """
 
     summary: str
     text: str
+    shown: bool = False
     kind: ClassVar[str] = "listing"
 
 

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from cpfls_cli.report.content import Block, Listing, Section, Table
+from cpfls_cli.report.content import Block, Listing, Section, Table, Text
+from cpfls_cli.report.repeat import commands, config_name
 from cpfls_cli.report.source import Source, Sources
+
+_REPEAT = (
+    "To make these artifacts again, save each config below, as it is, under the name that stands before it, and run "
+    "these commands in the same folder. With the same versions of cpfls and of the libraries under it every file comes "
+    "out equal, byte for byte."
+)
 
 
 def provenance_section(sources: Sources) -> Section:
@@ -31,10 +38,12 @@ def provenance_section(sources: Sources) -> Section:
         header = ("File", "Role", "Made from", "Format", "SHA-256", "In this report")
         caption = "The files that they were made from."
         blocks.append(Table("inputs", caption, header, inputs, frozenset(range(6))))
+    blocks.append(Text(_REPEAT))
+    blocks.append(Listing("Commands to repeat", commands(sources), shown=True))
     for config in dict.fromkeys(source.artifact.header.config for source in sources.all):
         users = [source for source in sources.all if source.artifact.header.config == config]
         names = ", ".join(source.label for source in users)
-        blocks.append(Listing(f"Config of {names} (SHA-256 {users[0].config_sha256[:12]})", config))
+        blocks.append(Listing(f"{config_name(users[0])}: config of {names}", config))
     return Section("provenance", "Provenance", blocks)
 
 
