@@ -111,7 +111,7 @@ FLIGHT = ArtifactSpec(
         DatasetSpec("effects/value", ("flown",), "SI", NO_FRAME, "the true value of each", required=False),
         *TRACKING,
     ),
-    ("trajectory", "log"),
+    ("trajectory", "model", "log"),
 )
 
 SELECTION = ArtifactSpec(

@@ -63,7 +63,7 @@ def verdict_summary(verdict: Verdict | None) -> dict[str, Any] | None:
     """
     if verdict is None:
         return None
-    reasons = zip(verdict.reasons, verdict.speaks, strict=True)
+    reasons = zip(verdict.reason, verdict.speaks, strict=True)
     told = [{"text": text, "speaks": speaks} for text, speaks in reasons]
     return {"label": verdict.label, "region": verdict.region, "reasons": told}
 
@@ -82,4 +82,4 @@ def verdict_lines(verdict: Verdict | None) -> list[str]:
     if verdict is None:
         return []
     lines = [f"verdict: {verdict.label.replace('-', ' ')}; {verdict.region}"]
-    return lines + [f"  {_SIGNS[speaks]} {text}" for text, speaks in zip(verdict.reasons, verdict.speaks, strict=True)]
+    return lines + [f"  {_SIGNS[speaks]} {text}" for text, speaks in zip(verdict.reason, verdict.speaks, strict=True)]

@@ -70,7 +70,7 @@ def bootstrap(
     within them; a block that is not drawn would leave parameters undetermined, so blocks are weighted and not drawn
     with replacement. Residuals are smaller than the noise by what the fit has followed of it, which the power undoes:
     -1/2 (CR2) gives the variance of white noise without bias, but the bands of attitudes that few blocks speak of are
-    then too narrow, -1 (CR3, the jackknife) gives bands that are too wide; benchmarks/coverage.py.
+    then too narrow, -1 (CR3, the jackknife) gives bands that are too wide; benchmarks/band_coverage.py.
 
     A ridge also pulls the parameters towards a rigid body. The bias ``-(A^T A + P)^-1 P x`` is estimated with the
     model's x, corrected once by itself, and added to each draw times a normal number of standard deviation 0.75.

@@ -10,7 +10,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.identification.normal_equations import SMALLEST_SINGULAR_SHARE
 
 POWER = 0.75
-"""Of the correction for leverage: between 1/2, CR2, and 1, CR3; benchmarks/coverage.py measures all three."""
+"""Of the correction for leverage: between 1/2, CR2, and 1, CR3; benchmarks/band_coverage.py measures all three."""
 
 # A direction that one block alone determines leaves it no residual: there the correction would find rounding.
 _SMALLEST_REST = 1e-3

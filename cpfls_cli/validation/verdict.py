@@ -28,7 +28,7 @@ class Verdict:
         ``good-for-control``, ``good-inside-region``, ``not-better-than-rigid-body`` or ``do-not-use``.
     region : str
         Attitudes that the verdict is about.
-    reasons : tuple of str
+    reason : tuple of str
         One sentence each; the first is what decided.
     speaks : tuple of int
         For each reason: 1 for the model, -1 against it, 0 neither.
@@ -36,7 +36,7 @@ class Verdict:
 
     label: Label
     region: str
-    reasons: tuple[str, ...]
+    reason: tuple[str, ...]
     speaks: tuple[int, ...]
 
 

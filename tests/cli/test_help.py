@@ -17,6 +17,7 @@ COMMANDS = (
     "identify",
     "sweep",
     "predict",
+    "export",
     "report",
     "compare",
     "diagnose",

@@ -72,8 +72,8 @@ def grounds(torque_of, noise=0.0, structure=(), *, held_out=True, seeds=(3, 53))
 
 def said(judged, words):
     """Give what the reason with these words speaks for."""
-    own = [speaks for text, speaks in zip(judged.reasons, judged.speaks, strict=True) if words in text]
-    assert len(own) == 1, (words, judged.reasons)
+    own = [speaks for text, speaks in zip(judged.reason, judged.speaks, strict=True) if words in text]
+    assert len(own) == 1, (words, judged.reason)
     return own[0]
 
 
@@ -117,8 +117,8 @@ def test_noisy_rotations_of_a_rigid_vehicle_switch_the_fuzzy_part_off():
 def test_the_paper_s_coefficients_on_noisy_rotations_are_no_body():
     judged = verdict(grounds(rigid, 0.05, tuple(PAPER.items())))
     assert judged.label == "do-not-use"
-    assert "D(q) is not positive definite" in judged.reasons[0]
-    assert "the rigid body is good for control" in judged.reasons[0]
+    assert "D(q) is not positive definite" in judged.reason[0]
+    assert "the rigid body is good for control" in judged.reason[0]
 
 
 def test_inertia_that_depends_on_attitude_is_worth_a_model(better):
@@ -128,13 +128,13 @@ def test_inertia_that_depends_on_attitude_is_worth_a_model(better):
     assert said(judged, "squared error of the body rate replayed") == 1
     assert said(judged, "is positive definite in all") == 1
     assert set(judged.speaks) <= {-1, 0, 1}
-    assert len(judged.speaks) == len(judged.reasons)
+    assert len(judged.speaks) == len(judged.reason)
 
 
 def test_without_held_out_data_no_model_is_good():
     judged = verdict(grounds(bent, 0.05, held_out=False))
     assert judged.label == "not-better-than-rigid-body"
-    assert "nothing was held out" in judged.reasons[0]
+    assert "nothing was held out" in judged.reason[0]
     assert said(judged, "its own training data alone") == -1
     assert said(judged, "body rate replayed (training)") == 0
 
@@ -203,17 +203,17 @@ def test_a_rigid_body_that_is_not_good_either_is_said_to_be_so(better):
     evidence = replace(with_r2(better, [0.7, 0.9, 0.9], [0.7, 0.9, 0.9]), torque=compared(higher=True))
     judged = verdict(evidence)
     assert judged.label == "not-better-than-rigid-body"
-    assert "yet about roll it is not good enough for control" in judged.reasons[0]
+    assert "yet about roll it is not good enough for control" in judged.reason[0]
     useless = verdict(with_r2(evidence, [-0.1, 0.9, 0.9], [-0.1, 0.9, 0.9]))
     assert useless.label == "do-not-use"
-    assert "than a constant does" in useless.reasons[0]
+    assert "than a constant does" in useless.reason[0]
 
 
 def test_one_cell_without_a_body_is_enough_to_refuse(better):
     physics = replace(better.physics, indefinite=1, worst_attitude=np.radians([30.0, -10.0]))
     judged = verdict(replace(better, physics=physics))
     assert judged.label == "do-not-use"
-    assert "worst at roll and pitch of 30 and -10 degrees" in judged.reasons[0]
+    assert "worst at roll and pitch of 30 and -10 degrees" in judged.reason[0]
 
 
 def test_what_does_not_decide_is_told(better):

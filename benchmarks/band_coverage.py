@@ -1,6 +1,6 @@
 """Print how often bands of 95 % hold the truth, in 200 simulated flights.
 
-    python benchmarks/coverage.py [--runs 200]
+    python benchmarks/band_coverage.py [--runs 200]
 
 Each flight has the same motion and new noise, 5 % of each torque's root mean square: white, or coloured (first-order
 autoregressive, time constant 5 samples). Bands are those of `cpfls identify`: 40 blocks, 200 draws. They are asked for
