@@ -27,9 +27,9 @@ def summary_section(sources: Sources) -> Section:
     -------
     Section
     """
-    blocks: list[Block] = [Text(note, "note") for note in sources.settings.notes]
+    blocks: list[Block] = [_line(model) for model in sources.models]
+    blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
-    blocks += [_line(model) for model in sources.models]
     for number, model in enumerate(sources.models, start=1):
         blocks += _model(model, sources, number)
     if not sources.models and not sources.only_gap:

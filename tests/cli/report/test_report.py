@@ -4,7 +4,6 @@ import shutil
 import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
-from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -15,7 +14,6 @@ from typer.testing import CliRunner
 from cpfls_cli.artifacts import read_artifact, write_artifact
 from cpfls_cli.cli.app import app
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 CONFIG = """
 seed: 3
 trajectory: {sample_time_s: 0.2}
@@ -309,18 +307,3 @@ def test_the_search_is_labelled_by_the_error_that_it_minimised(study, tmp_path):
         assert f"smallest {error.split(',')[0]}" in section
         assert f"Pareto front of {model.name}, " in section
         assert f"{error.split(',')[0]} against condition number, as the search saw them" in section
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to show the page in")
-def test_a_browser_shows_all_figures(full, tmp_path):
-    picture = tmp_path / "page.png"
-    quiet = ("disable-gpu", "disable-quic", "no-first-run", "disable-background-networking", "disable-component-update")
-    options = ["headless", "no-sandbox", "disable-sync", *quiet, f"user-data-dir={tmp_path / 'profile'}"]
-    command = [CHROMIUM, *(f"--{option}" for option in options), f"--screenshot={picture}", "--window-size=420,2000"]
-    shown = subprocess.run(
-        [*command, "--dump-dom", full.output.as_uri()], capture_output=True, text=True, check=True, timeout=120
-    ).stdout
-    assert Page(shown).ids("figure") == full.summary["figures"]
-    assert shown.count("<svg") == len(full.summary["figures"])
-    subprocess.run([*command, full.output.as_uri()], capture_output=True, check=True, timeout=120)
-    assert Path(picture).stat().st_size > 10_000

@@ -1,0 +1,136 @@
+"""The page in a browser: on a phone, in the dark, on a wide screen; nothing asked of any network."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from types import SimpleNamespace
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from tests.cli.report.evidence_artifacts import with_evidence
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to show the page in")
+PHONE, HEIGHT = 360, 800
+QUIET = (
+    "headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-background-networking",
+    "disable-component-update", "disable-sync", "disable-default-apps", "hide-scrollbars", "enable-logging=stderr",
+    "host-resolver-rules=MAP * ~NOTFOUND", "virtual-time-budget=4000",
+)  # fmt: skip
+# Told by the page inside a frame of the size of a phone: windows cannot be as narrow.
+MEASURE = """
+<script>
+addEventListener("load", () => {
+  const page = document.querySelector("iframe").contentDocument;
+  const box = (element) => element.getBoundingClientRect();
+  const told = {
+    width: page.documentElement.scrollWidth,
+    sections: [...page.querySelectorAll("main > section")].map((each) => [each.id, box(each).top, box(each).bottom]),
+    figures: [...page.querySelectorAll("figure")].map((each) => [each.id, box(each.querySelector("svg")).width,
+      box(each.querySelector("svg")).height, box(each).right]),
+    asked: performance.getEntriesByType("resource").concat(
+      page.defaultView.performance.getEntriesByType("resource")).map((each) => each.name),
+    links: [...page.querySelectorAll("nav a")].map((each) => page.querySelector(each.getAttribute("href")) !== null),
+    background: page.defaultView.getComputedStyle(page.body).backgroundColor,
+    figure: page.defaultView.getComputedStyle(page.querySelector("figure")).backgroundColor,
+  };
+  const result = document.createElement("pre");
+  result.id = "told";
+  result.textContent = JSON.stringify(told);
+  document.body.append(result);
+});
+</script>
+"""
+
+
+@pytest.fixture(scope="module")
+def page(cpfls, pipeline, study, tmp_path_factory):
+    """A report with everything: two models, of which one holds evidence."""
+    folder = tmp_path_factory.mktemp("browser")
+    model, output = with_evidence(pipeline.model, folder / "other.h5"), folder / "report.html"
+    result = cpfls("report", study, *pipeline.paths.values(), model, "-o", output, "--json")
+    assert result.exit_code == 0, result.stderr
+    return SimpleNamespace(text=output.read_text(encoding="utf-8"), path=output, **json.loads(result.stdout))
+
+
+@pytest.fixture(scope="module")
+def browse(tmp_path_factory):
+    profile = tmp_path_factory.mktemp("profile")
+
+    def call(path, *options):
+        flags = [f"--{option}" for option in (*QUIET, f"user-data-dir={profile}", *options)]
+        done = subprocess.run(
+            [CHROMIUM, *flags, path.as_uri()], capture_output=True, text=True, check=True, timeout=120
+        )
+        assert "CONSOLE" not in done.stderr, done.stderr
+        return done.stdout
+
+    return call
+
+
+def framed(page, width, height, script=MEASURE):
+    path = page.path.with_name(f"frame-{width}.html")
+    frame = f'<iframe style="width:{width}px;height:{height}px;border:0" srcdoc="{html.escape(page.text)}"></iframe>'
+    path.write_text(f'<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">{frame}{script}', encoding="utf-8")
+    return path
+
+
+def told(browse, page, width, *options):
+    shown = browse(framed(page, width, HEIGHT), "dump-dom", f"window-size={max(width, 500)},{HEIGHT}", *options)
+    return json.loads(html.unescape(re.search(r'<pre id="told">(.*?)</pre>', shown, re.DOTALL)[1]))
+
+
+@pytest.mark.parametrize("width", [PHONE, 1400])
+def test_every_section_and_figure_is_there_and_the_page_is_no_wider_than_the_screen(browse, page, width):
+    seen = told(browse, page, width)
+    assert seen["width"] <= width
+    assert [name for name, _, _ in seen["sections"]] == page.sections
+    assert all(bottom - top > 60 for _, top, bottom in seen["sections"])
+    assert [name for name, *_ in seen["figures"]] == page.figures
+    for name, across, high, right in seen["figures"]:
+        assert across > 300, name
+        assert high > 50, name
+        assert right <= width, name
+    assert all(seen["links"])
+    assert len(seen["links"]) == len(page.sections)
+    assert seen["asked"] == []
+
+
+def test_it_is_dark_where_the_reader_wants_it_dark(browse, page):
+    grounds = {}
+    for scheme, number in (("dark", 0), ("light", 1)):
+        seen = told(browse, page, 900, f"blink-settings=preferredColorScheme={number}")
+        grounds[scheme] = [sum(map(int, re.findall(r"\d+", seen[key])[:3])) for key in ("background", "figure")]
+    assert max(grounds["dark"]) < 150 < 600 < min(grounds["light"])
+
+
+def test_a_picture_of_every_section_shows_something(browse, page, tmp_path):
+    width, scale = 900, 0.5
+    seen = told(browse, page, width)
+    height = int(max(bottom for _, _, bottom in seen["sections"])) + 100
+    picture = tmp_path / "page.png"
+    browse(
+        framed(page, width, height), f"screenshot={picture}", f"window-size={width},{height}",
+        f"force-device-scale-factor={scale}",
+    )  # fmt: skip
+    pixels = matplotlib.image.imread(picture)[:, :, :3]
+    assert pixels.shape[0] >= scale * height - 2
+    ground = pixels[5, 2]
+    for name, top, bottom in seen["sections"]:
+        strip = pixels[int(scale * top) : int(scale * bottom)]
+        drawn = np.abs(strip - ground).max(axis=2) > 0.1
+        assert drawn.mean() > 0.01, name
+
+
+def test_the_printed_page_is_black_on_white_and_folds_the_data_of_its_figures(browse, page):
+    printed = page.path.with_name("printed.html")
+    printed.write_text(page.text.replace("@media print", "@media all"), encoding="utf-8")
+    text = printed.read_text(encoding="utf-8")
+    paper = SimpleNamespace(text=text, path=printed, sections=page.sections, figures=page.figures)
+    seen = told(browse, paper, 750)
+    assert seen["background"] == "rgb(255, 255, 255)"
+    assert seen["width"] <= 750
