@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from cpfls_cli.report.claims.as_good import AS_GOOD
 from cpfls_cli.report.claims.claim import Verdict
 from cpfls_cli.report.claims.model_figures import partitions_compared
 from cpfls_cli.report.claims.motion_figures import seesaw_compared
 from cpfls_cli.report.claims.paired import paired_ratio
 from cpfls_cli.report.claims.reduction import reduction_claims
-from cpfls_cli.report.claims.searches import AS_GOOD, search_claims
+from cpfls_cli.report.claims.searches import search_claims
 from cpfls_cli.report.claims.timing import timing_claims
 from cpfls_cli.report.settings import EvaluationTime
 from cpfls_cli.report.swept_setting import SweptSetting
