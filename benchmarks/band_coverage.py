@@ -1,6 +1,6 @@
 """Print how often bands of 95 % hold the truth, in 200 simulated flights.
 
-    python benchmarks/band_coverage.py [--runs 200]
+    python benchmarks/band_coverage.py [--runs 200] [--seed 2027]
 
 Each flight has the same motion and new noise, 5 % of each torque's root mean square: white, or coloured (first-order
 autoregressive, time constant 5 samples). Bands are those of `cpfls identify`: 40 blocks, 200 draws. They are asked for
@@ -133,9 +133,9 @@ def noise(rng: np.random.Generator, samples: int, coloured: bool) -> Array:
     return signal.lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], white, axis=0)[settle:]
 
 
-def coverage(case: Case, coloured: bool, runs: int) -> tuple:
+def coverage(case: Case, coloured: bool, runs: int, seed: int) -> tuple:
     """Count how often the bands hold the truth: by entry of the inertia matrix, and by rigid-body parameter."""
-    rng, truth = np.random.default_rng(7), case.inertia()
+    rng, truth = np.random.default_rng(seed), case.inertia()
     strength = NOISE * axis_scale(case.flight)
     inside, held, weights = [], [], []
     for _ in range(runs):
@@ -158,9 +158,9 @@ def free(case: Case) -> bool:
     return case.settings.base == "none"
 
 
-def compared(case: Case, coloured: bool, runs: int) -> dict[str, Array]:
+def compared(case: Case, coloured: bool, runs: int, seed: int) -> dict[str, Array]:
     """Count for other ways to draw blocks: coverage by attitude of all D_ij(q), without a ridge."""
-    rng, truth = np.random.default_rng(7), case.inertia()
+    rng, truth = np.random.default_rng(seed), case.inertia()
     strength, counts = NOISE * axis_scale(case.flight), {name: [] for name in ("pairs, percentiles", *POWERS)}
     some = [place for place in INERTIA_PLACES if np.any(truth[:, *place] != 0)]
     linear = unit_inertias(case.fitted(case.flight.torque)[2], case.attitude)
@@ -210,22 +210,24 @@ def pairs(scores: BlockScores, rng: np.random.Generator, tolerance: float) -> Ar
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=200)
-    runs, rows = parser.parse_args().runs, []
+    parser.add_argument("--seed", type=int, default=2027)
+    asked, rows = parser.parse_args(), []
+    runs, seed = asked.runs, asked.seed
     for case in cases():
         for coloured in (False, True):
-            entries, held, lowest, weight = coverage(case, coloured, runs)
+            entries, held, lowest, weight = coverage(case, coloured, runs, seed)
             kind = "coloured" if coloured else "white"
             rows.append((case.name, kind, weight, *map(percent, (entries, [lowest], held))))
     columns = ("model", "noise", "median ridge weight", "D_ij, mean (by entry)", "worst D_ij(q)", "rigid body")
-    table("coverage", columns, rows, runs=runs)
+    table("coverage", columns, rows, runs=runs, seed=seed)
     print()
     rows, fewer = [], max(runs // 4, 1)
     for case in (part for part in cases() if free(part)):
         for coloured in (False, True):
-            ways = compared(case, coloured, fewer)
+            ways = compared(case, coloured, fewer, seed)
             counts = (f"{100 * way.mean():.1f} ({100 * way.min():.0f})" for way in ways.values())
             rows.append((case.name, "coloured" if coloured else "white", *counts))
-    table("coverage_ways", ("model", "noise", *ways), rows, runs=fewer)
+    table("coverage_ways", ("model", "noise", *ways), rows, runs=fewer, seed=seed)
 
 
 def percent(shares) -> str:
