@@ -21,6 +21,8 @@ from cpfls_cli.report.numbers import plain
 from cpfls_cli.report.svg import inline_svg
 
 WIDTH = 7.6
+# Both ends of a band are drawn at the samples that either of them keeps.
+_BAND_POINTS = 400
 GREY = "#767676"
 STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#1b4f8a", "linestyle": "-"},
@@ -116,7 +118,7 @@ def band(axes: Axes, x: Array, low: Array, high: Array, **style: Any) -> None:
     **style
         As `Axes.fill_between` takes it.
     """
-    kept = np.union1d(kept_samples(low), kept_samples(high))
+    kept = np.union1d(kept_samples(low, _BAND_POINTS), kept_samples(high, _BAND_POINTS))
     axes.fill_between(x[kept], low[kept], high[kept], **{"linewidth": 0.0, "zorder": 1.0, **style})
 
 

@@ -44,6 +44,12 @@ class Judged:
             return np.full(3, np.nan)
         return np.asarray(getattr(self, measure)[self.models.index(model), self.parts.index(part)])
 
+    def nrmse(self, model: str, part: str) -> Array:
+        """Get the root mean square error by axis over the standard deviation of the torque, shape (3,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            variance = self.of("mse", ZERO, part) / (1.0 - self.of("r2", ZERO, part))
+            return np.asarray(np.sqrt(self.of("mse", model, part) / variance))
+
     def worst(self, model: str, part: str) -> tuple[float, str]:
         """Get the largest relative error and its axis."""
         values = self.of("relative_error", model, part)

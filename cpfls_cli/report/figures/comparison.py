@@ -13,7 +13,7 @@ from cpfls_cli.report.canvas import BASELINE, GREY, band, plain_ticks, plot, sty
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.figures.before_after import legend_over
 from cpfls_cli.report.figures.inertia_curves import ENTRIES, entry_of
-from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, ZERO, judged
+from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, judged
 from cpfls_cli.report.judged_on import JudgedOn
 from cpfls_cli.report.source import Source
 
@@ -87,7 +87,7 @@ def compared_errors_figure(name: str, parts: Sequence[JudgedOn], models: Sequenc
             axes.grid(visible=False, axis="y")
             axes.tick_params(axis="y", length=0)
             _scale(axes)
-        panels[1].set_xlabel("root mean square error over that of the torque, %")
+        panels[1].set_xlabel("root mean square error over the standard deviation of the torque, %")
         legend_over(figure, panels[0])
 
     caption = (
@@ -129,10 +129,9 @@ def _draw_errors(axes: Axes, parts: Sequence[JudgedOn], model: Source, axis: int
     for row, part in enumerate(parts[::-1]):
         if model in part.models:
             name = part.names[part.models.index(model)]
-            scale = np.sqrt(scores.of("mse", ZERO, name)[axis])
             rows.append(row + offset)
-            own.append(100 * float(np.sqrt(scores.of("mse", MODEL, name)[axis]) / scale))
-            rigid.append(100 * float(np.sqrt(scores.of("mse", RIGID_BODY, name)[axis]) / scale))
+            own.append(100 * float(scores.nrmse(MODEL, name)[axis]))
+            rigid.append(100 * float(scores.nrmse(RIGID_BODY, name)[axis]))
     mark: dict[str, Any] = {"marker": _MARKERS[index % len(_MARKERS)], "linestyle": "none", "markersize": 5}
     hollow = {**mark, "markersize": 9, "color": GREY, "markerfacecolor": "none"}
     axes.plot(rigid, rows, label=f"rigid body of {model.label}", **hollow)

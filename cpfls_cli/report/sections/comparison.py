@@ -12,7 +12,7 @@ from cpfls_cli.report.differences import differences
 from cpfls_cli.report.evidence import SHORT_VERDICTS, has
 from cpfls_cli.report.figures.comparison import compared_curves_figure, compared_errors_figure
 from cpfls_cli.report.gap_words import joined
-from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, ZERO, judged
+from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, judged
 from cpfls_cli.report.judged_on import JudgedOn, judged_on, learned_only
 from cpfls_cli.report.numbers import UNKNOWN, count, number, percent, r_squared
 from cpfls_cli.report.source import Source, Sources
@@ -82,7 +82,7 @@ def _caption(part: JudgedOn) -> str:
     learned = " They learned from it: these errors are no prediction." if learned_only(part) else ""
     return (
         f"All on {part.title} ({_flights(part)}), the same data for all.{learned} Each rigid body was fitted to what "
-        "its model learned from. NRMSE: over the root mean square of the torque. ◂ marks the best of a column, of "
+        "its model learned from. NRMSE: over the standard deviation of the torque. ◂ marks the best of a column, of "
         "models and rigid bodies alike."
     )
 
@@ -129,7 +129,7 @@ def _scores(model: Source, kind: str, part: str) -> tuple[tuple[float, ...], tup
     """Read what is compared; a share of variance as what it lacks, so that the least is the best of every column."""
     scores = judged(model)
     error = np.sqrt(scores.of("mse", kind, part))
-    share = error / np.sqrt(scores.of("mse", ZERO, part))
+    share = scores.nrmse(kind, part)
     r2, vaf = _worst(scores.of("r2", kind, part)), _worst(_vaf(model, kind, part))
     largest, relative = float(np.max(scores.of("max_error", kind, part))), scores.worst(kind, part)[0]
     shown = [f"{number(float(e), 3)} ({percent(float(s))})" for e, s in zip(error, share, strict=True)]

@@ -75,9 +75,7 @@ def _scores(model: Source, index: int) -> Table:
     scores, vaf = judged(model), _vaf(model)
     rows: list[list[str | Cell]] = []
     for place, part in enumerate(scores.parts):
-        mse, nothing = scores.of("mse", MODEL, part), scores.of("mse", "torque-zero", part)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.sqrt(mse / nothing)
+        mse, share = scores.of("mse", MODEL, part), scores.nrmse(MODEL, part)
         for axis, word in enumerate(AXES):
             r2 = float(scores.of("r2", MODEL, part)[axis])
             rows.append(
@@ -93,7 +91,7 @@ def _scores(model: Source, index: int) -> Table:
                 ]
             )
     caption = (
-        f"Torque error of {model.label} by part and Euler axis. NRMSE: over the root mean square of the torque. VAF: "
+        f"Torque error of {model.label} by part and Euler axis. NRMSE: over the standard deviation of the torque. VAF: "
         "R² without the mean of the error. Relative: largest error over largest torque."
     )
     return Table(f"scores-{index}", caption, ("Part", "Axis", *_SCORES), rows, frozenset({0, 1}))
