@@ -128,7 +128,7 @@ def test_everything_given_everything_shown(full):
     assert kinds == {
         "figure-2-derivatives", "figure-3-attitude", "figure-4-torque", "figure-5-reduction", "convergence",
         "pareto-front", "ridge-curve", "figure-6-partitions", "figure-7-error", "torques", "inertia-matrix",
-        "replicates",
+        "replicates", "figure-1-seesaw",
     }  # fmt: skip
 
 
