@@ -202,6 +202,6 @@ class Section:
 
     @property
     def tables(self) -> list[str]:
-        """Names of its tables, also of those folded away."""
-        names = [block.name for block in self.blocks if isinstance(block, Table)]
-        return names + [table.name for block in self.blocks if isinstance(block, Folded) for table in block.tables]
+        """Names of its tables, also of those folded away, in order."""
+        shown = [block.tables if isinstance(block, Folded) else [block] for block in self.blocks]
+        return [table.name for tables in shown for table in tables if isinstance(table, Table)]

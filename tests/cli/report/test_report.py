@@ -35,8 +35,8 @@ report: {title: "<script>alert(1)</script> & a study", paper: true}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
-    "summary", "reproduction", "vehicle", "path", "flights", "reduction", "identification", "validation", "replicates",
-    "search", "partitions", "prediction", "rules", "provenance",
+    "summary", "comparison", "reproduction", "vehicle", "path", "flights", "reduction", "identification", "validation",
+    "replicates", "search", "partitions", "prediction", "rules", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -126,9 +126,9 @@ def test_everything_given_everything_shown(full):
     assert full.summary["bytes"] == full.output.stat().st_size < 3_000_000
     kinds = {re.sub(r"-\d+$", "", name) for name in full.summary["figures"]}
     assert kinds == {
-        "figure-2-derivatives", "figure-3-attitude", "figure-4-torque", "figure-5-reduction", "convergence",
+        "figure-1-seesaw", "figure-2-derivatives", "figure-3-attitude", "figure-4-torque", "figure-5-reduction", "convergence",
         "pareto-front", "ridge-curve", "figure-6-partitions", "figure-7-error", "torques", "inertia-matrix",
-        "replicates", "figure-1-seesaw",
+        "replicates",
     }  # fmt: skip
 
 
@@ -144,7 +144,7 @@ def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_pat
     assert summary["missing"] == ["trajectory", "selection", "model", "prediction", "sweep"]
     for command in ("trajectory CONFIG", "reduce CONFIG", "identify CONFIG", "predict CONFIG"):
         assert f"cpfls {command}" in html
-    assert "cpfls simulate" not in html
+    assert "cpfls simulate CONFIG" not in html
 
 
 def test_the_page_needs_nothing_from_outside(full):
