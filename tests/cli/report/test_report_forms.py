@@ -17,7 +17,7 @@ HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"
 
 @pytest.fixture(scope="module")
 def report(cpfls, pipeline, study, tmp_path_factory):
-    """Write a report of the tiny study to a file of this name, and read it; where little is enough, of one selection."""
+    """Write a report of the tiny study to a file of this name, and read it; a little one is of one selection."""
 
     def write(name, *options, little=False):
         output = tmp_path_factory.mktemp("report") / name
