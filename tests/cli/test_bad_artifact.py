@@ -182,6 +182,9 @@ def test_model_whose_numbers_do_not_fit_its_config(refuse, changed, pipeline, st
             values = file[f"model/{name}"][:-1]
             del file[f"model/{name}"]
             file[f"model/{name}"] = values
+        draws = file["uncertainty/coefficients"][:, :-1]
+        del file["uncertainty/coefficients"]
+        file["uncertainty/coefficients"] = draws
 
     model = changed("model", shorten)
     (line,) = refuse("predict", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
