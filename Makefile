@@ -249,6 +249,12 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python benchmarks/full_circle_noise.py
 	$(BIN)/python benchmarks/unseen_path.py
 	$(BIN)/python benchmarks/seam.py
+	$(BIN)/python benchmarks/band_coverage.py
+	$(BIN)/python benchmarks/tracking.py
+	$(BIN)/python benchmarks/export_speed.py
+	$(BIN)/python benchmarks/fuzzy_fitting.py
+	$(MAKE) data/paper/report.html
+	$(BIN)/python benchmarks/report_cost.py configs/paper.yaml data/paper/*.h5
 
 # Stopped and started again it goes on where it was. SIZE takes more options: `python -m tests.gap.study --help`.
 SEED := 2027
@@ -258,6 +264,6 @@ blind-study: $(INSTALLED_DEV)
 	$(BIN)/python -m tests.gap.study run --out data/blind --seed $(SEED) --draws $(DRAWS) --none $(NONE) $(SIZE)
 
 clean:
-	rm -rf data/paper data/quick data/hexarotor data/crazyflie data/gap-example
+	rm -rf data/paper data/quick data/hexarotor data/full-circle data/crazyflie data/gap-example
 
 FORCE:
