@@ -24,6 +24,9 @@ _STRUCTURES = (
 _RESIDUALS = (
     _spec("residuals/part", (), "text", NO_FRAME, "part whose residuals are examined"),
     _spec("residuals/samples", (), "1", NO_FRAME, "residuals examined"),
+    _spec("residuals/available", (), "1", NO_FRAME, "residuals of the whole part"),
+    _spec("residuals/mean", ("axis",), "N m", EULER, "constant torque that the model lacks", gaps=True),
+    _spec("residuals/mean_p", ("axis",), "1", EULER, "p-value of a mean of 0: small where it is not", gaps=True),
     _spec("residuals/lag", ("lag",), "s", NO_FRAME, "lags of the autocorrelation, from one sample on"),
     _spec("residuals/autocorrelation", _BY_LAG, "1", EULER, "of the torque error", gaps=True),
     _spec("residuals/band", (), "1", NO_FRAME, "1.96 / sqrt(samples): holds 95 % of the lags of white noise"),

@@ -205,15 +205,20 @@ def _outside(grounds: Grounds) -> Iterator[Reason]:
 def _white(grounds: Grounds) -> Iterator[Reason]:
     errors = grounds.residuals
     told = np.flatnonzero(np.isfinite(errors.ljung_box))
+    biased = np.flatnonzero(errors.mean_p < _NOT_WHITE)
+    if len(biased):
+        torques = ", ".join(f"{errors.mean[axis]:.3g} N m about {AXES[axis]}" for axis in biased)
+        text = f"a constant torque is left over: {torques} ({errors.part}"
+        yield Reason(f"{text}, p {_printed(float(np.min(errors.mean_p[biased])))}), which the model lacks", NEITHER)
     coloured = [AXES[axis] for axis in told if errors.ljung_box[axis] < _NOT_WHITE]
     if coloured:
         smallest = float(np.min(errors.ljung_box[told]))
         text = f"torque errors about {', '.join(coloured)} are not white ({errors.part}, p {_printed(smallest)})"
         yield Reason(f"{text}: filters of the log do that, and so does an effect that has no term", NEITHER)
-    elif len(told):
+    elif len(told) and not len(biased):
         text = f"torque errors are white noise as far as {errors.samples} samples of {errors.part} tell"
         yield Reason(f"{text} (p {_printed(float(np.min(errors.ljung_box[told])))})", FOR)
-    elif np.all(errors.exact):
+    elif not len(told) and np.all(errors.exact):
         yield Reason(f"the torque of {errors.part} is met to rounding", FOR)
 
 

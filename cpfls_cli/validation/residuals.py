@@ -12,8 +12,9 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.validation.autocorrelation import autocorrelation
+from cpfls_cli.validation.bias import mean_p_value
 from cpfls_cli.validation.cross_correlation import cross_correlation, inputs_of
-from cpfls_cli.validation.stretches import leading, sample_period, stretch_numbers
+from cpfls_cli.validation.stretches import leading, sample_numbers, sample_period
 
 # More do not change a picture; 0.1 GB of signals.
 _MOST_SAMPLES = 200_000
@@ -33,6 +34,12 @@ class ResidualAnalysis:
         Part of the data.
     samples : int
         Errors examined: the leading ones of a long part.
+    available : int
+        Errors of the whole part.
+    mean : array, shape (3,), N m
+        A constant torque that the model lacks; autocorrelation does not show it.
+    mean_p : array, shape (3,)
+        p-value: small where the mean is not 0; NaN for an exact axis.
     lag : array, shape (lag,), s
         From one sample on.
     autocorrelation : array, shape (lag, 3)
@@ -61,6 +68,9 @@ class ResidualAnalysis:
 
     part: str
     samples: int
+    available: int
+    mean: Array
+    mean_p: Array
     lag: Array
     autocorrelation: Array
     band: float
@@ -78,7 +88,7 @@ class ResidualAnalysis:
 def examine_residuals(
     part: str, source: TorqueSource, torque: Callable[[Motion], Array], lags: int
 ) -> ResidualAnalysis:
-    """Examine the torque errors of a model in the order of time, within stretches without a pause.
+    """Examine the torque errors of a model in the order of time.
 
     Parameters
     ----------
@@ -100,20 +110,24 @@ def examine_residuals(
     Ljung, System Identification: Theory for the User, section 16.6 (residual analysis).
     """
     data = leading(source, _MOST_SAMPLES)
-    errors, period, stretch = data.torque - torque(data.motion), sample_period(data.time), stretch_numbers(data.time)
+    predicted = torque(data.motion)
+    errors, period, number = data.torque - predicted, sample_period(data.time), sample_numbers(data.time, lags + 1)
     exact = np.max(np.abs(errors), axis=0) <= _ROUNDING * np.max(np.abs(data.torque))
-    own, inputs = autocorrelation(errors, stretch, exact, lags), inputs_of(data)
+    own, inputs = autocorrelation(errors, number, exact, lags), inputs_of(data, predicted)
     edges, counts = _histogram(errors)
     return ResidualAnalysis(
         part=part,
         samples=len(data),
+        available=len(source),
+        mean=errors.mean(axis=0),
+        mean_p=mean_p_value(errors, exact),
         lag=period * np.arange(1, len(own.value) + 1, dtype=float),
         autocorrelation=own.value,
         band=own.band,
         ljung_box=own.p_value,
         input=inputs.name,
         input_lag=period * np.arange(-lags, lags + 1, dtype=float),
-        correlation=cross_correlation(errors, inputs, stretch, exact, lags),
+        correlation=cross_correlation(errors, inputs, number, exact, lags),
         histogram_edge=edges,
         histogram_count=counts,
         normal_quantile=np.asarray(norm.ppf(_PROBABILITIES)),

@@ -231,3 +231,15 @@ def test_what_does_not_decide_is_told(better):
 def test_coloured_errors_are_told_and_speak_neither_way(better):
     residuals = replace(better.residuals, ljung_box=np.array([0.5, 1e-9, 0.4]))
     assert said(verdict(replace(better, residuals=residuals)), "torque errors about pitch are not white") == 0
+
+
+def test_a_constant_torque_is_named_and_no_longer_called_white_noise(better):
+    chance = {"ljung_box": np.array([0.5, 0.3, 0.4]), "mean_p": np.array([0.5, 1e-20, 0.2])}
+    residuals = replace(better.residuals, mean=np.array([1e-4, -0.125, 0.0]), **chance)
+    judged = verdict(replace(better, residuals=residuals))
+    assert said(judged, "a constant torque is left over: -0.125 N m about pitch (other, p below 1e-16)") == 0
+    assert not any("white" in reason for reason in judged.reason)
+    unbiased = replace(residuals, mean_p=np.full(3, 0.3))
+    assert said(verdict(replace(better, residuals=unbiased)), "white noise as far as") == 1
+    coloured = replace(residuals, ljung_box=np.array([1e-9, 0.5, 0.5]))
+    assert said(verdict(replace(better, residuals=coloured)), "about roll are not white") == 0
