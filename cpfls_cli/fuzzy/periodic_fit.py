@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +26,7 @@ _MOST_KEPT = 8_000_000
 
 
 def fit_periodic(
-    angles: npt.ArrayLike, values: npt.ArrayLike, settings: PeriodicSettings | None = None
+    angles: npt.ArrayLike, values: npt.ArrayLike, settings: PeriodicSettings | None = None, **keys: Any
 ) -> PeriodicSystem:
     """Fit a periodic fuzzy system of one or two angles, ``min |columns(q) c - y|^2 + samples w |c|^2``.
 
@@ -37,6 +39,8 @@ def fit_periodic(
     values : array-like, shape (samples,)
         What the system shall give there; its unit is that of the output.
     settings : PeriodicSettings, optional
+    **keys
+        Single settings by name, in place of those of `settings`.
 
     Returns
     -------
@@ -45,15 +49,18 @@ def fit_periodic(
     Raises
     ------
     ValueError
-        Wrong shapes, values that are not finite, fewer samples than coefficients without a ridge weight.
+        Wrong shapes, values that are not finite, fewer samples than coefficients without a ridge weight, a setting
+        that no system can have.
+    TypeError
+        `settings` of another type, or a key that is none.
 
     References
     ----------
     Equations (6)-(9), (12); method.md sections 4 and 5.
     """
-    settings = settings or PeriodicSettings()
+    settings = _settings(settings, keys)
     checked = as_angles(angles)
-    wanted = as_values(values, len(checked))
+    wanted, unit = _scaled(as_values(values, len(checked)))
     structure = _structure(settings, len(checked), checked.shape[1])
 
     def rows() -> Iterator[tuple[Array, Array]]:
@@ -62,7 +69,35 @@ def fit_periodic(
     kept = list(rows()) if len(checked) * structure.coefficients <= _MOST_KEPT else None
     weight = settings.ridge_weight * len(checked)
     solution = solve_ridge(rows if kept is None else lambda: iter(kept), weight, settings.rank_tolerance)
-    return PeriodicSystem(structure, solution.coefficients, _quality(solution, len(checked)))
+    return PeriodicSystem(structure, _in_unit(solution, unit), _quality(solution, len(checked), unit))
+
+
+def _settings(settings: object, keys: Mapping[str, Any]) -> PeriodicSettings:
+    if settings is not None and not isinstance(settings, PeriodicSettings):
+        raise TypeError(
+            f"settings: expected PeriodicSettings(...), got {type(settings).__name__}; or name single settings, "
+            "as in fit_periodic(angles, values, harmonic_order=2)"
+        )
+    known = [field.name for field in fields(PeriodicSettings)]
+    unknown = sorted(set(keys) - set(known))
+    if unknown:
+        raise TypeError(f"{unknown[0]}: is no key of PeriodicSettings; use {', '.join(known)}")
+    return replace(settings or PeriodicSettings(), **keys)
+
+
+def _scaled(values: Array) -> tuple[Array, float]:
+    """Divide by a power of two, which costs no digit: the squares of very large and very small values do not fit."""
+    largest = float(np.max(np.abs(values), initial=0.0))
+    unit = float(np.ldexp(1.0, np.frexp(largest)[1] - 1)) if largest else 1.0
+    return values / unit, unit
+
+
+def _in_unit(solution: RidgeSolution, unit: float) -> Array:
+    with np.errstate(over="ignore"):
+        coefficients: Array = solution.coefficients * unit
+    if not np.all(np.isfinite(coefficients)):
+        raise ValueError(f"values: up to {unit:g} in size, the coefficients overflow; scale the values down")
+    return coefficients
 
 
 def _structure(settings: PeriodicSettings, samples: int, inputs: int) -> PeriodicStructure:
@@ -94,11 +129,12 @@ def _with(settings: PeriodicSettings, functions: tuple[int, ...]) -> PeriodicStr
     return PeriodicStructure(partitions, settings.consequents, settings.harmonic_order, settings.products)
 
 
-def _quality(solution: RidgeSolution, samples: int) -> FitQuality:
-    residual_rms = float(np.sqrt(solution.residual_square / samples))
+def _quality(solution: RidgeSolution, samples: int, unit: float) -> FitQuality:
+    residual_rms = float(np.sqrt(solution.residual_square / samples)) * unit
     left = 1.0 - solution.effective_coefficients / samples
     return FitQuality(
         samples=samples,
+        coefficients=len(solution.coefficients),
         rank=solution.rank,
         condition_number=solution.condition_number,
         effective_coefficients=solution.effective_coefficients,

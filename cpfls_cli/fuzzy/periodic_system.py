@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.periodic_structure import PeriodicStructure
-from cpfls_cli.fuzzy.samples import as_angles, blocks
+from cpfls_cli.fuzzy.samples import as_points, blocks
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,8 @@ class FitQuality:
     Attributes
     ----------
     samples : int
+    coefficients : int
+        Number of coefficients of the system.
     rank : int
         Number of directions of the coefficients that the samples determine.
     condition_number : float
@@ -37,11 +39,21 @@ class FitQuality:
     """
 
     samples: int
+    coefficients: int
     rank: int
     condition_number: float
     effective_coefficients: float
     residual_rms: float
     cross_validation_rms: float
+
+    @property
+    def determined(self) -> float:
+        """Share of the coefficients that the samples determine, ``rank / coefficients``.
+
+        Below 1 the system is the smallest of many that fit as well: where no samples were, its values mean nothing,
+        and `cross_validation_rms` does not tell.
+        """
+        return self.rank / self.coefficients
 
 
 @dataclass(frozen=True)
@@ -70,32 +82,33 @@ class PeriodicSystem:
 
         Parameters
         ----------
-        angles : array-like, shape (samples, inputs), rad
-            Any number of turns; shape (samples,) too where there is one input.
+        angles : array-like, shape (samples, inputs), or (inputs,) for a single point, rad
+            Any number of turns; shape (samples,), or a number, too where there is one input.
 
         Returns
         -------
-        array, shape (samples,)
+        array, shape (samples,), or () for a single point
         """
-        checked = as_angles(angles, self.structure.inputs)
+        checked, outer = as_points(angles, self.structure.inputs)
         output = np.empty(len(checked))
         for rows in blocks(len(checked)):
             output[rows] = self.structure.columns(checked[rows]) @ self.coefficients
-        return output
+        return output.reshape(outer)
 
     def gradient(self, angles: npt.ArrayLike) -> Array:
         """Differentiate the system by its inputs, in closed form.
 
         Parameters
         ----------
-        angles : array-like, shape (samples, inputs), rad
+        angles : array-like, rad
+            Of the shapes that a call takes.
 
         Returns
         -------
-        array, shape (samples, inputs), 1/rad
+        array, shape (samples, inputs), or (inputs,) for a single point, 1/rad
         """
-        checked = as_angles(angles, self.structure.inputs)
+        checked, outer = as_points(angles, self.structure.inputs)
         output = np.empty(checked.shape)
         for rows in blocks(len(checked)):
             output[rows] = (self.structure.basis(checked[rows]).gradient @ self.coefficients).T
-        return output
+        return output.reshape(*outer, self.structure.inputs)

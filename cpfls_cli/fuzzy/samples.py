@@ -34,10 +34,42 @@ def as_angles(angles: npt.ArrayLike, inputs: int | None = None) -> Array:
     """
     given = _numbers("angles", angles)
     columns = given[:, None] if given.ndim == 1 else given
-    expected = "(samples, 1 or 2)" if inputs is None else f"(samples, {inputs})"
+    expected = (
+        "(samples, 1 or 2)" if inputs is None else f"(samples, {inputs}), or {_point_shape(inputs)} for one point"
+    )
     if columns.ndim != 2 or columns.shape[1] not in ((1, 2) if inputs is None else (inputs,)):
         raise ValueError(f"angles: expected shape {expected}, got {given.shape}")
     return _finite("angles", columns)
+
+
+def as_points(angles: npt.ArrayLike, inputs: int) -> tuple[Array, tuple[int, ...]]:
+    """Check the angles at which a system is asked for; a single point needs no column of samples.
+
+    Parameters
+    ----------
+    angles : array-like, shape (samples, inputs) or (inputs,), rad; one input: (samples,) or () too
+    inputs : int
+
+    Returns
+    -------
+    columns : array, shape (samples, inputs), rad
+    outer : tuple of int
+        Shape of one result for each point: (samples,), or () for a single point.
+
+    Raises
+    ------
+    ValueError
+        Another shape, or a value that is not finite.
+    """
+    given = _numbers("angles", angles)
+    if given.shape == _point_shape(inputs):
+        return as_angles(given.reshape(1, inputs), inputs), ()
+    columns = as_angles(given, inputs)
+    return columns, (len(columns),)
+
+
+def _point_shape(inputs: int) -> tuple[int, ...]:
+    return () if inputs == 1 else (inputs,)
 
 
 def as_values(values: npt.ArrayLike, samples: int) -> Array:

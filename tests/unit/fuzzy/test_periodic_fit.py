@@ -144,7 +144,7 @@ def test_what_cannot_be_fitted_is_refused_in_words(angles, values, message):
 
 def test_a_fitted_system_refuses_another_number_of_inputs():
     system = fit_periodic(GOOD, np.zeros(100))
-    with pytest.raises(ValueError, match=r"angles: expected shape \(samples, 2\), got \(5,\)"):
+    with pytest.raises(ValueError, match=r"angles: expected shape \(samples, 2\), or \(2,\) for one point, got \(5,\)"):
         system(np.zeros(5))
 
 
@@ -161,6 +161,12 @@ def test_more_coefficients_than_samples_need_a_weight():
         ("membership_functions", 0),
         ("membership_functions", (3, 0)),
         ("membership_functions", (3, 3, 3)),
+        ("membership_functions", 3.5),
+        ("membership_functions", "3"),
+        ("membership_functions", ["a", 3]),
+        ("harmonic_order", 2.5),
+        ("harmonic_order", "2"),
+        ("ridge_weight", "much"),
         ("consequents", "linear"),
         ("products", "sum"),
         ("harmonic_order", 0),
@@ -179,3 +185,58 @@ def test_partitions_are_equidistant():
     system = fit_periodic(GOOD, surface(GOOD), PeriodicSettings(membership_functions=(3, 4)))
     np.testing.assert_allclose(system.breakpoints[1], [0, 1 / 3, 2 / 3, 1])
     np.testing.assert_allclose(system.breakpoints[0], breakpoints(np.ones(2)))
+
+
+@pytest.mark.parametrize("size", [1e200, 1e-200, 1e300, 1e-300])
+def test_values_of_any_size_are_fitted_alike(size):
+    angles = samples(300)
+    values = surface(angles)
+    plain, scaled = fit_periodic(angles, values), fit_periodic(angles, values * size)
+    np.testing.assert_allclose(scaled(angles) / size, plain(angles), rtol=1e-9, atol=1e-12)
+    assert plain.quality.residual_rms > 1e-3
+    assert scaled.quality.residual_rms / size == pytest.approx(plain.quality.residual_rms, rel=1e-9)
+    assert scaled.quality.cross_validation_rms / size == pytest.approx(plain.quality.cross_validation_rms, rel=1e-9)
+
+
+def test_coefficients_beyond_all_numbers_are_refused():
+    angles = 0.01 * samples(400)
+    with pytest.raises(ValueError, match=r"values: up to .* scale the values down"):
+        fit_periodic(angles, 1.7e308 * np.sign(angles[:, 0]))
+
+
+def test_settings_by_name_as_a_list_and_of_numpy():
+    wanted = fit_periodic(GOOD, surface(GOOD), PeriodicSettings(membership_functions=(3, 1), harmonic_order=2))
+    for settings, keys in [
+        (None, {"membership_functions": [3, 1], "harmonic_order": 2}),
+        (PeriodicSettings(membership_functions=(3, 1)), {"harmonic_order": np.int64(2)}),
+    ]:
+        system = fit_periodic(GOOD, surface(GOOD), settings, **keys)
+        np.testing.assert_array_equal(system.coefficients, wanted.coefficients)
+
+
+def test_settings_of_another_type_name_the_right_one():
+    with pytest.raises(TypeError, match=r"settings: expected PeriodicSettings\(\.\.\.\), got dict; .*harmonic_order=2"):
+        fit_periodic(GOOD, surface(GOOD), {"harmonic_order": 2})
+    with pytest.raises(TypeError, match=r"order: is no key of PeriodicSettings; use membership_functions, "):
+        fit_periodic(GOOD, surface(GOOD), order=2)
+
+
+def test_a_single_point_gives_a_single_value():
+    two = fit_periodic(GOOD, surface(GOOD))
+    assert two([0.1, 0.2]).shape == ()
+    assert two([0.1, 0.2]) == two([[0.1, 0.2]])[0]
+    np.testing.assert_array_equal(two.gradient([0.1, 0.2]), two.gradient([[0.1, 0.2]])[0])
+    one = fit_periodic(GOOD[:, 0], np.sin(GOOD[:, 0]))
+    assert one(0.3).shape == ()
+    assert one(0.3) == one([0.3])[0]
+    assert one([0.3, 0.4]).shape == (2,)
+    assert one.gradient(0.3).shape == (1,)
+    with pytest.raises(ValueError, match=r"angles: expected shape \(samples, 1\), or \(\) for one point, got \(3, 2\)"):
+        one(np.zeros((3, 2)))
+
+
+def test_the_share_that_samples_determine_is_told():
+    assert fit_periodic(samples(3000), np.zeros(3000)).quality.determined == 1.0
+    quality = fit_periodic(np.full((400, 2), 0.5), np.full(400, 3.0)).quality
+    assert (quality.rank, quality.coefficients) == (1, 81)
+    assert quality.determined == pytest.approx(1 / 81)
