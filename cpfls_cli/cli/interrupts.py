@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import Timer
 from types import FrameType
 from typing import Any
 
 _MESSAGE = b"cpfls: error: interrupted: no half-written file is left\n"
 
+_A_MOMENT_S = 0.02
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _Handler = Callable[[int, FrameType | None], None]
 
@@ -39,6 +42,8 @@ def interruptible() -> Iterator[None]:
         raise KeyboardInterrupt(number)
 
     _install(stop)
+    unraisable = sys.unraisablehook
+    sys.unraisablehook = _sent_again(received, unraisable)
     try:
         yield
     except BaseException:
@@ -47,7 +52,20 @@ def interruptible() -> Iterator[None]:
             _leave(received[0], None)
         raise
     finally:
+        sys.unraisablehook = unraisable
         _install(signal.SIG_DFL)
+
+
+def _sent_again(received: list[int], otherwise: Callable[[Any], object]) -> Callable[[Any], None]:
+    """Send an interrupt again that came in a destructor or a callback of the interpreter, which swallow it."""
+
+    def hook(unraisable: Any) -> None:
+        if received and issubclass(unraisable.exc_type, KeyboardInterrupt):
+            Timer(_A_MOMENT_S, os.kill, (os.getpid(), received.pop())).start()
+        else:
+            otherwise(unraisable)
+
+    return hook
 
 
 @contextmanager

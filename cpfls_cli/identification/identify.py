@@ -125,7 +125,14 @@ def model_evaluator(training: TorqueSource, learned: TorqueSource, settings: Ide
     Returns
     -------
     Evaluator
+
+    Raises
+    ------
+    ComputationError
+        If there is no torque to learn from.
     """
+    if not any(data.torque.any() for data in learned.chunks()):
+        raise ComputationError("the torque is zero at all samples to learn from; nothing can be identified from it")
     structure, over_rigid_body = model_structure(settings), settings.base == "rigid-body"
     ranges = joined_ranges(data_ranges(structure, data.motion.attitude) for data in training.chunks())
     whole = Samples.of(Ready(training, over_rigid_body), structure, ranges)

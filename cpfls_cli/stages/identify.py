@@ -31,7 +31,7 @@ from cpfls_cli.stages.same_vehicle import other_vehicles
 from cpfls_cli.stages.stopped import stopped, without_model
 from cpfls_cli.stages.study import generator, settings_of
 from cpfls_cli.stages.training import TrainingData, flight_roles, read_training
-from cpfls_cli.stages.validating import evidence_on, verdict_lines, verdict_summary
+from cpfls_cli.stages.validating import gather_evidence, verdict_lines, verdict_summary, without_evidence
 from cpfls_cli.stages.validation_file import validation_data
 from cpfls_cli.validation.verdict import Verdict
 from cpfls_cli.workers.worker_error import WorkerError
@@ -70,7 +70,7 @@ def run(
     with settings_of("identification", job.study):
         require_flights(job.study.identification.choice, given=kept is not None)
     held_out = held_out_parts(job.study, data.rests, started.inputs, validate)
-    others = other_vehicles([*choose_on, *validate], job.study)
+    others = other_vehicles([*flights, *choose_on, *validate], job.study)
     if started.dry_run is not None:
         return started.dry_run
     clock = time.perf_counter()
@@ -81,12 +81,14 @@ def run(
         search.end(result.stop_reason)
         raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
     with search.kept():
-        evidence = evidence_on(job, result, data, held_out)
+        gathered = gather_evidence(job, result, data, held_out)
         model = model_data(result, job.study.identification.base, data.indices)
+        evidence = gathered.evidence
         finish(job, MODEL, model | (validation_data(evidence) if evidence else {}), started.inputs)
     search.end(result.stop_reason)
     verdict = evidence.verdict if evidence else None
     outcome = _outcome(job, result, verdict, len(data.learned), time.perf_counter() - clock, others)
+    outcome = without_evidence(outcome, gathered, job.output)
     return stopped(outcome, result.stop_reason, watch.signal, job.output)
 
 
@@ -298,5 +300,5 @@ def _lines(result: Identification, learned: int, stall: int | None) -> list[str]
             r2 = " ".join(f"{value:8.4f}" for value in score.r2_body)
             errors = f"MSE {np.mean(score.mse):9.3g}  largest error {np.max(score.max_error):9.3g} N m"
             relative = f"relative {score.worst_relative_error:8.3%}"
-            lines.append(f"{part:{width}}  {name:16}  {errors}  {relative}  R2 roll pitch yaw {r2}")
+            lines.append(f"{part:{width}}  {name:16}  {errors}  {relative}  body R2 roll pitch yaw {r2}")
     return lines

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,9 @@ from cpfls_cli.stages.flight_source import MOTION, flight_motion
 from cpfls_cli.stages.job import Job, Outcome, begin, finish
 from cpfls_cli.stages.model_file import read_model
 from cpfls_cli.stages.predict_extended import extended_prediction
+from cpfls_cli.stages.same_vehicle import other_vehicles
 from cpfls_cli.stages.sources import read_good, read_with
+from cpfls_cli.stages.trust import trust_notes
 from cpfls_cli.stages.validation_file import read_draws
 from cpfls_cli.validation.bands import inertia_band, torque_band
 from cpfls_cli.validation.bootstrap import Draws
@@ -56,7 +59,9 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         return started.dry_run
     data = _predict(identified, source, read_draws(artifact))
     finish(job, PREDICTION, data, started.inputs)
-    return _outcome(data, _trust_outside(identified, artifact))
+    outcome = _outcome(data, _trust_outside(identified, artifact))
+    notes = (*trust_notes(artifact, model), *other_vehicles([flight], job.study))
+    return replace(outcome, warnings=(*notes, *outcome.warnings))
 
 
 def _predict(model: Model, flight: Artifact, draws: Draws | None) -> dict[str, Any]:

@@ -11,7 +11,8 @@ from cpfls_cli.stages.job import Outcome
 
 _STOPPED = {"interrupted": "the search was interrupted", "time-limit": "--time-limit ended the search"}
 _REMEDY = "the same command with --resume goes on"
-_FROM_SIGNAL = 128
+FROM_SIGNAL = 128
+"""What the number of a signal is added to for an exit code."""
 
 
 def stopped(outcome: Outcome, reason: StopReason, signal: int | None, output: Path) -> Outcome:
@@ -35,7 +36,7 @@ def stopped(outcome: Outcome, reason: StopReason, signal: int | None, output: Pa
     if is_end(reason):
         return outcome
     note = f"{output}: is incomplete, because {_STOPPED[reason]}; {_REMEDY}"
-    code = 0 if signal is None else _FROM_SIGNAL + signal
+    code = 0 if signal is None else FROM_SIGNAL + signal
     return replace(outcome, warnings=(*outcome.warnings, note), exit_code=code)
 
 
@@ -57,4 +58,4 @@ def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
     if is_end(reason):
         return None
     message = f"{_STOPPED[reason]} before a model was found, so none is written; {_REMEDY}"
-    return ComputationError(message) if signal is None else StoppedError(message, _FROM_SIGNAL + signal)
+    return ComputationError(message) if signal is None else StoppedError(message, FROM_SIGNAL + signal)

@@ -21,6 +21,7 @@ from cpfls_cli.stages.study import generator, settings_of
 from cpfls_cli.stages.tracking_file import logged_signals, tracking_data
 from cpfls_cli.stages.tracking_setup import controllers_of, loop_of, planned_torque
 from cpfls_cli.stages.tracking_words import tracking_outcome
+from cpfls_cli.stages.trust import trust_notes
 
 _TURNED = ("attitude", "attitude_rate", "attitude_acceleration")
 
@@ -65,7 +66,8 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
     record = tracking_data(plan, names, scores(plan, tracked, loop.gains.settling_time), identified, exact["attitude"])
     signals, noise = logged_signals(exact, job.study, rng)
     finish(job, FLIGHT, {**signals, **noise_record(noise), **record}, started.inputs)
-    return tracking_outcome(signals, sorted(noise), record, _complete(artifact), identified.same_everywhere)
+    notes = trust_notes(artifact, model)
+    return tracking_outcome(signals, sorted(noise), record, notes, identified.same_everywhere)
 
 
 def _identified(path: Path, study: Study) -> Artifact:
@@ -75,10 +77,6 @@ def _identified(path: Path, study: Study) -> Artifact:
             "`cpfls identify` made"
         )
     return model_base(path, study)
-
-
-def _complete(artifact: Artifact) -> bool:
-    return "search/complete" not in artifact.data or bool(artifact.number("search/complete"))
 
 
 def _plan(trajectory: Path, study: Study) -> Plan:

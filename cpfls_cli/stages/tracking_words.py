@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,11 @@ from cpfls_cli.stages.job import Outcome
 
 
 def tracking_outcome(
-    signals: Mapping[str, Array], noise: Sequence[str], record: Mapping[str, Any], complete: bool, same_everywhere: bool
+    signals: Mapping[str, Array],
+    noise: Sequence[str],
+    record: Mapping[str, Any],
+    notes: Iterable[str],
+    same_everywhere: bool,
 ) -> Outcome:
     """Describe a comparison.
 
@@ -24,8 +28,8 @@ def tracking_outcome(
         Signals with noise in the log.
     record : mapping of str to array
         Datasets of the comparison.
-    complete : bool
-        Whether the search for the model came to its end.
+    notes : iterable of str
+        What to know of the model.
     same_everywhere : bool
         Whether the model has the same coefficients at all attitudes.
 
@@ -45,7 +49,7 @@ def tracking_outcome(
         "controllers": list(_controllers(record)),
     }
     lines = (_first_line(summary, record), _head(summary), *_table(summary["controllers"]), *_compared(record))
-    return Outcome(summary, lines, tuple(_warnings(summary, complete, same_everywhere)))
+    return Outcome(summary, lines, (*notes, *_warnings(summary, same_everywhere)))
 
 
 def _controllers(record: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
@@ -100,10 +104,8 @@ def _compared(record: Mapping[str, Any]) -> Iterator[str]:
         yield f"rms error with the model (roll pitch yaw): {', '.join(f'times {share}' for share in shares)}"
 
 
-def _warnings(summary: Mapping[str, Any], complete: bool, same_everywhere: bool) -> Iterator[str]:
+def _warnings(summary: Mapping[str, Any], same_everywhere: bool) -> Iterator[str]:
     samples = summary["samples"]
-    if not complete:
-        yield "the search for this model was stopped before its end; `cpfls identify --resume` goes on"
     if summary["outside"]:
         trust = (
             "the same coefficients hold there, if the structure does" if same_everywhere else "do not trust it there"

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.results import Identification
-from cpfls_cli.stages.job import Job
+from cpfls_cli.stages.job import Job, Outcome
+from cpfls_cli.stages.stopped import FROM_SIGNAL
 from cpfls_cli.stages.study import generator, settings_of
 from cpfls_cli.stages.training import TrainingData
 from cpfls_cli.validation.validate import Validation, validate
@@ -16,10 +19,30 @@ from cpfls_cli.validation.verdict import Verdict
 _SIGNS = {1: "+", -1: "-", 0: " "}
 
 
-def evidence_on(
+@dataclass(frozen=True)
+class Gathered:
+    """The evidence on a model, as far as somebody let it be gathered.
+
+    Attributes
+    ----------
+    evidence : Validation or None
+        None where it is not asked for, or where somebody waits for the program to stop.
+    signal : int or None
+        Number of the signal that stopped it.
+    """
+
+    evidence: Validation | None
+    signal: int | None = None
+
+
+class _StoppedError(Exception):
+    """Somebody waits for the program to stop."""
+
+
+def gather_evidence(
     job: Job, result: Identification, data: TrainingData, held_out: Mapping[str, TorqueSource]
-) -> Validation | None:
-    """Gather the evidence on a model.
+) -> Gathered:
+    """Gather the evidence on a model; an interrupt leaves the model without it.
 
     Parameters
     ----------
@@ -31,23 +54,45 @@ def evidence_on(
 
     Returns
     -------
-    Validation or None
-        None where it is not asked for, or where somebody waits for a search to stop.
+    Gathered
     """
     settings = job.study.identification
     if not settings.validation.enabled or result.stop_reason == "interrupted":
-        return None
-    generations = settings.generations + 1
-    with settings_of("identification", job.study):
-        return validate(
-            data.training,
-            data.learned,
-            held_out,
-            settings,
-            result,
-            generator(job.study, "validate"),
-            lambda note: job.progress(generations, generations, note),
-        )
+        return Gathered(None)
+    rng, total = generator(job.study, "validate"), settings.generations + 1
+    with job.deferred_interrupts() as interrupted, settings_of("identification", job.study):
+
+        def tell(note: str) -> None:
+            if interrupted() is not None:
+                raise _StoppedError
+            job.progress(total, total, note)
+
+        try:
+            return Gathered(validate(data.training, data.learned, held_out, settings, result, rng, tell))
+        except _StoppedError:
+            return Gathered(None, interrupted())
+
+
+def without_evidence(outcome: Outcome, gathered: Gathered, output: Path) -> Outcome:
+    """Add to what is said of a model that an interrupt left it without evidence.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    gathered : Gathered
+    output : Path
+        The model.
+
+    Returns
+    -------
+    Outcome
+    """
+    if gathered.signal is None:
+        return outcome
+    note = (
+        f"{output}: is complete but was not judged, because of the interrupt; the same command with --force judges it"
+    )
+    return replace(outcome, warnings=(*outcome.warnings, note), exit_code=FROM_SIGNAL + gathered.signal)
 
 
 def verdict_summary(verdict: Verdict | None) -> dict[str, Any] | None:

@@ -75,3 +75,21 @@ def test_output_to_a_full_disk():
     with open("/dev/full", "w") as full:
         result = subprocess.run([*PROGRAM, "config"], stdout=full, stderr=subprocess.PIPE, text=True)
     assert (result.returncode, result.stderr) == (1, "cpfls: error: output: No space left on device\n")
+
+
+def test_an_interrupt_that_a_destructor_swallows_comes_again():
+    code = (
+        "import os, signal, time\n"
+        "from cpfls_cli.cli.interrupts import interruptible\n"
+        "class Swallows:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "        time.sleep(0.01)\n"
+        "with interruptible():\n"
+        "    one = Swallows()\n"
+        "    del one\n"
+        "    time.sleep(20)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 130
+    assert done.stderr == MESSAGE

@@ -142,7 +142,7 @@ def test_an_unfinished_search_is_said(control, made):
     finally:
         with h5py.File(made[2], "r+") as file:
             file["search/complete"][()] = 1
-    assert "the search for this model was stopped before its end" in result.stderr
+    assert "is incomplete: its search was stopped" in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,15 @@
 """The evidence on a model in its artifact: what `identify` writes and says, and what `predict` makes of it."""
 
 import json
+import os
+import signal
 
 import h5py
 import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.validation_formats import VALIDATION
+from cpfls_cli.validation import validate
 
 LABELS = {"good-for-control", "good-inside-region", "not-better-than-rigid-body", "do-not-use"}
 
@@ -86,3 +89,37 @@ def test_equal_seeds_draw_equal_evidence_and_others_do_not(validated, cpfls, stu
     assert cpfls(*words, other, "--seed", 2).exit_code == 0
     with h5py.File(other) as theirs, h5py.File(again) as ours:
         assert not np.array_equal(theirs["uncertainty/best_rigid_body"][()], ours["uncertainty/best_rigid_body"][()])
+
+
+def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
+    validated, cpfls, study, pipeline, tmp_path, monkeypatch
+):
+    def interrupted(*_):
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(validate, "compare_structures", interrupted)
+    output = tmp_path / "model.h5"
+    result = cpfls("identify", study, pipeline.flight, "--set", "identification.training_share=0.6", "-o", output)
+    assert result.exit_code == 130
+    assert f"{output}: is complete but was not judged" in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["model.h5"]
+    with h5py.File(output) as plain, h5py.File(validated[0]) as whole:
+        assert plain["search/complete"][()] == 1
+        assert "verdict/label" not in plain
+        np.testing.assert_array_equal(plain["model/coefficients"][()], whole["model/coefficients"][()])
+
+
+def test_use_of_a_model_that_was_not_judged_or_judged_unfit_is_told(validated, cpfls, study, pipeline, tmp_path):
+    for number, (label, told) in enumerate(
+        ((None, "has no verdict and no bands"), (b"do-not-use", "do not use"), (b"good-for-control", None))
+    ):
+        model, output = tmp_path / f"{number}.h5", tmp_path / f"prediction-{number}.h5"
+        model.write_bytes(validated[0].read_bytes())
+        with h5py.File(model, "a") as file:
+            attributes = dict(file["verdict/label"].attrs)
+            del file["verdict/label"]
+            if label is not None:
+                file["verdict/label"] = np.bytes_(label)
+                file["verdict/label"].attrs.update({k: attributes[k] for k in ("units", "frame", "description")})
+        stderr = cpfls("predict", study, model, pipeline.flight, "-o", output).stderr
+        assert (told in stderr) if told else ("verdict" not in stderr)
