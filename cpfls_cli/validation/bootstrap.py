@@ -18,7 +18,7 @@ from cpfls_cli.validation.blocks import time_blocks
 from cpfls_cli.validation.scores import BlockScores
 from cpfls_cli.validation.simulated import Missed
 
-# Twice this many estimated biases lie within a band of 95 %.
+# A band of two standard deviations then holds a truth shifted by any number of them in 94 of 100 flights.
 _BIAS_DEVIATION = 0.75
 
 # Sums of products in memory, 160 MB; a model of very many parameters gets fewer blocks.
@@ -72,11 +72,20 @@ def bootstrap(
     -1/2 (CR2) gives the variance of white noise without bias, but the bands of attitudes that few blocks speak of are
     then too narrow, -1 (CR3, the jackknife) gives bands that are too wide; benchmarks/band_coverage.py.
 
-    A ridge also pulls the parameters towards a rigid body. The bias ``-(A^T A + P)^-1 P x`` is estimated with the
-    model's x, corrected once by itself, and added to each draw times a normal number of standard deviation 0.75.
+    A ridge pulls the parameters towards a rigid body, most where the samples say least. What it hides cannot be told
+    from the parameters that it has shrunk, so the band of a model with a ridge does not lean on it: the sum above is
+    taken under the weakest ridge that has a meaning, P_1, with the residuals r_b that it leaves, and to it are added
 
-    Partitions and ridge weight are held at the model's. What the samples do not determine stays where it is, as does
-    a fuzzy part that the ridge switched off.
+        (A^T A + P_1)^-1 P_1 z  and  0.75 u (x_1 - x),
+
+    x_1 its parameters, z and u standard normal. P_1 is the mean squared residual of a row: it takes fuzzy parameters
+    for normal numbers of variance 1, each of which alone would make a torque as large as the flight has. The first
+    term is what that leaves open: of directions that the samples do not determine the whole of it, of determined
+    ones nothing. The second is the bias of the model, as far as the flight tells it.
+
+    Partitions and ridge weight are held at the model's. Without a ridge, what the samples do not determine stays where
+    it is, at the smallest norm: there a band is what the structure does at attitudes that were not visited, not what
+    the vehicle does. The same holds of a fuzzy part that the ridge switched off.
 
     Parameters
     ----------
@@ -97,7 +106,9 @@ def bootstrap(
     References
     ----------
     Cameron, Gelbach and Miller, Review of Economics and Statistics 90 (2008), 414 (wild bootstrap by cluster);
-    Bell and McCaffrey, Survey Methodology 28 (2002), 169 (CR2, CR3).
+    Bell and McCaffrey, Survey Methodology 28 (2002), 169 (CR2, CR3); Nychka, Journal of the American Statistical
+    Association 83 (1988), 1134, and Marra and Wood, Scandinavian Journal of Statistics 39 (2012), 53 (bands that hold
+    their truth because the variance of what is left open contains the bias).
     """
     columns = RIGID + len(model.coefficients)
     blocks = time_blocks(training, settings.block_s, _MOST_PRODUCTS // columns**2)
@@ -109,8 +120,12 @@ def bootstrap(
     weights = rng.standard_normal((settings.draws, count))
     hidden = _BIAS_DEVIATION * rng.standard_normal((settings.draws, 1))
     scores, parameters = _model_scores(products, model, fit, over_rigid_body=learned.ready.rigid)
+    held = scores.penalty > 0
+    weakest = scores.under(held * _mean_square(products), tolerance)
+    still_open = weakest.left(held * rng.standard_normal((settings.draws, len(held))), tolerance)
     found = np.zeros((settings.draws, columns))
-    found[:, parameters] = scores.draws(weights, tolerance) + hidden * scores.bias(tolerance)
+    found[:, parameters] = weakest.draws(weights, tolerance) + still_open
+    found[:, parameters] += hidden * (weakest.parameters - scores.parameters)
     found *= _divide(fit)
     best, best_rigid_body = _rigid_scores(products, model, tolerance)
     return Draws(
@@ -143,6 +158,11 @@ def _rigid_scores(products: Products, model: Model, rank_tolerance: float) -> tu
     free = BlockScores(gram, torque, np.zeros(RIGID), np.zeros(RIGID))
     best = free.solution(rank_tolerance)
     return replace(free, score=torque - gram @ best, parameters=best), best
+
+
+def _mean_square(products: Products) -> float:
+    """Mean squared torque of a row."""
+    return float(np.sum(products.square) / np.sum(products.rows))
 
 
 def _divide(fit: Fit) -> Array:

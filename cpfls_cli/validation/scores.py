@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,11 +60,39 @@ class BlockScores:
         along *= np.maximum(1.0 - values, _SMALLEST_REST) ** -self.power
         return np.asarray(weights @ np.einsum("bij,bj->bi", vectors, along) @ half.T)
 
-    def bias(self, rank_tolerance: float) -> Array:
-        """Estimate what the penalty takes from the parameters, shape (parameters,): twice ``(A^T A + P)^-1 P x``."""
+    def under(self, penalty: Array, rank_tolerance: float) -> BlockScores:
+        """Solve the same least squares under another penalty.
+
+        Parameters
+        ----------
+        penalty : array, shape (parameters,)
+        rank_tolerance : float
+
+        Returns
+        -------
+        BlockScores
+        """
+        half = replace(self, penalty=penalty)._half_inverse(rank_tolerance)
+        # The scores add up to P x: taken from there, parameters without a penalty do not move by rounding.
+        step = half @ (half.T @ ((self.penalty - penalty) * self.parameters))
+        return replace(self, score=self.score - self.gram @ step, penalty=penalty, parameters=self.parameters + step)
+
+    def left(self, values: Array, rank_tolerance: float) -> Array:
+        """Leave of parameters what the samples do not determine, ``(A^T A + P)^-1 P z``.
+
+        Parameters
+        ----------
+        values : array, shape (draws, parameters)
+            z.
+        rank_tolerance : float
+
+        Returns
+        -------
+        array, shape (draws, parameters)
+        """
         half = self._half_inverse(rank_tolerance)
-        once = half @ (half.T @ (self.penalty * self.parameters))
-        return np.asarray(once + half @ (half.T @ (self.penalty * once)))
+        kept = half / np.linalg.norm(half, axis=0)
+        return np.asarray((values * self.penalty) @ half @ half.T + values - values @ kept @ kept.T)
 
     def solution(self, rank_tolerance: float) -> Array:
         """Solve for the parameters of smallest norm that the scores, taken as ``A_b^T tau_b``, ask for."""

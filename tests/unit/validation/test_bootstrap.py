@@ -50,23 +50,25 @@ def drawn(training, learned, base, seed=4):
 
 
 def brute_force(A, penalty, y, label):
-    """Turn the corrected errors of each block over and solve all rows again; also what the penalty takes."""
-    blocks, rng = label[-1] + 1, np.random.default_rng(4)
+    """Turn the corrected errors of each block over and solve all rows again, under the weakest penalty."""
+    blocks, rng, held = label[-1] + 1, np.random.default_rng(4), penalty > 0
     weights, hidden = rng.standard_normal((DRAWS, blocks)), rng.standard_normal((DRAWS, 1))
-    below, zeros = np.diag(np.sqrt(penalty)), np.zeros(A.shape[1])
+    prior = held * rng.standard_normal((DRAWS, len(held)))
 
-    def solve(torque):
-        return linalg.lstsq(np.vstack([A, below]), np.append(torque, zeros))[0]
+    def solve(torque, penalty):
+        return linalg.lstsq(np.vstack([A, np.diag(np.sqrt(penalty))]), np.append(torque, np.zeros(A.shape[1])))[0]
 
-    inverse, x, corrected = np.linalg.inv(A.T @ A + np.diag(penalty)), solve(y), np.zeros((blocks, len(y)))
+    x = solve(y, penalty)
+    weakest = held * np.mean((y - A @ x) ** 2)
+    least = solve(y, weakest)
+    inverse, corrected = np.linalg.inv(A.T @ A + np.diag(weakest)), np.zeros((blocks, len(y)))
     for block in range(blocks):
         rows = label == block
         values, vectors = np.linalg.eigh(np.eye(rows.sum()) - A[rows] @ inverse @ A[rows].T)
-        corrected[block, rows] = vectors @ (values**-0.75 * (vectors.T @ (y - A @ x)[rows]))
-    taken = x - solve(A @ x)
-    twice = x + taken - solve(A @ (x + taken))
-    moved = np.array([solve(A @ x + errors) - solve(A @ x) for errors in weights @ corrected])
-    return x, x + moved + 0.75 * hidden * twice
+        corrected[block, rows] = vectors @ (values**-0.75 * (vectors.T @ (y - A @ least)[rows]))
+    moved = np.array([solve(errors, weakest) for errors in weights @ corrected])
+    left = np.array([z - solve(A @ z, weakest) for z in prior])
+    return x, x + moved + left + 0.75 * hidden * (least - x)
 
 
 @pytest.mark.parametrize("every", [1, 3], ids=["all", "selection"])
@@ -115,7 +117,7 @@ def test_a_seed_gives_the_same_draws_and_chunks_change_nothing(base, monkeypatch
     monkeypatch.setattr(data, "CHUNK", 37)
     again, _, _ = drawn(training, training, base)
     for name in ("coefficients", "rigid_body", "best_rigid_body"):
-        np.testing.assert_allclose(getattr(once, name), getattr(again, name), rtol=0, atol=1e-10)
+        np.testing.assert_allclose(getattr(once, name), getattr(again, name), rtol=0, atol=1e-7)
     assert once.coefficients.shape == (DRAWS, len(model.coefficients))
 
 

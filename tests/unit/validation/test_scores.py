@@ -45,12 +45,27 @@ def test_other_powers_correct_the_residuals_themselves(case, power):
         np.testing.assert_allclose(moved, inverse @ A.T @ residual, atol=1e-12)
 
 
-def test_bias_is_what_the_penalty_takes_from_parameters_that_are_true(case):
-    """Refitting noise-free rows twice: of x, and of x with what the first fit took from it given back."""
-    taken = case.x - solved(case.A, case.A @ case.x, case.penalty)
-    again = case.x + taken
-    expected = again - solved(case.A, case.A @ again, case.penalty)
-    np.testing.assert_allclose(case.scores.bias(TOLERANCE), expected, atol=1e-12)
+def test_another_penalty_is_that_of_all_rows_solved_again(case):
+    penalty = np.array([0.0, 0.0, 0.1, 0.3, 0.2])
+    other = case.scores.under(penalty, TOLERANCE)
+    np.testing.assert_allclose(other.parameters, solved(case.A, case.y, penalty), atol=1e-12)
+    residual = case.y - case.A @ other.parameters
+    np.testing.assert_allclose(other.score, np.einsum("bnp,bn->bp", case.A, residual), atol=1e-12)
+    np.testing.assert_array_equal(other.penalty, penalty)
+
+
+def test_left_is_what_samples_do_not_tell_of_values_that_are_true(case):
+    values = (case.penalty > 0) * np.random.default_rng(3).standard_normal((4, PARAMETERS))
+    expected = [value - solved(case.A, case.A @ value, case.penalty) for value in values]
+    np.testing.assert_allclose(case.scores.left(values, TOLERANCE), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("penalty", [0.0, 1e-30, 1e-3], ids=["none", "rounding", "some"])
+def test_all_is_left_of_a_direction_that_no_sample_sees(penalty):
+    gram = np.diag([4.0, 1.0, 0.0])[None]
+    scores = BlockScores(gram, np.zeros((1, 3)), np.full(3, penalty), np.ones(3))
+    left = scores.left(np.array([[3.0, -2.0, 5.0]]), TOLERANCE)
+    np.testing.assert_allclose(left, [[3.0 * penalty / (4 + penalty), -2.0 * penalty / (1 + penalty), 5.0]], atol=1e-15)
 
 
 def test_solution_is_that_of_least_squares(case):
