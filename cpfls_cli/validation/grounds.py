@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,9 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.findings import HARDLY_EXCITED_SHARE
 from cpfls_cli.identification.results import Identification
-from cpfls_cli.validation.paired import Comparison, compare_windows
+from cpfls_cli.validation.memory import BLOCKS
+from cpfls_cli.validation.paired import Comparison
+from cpfls_cli.validation.paired_windows import apart, compare_windows
 from cpfls_cli.validation.physical import Physics
 from cpfls_cli.validation.residuals import ResidualAnalysis
 from cpfls_cli.validation.steps import NOTHING_MOVES, StepErrors
@@ -18,6 +21,7 @@ MODEL, RIGID_BODY = "model", "rigid-body"
 
 # Rounding of a mean over determined directions.
 _ALL = 1 - 1e-6
+_MANY_LOST = 0.05
 
 
 @dataclass(frozen=True)
@@ -28,25 +32,32 @@ class Grounds:
     ----------
     identification : Identification
         Its scores hold the training part first, then what was held out.
-    torque : Comparison or None
-        Errors of held-out torque, the model beside the rigid body; None where nothing was held out.
+    torque : mapping of str to Comparison
+        Errors of torque, the model beside the rigid body, by held-out part; each with the constant torque that it
+        misses in training.
     steps : StepErrors
-        Of predictors `MODEL`, `RIGID_BODY` and `NOTHING_MOVES`.
+        Of predictors `MODEL`, `RIGID_BODY` and `NOTHING_MOVES` as they are, to be shown.
+    replayed : mapping of str to StepErrors
+        The same of each judged part, without the constant torque that each predictor misses in training.
     residuals : ResidualAnalysis
     physics : Physics
     r2_min : float
         R2 of body torque that is good enough for control.
     band : array, shape (3,), or None
         Widest 95 % band of D11, D22 and D33 over the value itself, where training was; None if no bands were drawn.
+    definite : float or None
+        Share of the bootstrap draws whose D(q) is positive definite in all cells visited; None if none were drawn.
     """
 
     identification: Identification
-    torque: Comparison | None
+    torque: Mapping[str, Comparison]
     steps: StepErrors
+    replayed: Mapping[str, StepErrors]
     residuals: ResidualAnalysis
     physics: Physics
     r2_min: float
     band: Array | None = None
+    definite: float | None = None
 
     @property
     def held_out(self) -> tuple[str, ...]:
@@ -70,7 +81,12 @@ class Grounds:
 
     @property
     def everywhere(self) -> bool:
-        """Whether what was learned holds at every attitude: one rule, seen all round, with all its coefficients."""
+        """Whether what was learned holds at every attitude: one rule, seen all round, determined, a body anywhere."""
+        return self.one_rule and self.physics.indefinite_anywhere == 0
+
+    @property
+    def one_rule(self) -> bool:
+        """Whether one rule acts at all attitudes, training went all round, and all its coefficients are determined."""
         return self.identification.model.same_everywhere and self.determined
 
     @property
@@ -85,21 +101,56 @@ class Grounds:
         return np.asarray(np.fmin.reduce(scores))
 
     def rate_error(self, predictor: str) -> Array:
-        """Give the root mean square error of the body rate over the whole horizon, shape (3,), rad/s."""
-        error = self.steps.body_rate[self.steps.model.index(predictor)]
-        return np.asarray(np.sqrt(np.mean(error**2, axis=0)))
+        """Give the root mean square error of the body rate over a window, worst judged part, shape (3,), rad/s."""
+        errors = [steps.window_error[steps.model.index(predictor)] for steps in self.replayed.values()]
+        return np.asarray(np.max([np.sqrt(_mean(own)) for own in errors], axis=0))
 
-    def steps_beside(self, rival: str) -> Comparison:
-        """Compare the errors of the body rate, window by window, the model beside a rival."""
-        error = dict(zip(self.steps.model, self.steps.window_error, strict=True))
-        still = error[NOTHING_MOVES]
-        return compare_windows(error[MODEL], error[rival], float(np.mean(still)) if len(still) else 0.0)
+    def replay_beside(self, part: str, predictor: str, rival: str, axes: Sequence[int] = (0, 1, 2)) -> Comparison:
+        """Compare the errors of the body rate of two predictors in windows of a part that do not overlap."""
+        steps, samples = self.replayed[part], self.identification.samples[part]
+        kept = apart(steps.start, len(steps.samples))
+        summed = np.sum(steps.window_error[:, kept][:, :, list(axes)], axis=2)
+        error = dict(zip(steps.model, summed, strict=True))
+        # Errors that remember each other for long leave few blocks, of torque as of rate.
+        blocks = self.torque[part].blocks if part in self.torque else BLOCKS
+        size = float(_mean(error[NOTHING_MOVES]))
+        return compare_windows(error[predictor], error[rival], size, steps.start[kept] * blocks // samples)
+
+    def beats_nothing_moves(self, predictor: str) -> BoolArray:
+        """Tell about which axes the rate is replayed better than if nothing moved, by more than chance, in each part.
+
+        Shape (3,).
+        """
+        lower = [
+            [self.replay_beside(part, predictor, NOTHING_MOVES, (axis,)).lower for axis in range(3)]
+            for part in self.replayed
+        ]
+        return np.asarray(np.all(np.array(lower, dtype=bool), axis=0))
 
     def lost(self, predictor: str) -> int:
-        """Count the windows that a predictor did not come to the end of."""
-        return int(self.steps.lost[self.steps.model.index(predictor), -1])
+        """Count the windows of all judged parts that a predictor did not come to the end of."""
+        return sum(_lost(steps, predictor) for steps in self.replayed.values())
+
+    @property
+    def windows(self) -> int:
+        """Windows replayed, of all judged parts."""
+        return sum(steps.windows for steps in self.replayed.values())
+
+    @property
+    def loses_many(self) -> bool:
+        """Whether the model loses more than one in twenty windows of some judged part."""
+        return any(_lost(steps, MODEL) > _MANY_LOST * steps.windows for steps in self.replayed.values())
 
     @property
     def impossible(self) -> bool:
         """Whether no body has the inertia D(q), somewhere where training was."""
         return self.physics.indefinite > 0 or self.identification.indefinite > 0
+
+
+def _lost(steps: StepErrors, predictor: str) -> int:
+    return int(steps.lost[steps.model.index(predictor), -1])
+
+
+def _mean(windows: Array) -> Array:
+    """Mean over windows; NaN of none."""
+    return np.asarray(np.sum(windows, axis=0) / len(windows) if len(windows) else np.full(windows.shape[1:], np.nan))

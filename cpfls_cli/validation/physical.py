@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model, coriolis_matrix
 from cpfls_cli.identification.physics import not_positive_definite, vertical
@@ -31,6 +31,10 @@ class Physics:
     energy : float
         Largest size of ``qd^T (dD/dt - 2 C) qd`` over the sum of the sizes of its terms. Torque that is D and C does
         work on kinetic energy alone, so that it is rounding for every model with Christoffel symbols.
+    indefinite_anywhere : int
+        Cells of all roll and pitch, visited or not, where D(q) is not positive definite; of `every_cell`.
+    every_cell : int
+        All cells but those near a pitch of +-90 degrees.
     """
 
     cells: int
@@ -38,10 +42,12 @@ class Physics:
     smallest_eigenvalue: float
     worst_attitude: Array
     energy: float
+    indefinite_anywhere: int
+    every_cell: int
 
 
 def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
-    """Examine a model at the centres of the cells that training visited.
+    """Examine a model at the centres of the cells that training visited, and its D(q) at those of all.
 
     Parameters
     ----------
@@ -57,9 +63,10 @@ def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
     ----------
     Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 6.5 (skew symmetry, passivity).
     """
-    attitude = _centres(model)
+    attitude, everywhere = cell_centres(model.visited), cell_centres(np.ones_like(model.visited))
+    anywhere = int(np.sum(not_positive_definite(model.inertia(everywhere).value, everywhere)))
     if len(attitude) == 0:
-        return Physics(0, 0, float("nan"), np.full(2, np.nan), 0.0)
+        return Physics(0, 0, float("nan"), np.full(2, np.nan), 0.0, anywhere, len(everywhere))
     values, rate = model.inertia(attitude), rng.standard_normal(attitude.shape)
     smallest = np.linalg.eigvalsh(values.value)[:, 0]
     worst = int(np.argmin(smallest))
@@ -69,6 +76,8 @@ def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
         smallest_eigenvalue=float(smallest[worst]),
         worst_attitude=attitude[worst, :2],
         energy=energy_share(values, coriolis_matrix(values, rate), rate),
+        indefinite_anywhere=anywhere,
+        every_cell=len(everywhere),
     )
 
 
@@ -95,8 +104,20 @@ def energy_share(values: InertiaValues, coriolis: Array, rate: Array) -> float:
     return float(np.max(power / np.where(size > 0, size, 1.0)))
 
 
-def _centres(model: Model) -> Array:
-    roll, pitch = np.nonzero(model.visited)
+def cell_centres(visited: BoolArray) -> Array:
+    """Give the attitudes at the centres of cells, without those near a pitch of +-90 degrees.
+
+    Parameters
+    ----------
+    visited : array of bool, shape (cells, cells)
+        Cells of roll and pitch, roll along the first axis, from -180 degrees.
+
+    Returns
+    -------
+    array, shape (visited cells, 3), rad
+        The yaw is 0.
+    """
+    roll, pitch = np.nonzero(visited)
     centres = (np.stack([roll, pitch, np.zeros_like(roll)], axis=1) + 0.5) * (2 * np.pi / CELLS) - np.pi
     attitude = centres * [1.0, 1.0, 0.0]
     return np.asarray(attitude[~vertical(attitude)])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.findings import AXES
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.paired import Comparison
@@ -18,6 +18,10 @@ FOR, NEITHER, AGAINST = 1, 0, -1
 # White errors fall below it once in a hundred times an axis.
 _NOT_WHITE = 0.01
 _SMALLEST_P = 1e-16
+DEFINITE_SHARE = 0.975
+"""Share of the bootstrap draws that are to be positive definite wherever training was."""
+
+_LARGE_BESIDE_NOISE, _SMALL = 0.25, 0.01
 
 
 class Reason(NamedTuple):
@@ -46,24 +50,28 @@ def reasons(grounds: Grounds) -> Iterator[Reason]:
     ------
     Reason
     """
-    rules = (_held_out, _hardly_excited, _beside_rigid_body, _steps, _lost, _definite, _fuzzy_part, _determined)
-    for rule in (*rules, _band, _search, _outside, _white):
+    measured = (_held_out, _hardly_excited, _beside_rigid_body, _constant, _steps, _lost)
+    sense = (_definite, _draws, _elsewhere, _fuzzy_part, _determined)
+    for rule in (*measured, *sense, _band, _search, _outside, _white):
         yield from rule(grounds)
 
 
-def numbers(values: Array) -> str:
+def numbers(values: Array, shown: BoolArray | None = None) -> str:
     """Print the numbers of the three axes.
 
     Parameters
     ----------
     values : array, shape (3,)
+    shown : array of bool, shape (3,), optional
+        Axes to print; all by default.
 
     Returns
     -------
     str
         As ``roll 0.95 pitch 0.97 yaw 0.23``.
     """
-    return " ".join(f"{axis} {value:.3g}" for axis, value in zip(AXES, values, strict=True))
+    axes = np.flatnonzero(np.ones(3, dtype=bool) if shown is None else shown)
+    return " ".join(f"{AXES[axis]} {values[axis]:.3g}" for axis in axes)
 
 
 def _held_out(grounds: Grounds) -> Iterator[Reason]:
@@ -90,26 +98,39 @@ def _hardly_excited(grounds: Grounds) -> Iterator[Reason]:
         text = f"{AXES[axis]} hardly moves in training: its rate is predicted with an error of {ours:.3g} rad/s"
         if not np.isfinite(ours):
             yield Reason(f"{AXES[axis]} hardly moves in training, and windows of it cannot be replayed", AGAINST)
-        elif ours > still:
-            yield Reason(f"{text}, {still:.3g} if nothing moved", AGAINST)
-        else:
-            neither = "which neither confirms the model there nor refutes it"
+        elif grounds.beats_nothing_moves(MODEL)[axis]:
+            neither = "which is better by more than chance, but confirms no model of its torque"
             yield Reason(f"{text}, {still:.3g} if nothing moved, {neither}", NEITHER)
+        else:
+            yield Reason(f"{text}, {still:.3g} if nothing moved: not better by more than chance", AGAINST)
 
 
 def _beside_rigid_body(grounds: Grounds) -> Iterator[Reason]:
-    if grounds.torque is not None:
-        yield _compared("squared error of held-out torque", grounds.torque)
-    if grounds.steps.windows:
-        compared = grounds.steps_beside(RIGID_BODY)
-        reason = _compared(f"squared error of the body rate replayed ({grounds.steps.part})", compared)
-        # What was learned from is no witness.
-        yield reason if grounds.steps.part in grounds.held_out else Reason(reason.text, NEITHER)
+    several = len(grounds.held_out) > 1
+    for part, compared in grounds.torque.items():
+        where = f" ({part})" if several else ""
+        yield _compared(f"squared error of held-out torque{where}", compared)
+    for part, steps in grounds.replayed.items():
+        if steps.windows:
+            compared = grounds.replay_beside(part, MODEL, RIGID_BODY)
+            reason = _compared(f"squared error of the body rate replayed ({part})", compared)
+            # What was learned from is no witness.
+            yield reason if part in grounds.held_out else Reason(reason.text, NEITHER)
+
+
+def _constant(grounds: Grounds) -> Iterator[Reason]:
+    """Name a constant torque that is large beside the noise, and not negligible beside the torque."""
+    axes = grounds.identification.axes
+    constant, noise = np.abs(axes.constant), axes.torque * np.sqrt(np.clip(1.0 - axes.r2, 0.0, None))
+    for axis in np.flatnonzero((constant > _LARGE_BESIDE_NOISE * noise) & (constant > _SMALL * axes.torque)):
+        share = f"{100 * constant[axis] / axes.torque[axis]:.3g} % of its torque"
+        text = f"{AXES[axis]}: a constant torque of {axes.constant[axis]:.3g} N m acts in training, {share}"
+        yield Reason(f"{text}: no inertia makes it, and errors are compared with the rigid body's without it", NEITHER)
 
 
 def _compared(what: str, found: Comparison) -> Reason:
     if not found.blocks:
-        return Reason(f"{what}: nothing to compare, all windows were lost", AGAINST)
+        return Reason(f"{what}: nothing to compare", AGAINST)
     if found.ratio == 1:
         return Reason(f"{what}: the same as that of the rigid body", AGAINST)
     if np.isinf(found.ratio):
@@ -141,7 +162,7 @@ def _steps(grounds: Grounds) -> Iterator[Reason]:
 def _lost(grounds: Grounds) -> Iterator[Reason]:
     if grounds.lost(MODEL):
         yield Reason(
-            f"{grounds.lost(MODEL)} of {grounds.steps.windows} windows replayed do not come to their end: D(q) is not "
+            f"{grounds.lost(MODEL)} of {grounds.windows} windows replayed do not come to their end: D(q) is not "
             "positive definite there, or the model turns faster than any step of integration",
             AGAINST,
         )
@@ -155,6 +176,26 @@ def _definite(grounds: Grounds) -> Iterator[Reason]:
             f"eigenvalue is {physics.smallest_eigenvalue:.3g} kg m^2",
             FOR,
         )
+
+
+def _draws(grounds: Grounds) -> Iterator[Reason]:
+    share = grounds.definite
+    if share is not None and not grounds.impossible:
+        text = f"D(q) is positive definite in all these cells in {100 * share:.3g} % of the bootstrap draws"
+        enough = share >= DEFINITE_SHARE
+        yield Reason(
+            text if enough else f"{text}; {100 * DEFINITE_SHARE:g} % are asked for", FOR if enough else AGAINST
+        )
+
+
+def _elsewhere(grounds: Grounds) -> Iterator[Reason]:
+    """Where training went all round but not everywhere, a rule of all attitudes may be no body at others."""
+    physics = grounds.physics
+    if grounds.one_rule and not grounds.impossible and physics.indefinite_anywhere:
+        text = (
+            f"D(q) is not positive definite in {physics.indefinite_anywhere} of the {physics.every_cell} cells of all"
+        )
+        yield Reason(f"{text} roll and pitch, though in none that training visited", AGAINST)
 
 
 def _fuzzy_part(grounds: Grounds) -> Iterator[Reason]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -40,9 +41,10 @@ class StepErrors:
     lost : array of int, shape (predictor, horizon)
         Windows in which a predictor's inertia was not positive definite, or which it turned faster than any step can
         follow.
-    window_error : array, shape (predictor, window), (rad/s)^2
-        Mean squared error of the body rate over a window, summed over axes; NaN where lost. To compare predictors
-        window by window.
+    window_error : array, shape (predictor, window, 3), (rad/s)^2
+        Mean squared error of the body rate over a window; NaN where lost. To compare predictors window by window.
+    start : array of int, shape (window,)
+        First sample of each window, ascending.
     """
 
     part: str
@@ -54,10 +56,16 @@ class StepErrors:
     body_rate: Array
     lost: IntArray
     window_error: Array
+    start: IntArray
 
 
 def replay_steps(
-    part: str, source: TorqueSource, predictors: Mapping[str, Predictor], horizon_samples: int, windows: int
+    part: str,
+    source: TorqueSource,
+    predictors: Mapping[str, Predictor],
+    horizon_samples: int,
+    windows: int,
+    missing: Mapping[str, Array] = MappingProxyType({}),
 ) -> StepErrors:
     """Replay measured torques from many starts and compare with what was measured.
 
@@ -74,6 +82,8 @@ def replay_steps(
         Length of the windows; shorter where the data have no window of that length without a pause.
     windows : int
         Windows at most, evenly spread.
+    missing : mapping of str to array, shape (3,), N m, body frame, optional
+        Constant torque that a predictor misses, which is not its inertia's; taken off what was measured.
 
     Returns
     -------
@@ -88,7 +98,10 @@ def replay_steps(
     plan, names = plan_windows(source, horizon_samples, windows), (*predictors, NOTHING_MOVES)
     sums = [_Sums(plan.horizon) for _ in names]
     for measured in read_windows(source, plan):
-        runs = [free_runs(turning_law(predictor), measured) for predictor in predictors.values()]
+        runs = [
+            free_runs(turning_law(predictor), replace(measured, torque=measured.torque - missing.get(name, 0.0)))
+            for name, predictor in predictors.items()
+        ]
         for own, run in zip(sums, [*runs, _still(measured)], strict=True):
             own.add(measured, run)
     return StepErrors(
@@ -100,7 +113,8 @@ def replay_steps(
         attitude=np.array([own.root_mean_square(own.attitude) for own in sums]),
         body_rate=np.array([own.root_mean_square(own.body_rate) for own in sums]),
         lost=np.array([own.lost for own in sums]),
-        window_error=np.array([np.concatenate([np.zeros(0), *own.window_error]) for own in sums]),
+        window_error=np.array([np.concatenate([np.zeros((0, 3)), *own.window_error]) for own in sums]),
+        start=plan.start,
     )
 
 
@@ -114,13 +128,13 @@ class _Sums:
         self.window_error: list[Array] = []
 
     def add(self, measured: Windows, run: Iterator[State]) -> None:
-        by_window = np.zeros(len(measured.time))
+        by_window = np.zeros((len(measured.time), 3))
         for step, state in enumerate(run):
             turned, rate = _errors(measured, step + 1, state)
             self.lost[step] += np.sum(~state.exists)
             self.attitude[step] += np.sum(turned**2, axis=0)
             self.body_rate[step] += np.sum(rate**2, axis=0)
-            by_window += np.where(state.exists, np.sum(rate**2, axis=1), np.nan)
+            by_window += np.where(state.exists[:, None], rate**2, np.nan)
         self.windows += len(by_window)
         self.window_error.append(by_window / len(self.lost))
 

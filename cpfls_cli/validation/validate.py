@@ -7,14 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, model_evaluator
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.validation.bootstrap import Draws, bootstrap
 from cpfls_cli.validation.curves import Curves, curves
+from cpfls_cli.validation.definite import definite_share
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
-from cpfls_cli.validation.paired import compare_torque
+from cpfls_cli.validation.missing_torque import mean_missing_torque, with_constant
+from cpfls_cli.validation.paired import Comparison
+from cpfls_cli.validation.paired_torque import compare_torque
 from cpfls_cli.validation.period import PeriodErrors, one_period_away
 from cpfls_cli.validation.physical import Physics, physical_sense
 from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
@@ -45,7 +49,7 @@ class Validation:
     round_trip : RoundTrip
         What is identified from a simulation of the model.
     steps : StepErrors
-        Measured torques replayed, on the same part as the residuals.
+        Measured torques replayed, on the same part as the residuals, by the predictors as they are.
     physics : Physics
     period : PeriodErrors or None
         None where inputs do not go all the way round.
@@ -75,6 +79,7 @@ def validate(
     """Gather the evidence on a model.
 
     Residuals and prediction by horizon are examined on the first part that was held out, in training where none was.
+    The verdict rests on all parts, whatever their order.
 
     Parameters
     ----------
@@ -109,6 +114,34 @@ def validate(
     residuals = examine_residuals(part, source, model.torque, asked.lags)
     physics = physical_sense(model, examining)
     period = one_period_away(model, {TRAINING: training, **held_out})
-    compared = compare_torque(held_out, model.torque, result.baselines[0].torque)
-    judged = verdict(Grounds(result, compared, steps, residuals, physics, asked.r2_min, drawn.relative_width))
+    missing = _missing(training, result)
+    grounds = Grounds(
+        identification=result,
+        torque=_torque_compared(held_out, result, missing),
+        steps=steps,
+        replayed={
+            name: replay_steps(name, own, predictors, asked.horizon_samples, asked.windows, missing)
+            for name, own in (held_out or {TRAINING: training}).items()
+        },
+        residuals=residuals,
+        physics=physics,
+        r2_min=asked.r2_min,
+        band=drawn.relative_width,
+        definite=definite_share(model, draws),
+    )
+    judged = verdict(grounds)
     return Validation(structures, residuals, draws, drawn, again, steps, physics, period, judged)
+
+
+def _missing(training: TorqueSource, result: Identification) -> dict[str, Array]:
+    """Average what model and rigid body miss of the body torque in training."""
+    torques = {MODEL: result.model.torque, RIGID_BODY: result.baselines[0].torque}
+    return {name: mean_missing_torque(training, torque) for name, torque in torques.items()}
+
+
+def _torque_compared(
+    held_out: Mapping[str, TorqueSource], result: Identification, missing: Mapping[str, Array]
+) -> dict[str, Comparison]:
+    ours = with_constant(result.model.torque, missing[MODEL])
+    theirs = with_constant(result.baselines[0].torque, missing[RIGID_BODY])
+    return {part: compare_torque(source, ours, theirs) for part, source in held_out.items()}

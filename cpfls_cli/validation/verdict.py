@@ -11,9 +11,8 @@ from cpfls_cli.arrays import BoolArray
 from cpfls_cli.identification.findings import AXES
 from cpfls_cli.identification.physics import why_unphysical
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
-from cpfls_cli.validation.reasons import AGAINST, NEITHER, Reason, numbers, reasons
+from cpfls_cli.validation.reasons import AGAINST, DEFINITE_SHARE, FOR, NEITHER, Reason, numbers, reasons
 from cpfls_cli.validation.region import region_in_words
-from cpfls_cli.validation.steps import NOTHING_MOVES
 
 Label = Literal["good-for-control", "good-inside-region", "not-better-than-rigid-body", "do-not-use"]
 
@@ -46,19 +45,22 @@ def verdict(grounds: Grounds) -> Verdict:
     1. *do-not-use* where D(q) is not positive definite at an attitude that training visited: then some torque turns
        the model the wrong way, and a controller that inverts D(q) diverges.
     2. A model has to show that it is better than the rigid body, which has six parameters and holds at every
-       attitude: on held-out data its error of torque, or of the body rate replayed (if replayed on held-out data), is
-       lower by more than chance, and neither is higher by more than chance. Otherwise, and always if nothing was held
-       out, *not-better-than-rigid-body*; or *do-not-use*, where the rigid body explains no more of the torque about
-       an excited axis than a constant does (R2 of 0 or less).
-    3. *do-not-use* where the held-out R2 of body torque about any axis is below `r2_min`. Instead of R2, which then
-       measures noise, an axis that hardly accelerates is judged by its body rate replayed: not worse than the
+       attitude: in one held-out part at least its error of torque, or of the body rate replayed, is lower by more than
+       chance, and neither is higher by more than chance in any. Both are compared with the constant torque that they
+       miss in training, which is not inertia's, and which a fuzzy part can imitate and a rigid body cannot. Otherwise,
+       and always if nothing was held out, *not-better-than-rigid-body*; or *do-not-use*, where the rigid body is no
+       body, or explains no more of the torque about an excited axis than a constant does (R2 of 0 or less).
+    3. *do-not-use* where the model loses more than one in twenty windows of a held-out part; where less than 97.5 % of
+       the bootstrap draws of D(q) are positive definite at all attitudes visited; or where the held-out R2 of body
+       torque about any axis is below `r2_min` in any part. Instead of R2, which then measures noise, an axis that
+       hardly accelerates is judged by its body rate replayed: better by more than chance, in every part, than the
        prediction that it stays what it is.
-    4. *good-for-control* where the model is the same rule at every attitude, training went all round, and the samples
-       determine every coefficient beyond their noise; otherwise *good-inside-region*: nothing is known outside.
+    4. *good-for-control* where the model is the same rule at every attitude, training went all round, the samples
+       determine every coefficient beyond their noise, D(q) is positive definite at every roll and pitch, and R2
+       confirms every axis; otherwise *good-inside-region*: nothing is known outside.
 
-    An unfinished search, wide bands, coefficients that are not determined, residuals that are not white and windows
-    that were lost are told as reasons and do not decide: each of them harms a model only as far as it predicts worse,
-    and that is measured.
+    An unfinished search, wide bands, residuals that are not white and a few windows that were lost are told as
+    reasons and do not decide: each of them harms a model only as far as it predicts worse, and that is measured.
 
     Parameters
     ----------
@@ -86,9 +88,24 @@ def good_axes(grounds: Grounds, predictor: str) -> BoolArray:
     -------
     array of bool, shape (3,)
     """
-    r2 = grounds.r2(predictor)
-    not_worse = grounds.rate_error(predictor) <= grounds.rate_error(NOTHING_MOVES)
-    return np.asarray((r2 >= grounds.r2_min) | ((grounds.hardly_excited | np.isnan(r2)) & not_worse))
+    unexcited = grounds.hardly_excited | np.isnan(grounds.r2(predictor))
+    return confirmed_axes(grounds, predictor) | (unexcited & grounds.beats_nothing_moves(predictor))
+
+
+def confirmed_axes(grounds: Grounds, predictor: str) -> BoolArray:
+    """Tell about which body axes the held-out R2 of torque is at least what is asked for.
+
+    Parameters
+    ----------
+    grounds : Grounds
+    predictor : str
+        `MODEL` or `RIGID_BODY`.
+
+    Returns
+    -------
+    array of bool, shape (3,)
+    """
+    return np.asarray(grounds.r2(predictor) >= grounds.r2_min)
 
 
 def _decided(grounds: Grounds) -> tuple[Label, Reason]:
@@ -96,21 +113,41 @@ def _decided(grounds: Grounds) -> tuple[Label, Reason]:
         return "do-not-use", Reason(_no_body(grounds), AGAINST)
     if not _better(grounds):
         return _beside_rigid_body(grounds)
-    r2, asked = numbers(grounds.r2(MODEL)), f"{grounds.r2_min:g} is asked for"
-    if not np.all(good_axes(grounds, MODEL)):
-        text = f"better than the rigid body, but not good enough for control: R2 of held-out body torque {r2}; {asked}"
-        return "do-not-use", Reason(text, AGAINST)
-    text = f"better than the rigid body on held-out data, and good enough for control: R2 of body torque {r2}; {asked}"
-    return "good-for-control" if grounds.everywhere else "good-inside-region", Reason(text, 1)
+    why = _not_good_enough(grounds)
+    if why is not None:
+        return "do-not-use", Reason(f"better than the rigid body, but {why}", AGAINST)
+    confirmed = bool(np.all(confirmed_axes(grounds, MODEL)))
+    label: Label = "good-for-control" if grounds.everywhere and confirmed else "good-inside-region"
+    text = "better than the rigid body on held-out data, and good enough for control"
+    return label, Reason(f"{text}: {_r2_in_words(grounds, MODEL)}", FOR)
 
 
 def _better(grounds: Grounds) -> bool:
-    if grounds.torque is None:
-        return False
-    compared = [grounds.torque]
-    if grounds.steps.part in grounds.held_out:
-        compared.append(grounds.steps_beside(RIGID_BODY))
+    replayed = [grounds.replay_beside(part, MODEL, RIGID_BODY) for part in grounds.held_out]
+    compared = [*grounds.torque.values(), *replayed]
     return any(one.lower for one in compared) and not any(one.higher for one in compared)
+
+
+def _not_good_enough(grounds: Grounds) -> str | None:
+    """Say why a model that is better than the rigid body is not to be used; None where it is."""
+    if grounds.loses_many:
+        return f"{grounds.lost(MODEL)} of {grounds.windows} windows replayed do not come to their end"
+    if grounds.definite is not None and grounds.definite < DEFINITE_SHARE:
+        share = f"only {100 * grounds.definite:.3g} % of the bootstrap draws"
+        return (
+            f"{share} have a D(q) that is positive definite wherever training was; {100 * DEFINITE_SHARE:g} % are asked"
+        )
+    if np.all(good_axes(grounds, MODEL)) and np.any(confirmed_axes(grounds, MODEL)):
+        return None
+    r2 = numbers(grounds.r2(MODEL))
+    return f"not good enough for control: R2 of held-out body torque {r2}; {grounds.r2_min:g} is asked for"
+
+
+def _r2_in_words(grounds: Grounds, predictor: str) -> str:
+    """Give the R2 of the axes that it confirms, and name those that nothing confirms."""
+    confirmed, r2 = confirmed_axes(grounds, predictor), grounds.r2(predictor)
+    text = f"R2 of body torque {numbers(r2, confirmed)}; {grounds.r2_min:g} is asked for"
+    return text if np.all(confirmed) else f"{text}; about {_names(~confirmed)} nothing confirms it"
 
 
 def _beside_rigid_body(grounds: Grounds) -> tuple[Label, Reason]:
@@ -120,18 +157,29 @@ def _beside_rigid_body(grounds: Grounds) -> tuple[Label, Reason]:
     if np.any((r2 <= 0) & ~grounds.hardly_excited):
         text = f"neither the model nor the rigid body explains more of the torque than a constant does: {explains}"
         return "do-not-use", Reason(text, AGAINST)
+    if why is not None:
+        return "do-not-use", Reason(f"the model is not shown to be better than the rigid body, and that {why}", AGAINST)
     if not grounds.held_out:
         text = "nothing was held out, so nothing shows that the model is better than the rigid body, which is simpler"
         return "not-better-than-rigid-body", Reason(f"{text} (rigid body in training: {explains})", AGAINST)
-    use = "use the rigid body: it is simpler, and the model is not better by more than chance on held-out data"
-    if why is not None:
-        return "not-better-than-rigid-body", Reason(f"{use}; yet the rigid body {why}", AGAINST)
-    good = good_axes(grounds, RIGID_BODY)
-    if np.all(good):
-        return "not-better-than-rigid-body", Reason(f"{use}; it is itself good for control ({explains})", NEITHER)
-    bad = ", ".join(np.array(AXES)[~good])
-    text = f"{use}; yet about {bad} it is not good enough for control ({explains}; {grounds.r2_min:g} is asked for)"
-    return "not-better-than-rigid-body", Reason(text, AGAINST)
+    return "not-better-than-rigid-body", _rigid_body_instead(grounds)
+
+
+def _rigid_body_instead(grounds: Grounds) -> Reason:
+    """Say whether the rigid body is to be used in place of a model that is not better."""
+    bad = ~good_axes(grounds, RIGID_BODY)
+    if not np.any(bad):
+        use = "use the rigid body: it is simpler, and the model is not better by more than chance on held-out data"
+        return Reason(f"{use}; it is itself good for control ({_r2_in_words(grounds, RIGID_BODY)})", NEITHER)
+    neither = bad & ~good_axes(grounds, MODEL)
+    who, where = ("neither is", neither) if np.any(neither) else ("that is not", bad)
+    text = f"the model is not better than the rigid body by more than chance, and {who} "
+    explains = f"rigid body: R2 of body torque {numbers(grounds.r2(RIGID_BODY))}; {grounds.r2_min:g} is asked for"
+    return Reason(f"{text}good enough for control about {_names(where)} ({explains})", AGAINST)
+
+
+def _names(axes: BoolArray) -> str:
+    return ", ".join(np.array(AXES)[axes])
 
 
 def _no_body(grounds: Grounds) -> str:
@@ -143,7 +191,7 @@ def _no_body(grounds: Grounds) -> str:
     else:
         at = f"at {found.indefinite} of {next(iter(found.samples.values()))} training samples"
     text = f"D(q) is not positive definite {at}: no body turns like that"
-    if grounds.held_out and np.all(good_axes(grounds, RIGID_BODY)) and why_unphysical(found.rigid_body) is None:
+    if grounds.held_out and np.all(confirmed_axes(grounds, RIGID_BODY)) and why_unphysical(found.rigid_body) is None:
         text += f"; the rigid body is good for control (R2 of body torque {numbers(grounds.r2(RIGID_BODY))})"
     return text
 

@@ -13,7 +13,8 @@ from cpfls_cli.regressor import Motion
 from cpfls_cli.trajectory import full_rotation
 from cpfls_cli.trajectory.rotation_settings import RotationSettings
 from cpfls_cli.validation.grounds import Grounds
-from cpfls_cli.validation.paired import Comparison, compare_torque
+from cpfls_cli.validation.paired import Comparison
+from cpfls_cli.validation.paired_torque import compare_torque
 from cpfls_cli.validation.physical import physical_sense
 from cpfls_cli.validation.residuals import examine_residuals
 from cpfls_cli.validation.steps import replay_steps
@@ -60,10 +61,12 @@ def grounds(torque_of, noise=0.0, structure=(), *, held_out=True, seeds=(3, 53))
     found = identify(training, training, parts, settings, np.random.default_rng(1))
     part, data = ("other", other) if held_out else ("training", training)
     rigid_body = found.baselines[0]
+    steps = replay_steps(part, data, {"model": found.model, "rigid-body": rigid_body.parameters}, 10, 100)
     return Grounds(
         identification=found,
-        torque=compare_torque(parts, found.model.torque, rigid_body.torque),
-        steps=replay_steps(part, data, {"model": found.model, "rigid-body": rigid_body.parameters}, 10, 100),
+        torque={name: compare_torque(own, found.model.torque, rigid_body.torque) for name, own in parts.items()},
+        steps=steps,
+        replayed={part: steps},
         residuals=examine_residuals(part, data, found.model.torque, 20),
         physics=physical_sense(found.model, np.random.default_rng(2)),
         r2_min=0.8,
@@ -161,20 +164,33 @@ def test_r2_asked_for(better, r2, label):
     assert (said(judged, "R2 of body torque, held out") == 1) == (label == "good-for-control")
 
 
+def with_replayed(evidence, **changes):
+    return replace(evidence, replayed={"other": replace(evidence.replayed["other"], **changes)})
+
+
+def with_yaw_rate(evidence, share):
+    """The same evidence with errors of the model's yaw rate that are a share of those if nothing moved."""
+    errors = evidence.replayed["other"].window_error.copy()
+    errors[0, :, 2] = share * errors[2, :, 2]
+    return with_replayed(evidence, window_error=errors)
+
+
 def test_an_axis_that_hardly_moves_is_judged_by_its_rate_replayed(better):
-    quiet = with_still_yaw(with_r2(better, [0.9, 0.9, 0.1], [0.5, 0.5, 0.1]))
-    judged = verdict(quiet)
-    assert judged.label == "good-for-control"
+    quiet = with_still_yaw(with_r2(better, [0.9, 0.9, -5.0], [0.5, 0.5, 0.1]))
+    judged = verdict(with_yaw_rate(quiet, 1e-3))
+    assert judged.label == "good-inside-region"
+    assert "about yaw nothing confirms it" in judged.reason[0]
+    assert "-5" not in judged.reason[0]
     assert said(judged, "yaw hardly moves") == 0
-    rate = quiet.steps.body_rate.copy()
-    rate[0, :, 2] = 1.1 * rate[2, :, 2]
-    worse = replace(quiet, steps=replace(quiet.steps, body_rate=rate))
-    assert verdict(worse).label == "do-not-use"
+
+
+@pytest.mark.parametrize("share", [1.0, 1.2, np.nan])
+def test_a_rate_that_is_no_better_than_nothing_moves_refuses_an_axis(better, share):
+    worse = with_yaw_rate(with_still_yaw(with_r2(better, [0.9, 0.9, 0.1], [0.5, 0.5, 0.1])), share)
+    assert verdict(worse).label != "good-for-control"
+    assert verdict(worse).label != "good-inside-region"
     assert said(verdict(worse), "yaw hardly moves") == -1
     np.testing.assert_array_equal(good_axes(worse, "model"), [True, True, False])
-    rate[0, :, 2] = np.nan
-    lost = replace(quiet, steps=replace(quiet.steps, body_rate=rate))
-    np.testing.assert_array_equal(good_axes(lost, "model"), [True, True, False])
 
 
 def compared(*, lower=False, higher=False):
@@ -195,18 +211,84 @@ def compared(*, lower=False, higher=False):
 def test_better_is_lower_beyond_chance_in_one_and_higher_in_none(better, torque, steps, label):
     errors = better.steps.window_error.copy()
     errors[0] = {"lower": 0.5, "same": 1.0, "higher": 2.0}[steps] * errors[1]
-    changed = replace(better, torque=torque, steps=replace(better.steps, window_error=errors))
+    changed = with_replayed(replace(better, torque={"other": torque}), window_error=errors)
     assert verdict(changed).label == label
 
 
-def test_a_rigid_body_that_is_not_good_either_is_said_to_be_so(better):
-    evidence = replace(with_r2(better, [0.7, 0.9, 0.9], [0.7, 0.9, 0.9]), torque=compared(higher=True))
+def not_better(evidence):
+    return replace(evidence, torque={"other": compared(higher=True)})
+
+
+def test_a_rigid_body_that_is_not_good_either_is_not_recommended(better):
+    evidence = not_better(with_r2(better, [0.7, 0.9, 0.9], [0.7, 0.9, 0.9]))
     judged = verdict(evidence)
     assert judged.label == "not-better-than-rigid-body"
-    assert "yet about roll it is not good enough for control" in judged.reason[0]
+    assert "and neither is good enough for control about roll" in judged.reason[0]
+    alone = verdict(not_better(with_r2(better, [0.9, 0.9, 0.9], [0.7, 0.9, 0.9])))
+    assert "that is not good enough for control about roll" in alone.reason[0]
+    assert not any("use the rigid body" in text for one in (judged, alone) for text in one.reason)
     useless = verdict(with_r2(evidence, [-0.1, 0.9, 0.9], [-0.1, 0.9, 0.9]))
     assert useless.label == "do-not-use"
     assert "than a constant does" in useless.reason[0]
+
+
+def test_a_rigid_body_that_is_none_is_not_recommended(better):
+    unphysical = replace(better.identification, rigid_body=np.array([0.6, -0.1, 1.2, 0.0, 0.0, 0.0]))
+    judged = verdict(not_better(replace(better, identification=unphysical)))
+    assert judged.label == "do-not-use"
+    assert "use the rigid body" not in judged.reason[0]
+    assert "is not positive definite" in judged.reason[0]
+
+
+def with_lost(evidence, windows):
+    """The model loses the first windows; in the others it errs half as much as the rigid body."""
+    steps = evidence.replayed["other"]
+    errors, lost = steps.window_error.copy(), steps.lost.copy()
+    errors[0], lost[0] = 0.5 * errors[1], windows
+    errors[0, :windows] = np.nan
+    return with_replayed(evidence, window_error=errors, lost=lost)
+
+
+@pytest.mark.parametrize(
+    ("lost", "torque", "label"),
+    [
+        (90, compared(), "not-better-than-rigid-body"),
+        (90, compared(lower=True), "not-better-than-rigid-body"),
+        (100, compared(), "not-better-than-rigid-body"),
+        (6, compared(lower=True), "do-not-use"),
+    ],
+)
+def test_windows_that_the_model_loses_count_against_it(better, lost, torque, label):
+    judged = verdict(with_lost(replace(better, torque={"other": torque}), lost))
+    assert judged.label == label
+    assert said(judged, f"{lost} of 100 windows replayed do not come to their end: ") == -1
+
+
+def test_windows_that_both_lose_prove_nothing(better):
+    errors = np.full_like(better.steps.window_error, np.nan)
+    lost = np.full_like(better.steps.lost, 100)
+    gone = with_replayed(replace(better, torque={"other": compared()}), window_error=errors, lost=lost)
+    assert verdict(gone).label == "not-better-than-rigid-body"
+    some_torque = replace(gone, torque={"other": compared(lower=True)})
+    assert verdict(some_torque).label == "do-not-use"
+
+
+def test_a_rule_of_all_attitudes_has_to_be_a_body_at_all_of_them(better):
+    """Training went all round in roll and in pitch and yet left most attitudes out."""
+    physics = replace(better.physics, indefinite_anywhere=2000)
+    judged = verdict(replace(better, physics=physics))
+    assert judged.label == "good-inside-region"
+    assert judged.region != "every roll and pitch"
+    assert said(judged, "not positive definite in 2000 of the 4896 cells of all roll and pitch") == -1
+
+
+@pytest.mark.parametrize(("definite", "label"), [(0.98, "good-for-control"), (0.97, "do-not-use")])
+def test_most_draws_have_to_be_a_body_wherever_training_was(better, definite, label):
+    judged = verdict(replace(better, definite=definite))
+    assert judged.label == label
+    assert said(judged, "D(q) is positive definite in all these cells") == (1 if definite > 0.975 else -1)
+    if label == "do-not-use":
+        assert "only 97 % of the bootstrap draws" in judged.reason[0]
 
 
 def test_one_cell_without_a_body_is_enough_to_refuse(better):
@@ -218,8 +300,8 @@ def test_one_cell_without_a_body_is_enough_to_refuse(better):
 
 def test_what_does_not_decide_is_told(better):
     stopped = replace(better.identification, stop_reason="time-limit")
-    steps = replace(better.steps, lost=better.steps.lost + np.array([[3], [0], [0]]))
-    evidence = replace(better, identification=stopped, steps=steps, band=np.array([0.2, 1.4, 0.3]))
+    lost = better.steps.lost + np.array([[3], [0], [0]])
+    evidence = replace(with_replayed(better, lost=lost), identification=stopped, band=np.array([0.2, 1.4, 0.3]))
     judged = verdict(evidence)
     assert judged.label == "good-for-control"
     assert said(judged, "the search stopped before its end (time-limit") == -1

@@ -2,11 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import binom
 
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.regressor import Motion
-from cpfls_cli.validation.paired import BLOCKS, compare, compare_torque, compare_windows
+from cpfls_cli.validation.memory import BLOCKS, block_count, correlation_time
+from cpfls_cli.validation.paired import compare
+from cpfls_cli.validation.paired_torque import compare_torque
+from cpfls_cli.validation.paired_windows import apart, compare_windows
 
 
 def test_equal_models_differ_by_chance_as_often_as_they_should():
@@ -48,12 +52,36 @@ def test_three_blocks_prove_nothing():
     assert (found.lower, found.blocks) == (False, 3)
 
 
-def test_windows_that_were_lost_are_left_out():
+def windows(ours, theirs, size=1.0):
+    return compare_windows(ours, theirs, size, np.arange(len(ours)) * BLOCKS // len(ours))
+
+
+def test_windows_that_one_lost_speak_for_the_other():
     ours, theirs = np.ones(100), np.full(100, 2.0)
-    ours[10:20], theirs[30:40] = np.nan, np.nan
-    found = compare_windows(ours, theirs, 1.0)
-    assert (found.ratio, found.lower) == (0.5, True)
-    assert compare_windows(np.full(5, np.nan), theirs[:5], 1.0).blocks == 0
+    assert windows(ours, theirs).lower
+    ours[:90] = np.nan
+    assert (windows(ours, theirs).lower, windows(ours, theirs).higher) == (False, True)
+    assert windows(theirs, ours).lower
+
+
+def test_windows_that_both_lost_are_left_out():
+    ours, theirs = np.ones(100), np.full(100, 2.0)
+    ours[10:20] = theirs[10:20] = np.nan
+    found = windows(ours, theirs)
+    assert (found.ratio, found.lower, found.blocks) == (0.5, True, 18)
+    none = windows(np.full(5, np.nan), np.full(5, np.nan))
+    assert (none.blocks, none.lower, none.higher) == (0, False, False)
+
+
+def test_all_windows_lost_is_worse_than_any():
+    found = windows(np.full(40, np.nan), np.random.default_rng(64).lognormal(size=40))
+    assert (found.lower, found.higher) == (False, True)
+
+
+def test_windows_apart_do_not_overlap():
+    start = np.array([0, 3, 10, 12, 19, 20, 50])
+    np.testing.assert_array_equal(start[apart(start, 10)], [0, 10, 20, 50])
+    assert len(apart(start[:0], 10)) == 0
 
 
 def flight(torque, attitude):
@@ -67,16 +95,53 @@ def test_torque_is_scaled_by_axis_and_left_out_where_the_pitch_is_vertical():
     attitude = np.zeros((400, 3))
     attitude[::7, 1] = np.pi / 2
     told = np.arange(400) % 7 != 0
-    parts = {"one": flight(torque, attitude)}
     found = compare_torque(
-        parts, lambda motion: 0.9 * torque[: len(motion)], lambda motion: 0.8 * torque[: len(motion)]
+        flight(torque, attitude),
+        lambda motion: 0.9 * torque[: len(motion)],
+        lambda motion: 0.8 * torque[: len(motion)],
     )
     scaled = np.sum((0.1 * torque[told]) ** 2 / np.mean(torque[told] ** 2, axis=0), axis=1)
     assert found.ours == pytest.approx(np.mean(scaled), rel=0.01)
     assert found.ratio == pytest.approx(0.25)
     assert found.lower
-    assert found.blocks == BLOCKS
+    # 342 samples are left, and a block has 20.
+    assert found.blocks == 17
 
 
-def test_nothing_held_out_is_nothing_to_compare():
-    assert compare_torque({}, np.zeros_like, np.zeros_like) is None
+def test_a_vertical_pitch_throughout_is_nothing_to_compare():
+    data = flight(np.ones((50, 3)), np.tile([0.0, np.pi / 2, 0.0], (50, 1)))
+    assert compare_torque(data, lambda motion: motion.rate, lambda motion: motion.rate).blocks == 0
+
+
+def coloured(rng, samples, memory):
+    share = np.exp(-1 / memory)
+    white = rng.standard_normal((300 + samples, 3))
+    return lfilter([np.sqrt(1 - share**2)], [1, -share], white, axis=0)[300:]
+
+
+@pytest.mark.parametrize("samples", [40, 100, 200, 1000])
+@pytest.mark.parametrize("memory", [5, 20])
+def test_errors_that_remember_each_other_seldom_prove_what_is_not_so(samples, memory):
+    """Two models that are equally wrong, on a hold-out from far too short to long."""
+    rng, proved = np.random.default_rng(65), 0
+    for _ in range(200):
+        noise, ours, theirs = (coloured(rng, samples, memory) for _ in range(3))
+        data = flight(5 * coloured(rng, samples, memory), np.zeros((samples, 3)))
+        found = compare_torque(
+            data, lambda _, d=data, e=noise + ours: d.torque + e, lambda _, d=data, e=noise + theirs: d.torque + e
+        )
+        proved += found.lower + found.higher
+    # Both directions; 0.05 of each would be 20 of 200, and 4 more by the chance of this test.
+    assert proved <= 24
+
+
+def test_blocks_are_at_least_four_correlation_times_long():
+    rng = np.random.default_rng(66)
+    assert block_count(rng.standard_normal((5000, 3))) == BLOCKS
+    assert block_count(rng.standard_normal((99, 3))) == 4
+    slow = np.sin(2 * np.pi * np.arange(1000) / 400)[:, None]
+    # cos reaches 1/e at 0.19 of a period of 400 samples; the end of the flight takes a little off.
+    assert correlation_time(slow) == pytest.approx(75, abs=8)
+    assert block_count(slow) == 1000 // (4 * correlation_time(slow))
+    assert correlation_time(np.ones((50, 2))) == 0
+    assert block_count(np.zeros((0, 3))) == 1

@@ -68,3 +68,13 @@ def test_a_coriolis_matrix_that_is_not_christoffel_s_makes_energy():
 def test_a_body_that_stands_still_makes_none():
     still = InertiaValues(np.eye(3)[None], np.zeros((1, 3, 3, 3)))
     assert energy_share(still, np.zeros((1, 3, 3)), np.zeros((1, 3))) == 0.0
+
+
+def test_cells_that_training_did_not_visit_are_examined_too():
+    """A D11 of -0.7 more is no body anywhere, wherever training was."""
+    visited = np.zeros((72, 72), dtype=bool)
+    visited[36, 36] = True
+    found = examined(visited=visited, d11=-0.7)
+    assert (found.indefinite_anywhere, found.every_cell) == (72 * 68, 72 * 68)
+    assert examined(visited=visited).indefinite_anywhere == 0
+    assert examined(visited=np.zeros((72, 72), dtype=bool), d11=-0.7).indefinite_anywhere == 72 * 68

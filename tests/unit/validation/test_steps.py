@@ -8,6 +8,7 @@ import pytest
 from cpfls_cli.identification.data import TorqueData, joined
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion
+from cpfls_cli.rotations import generalised_torque
 from cpfls_cli.trajectory import full_rotation
 from cpfls_cli.trajectory.rotation_settings import RotationSettings
 from cpfls_cli.validation.steps import NOTHING_MOVES, replay_steps
@@ -64,7 +65,8 @@ def test_no_window_at_a_vertical_pitch():
     found = replay_steps("x", steep[20:], {"body": INERTIA}, 4, 1000)
     assert found.windows == 0
     assert np.isnan(found.attitude).all()
-    assert found.window_error.shape == (2, 0)
+    assert found.window_error.shape == (2, 0, 3)
+    assert len(found.start) == 0
 
 
 @pytest.mark.parametrize("inertia", [[0.6, -0.8, 1.2, 0, 0, 0], [0.6, 0.8, 0.0, 0, 0, 0], [0.6, 0.8, 1.2, 0.9, 0, 0]])
@@ -97,5 +99,14 @@ def test_windows_are_the_same_read_at_once_or_one_by_one(monkeypatch):
 
 def test_errors_by_window_and_by_horizon_are_the_same_errors():
     found = replay_steps("x", flight(), {"body": 1.1 * INERTIA}, 12, 30)
-    by_window, by_horizon = np.mean(found.window_error, axis=1), np.mean(np.sum(found.body_rate**2, axis=2), axis=1)
+    by_window, by_horizon = np.mean(found.window_error, axis=1), np.mean(found.body_rate**2, axis=1)
     np.testing.assert_allclose(by_window, by_horizon)
+
+
+def test_a_constant_torque_is_taken_off_what_was_measured():
+    data, constant = flight(), np.array([0.3, -0.2, 0.1])
+    pushed = replace(data, torque=data.torque + generalised_torque(data.motion.attitude, np.tile(constant, (300, 1))))
+    plain = replay_steps("x", data, {"body": INERTIA, "other": 1.1 * INERTIA}, 12, 30)
+    found = replay_steps("x", pushed, {"body": INERTIA, "other": 1.1 * INERTIA}, 12, 30, {"body": constant})
+    np.testing.assert_allclose(found.body_rate[0], plain.body_rate[0], rtol=1e-6, atol=1e-9)
+    assert np.mean(found.window_error[1]) > 1.5 * np.mean(plain.window_error[1])
