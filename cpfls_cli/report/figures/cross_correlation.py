@@ -44,8 +44,9 @@ def cross_correlation_figure(name: str, model: Source) -> Plot:
         panels[-1].set_xlabel("lag, s (positive: the error follows the input)")
 
     caption = (
-        f"Correlation of the torque error of {model.label} with the signals that go into the model, on "
-        f"{artifact.text('residuals/part')}; the three strongest of each axis are named, the others are grey lines. "
+        f"Correlation of the torque error of {model.label} with the signals that go into the model and the "
+        f"torque that comes out of it, on {artifact.text('residuals/part')}; the three strongest of each axis are "
+        "named, the others are grey lines. "
         "Far outside the grey band the error follows a signal, so that a better model could explain it; slow signals "
         "leave the band by chance too."
     )

@@ -22,6 +22,9 @@ def residuals(rng):
     return {
         "residuals/part": np.array("held-out rest"),
         "residuals/samples": 2500,
+        "residuals/available": 7300,
+        "residuals/mean": np.array([0.002, 0.125, 1e-20]),
+        "residuals/mean_p": np.array([0.3, 1e-30, np.nan]),
         "residuals/lag": lag * 0.01,
         "residuals/autocorrelation": 0.7 ** lag[:, None] * np.array([1.0, 0.2, np.nan]),
         "residuals/band": 1.96 / 50,

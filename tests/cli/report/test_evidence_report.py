@@ -142,11 +142,24 @@ def test_the_ridge_curve_says_whether_there_is_evidence_for_a_fuzzy_part(report,
     assert "ridge-curve-1" in page.figures
 
 
+def test_how_many_samples_of_how_many_were_examined(report, model):
+    assert "the first 2500 of its 7300 samples" in section(report(model()), "residuals")
+    whole = section(report(model(**{"residuals/available": 2500})), "residuals")
+    assert "held-out rest, 2500 samples" in whole
+
+
+def test_a_model_of_before_the_mean_was_tested_is_shown(report, model):
+    missing = dict.fromkeys(["residuals/available", "residuals/mean", "residuals/mean_p"])
+    shown = section(report(model(**missing)), "residuals")
+    assert "2500 samples" in shown
+    assert re.search(r"pitch 0\.140 \S+ % 0\.40 — — white", shown)
+
+
 def test_residuals_are_called_white_where_they_are(page):
     shown = section(page, "residuals")
-    assert re.search(r"roll 0\.700 2\d\.\d % < 10⁻⁶ not white", shown)
-    assert re.search(r"pitch 0\.140 \S+ % 0\.40 white", shown)
-    assert "yaw — — — only rounding is left" in shown
+    assert re.search(r"roll 0\.700 2\d\.\d % < 10⁻⁶ \S+ 0\.30 not white pitch", shown)
+    assert re.search(r"pitch 0\.140 \S+ % 0\.40 0\.1250? < 10⁻⁶ white, not 0 in the mean", shown)
+    assert "yaw — — — — — only rounding is left" in shown
     assert re.search(r"roll \+0\.4\d at 0\.0\d ◂", shown)
     assert "a|b <i>" in shown
 
