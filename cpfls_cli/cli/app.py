@@ -422,16 +422,20 @@ def export(
     model: ModelArgument,
     output: OutputOption,
     form: Annotated[
-        ExportFormat,
+        ExportFormat | None,
         typer.Option(
             "--format",
             help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
-            "module that needs NumPy only.",
+            "module that needs NumPy only; without, by the suffix of FILE (.json, .c, .py).",
         ),
-    ],
+    ] = None,
     name: Annotated[
         str | None,
-        typer.Option("--name", metavar="NAME", help="Prefix of the names in C; without, from the name of the output."),
+        typer.Option(
+            "--name",
+            metavar="NAME",
+            help="Prefix of the names in C, name in JSON; without, from the name of FILE.",
+        ),
     ] = None,
     *,
     common: Common,
@@ -445,7 +449,7 @@ def export(
         narration = Narration("export", common.verbose and not common.quiet)
         with progress_bar("export", common) as progress:
             job = Job(validate({}, "default"), output, common.force, common.dry_run, progress, narration.reads)
-            outcome = stage.run(job, model, form.value, name)
+            outcome = stage.run(job, model, form and form.value, name)
         if not common.dry_run:
             narration.wrote(output)
         tell(outcome, common)

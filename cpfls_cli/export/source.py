@@ -58,7 +58,7 @@ def common_words(sheet: Sheet) -> dict[str, Any]:
         "banner": comment_lines(banner(sheet)),
         "facts": comment_lines(facts(sheet)),
         "complete": sheet.evidence.complete,
-        "verdict_label": literal_text(verdict.label) if verdict else "",
+        "verdict_label": literal_text(verdict.label) if verdict else "none",
         "model_sha256": sheet.provenance.sha256,
         "vertical": VERTICAL,
         "cells": CELLS,

@@ -96,5 +96,7 @@ def checked_identifier(name: str) -> str:
     InputError
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise InputError(f"--name {name}: is no identifier; use letters, digits and underscores, a letter first")
+        raise InputError(
+            f"--name {name or repr(name)}: is no identifier; use letters, digits and underscores, a letter first"
+        )
     return name

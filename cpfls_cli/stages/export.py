@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,19 +20,18 @@ from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points
 from cpfls_cli.export.python_form import python_source
 from cpfls_cli.export.sheet import Provenance, Sheet
-from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
+from cpfls_cli.stages.export_names import form_of, outputs_of, prefix_of
 from cpfls_cli.stages.extended_file import is_extended
 from cpfls_cli.stages.job import Job, Outcome, take_inputs
 from cpfls_cli.stages.model_file import read_model
 from cpfls_cli.stages.sources import read_good
 
-_ENDINGS = {"json": ".json", "c": ".c", "python": ".py"}
 _SEED = 1
 
 
-def run(job: Job, model: Path, form: str, name: str | None) -> Outcome:
+def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     """Write a model in another form.
 
     Parameters
@@ -41,18 +39,21 @@ def run(job: Job, model: Path, form: str, name: str | None) -> Outcome:
     job : Job
         Its study is not used: a model holds its own.
     model : Path
-    form : {"json", "c", "python"}
+    form : {"json", "c", "python"} or None
+        None takes the suffix of the output.
     name : str or None
-        Prefix of the names in source code; None takes the name of the output.
+        Prefix of the names in C, name of the model in JSON; None takes the name of the output.
 
     Returns
     -------
     Outcome
     """
-    prefix = identifier(job.output.stem) if name is None else checked_identifier(name)
-    outputs = _outputs(job.output, form)
+    form = form or form_of(job.output)
+    prefix = prefix_of(job.output, form, name)
+    outputs = outputs_of(job.output, form)
     files = [take_inputs(replace(job, output=output), {"model": model})["model"] for output in outputs]
-    for output in outputs:
+    # The file that was asked for first: a message about its folder is to name it.
+    for output in reversed(outputs):
         check_output(output, job.force)
     sheet = _sheet(model, prefix, files[0].sha256)
     if not sheet.evidence.complete and not job.force:
@@ -64,19 +65,7 @@ def run(job: Job, model: Path, form: str, name: str | None) -> Outcome:
     if not job.dry_run:
         for path, text in texts.items():
             write_text(path, text)
-    return _outcome(sheet, form, texts, job.dry_run)
-
-
-def _outputs(output: Path, form: str) -> list[Path]:
-    """Name the files to be written, the one that needs the others last."""
-    ending = _ENDINGS[form]
-    if output.suffix != ending:
-        raise InputError(f"{output}: --format {form} writes a file that ends in {ending}; name it so")
-    if form != "c":
-        return [output]
-    if not re.fullmatch(r"[A-Za-z0-9_.+-]+", output.stem):
-        raise InputError(f"{output}: C includes its header by name; use letters, digits and any of _ . + - in it")
-    return [output.with_suffix(".h"), output]
+    return _outcome(sheet, form, texts, job.dry_run, tuple(_warnings(sheet, model)))
 
 
 def _sheet(path: Path, name: str, sha256: str) -> Sheet:
@@ -115,7 +104,22 @@ def _texts(sheet: Sheet, form: str, outputs: list[Path]) -> dict[Path, str]:
     return {outputs[0]: written.header, outputs[1]: written.source}
 
 
-def _outcome(sheet: Sheet, form: str, texts: Mapping[Path, str], dry_run: bool) -> Outcome:
+def _warnings(sheet: Sheet, model: Path) -> Iterator[str]:
+    """Say what speaks against flying with this model."""
+    verdict = sheet.evidence.verdict
+    if not sheet.evidence.complete:
+        yield "the model is incomplete, and marked as such: do not fly with it"
+    if verdict is None:
+        identification = sheet.provenance.config.get("identification") or {}
+        off = not (identification.get("validation") or {}).get("enabled", True)
+        why = "identification.validation.enabled was off when it was identified" if off else "it was not validated"
+        yield f"{model}: holds no verdict: {why}; nothing says how far to trust it; `cpfls identify` it with it on"
+    elif verdict.label == "do-not-use":
+        against = [reason for reason, speaks in verdict.reasons if speaks < 0]
+        yield ": ".join([f"{model}: its verdict is do-not-use, exported all the same", *against[:1]])
+
+
+def _outcome(sheet: Sheet, form: str, texts: Mapping[Path, str], dry_run: bool, warnings: tuple[str, ...]) -> Outcome:
     evidence = sheet.evidence
     sizes = {str(path): len(text.encode()) for path, text in texts.items()}
     summary = {
@@ -134,7 +138,5 @@ def _outcome(sheet: Sheet, form: str, texts: Mapping[Path, str], dry_run: bool) 
     verb = "would be written" if dry_run else "written"
     lines = [f"{path}: {verb} ({size} bytes)" for path, size in sizes.items()]
     lines.append(f"training visited {summary['region_share']:.1%} of the circle of roll and pitch")
-    if evidence.verdict:
-        lines.append(f"verdict: {evidence.verdict.label}")
-    warnings = () if evidence.complete else ("the model is incomplete, and marked as such: do not fly with it",)
+    lines.append(f"verdict: {evidence.verdict.label if evidence.verdict else 'none'}")
     return Outcome(summary, tuple(lines), warnings)

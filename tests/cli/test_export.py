@@ -191,10 +191,11 @@ def test_output_rules(cpfls, refuse, model, tmp_path):
     assert refuse(*words, "--dry-run") == [f"{tmp_path / 'm.h'}: exists already; --force replaces it"]
     assert cpfls(*words, "--force", "-q").stdout == ""
     assert "precious" not in (tmp_path / "m.h").read_text()
-    assert refuse(*words) == [f"{tmp_path / 'm.h'}: exists already; --force replaces it"]
-    missing = tmp_path / "none" / "m.json"
-    (line,) = refuse("export", model, "--format", "json", "-o", missing)
-    assert line == f"{missing}: cannot write into the folder {missing.parent}: No such file or directory"
+    assert refuse(*words) == [f"{tmp_path / 'm.c'}: exists already; --force replaces it"]
+    for form, ending in ENDINGS.items():
+        missing = tmp_path / "none" / f"m.{ending}"
+        (line,) = refuse("export", model, "--format", form, "-o", missing)
+        assert line == f"{missing}: cannot write into the folder {missing.parent}: No such file or directory"
     for form, name, ending in (("c", "m.h", ".c"), ("json", "m.h5", ".json"), ("python", "m", ".py")):
         (line,) = refuse("export", model, "--format", form, "-o", tmp_path / name)
         assert line == f"{tmp_path / name}: --format {form} writes a file that ends in {ending}; name it so"
@@ -227,6 +228,81 @@ def test_names(cpfls, refuse, pipeline, tmp_path):
     assert "#define QUAD_7_OUTSIDE 1u" in (tmp_path / "2-m.h").read_text()
     (line,) = refuse(*words, "--force", "--name", "x; int y")
     assert line == "--name x; int y: is no identifier; use letters, digits and underscores, a letter first"
+
+
+def test_an_empty_name_is_shown(refuse, pipeline, tmp_path):
+    (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.c", "--name", "")
+    assert line == "--name '': is no identifier; use letters, digits and underscores, a letter first"
+
+
+def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):
+    words = ("export", pipeline.model, "--name", "uav", "-o")
+    (line,) = refuse(*words, tmp_path / "m.py")
+    assert line == "--name uav: a module of Python is called as its file is; leave --name out, or rename -o"
+    assert cpfls(*words, tmp_path / "m.json").exit_code == 0
+    assert json.loads((tmp_path / "m.json").read_text())["name"] == "uav"
+
+
+@pytest.mark.parametrize("form", ENDINGS)
+def test_the_suffix_tells_the_form(cpfls, pipeline, tmp_path, form):
+    output = tmp_path / f"m.{ENDINGS[form]}"
+    result = cpfls("export", pipeline.model, "-o", output, "--json")
+    assert json.loads(result.stdout)["format"] == form
+    told = tmp_path / "told" / output.name
+    told.parent.mkdir()
+    assert cpfls("export", pipeline.model, "--format", form, "-o", told).exit_code == 0
+    assert told.read_bytes() == output.read_bytes()
+
+
+def test_a_suffix_that_tells_no_form(refuse, pipeline, tmp_path):
+    (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.h")
+    assert line == (
+        f"{tmp_path / 'm.h'}: the ending tells no form; end the name in one of .json (json), .c (c), .py (python)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("stem", "instead"),
+    [("class", "class_model"), ("a b", "a_b_model"), ("2-m", "model_2_m_model"), ("numpy", "numpy_model")],
+)
+def test_a_module_that_nobody_could_import(cpfls, refuse, pipeline, tmp_path, stem, instead):
+    output = tmp_path / f"{stem}.py"
+    (line,) = refuse("export", pipeline.model, "-o", output)
+    assert line.startswith(f"{output}: Python cannot import a module of this name; use letters, digits and _")
+    assert line.endswith(f"such as {instead}.py")
+    assert cpfls("export", pipeline.model, "-o", tmp_path / f"{instead}.py").exit_code == 0
+    command = [sys.executable, "-c", f"import {instead}"]
+    assert subprocess.run(command, cwd=tmp_path, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("form", ENDINGS)
+def test_a_model_without_verdict_is_told(cpfls, model, tmp_path, form):
+    change(model, verdict=None)
+    output = tmp_path / f"m.{ENDINGS[form]}"
+    result = cpfls("export", model, "-o", output)
+    assert result.exit_code == 0
+    assert result.stderr.startswith(f"cpfls: note: {model}: holds no verdict: ")
+    assert len(result.stderr.splitlines()) == 1
+    assert result.stdout.endswith("verdict: none\n")
+    if form == "c":
+        assert '#define M_VERDICT "none"\n' in output.with_suffix(".h").read_text()
+    else:
+        assert ("VERDICT = None\n" if form == "python" else '"verdict": null') in output.read_text()
+
+
+def test_a_model_that_was_judged_unfit_is_told(cpfls, model, tmp_path):
+    change(
+        model,
+        verdict__label=np.array("do-not-use"),
+        verdict__reason=np.array(["it is fast", "it explains nothing"]),
+        verdict__speaks=np.array([1, -1]),
+    )
+    result = cpfls("export", model, "-o", tmp_path / "m.c")
+    assert result.exit_code == 0
+    assert result.stderr == (
+        f"cpfls: note: {model}: its verdict is do-not-use, exported all the same: it explains nothing\n"
+    )
+    assert '#define M_VERDICT "do-not-use"\n' in (tmp_path / "m.h").read_text()
 
 
 def test_formats_are_named(cpfls, pipeline, tmp_path):
