@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from cpfls_cli.report.claims.claim import Claim
 from cpfls_cli.report.claims.paired import PairedRatio, paired_ratio
 from cpfls_cli.report.numbers import number
@@ -28,7 +30,8 @@ AS_GOOD = max(printed_ratio(column, PRINTED[1]) for column in PRINTED[2:5])
 
 RULE = (
     f"Ratio of the mean squared errors, paired by seed, with its 95 % interval. Pass: all of it at most "
-    f"{number(AS_GOOD, 3)}, the largest ratio that the paper prints and calls no difference; fail: all of it above."
+    f"{number(AS_GOOD, 3)}, the largest ratio that the paper prints and calls no difference; fail: all of it above, or "
+    "a seed that finds no model where the other setting finds one."
 )
 
 
@@ -50,9 +53,11 @@ def as_good(claim: Claim, setting: SweptSetting, reference: SweptSetting, reason
     found = paired_ratio(setting, reference)
     if not found.seeds:
         return None
-    searched = f"{_seeds(found)} of {_sizes(setting, reference)} (population × generations)."
-    if found.seeds == 1:
-        return claim.undecided(times(found.ratio), f"{searched} One seed says nothing about the next.")
+    searched = f"{_seeds(found)} of {_sizes(setting, reference)} (population × generations).{_failed(found)}"
+    if np.isinf(found.ratio):
+        return claim.decided(False, f"no model for {found.failed} of {_seeds(found)}", searched)
+    if np.isnan(found.low):
+        return claim.undecided(times(found.ratio), f"{searched} Fewer than two seeds with models say nothing.")
     ours = f"{times(found.ratio)} ({number(found.low, 3)} to {number(found.high, 3)})"
     tested = f"{searched} Wilcoxon p that neither is better: {number(found.p_value, 2)}."
     if found.low <= AS_GOOD < found.high:
@@ -79,6 +84,11 @@ def times(ratio: float) -> str:
 
 def _seeds(found: PairedRatio) -> str:
     return f"{found.seeds} seed{'' if found.seeds == 1 else 's'}"
+
+
+def _failed(found: PairedRatio) -> str:
+    counts = {"this setting": found.failed, "the one beside it": found.reference_failed}
+    return "".join(f" No model in {count} of them with {whose}." for whose, count in counts.items() if count)
 
 
 def _sizes(setting: SweptSetting, reference: SweptSetting) -> str:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from cpfls_cli.report.numbers import UNKNOWN
 
-Agreement = Literal["agrees", "differs", "cannot be compared", "not shown"]
+Agreement = Literal["agrees", "differs", "read as printed", "cannot be compared", "not shown"]
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,8 @@ class ComparedFigure:
         Number and subject.
     paper, ours : str
         What the paper's text says of it in numbers, and the same of ours.
-    agreement : {"agrees", "differs", "cannot be compared", "not shown"}
+    agreement : {"agrees", "differs", "read as printed", "cannot be compared", "not shown"}
+        Read as printed: the paper's own numbers, decoded as here, agree with each other. It says nothing of any model.
     why : str
     """
 
@@ -43,6 +44,20 @@ def agreement(agrees: bool) -> Agreement:
     {"agrees", "differs"}
     """
     return "agrees" if agrees else "differs"
+
+
+def reading(agrees: bool) -> Agreement:
+    """Say whether printed numbers agree with each other as they are decoded here, whatever was identified.
+
+    Parameters
+    ----------
+    agrees : bool
+
+    Returns
+    -------
+    {"read as printed", "differs"}
+    """
+    return "read as printed" if agrees else "differs"
 
 
 def not_shown(title: str, printed: str, why: str) -> ComparedFigure:

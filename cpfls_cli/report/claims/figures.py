@@ -30,7 +30,6 @@ def compared_figures(sources: Sources) -> list[ComparedFigure]:
         attitude_compared,
         torque_compared,
         reduction_compared,
-        partitions_compared,
-        error_compared,
     )
-    return [seesaw_compared(), *(compare(sources) for compare in of_sources)]
+    shown = [compare(sources) for compare in of_sources]
+    return [seesaw_compared(), *shown, partitions_compared(), error_compared(sources)]

@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli.fuzzy.inputs import seesaw
 from cpfls_cli.report.claims.claim import Verdict
-from cpfls_cli.report.claims.compared import ComparedFigure, agreement, not_shown
+from cpfls_cli.report.claims.compared import ComparedFigure, agreement, not_shown, reading
 from cpfls_cli.report.claims.path import move_claim
 from cpfls_cli.report.numbers import number
 from cpfls_cli.report.printed import PRINTED_RELATIVE_ERROR, PRINTED_SEESAW
@@ -25,11 +25,11 @@ def seesaw_compared() -> ComparedFigure:
     off = float(np.max(np.abs(seesaw(angles)[0] - printed)))
     agrees = off < 1e-12
     why = (
-        "Equation (11) as printed has a condition that no angle meets (3π/2 < q > π/2); read as between them it is "
-        "this curve."
+        "A check of how the paper is read, not of any model. Equation (11) as printed has a condition that no angle "
+        "meets (3π/2 < q > π/2); read as between them it is this curve."
     )
     values = ", ".join(f"{value:g} at {angle:g}π" for angle, value in PRINTED_SEESAW.items())
-    return ComparedFigure("1: seesaw", values, f"largest difference {number(off, 2)}", agreement(agrees), why)
+    return ComparedFigure("1: seesaw", values, f"largest difference {number(off, 2)}", reading(agrees), why)
 
 
 def derivatives_compared(sources: Sources) -> ComparedFigure:

@@ -22,13 +22,19 @@ class PairedRatio:
     ----------
     seeds : int
         Pairs.
+    failed, reference_failed : int
+        Pairs in which the setting, or the reference, found no model.
     ratio, low, high : float
-        Ratio of geometric means, and its 95 % interval; the interval is NaN for fewer than two pairs.
+        Ratio of geometric means over the pairs with two models, and its 95 % interval; the interval is NaN for fewer
+        than two such pairs. All are infinite where the setting failed and the reference did not: no model is an
+        infinite error.
     p_value : float
         Of Wilcoxon's signed-rank test that neither setting is better; NaN for fewer than two pairs.
     """
 
     seeds: int
+    failed: int
+    reference_failed: int
     ratio: float
     low: float
     high: float
@@ -50,14 +56,17 @@ def paired_ratio(setting: SweptSetting, reference: SweptSetting) -> PairedRatio:
     PairedRatio
     """
     both, places, others = np.intersect1d(setting.seeds, reference.seeds, return_indices=True)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        logs = np.log(setting.mse[places, 0]) - np.log(reference.mse[others, 0])
-    logs = logs[np.isfinite(logs)] if len(both) else np.zeros(0)
+    ours, theirs = setting.mse[places, 0], reference.mse[others, 0]
+    found, found_theirs = np.isfinite(ours), np.isfinite(theirs)
+    logs = np.log(ours[found & found_theirs]) - np.log(theirs[found & found_theirs])
+    failed = int(np.sum(~found)), int(np.sum(~found_theirs))
+    if np.any(found_theirs & ~found):
+        return PairedRatio(len(both), *failed, np.inf, np.inf, np.inf, float("nan"))
     mean = float(np.mean(logs)) if len(logs) else float("nan")
     half = _half_width(logs)
     p_value = float(wilcoxon(logs).pvalue) if len(logs) > 1 and logs.any() else float("nan")
     low, ratio, high = np.exp([mean - half, mean, mean + half])
-    return PairedRatio(len(logs), float(ratio), float(low), float(high), p_value)
+    return PairedRatio(len(both), *failed, float(ratio), float(low), float(high), p_value)
 
 
 def _half_width(logs: Array) -> float:

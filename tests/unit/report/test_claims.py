@@ -49,11 +49,31 @@ def test_a_ratio_is_that_of_a_t_test_on_logarithms_of_pairs():
     assert found.p_value == pytest.approx(stats.wilcoxon(one, other).pvalue, abs=0.05)
 
 
-def test_only_seeds_of_both_and_runs_that_found_a_model_are_paired():
-    found = paired_ratio(setting([2.0, 4.0, np.nan], seeds=[1, 2, 3]), setting([9.0, 2.0, 1.0], seeds=[5, 2, 3]))
-    assert (found.seeds, found.ratio) == (1, 2.0)
+def test_only_seeds_of_both_are_paired():
+    found = paired_ratio(setting([2.0, 4.0, 8.0], seeds=[1, 2, 3]), setting([9.0, 2.0, np.nan], seeds=[5, 2, 3]))
+    assert (found.seeds, found.failed, found.reference_failed, found.ratio) == (2, 0, 1, 2.0)
     assert np.isnan(found.low)
     assert paired_ratio(setting([1.0]), setting([1.0], seeds=[7])).seeds == 0
+
+
+@pytest.mark.parametrize("failed", [[4], [1, 2, 3, 4, 5, 6, 7]])
+def test_a_seed_without_a_model_is_a_failure_of_its_setting(failed):
+    """Left out, it would let a setting pass that fails often."""
+    lost = NOISE.copy()
+    lost[failed] = np.nan
+    found = paired_ratio(setting(lost), setting(NOISE))
+    assert (found.seeds, found.failed, found.ratio, found.low) == (10, len(failed), np.inf, np.inf)
+    own = search_claims([sweep(setting(NOISE), setting(lost, samples=685))])[2]
+    assert (own.verdict, own.ours) == (Verdict.FAIL, f"no model for {len(failed)} of 10 seeds")
+    beside = search_claims([sweep(setting(lost), setting(NOISE, samples=685))])[2]
+    assert f"No model in {len(failed)} of them with the one beside it" in beside.why
+
+
+def test_a_seed_without_a_model_in_both_is_told_and_decides_nothing():
+    lost = np.where(np.arange(10) == 4, np.nan, NOISE)
+    judged = search_claims([sweep(setting(lost), setting(lost, samples=685))])[2]
+    assert judged.verdict == Verdict.PASS
+    assert "No model in 1 of them with this setting." in judged.why
 
 
 def test_the_margin_is_the_largest_that_the_paper_prints_and_calls_no_difference():
@@ -140,5 +160,8 @@ def test_what_a_fifth_of_the_samples_keeps():
 
 
 def test_the_printed_numbers_are_read_as_the_paper_means_them():
-    assert seesaw_compared().agreement == "agrees"
-    assert partitions_compared(SimpleNamespace(models=["one"])).agreement == "agrees"
+    """They are held against a decoder: no model, good or bad, has a part in it."""
+    assert seesaw_compared().agreement == "read as printed"
+    assert partitions_compared().agreement == "read as printed"
+    for figure in (seesaw_compared(), partitions_compared()):
+        assert "how the paper is read, not of any model" in figure.why
