@@ -27,7 +27,7 @@ from cpfls_cli.report.sections.rules import rules_section
 from cpfls_cli.report.sections.search import search_section
 from cpfls_cli.report.sections.sensors import sensors_section
 from cpfls_cli.report.sections.steps import steps_section
-from cpfls_cli.report.sections.summary import summary_section
+from cpfls_cli.report.sections.summary import models_section, summary_section
 from cpfls_cli.report.sections.tracking import tracking_section
 from cpfls_cli.report.sections.uncertainty import uncertainty_section
 from cpfls_cli.report.sections.unseen import unseen_section
@@ -38,6 +38,7 @@ from cpfls_cli.report.source import Sources
 _SECTIONS = (
     summary_section,
     comparison_section,
+    models_section,
     reproduction_section,
     diagnosis_section,
     extension_section,

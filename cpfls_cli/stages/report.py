@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -43,10 +44,9 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
     given = Sources(sources, job.study.vehicle, job.study.report)
     page = report_page(given, cpfls_cli.__version__, form or form_of(job.output))
     write_text(job.output, page.text)
-    repeated = tuple(
-        f"{path}: holds the same as {distinct[files[path]]}; shown once" for path in files if path not in kept
-    )
-    return _outcome(job.output, page, repeated)
+    again = [f"{path}: given {times} times; shown once" for path, times in Counter(artifacts).items() if times > 1]
+    equal = [f"{path}: holds the same as {distinct[files[path]]}; shown once" for path in files if path not in kept]
+    return _outcome(job.output, page, [*again, *equal])
 
 
 def _sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:

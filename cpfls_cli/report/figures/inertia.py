@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 
 from cpfls_cli.report.canvas import band, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Plot
+from cpfls_cli.report.figures.inertia_curves import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.report.figures.prediction import shade_outside
 from cpfls_cli.report.source import Source
 
@@ -48,6 +49,6 @@ def inertia_figure(name: str, prediction: Source) -> Plot:
 
     caption = (
         f"Entries of the inertia matrix D(q) of {prediction.input_name('model')} that depend on attitude, along "
-        f"{prediction.input_name('flight')}{', with 95 % bands' if banded else ''}."
+        f"{prediction.input_name('flight')}{f', with 95 % bands. {OUTSIDE_WORDS} {MISFIT_WORDS}' if banded else '.'}"
     )
     return plot(name, caption, "Entries 22, 33, 13 and 23 of the inertia matrix over time", 3.8, draw)

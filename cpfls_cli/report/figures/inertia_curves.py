@@ -22,6 +22,14 @@ _VISITED = "#eef3e6"
 _ROOM = 0.6
 _LEAST = 0.02
 
+OUTSIDE_WORDS = "Where training was not, a band says what the structure does, not what the vehicle does."
+"""What a band is where training was not."""
+
+MISFIT_WORDS = "Where the errors are misfit of the structure and not noise, a band need not hold the truth."
+"""What a band leaves out."""
+
+_SAME = 1e-9
+
 
 def inertia_curves_figure(name: str, model: Source, curve: int) -> Plot:
     """Draw the six entries of D(q) along one curve of attitudes.
@@ -54,7 +62,7 @@ def inertia_curves_figure(name: str, model: Source, curve: int) -> Plot:
     again = " Dashed: identified again from a simulation of the model itself." if has(model, "round_trip") else ""
     caption = (
         f"D(q) of {model.label} {word}, with 95 % bands; grey: the rigid body that fits best. Shaded green: where "
-        f"training was. Elsewhere a curve is what the structure makes of it.{again}"
+        f"training was. {OUTSIDE_WORDS} {MISFIT_WORDS}{_same(model, curve)}{again}"
     )
     return plot(name, caption, f"Six entries of the inertia matrix {word}, with bands", 4.5, draw)
 
@@ -74,6 +82,30 @@ def entry_of(values: Array, entry: str) -> Array:
     return np.asarray(values[..., int(entry[1]) - 1, int(entry[2]) - 1])
 
 
+def keep_scale(axes: Axes, shown: list[Array], largest: float) -> None:
+    """Keep the scale of what training saw: a band that opens where it was not would flatten everything.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    shown : list of array
+        What must be seen in full.
+    largest : float
+        Entry of the whole matrix, so that rounding of an entry that is zero is not drawn large.
+    """
+    known = np.concatenate([curve[np.isfinite(curve)] for curve in shown])
+    if known.size:
+        low, high = float(known.min()), float(known.max())
+        room = max(_ROOM * (high - low), _LEAST * largest) / 2
+        axes.set_ylim(low - room, high + room)
+
+
+def _same(model: Source, curve: int) -> str:
+    values, rigid = (model.artifact.array(f"curves/{key}")[curve] for key in ("inertia", "rigid_body"))
+    same = np.allclose(values, rigid, rtol=0.0, atol=_SAME * float(np.abs(rigid).max(initial=0.0)), equal_nan=True)
+    return " This model is that rigid body, so the grey line lies under its own." if same else ""
+
+
 def _draw_entry(axes: Axes, model: Source, curve: int, entry: str, angle: Array, visited: Array) -> None:
     keys = ["curves/inertia", "curves/low", "curves/high", "curves/rigid_body"]
     values, low, high, rigid = (entry_of(model.artifact.array(key)[curve], entry) for key in keys)
@@ -89,14 +121,5 @@ def _draw_entry(axes: Axes, model: Source, curve: int, entry: str, angle: Array,
     axes.set_xlim(angle[0], angle[-1])
     axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 2, 3, 4.5, 5, 6, 9, 10]))
     plain_ticks(axes.yaxis)
-    everything = model.artifact.array("curves/inertia")
-    _limit(axes, [rigid, values, low[visited], high[visited]], _LEAST * float(np.abs(everything).max(initial=1e-12)))
-
-
-def _limit(axes: Axes, shown: list[Array], least: float) -> None:
-    """Keep the scale of what training saw: a band that opens where it was not would flatten everything."""
-    known = np.concatenate([curve[np.isfinite(curve)] for curve in shown])
-    if known.size:
-        low, high = float(known.min()), float(known.max())
-        room = max(_ROOM * (high - low), least) / 2
-        axes.set_ylim(low - room, high + room)
+    largest = float(np.abs(model.artifact.array("curves/inertia")).max(initial=1e-12))
+    keep_scale(axes, [rigid, values, low[visited], high[visited]], largest)

@@ -10,6 +10,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.report.canvas import BASELINE, band, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.decimation import runs
+from cpfls_cli.report.figures.inertia_curves import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.report.source import Source
 
 AXES = ("roll", "pitch", "yaw")
@@ -81,7 +82,8 @@ def torques_figure(name: str, prediction: Source) -> Plot:
         panels[-1].set_xlabel("time, s")
 
     told = ", with the 95 % band of the prediction; a measured torque has its own noise beside it" if banded else ""
-    caption = f"Generalised torque of {_pair(prediction)}{told}.{_shaded(prediction)}"
+    words = f" {OUTSIDE_WORDS} {MISFIT_WORDS}" if banded else ""
+    caption = f"Generalised torque of {_pair(prediction)}{told}.{_shaded(prediction)}{words}"
     return plot(name, caption, "Torque of the model and of the flight over time", 4.8, draw)
 
 

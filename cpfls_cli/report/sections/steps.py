@@ -14,6 +14,8 @@ from cpfls_cli.report.sections.each import section_of_each
 from cpfls_cli.report.source import Source, Sources
 
 _WORDS = {"rigid-body": "rigid body", "nothing-moves": "nothing moves"}
+# Of equal predictors rounding must not choose one.
+_TIE = 1.0 + 1e-6
 
 
 def steps_section(sources: Sources) -> Section | None:
@@ -61,6 +63,6 @@ def _table(model: Source, index: int) -> Table:
 
 
 def _cell(errors: np.ndarray, place: int) -> Cell:
-    least = np.isfinite(errors[place]) and errors[place] <= np.nanmin(errors)
+    least = np.isfinite(errors[place]) and errors[place] <= _TIE * np.nanmin(errors)
     text = number(float(errors[place]), 3)
     return Cell(f"{text} ◂", "good") if least else Cell(text)

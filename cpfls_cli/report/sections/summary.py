@@ -30,14 +30,37 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = [_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
-    for number, model in enumerate(sources.models, start=1):
-        blocks += _model(model, sources, number)
+    if len(sources.models) == 1:
+        blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:
         blocks.append(Text("No model was given, so there is nothing to judge yet.", "note"))
     for flight in sources.flights:
         blocks += _flight_warnings(flight)
-    blocks += [Text(sentence, "note") for sentence in missing(sources).values()]
+    if len(sources.models) < 2:
+        blocks += _missing(sources)
     return Section("summary", "Summary", blocks)
+
+
+def models_section(sources: Sources) -> Section | None:
+    """Summarise each model; one alone stands in the summary itself.
+
+    Parameters
+    ----------
+    sources : Sources
+
+    Returns
+    -------
+    Section or None
+        None for fewer than two models.
+    """
+    if len(sources.models) < 2:
+        return None
+    blocks = [block for index, model in enumerate(sources.models, start=1) for block in _model(model, sources, index)]
+    return Section("models", "The models one by one", [*blocks, *_missing(sources)])
+
+
+def _missing(sources: Sources) -> list[Text]:
+    return [Text(sentence, "note") for sentence in missing(sources).values()]
 
 
 def _line(model: Source) -> Text:

@@ -17,6 +17,7 @@ from cpfls_cli.report.source import Source, Sources
 
 _SPEAKS = {1: "For it", -1: "Against it"}
 _ROUNDING = 1e-9
+_TIE = 1.0 + 1e-6
 _SCORES = ("RMSE, N\N{NO-BREAK SPACE}m", "NRMSE", "R²", "VAF", "Largest, N\N{NO-BREAK SPACE}m", "Relative")
 
 
@@ -174,18 +175,19 @@ def _structures(model: Source, index: int) -> Table:
     artifact = model.artifact
     columns = [artifact.array(f"structures/{key}") for key in ("parameters", "error", "standard_error", "ridge_weight")]
     own = artifact.array("structures/own") != 0
-    best = int(np.argmin(columns[1]))
+    least = _TIE * float(np.min(columns[1]))
     rows: list[list[str | Cell]] = []
     for place, name in enumerate(artifact.texts("structures/name")):
         parameters, error, deviation, weight = (float(column[place]) for column in columns)
         shown = "fuzzy part off" if np.isinf(weight) else number(weight, 2)
         told = f"{number(error, 4)} ± {number(deviation, 2)}"
-        mark = " ◂ least" if place == best else ""
+        best = error <= least
+        mark = " ◂ least" if best else ""
         label = f"{name} (this model)" if own[place] else name
-        rows.append([label, count(parameters), Cell(told + mark, "good" if place == best else "plain"), shown])
+        rows.append([label, count(parameters), Cell(told + mark, "good" if best else "plain"), shown])
     caption = (
         "Structures compared by cross-validation over contiguous blocks, without a search: mean squared error of the "
         "scaled torque on the blocks that were left out, ± one standard error. Differences within that are chance."
     )
     header = ("Structure", "Parameters", "Held-out error", "Ridge weight")
-    return Table(f"structures-{index}", caption, header, rows, frozenset({0}))
+    return Table(f"structures-{index}", caption, header, rows, frozenset({0}), frozenset({0}))

@@ -70,10 +70,11 @@ def test_one_model_is_compared_with_nothing(compared, write):
 def test_two_models_stand_right_after_the_summary_and_the_best_of_each_column_is_marked(compared, write):
     names, blocks = compared(write("one.h5"), write("two.h5", (0.5, 2.0, 1.0)))
     assert names[:2] == ["summary", "comparison"]
-    table = named(blocks, "comparison-1")
-    assert [row[0] for row in table["rows"]] == ["one.h5", "two.h5", "rigid body of one.h5 and two.h5"]
+    table = named(blocks, "comparison-axes-1")
+    for name in ("comparison-1", "comparison-axes-1"):
+        assert [row[0] for row in named(blocks, name)["rows"]] == ["one.h5", "two.h5", "rigid body"]
     column = {title.split(",")[0]: place for place, title in enumerate(table["header"])}
-    shown = {axis: [row[column[f"RMSE (NRMSE) {axis}"]] for row in table["rows"]] for axis in ("roll", "pitch", "yaw")}
+    shown = {axis: [row[column[axis]] for row in table["rows"]] for axis in ("roll", "pitch", "yaw")}
     rigid_wins = all("◂" in cells[2] for cells in shown.values())
     assert rigid_wins, "the flight is simulated without noise by a rigid body"
     one, two = (parsed(shown["roll"][row]) for row in (0, 1))
@@ -92,8 +93,8 @@ def test_among_models_the_smaller_error_is_marked(compared, write, bare):
         own = mse.copy()
         own[bare.texts("judged/models").index("model")] *= np.square(scale)
         paths.append(write(name, **{"judged/mse": own}))
-    rows = named(compared(*paths)[1], "comparison-1")["rows"]
-    places = range(4, 7)
+    rows = named(compared(*paths)[1], "comparison-axes-1")["rows"]
+    places = range(1, 4)
     assert [["◂" in row[place] for place in places] for row in rows] == [
         [True, False, True],
         [False, True, True],
@@ -104,12 +105,11 @@ def test_among_models_the_smaller_error_is_marked(compared, write, bare):
 def test_models_of_different_flights_are_not_ranked(compared, write):
     _, blocks = compared(write("one.h5"), write("two.h5", flight="f" * 64))
     texts = " ".join(block["text"] for block in blocks if block["kind"] == "text")
-    assert "judged on different flights: their errors cannot be ranked" in texts
+    assert texts.startswith("Judged on different flights, so the errors cannot be ranked: ")
     assert "one.h5 on training" in texts
     assert "two.h5 on training (sha256 ffffffffffff)" in texts
     tables = [block for block in blocks if block["kind"] == "table" and block["name"] != "comparison-keys"]
-    assert len(tables) == 2
-    assert not any(table["marked"] for table in tables)
+    assert not tables
     assert not [block for block in blocks if block["kind"] == "figure"]
 
 
@@ -129,6 +129,46 @@ def test_another_split_of_one_flight_is_other_data(compared, write):
     assert any("cannot be ranked" in block.get("text", "") for block in blocks)
     keys = named(blocks, "comparison-keys")
     assert keys["rows"] == [["identification.training_share", "1.0", "0.9"]]
+
+
+def test_rigid_bodies_that_differ_are_told_apart_by_their_models(compared, write, bare):
+    mse = bare.array("judged/mse").copy()
+    mse[bare.texts("judged/models").index("rigid-body")] = 1.0
+    _, blocks = compared(write("one.h5"), write("two.h5", **{"judged/mse": mse}))
+    names = ["one.h5", "two.h5", "rigid body of one.h5", "rigid body of two.h5"]
+    assert [row[0] for row in named(blocks, "comparison-1")["rows"]] == names
+
+
+def test_what_only_rounding_tells_apart_is_marked_alike(compared, write):
+    _, blocks = compared(write("one.h5", (1e-14, 1e-14, 1e-14)), write("two.h5", (3e-14, 3e-14, 3e-14)))
+    assert all("◂" in cell for row in named(blocks, "comparison-axes-1")["rows"] for cell in row[1:])
+
+
+def test_an_error_of_rounding_is_drawn_at_zero_and_leaves_the_others_their_scale(compared, write, bare):
+    mse = bare.array("judged/mse").copy()
+    mse[bare.texts("judged/models").index("rigid-body")] = 1e-32
+    two = mse.copy()
+    two[bare.texts("judged/models").index("model")] *= 1.21
+    paths = write("one.h5", **{"judged/mse": mse}), write("two.h5", **{"judged/mse": two})
+    series = named(compared(*paths)[1], "comparison-errors")["panels"][0]["series"]
+    assert [own["label"] for own in series] == ["one.h5", "two.h5", "rigid body of one.h5", "rigid body of two.h5"]
+    one, other, *rigid = (own["x"] for own in series)
+    assert other[0] == pytest.approx(1.1 * one[0], rel=1e-3)
+    assert rigid == [[0.0], [0.0]]
+
+
+def test_each_model_is_summarised_after_the_comparison(compared, write):
+    names, _ = compared(write("one.h5"), write("two.h5"))
+    assert "models" not in names, "equal files count once"
+    names, _ = compared(write("one.h5"), write("two.h5", (2.0, 1.0, 1.0)))
+    assert names[:3] == ["summary", "comparison", "models"]
+
+
+def test_a_file_given_twice_is_shown_once_and_said_so(cpfls, study, write, tmp_path):
+    path = write("one.h5")
+    result = cpfls("report", study, path, path, "-o", tmp_path / "twice.json")
+    assert result.exit_code == 0
+    assert f"{path}: given 2 times; shown once" in result.stderr
 
 
 def test_equal_configs_are_called_equal(compared, write):
