@@ -64,7 +64,7 @@ def in_order_and_cropped(table: Table, settings: ImportSettings) -> tuple[Table,
     SettingError
         If the crop leaves fewer than two rows.
     InputError
-        If the time stamps do, or go backward and stay behind.
+        If the time stamps do, or go backward and stay behind, or a mapped column has fewer than two values there.
     """
     begin, end = settings.crop_s or (-np.inf, np.inf)
     outside = (table.time < begin) | (table.time > end)
@@ -79,7 +79,23 @@ def in_order_and_cropped(table: Table, settings: ImportSettings) -> tuple[Table,
     kept, dropped = increasing_rows(table.time)
     if len(kept) < 2:
         raise InputError("the log has fewer than two rows of increasing time stamps; see import.time_column")
-    return table.rows(kept), dropped | {"crop": int(outside.sum())}
+    left = table.rows(kept)
+    _require_values(left, settings)
+    return left, dropped | {"crop": int(outside.sum())}
+
+
+def _require_values(table: Table, settings: ImportSettings) -> None:
+    """Refuse columns that are empty in the part of the log that is read, by their names."""
+    problems = [
+        f"import.signals.{name}.columns: {column!r} has fewer than two values ({count}) in the"
+        f" {len(table.time)} rows that are read"
+        for name, signal in settings.signals.items()
+        for column, count in zip(signal.columns, np.isfinite(table.signals[name]).sum(axis=0).tolist(), strict=True)
+        if count < 2
+    ]
+    if problems:
+        problems[-1] += "; map another column, or leave the signal out of import.signals"
+        raise InputError("\n".join(problems))
 
 
 def made_continuous(table: Table) -> Table:

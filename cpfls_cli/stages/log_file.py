@@ -8,6 +8,7 @@ from pathlib import Path
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.stages.log_content import refuse_other_content
 from cpfls_cli.stages.table import read_csv
 
 LOG_SUFFIXES = (".csv", ".csv.gz", ".parquet", ".ulg")
@@ -60,11 +61,13 @@ def read_log(path: Path, settings: ImportSettings) -> LogColumns:
     Raises
     ------
     InputError
-        If its name ends in no kind of log, it cannot be read, or the package that reads it is not installed.
+        If its name ends in no kind of log, or in another than it holds, it cannot be read, or the package that reads
+        it is not installed.
     """
     name = path.name.lower()
     if not is_log(path):
         raise InputError(f"{path}: not a log: its name must end in one of {', '.join(LOG_SUFFIXES)}")
+    refuse_other_content(path)
     if name.endswith(".parquet"):
         from cpfls_cli.stages.parquet_log import read_parquet
 

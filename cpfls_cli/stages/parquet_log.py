@@ -70,7 +70,10 @@ def _numbers(pyarrow: ModuleType, path: Path, name: str, column: Any) -> Array:
     types = pyarrow.types
     numeric = (types.is_integer, types.is_floating, types.is_boolean, types.is_decimal, types.is_null)
     if not any(is_kind(kind) for is_kind in numeric):
-        raise InputError(f"{path}: column '{name}' holds {kind}: not numbers")
+        raise InputError(
+            f"{path}: column '{name}' holds {kind}: not numbers; map another column in import.signals, or write this "
+            "one as numbers"
+        )
     if types.is_boolean(kind):
         column = column.cast(pyarrow.int8())
     return np.asarray(column.cast(pyarrow.float64(), safe=False).to_numpy(), dtype=float)

@@ -2,6 +2,7 @@
 
 import datetime
 import decimal
+import gzip
 import json
 import sys
 
@@ -124,7 +125,10 @@ def test_a_dot_in_a_name_is_part_of_it(cpfls, config, write, tmp_path):
 
 def test_columns_that_hold_no_numbers_are_named(wrong, write):
     log = write({"t": TIME} | COLUMNS | {"pitch": ["up"] * len(TIME)})
-    assert wrong(log) == ["LOG: column 'pitch' holds string: not numbers"]
+    assert wrong(log) == [
+        "LOG: column 'pitch' holds string: not numbers; map another column in import.signals, or write this one as "
+        "numbers"
+    ]
     nested = write({"t": TIME} | COLUMNS | {"yaw": [[1.0]] * len(TIME)}, "nested.parquet")
     (line,) = wrong(nested)
     assert line.startswith("LOG: column 'yaw' holds list<")
@@ -142,12 +146,52 @@ def test_no_rows(wrong, write):
     assert wrong(log) == ["LOG: holds column names but no samples"]
 
 
-@pytest.mark.parametrize("content", [b"", b"t,roll\n0,1\n", b"PAR1" + bytes(100) + b"PAR1"])
+@pytest.mark.parametrize("content", [b"", b"hello", b"PAR1" + bytes(100) + b"PAR1"])
 def test_what_is_no_parquet(wrong, tmp_path, content):
     path = tmp_path / "log.parquet"
     path.write_bytes(content)
     (line,) = wrong(path)
     assert line.startswith("LOG: cannot be read as Parquet: ")
+
+
+def test_columns_of_nulls_are_named(wrong, write):
+    nulls = pyarrow.array([None] * len(TIME), pyarrow.float64())
+    one = pyarrow.array([1.0, *[None] * (len(TIME) - 1)], pyarrow.float64())
+    lines = wrong(write({"t": TIME} | COLUMNS | {"pitch": nulls, "mz": one}))
+    assert lines == [
+        "LOG: import.signals.attitude.columns: 'pitch' has fewer than two values (0) in the 200 rows that are read",
+        "LOG: import.signals.body_torque.columns: 'mz' has fewer than two values (1) in the 200 rows that are read; "
+        "map another column, or leave the signal out of import.signals",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "held", "called", "ending"),
+    [
+        ("log.parquet", b"t,roll\n0,1\n", "CSV", ".csv"),
+        ("log.ulg", b"t;roll\r\n0;1\r\n", "CSV", ".csv"),
+        ("log.csv.gz", b"t\troll\n0\t1\n", "CSV", ".csv"),
+        ("log.parquet", b"ULog\x01\x12\x35\x01", "ULog", ".ulg"),
+        ("log.csv", b"ULog\x01\x12\x35\x01", "ULog", ".ulg"),
+        ("log.csv", gzip.compress(b"t,roll\n0,1\n"), "gzip-compressed data", ".csv.gz"),
+    ],
+)
+def test_another_kind_than_the_name_says_is_named(wrong, tmp_path, name, held, called, ending):
+    (tmp_path / name).write_bytes(held)
+    (line,) = wrong(tmp_path / name)
+    assert line == f"LOG: seems to hold {called}, not what its name ends in; rename it to end in {ending}"
+
+
+def test_parquet_under_another_name_is_named(wrong, write):
+    for name in ("log.csv", "log.ulg"):
+        (line,) = wrong(write({"t": TIME} | COLUMNS, name))
+        assert line == "LOG: seems to hold Parquet, not what its name ends in; rename it to end in .parquet"
+
+
+def test_a_csv_whose_first_column_is_called_as_parquet_begins(wrong, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("PAR1,roll\n0,1\n")
+    assert wrong(path)[0].startswith("LOG: import.time_column: the log has no column 't'")
 
 
 def test_a_broken_page(wrong, write):

@@ -225,7 +225,7 @@ def test_a_slow_topic_is_named(wrong):
     ("content", "message"),
     [
         (b"", "LOG: not a ULog file: it does not begin as one"),
-        (b"t,roll\n0,1\n", "LOG: not a ULog file: it does not begin as one"),
+        (b"t,roll\n0,1\n", "LOG: seems to hold CSV, not what its name ends in; rename it to end in .csv"),
         (header()[:10], "LOG: a broken ULog file: "),
         (header(), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in a .ulg"),
         (header() + definitions(), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in a .ulg"),
