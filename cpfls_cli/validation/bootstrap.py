@@ -121,7 +121,7 @@ def bootstrap(
     hidden = _BIAS_DEVIATION * rng.standard_normal((settings.draws, 1))
     scores, parameters = _model_scores(products, model, fit, over_rigid_body=learned.ready.rigid)
     held = scores.penalty > 0
-    weakest = scores.under(held * _mean_square(products), tolerance)
+    weakest = scores.under(np.where(held, _mean_square(products), 0.0), tolerance)
     still_open = weakest.left(held * rng.standard_normal((settings.draws, len(held))), tolerance)
     found = np.zeros((settings.draws, columns))
     found[:, parameters] = weakest.draws(weights, tolerance) + still_open

@@ -1,0 +1,82 @@
+"""Bands of flights that tilt little hold a vehicle that is no rigid body: where they flew, and where they did not."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.identification.chromosome import uniform_chromosome
+from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.regressor import Motion, uniform_breakpoints
+from cpfls_cli.validation.bands import inertia_band
+from cpfls_cli.validation.bootstrap import bootstrap
+from cpfls_cli.vehicle import newton_euler_torque
+
+RUNS, SAMPLES, NOISE = 40, 1200, 0.05
+TENSOR = np.diag([0.6, 0.8, 1.2])
+NOWHERE = np.zeros((72, 72), dtype=bool)
+FAR = np.column_stack([np.deg2rad(np.linspace(60, 120, 20)), np.zeros((20, 2))])
+ENTRIES = [(0, 0), (1, 1), (2, 2), (0, 2), (1, 2)]
+
+
+def tilting(degrees):
+    rng, time = np.random.default_rng(11), 0.01 * np.arange(SAMPLES)[:, None, None]
+    w, shift = rng.uniform(2, 9, (5, 3)), rng.uniform(0, 2 * np.pi, (5, 3))
+    size = rng.uniform(0.3, 1, (5, 3))
+    motion = [np.sum(size * w**k * np.sin(w * time + shift + 0.5 * k * np.pi), axis=1) for k in range(3)]
+    share = np.deg2rad(degrees) / np.abs(motion[0][:, :2]).max()
+    return Motion(*(share * part for part in motion))
+
+
+def bent_torque(m):
+    """Torque of a rigid body with 0.3 cos(roll) more in D22, from L = f(roll) pitch_rate^2 / 2."""
+    torque = newton_euler_torque(m.attitude, m.rate, m.acceleration, TENSOR)
+    f, slope = 0.3 * np.cos(m.attitude[:, 0]), -0.3 * np.sin(m.attitude[:, 0])
+    torque[:, 0] -= 0.5 * slope * m.rate[:, 1] ** 2
+    torque[:, 1] += f * m.acceleration[:, 1] + slope * m.rate[:, 0] * m.rate[:, 1]
+    return torque
+
+
+def bent_inertia(attitude):
+    roll, pitch = attitude[:, 0], attitude[:, 1]
+    W = np.eye(3)[None].repeat(len(attitude), axis=0)
+    W[:, 0, 2], W[:, 1, 1], W[:, 1, 2] = -np.sin(pitch), np.cos(roll), np.sin(roll) * np.cos(pitch)
+    W[:, 2, 1], W[:, 2, 2] = -np.sin(roll), np.cos(roll) * np.cos(pitch)
+    inertia = W.swapaxes(1, 2) @ TENSOR @ W
+    inertia[:, 1, 1] += 0.3 * np.cos(roll)
+    return inertia
+
+
+def noise(rng, time_constant):
+    keep = np.exp(-1 / time_constant) if time_constant else 0.0
+    return signal.lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal((300 + SAMPLES, 3)), axis=0)[300:]
+
+
+def held(m, torque, attitude, rng):
+    """Fit a flight under the ridge that it chooses; tell where the bands hold the vehicle."""
+    training = TorqueData(0.01 * np.arange(SAMPLES), m, torque)
+    evaluator = model_evaluator(training, training, IdentificationSettings())
+    fit, partitions = evaluator.fit(uniform_chromosome(evaluator.structure)), uniform_breakpoints(evaluator.structure)
+    model = Model(evaluator.structure, evaluator.judge.ranges, partitions, fit.coefficients, fit.rigid_body, NOWHERE)
+    draws = bootstrap(evaluator, training, model, fit, ValidationSettings(draws=100), rng)
+    low, high = inertia_band(model, draws, attitude)
+    truth = bent_inertia(attitude)
+    inside = (low <= truth) & (truth <= high)
+    return [inside[:, *place] for place in ENTRIES], fit.ridge_weight
+
+
+@pytest.mark.parametrize(("tilt", "time_constant"), [(13, 0), (40, 5)], ids=["13-white", "40-coloured"])
+def test_coverage_under_a_ridge(tilt, time_constant):
+    m, rng = tilting(tilt), np.random.default_rng(21)
+    exact, visited = bent_torque(m), slice(0, SAMPLES, 60)
+    attitude = np.vstack([m.attitude[visited], FAR])
+    found = [held(m, exact + NOISE * exact.std(axis=0) * noise(rng, time_constant), attitude, rng) for _ in range(RUNS)]
+    inside, weights = np.array([share for share, _ in found]), np.array([weight for _, weight in found])
+    near, far = (np.mean(inside[:, :, where], axis=(0, 2)) for where in (slice(0, 20), slice(20, None)))
+    assert np.median(weights) >= 0.01
+    assert np.all(np.isfinite(weights))
+    assert np.mean(near) > 0.92
+    assert np.min(near) > 0.85
+    assert np.min(far) > 0.9
