@@ -43,6 +43,9 @@ def band(estimate: Array, drawn: Array, blocks: int) -> tuple[Array, Array]:
 def inertia_band(model: Model, draws: Draws, attitude: Array) -> tuple[Array, Array]:
     """Put a band around the inertia matrix of a model, entry by entry.
 
+    Of a model without a ridge, attitudes that training did not visit have a band of what its structure does there, not
+    of what the vehicle does: coefficients that no sample determines do not scatter.
+
     Parameters
     ----------
     model : Model

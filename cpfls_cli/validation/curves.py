@@ -39,7 +39,8 @@ class Curves:
     inertia : array, shape (curves, points, 3, 3), kg m^2
         Of the model.
     low, high : array, shape (curves, points, 3, 3), kg m^2
-        Its 95 % band.
+        Its 95 % band. Of a model without a rigid body below it is, where training was not, what the structure does, not
+        what the vehicle does.
     rigid_body : array, shape (curves, points, 3, 3), kg m^2
         Of the rigid body that fits best.
     outside : array of bool, shape (curves, points)

@@ -1,4 +1,4 @@
-"""Simulate from a model, identify again, and see whether the same inertia comes back."""
+"""Give a model's torque along the recorded motion, identify again, and see whether the same inertia comes back."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class RoundTrip:
-    """The inertia matrix identified from a simulation of a model.
+    """The inertia matrix identified from torque that a model gave.
 
     Attributes
     ----------
@@ -51,8 +51,11 @@ def round_trip(
     samples times +1 or -1: noise as strong and as correlated as in the flight, none where the model misses nothing. It
     is larger than the errors by what the fit has followed of it.
 
+    Nothing is integrated in time: the motion is the recorded one, and only the torque is evaluated anew.
+
     The partitions are the model's: a search would find others that fit as well, and the question here is whether the
-    samples determine the inertia, not the breakpoints. The ridge weight is chosen anew.
+    samples determine the inertia, not the breakpoints. The ridge weight is chosen anew, and its pull towards a rigid
+    body is shared by both models: a model that it pulled too far comes back all the same.
 
     Parameters
     ----------
