@@ -181,7 +181,7 @@ def _definite(grounds: Grounds) -> Iterator[Reason]:
 def _draws(grounds: Grounds) -> Iterator[Reason]:
     share = grounds.definite
     if share is not None and not grounds.impossible:
-        text = f"D(q) is positive definite in all these cells in {100 * share:.3g} % of the bootstrap draws"
+        text = f"D(q) is positive definite in all cells clear of a vertical pitch in {100 * share:.3g} % of the draws"
         enough = share >= DEFINITE_SHARE
         yield Reason(
             text if enough else f"{text}; {100 * DEFINITE_SHARE:g} % are asked for", FOR if enough else AGAINST

@@ -15,8 +15,8 @@ from cpfls_cli.validation.turning import State
 
 # 40 MB of rotations, rates and torques at a time.
 _SAMPLES_AT_ONCE = 200_000
-# |cos(pitch)| of every sample of a window: errors of D(q) come to the body axes divided by its square, here by ten.
-_CLEAR = 0.3
+CLEAR = 0.3
+"""|cos(pitch)| from which on noise in D(q) says something of a body: it comes to the body axes divided by its square."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def plan_windows(source: TorqueSource, horizon: int, most: int) -> Plan:
     """
     time = sample_times(source)
     stretch = stretch_numbers(time)
-    steep = np.concatenate([np.abs(np.cos(data.motion.attitude[:, 1])) < _CLEAR for data in source.chunks()])
+    steep = np.concatenate([np.abs(np.cos(data.motion.attitude[:, 1])) < CLEAR for data in source.chunks()])
     starts = _starts(stretch, steep, horizon)
     while len(starts) == 0 and horizon > 1:
         horizon //= 2

@@ -51,7 +51,8 @@ def verdict(grounds: Grounds) -> Verdict:
        and always if nothing was held out, *not-better-than-rigid-body*; or *do-not-use*, where the rigid body is no
        body, or explains no more of the torque about an excited axis than a constant does (R2 of 0 or less).
     3. *do-not-use* where the model loses more than one in twenty windows of a held-out part; where less than 97.5 % of
-       the bootstrap draws of D(q) are positive definite at all attitudes visited; or where the held-out R2 of body
+       the bootstrap draws of D(q) are positive definite at all attitudes visited that are 17 degrees from a vertical
+       pitch; or where the held-out R2 of body
        torque about any axis is below `r2_min` in any part. Instead of R2, which then measures noise, an axis that
        hardly accelerates is judged by its body rate replayed: better by more than chance, in every part, than the
        prediction that it stays what it is.

@@ -46,6 +46,15 @@ def test_share_of_draws_is_that_of_their_models(monkeypatch, at_once):
     assert definite_share(own, drawn) == pytest.approx(np.mean(each))
 
 
+def test_near_a_vertical_pitch_noise_says_nothing_of_a_body():
+    """One row of cells there, at a pitch of 77.5 degrees, changes nothing; alone it leaves no share."""
+    visited, near = np.zeros((2, 72, 72), dtype=bool)
+    visited[30:40, 30:40] = near[:, 51] = True
+    drawn = draws(model(visited), 0.2)
+    assert definite_share(model(visited | near), drawn) == definite_share(model(visited), drawn) < 1
+    assert definite_share(model(near), drawn) is None
+
+
 def test_no_cell_was_visited():
     own = model(np.zeros((72, 72), dtype=bool))
     assert definite_share(own, draws(own, 0.05)) is None
