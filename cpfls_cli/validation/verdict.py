@@ -52,10 +52,9 @@ def verdict(grounds: Grounds) -> Verdict:
        body, or explains no more of the torque about an excited axis than a constant does (R2 of 0 or less).
     3. *do-not-use* where the model loses more than one in twenty windows of a held-out part; where less than 97.5 % of
        the bootstrap draws of D(q) are positive definite at all attitudes visited that are 17 degrees from a vertical
-       pitch; or where the held-out R2 of body
-       torque about any axis is below `r2_min` in any part. Instead of R2, which then measures noise, an axis that
-       hardly accelerates is judged by its body rate replayed: better by more than chance, in every part, than the
-       prediction that it stays what it is.
+       pitch; or where the held-out R2 of body torque about any axis is below `r2_min` in any part. Instead of R2,
+       which then measures noise, an axis that hardly accelerates is judged by its body rate replayed: better by more
+       than chance, in every part, than the prediction that it stays what it is.
     4. *good-for-control* where the model is the same rule at every attitude, training went all round, the samples
        determine every coefficient beyond their noise, D(q) is positive definite at every roll and pitch, and R2
        confirms every axis; otherwise *good-inside-region*: nothing is known outside.

@@ -286,7 +286,8 @@ def test_a_rule_of_all_attitudes_has_to_be_a_body_at_all_of_them(better):
 def test_most_draws_have_to_be_a_body_wherever_training_was(better, definite, label):
     judged = verdict(replace(better, definite=definite))
     assert judged.label == label
-    assert said(judged, "D(q) is positive definite in all cells clear of a vertical pitch") == (1 if definite > 0.975 else -1)
+    speaks = 1 if definite > 0.975 else -1
+    assert said(judged, "D(q) is positive definite in all cells clear of a vertical pitch") == speaks
     if label == "do-not-use":
         assert "only 97 % of the bootstrap draws" in judged.reason[0]
 
