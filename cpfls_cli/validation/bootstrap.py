@@ -122,9 +122,10 @@ def bootstrap(
     scores, parameters = _model_scores(products, model, fit, over_rigid_body=learned.ready.rigid)
     held = scores.penalty > 0
     weakest = scores.under(np.where(held, _mean_square(products), 0.0), tolerance)
-    still_open = weakest.left(held * rng.standard_normal((settings.draws, len(held))), tolerance)
+    prior = np.zeros((settings.draws, len(held)))
+    prior[:, held] = rng.standard_normal((settings.draws, np.count_nonzero(held)))
     found = np.zeros((settings.draws, columns))
-    found[:, parameters] = weakest.draws(weights, tolerance) + still_open
+    found[:, parameters] = weakest.draws(weights, tolerance) + weakest.left(prior, tolerance)
     found[:, parameters] += hidden * (weakest.parameters - scores.parameters)
     found *= _divide(fit)
     best, best_rigid_body = _rigid_scores(products, model, tolerance)

@@ -53,7 +53,8 @@ def brute_force(A, penalty, y, label):
     """Turn the corrected errors of each block over and solve all rows again, under the weakest penalty."""
     blocks, rng, held = label[-1] + 1, np.random.default_rng(4), penalty > 0
     weights, hidden = rng.standard_normal((DRAWS, blocks)), rng.standard_normal((DRAWS, 1))
-    prior = held * rng.standard_normal((DRAWS, len(held)))
+    prior = np.zeros((DRAWS, len(held)))
+    prior[:, held] = rng.standard_normal((DRAWS, held.sum()))
 
     def solve(torque, penalty):
         return linalg.lstsq(np.vstack([A, np.diag(np.sqrt(penalty))]), np.append(torque, np.zeros(A.shape[1])))[0]
