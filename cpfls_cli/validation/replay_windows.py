@@ -16,7 +16,7 @@ from cpfls_cli.validation.turning import State
 # 40 MB of rotations, rates and torques at a time.
 _SAMPLES_AT_ONCE = 200_000
 CLEAR = 0.3
-"""|cos(pitch)| that errors of D(q) are looked at from: they come to the body axes divided by its square, here by ten."""
+"""|cos(pitch)| from which on D(q) is looked at: its errors come to the body axes divided by the square, here by ten."""
 
 
 @dataclass(frozen=True)
