@@ -3,42 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
-import numpy as np
-
-from cpfls_cli.report.content import Block, Cell, Heading, Section, Table, Text
+from cpfls_cli.report.content import Block, Heading, Section, Table, Text
 from cpfls_cli.report.differences import differences
-from cpfls_cli.report.evidence import SHORT_VERDICTS, has
-from cpfls_cli.report.figures.comparison import compared_curves_figure, compared_errors_figure
+from cpfls_cli.report.evidence import has
+from cpfls_cli.report.figures.compared_errors import compared_errors_figure
+from cpfls_cli.report.figures.comparison import compared_curves_figure
 from cpfls_cli.report.gap_words import joined
-from cpfls_cli.report.judged import AXES, MODEL, RIGID_BODY, judged
-from cpfls_cli.report.judged_on import JudgedOn, judged_on, learned_only
-from cpfls_cli.report.numbers import ROUNDING, UNKNOWN, count, number, percent, r_squared
+from cpfls_cli.report.judged_on import JudgedOn, judged_on
+from cpfls_cli.report.sections.compared_scores import compared_tables, hashes_words
 from cpfls_cli.report.source import Source, Sources
 
-_OVERALL = (
-    "Model",
-    "Verdict",
-    "Parameters",
-    "Condition number",
-    "Largest error, N\N{NO-BREAK SPACE}m",
-    "Relative error, worst axis",
-    "R², worst axis",
-)
-_BY_AXIS = ("Model", *(f"{axis}, N\N{NO-BREAK SPACE}m" for axis in AXES))
-_SENTENCES = frozenset({0, 1})
-_TIE = 1.0 + 1e-6
 _MOST_KEYS = 30
-
-
-@dataclass(frozen=True)
-class _Line:
-    """A row of a table: words, and what is compared, as numbers and as they are shown."""
-
-    words: tuple[str, ...]
-    errors: tuple[float, ...]
-    shown: tuple[str, ...]
 
 
 def comparison_section(sources: Sources) -> Section | None:
@@ -62,90 +38,26 @@ def comparison_section(sources: Sources) -> Section | None:
 def _tables(models: Sequence[Source]) -> Iterator[Block]:
     parts = judged_on(models)
     common = [part for part in parts if len(part.models) > 1]
-    alone = [f"{part.models[0].label} on {part.title} ({_flights(part)})" for part in parts if len(part.models) == 1]
-    told = joined(alone) if alone else ""
+    told = _alone([part for part in parts if len(part.models) == 1])
     if not common:
         yield Text(f"Judged on different flights, so the errors cannot be ranked: {told}.", "warning")
         return
     for index, part in enumerate(common, start=1):
-        yield _overall(f"comparison-{index}", part)
-        yield _by_axis(f"comparison-axes-{index}", part)
+        yield from compared_tables(index, part)
     yield compared_errors_figure("comparison-errors", common, models)
     if told:
         yield Text(f"Judged by itself, so not ranked: {told}.", "note")
 
 
-def _flights(part: JudgedOn) -> str:
-    return "sha256 " + joined(sha256[:12] for sha256 in part.hashes)
-
-
-def _overall(name: str, part: JudgedOn) -> Table:
-    learned = " They learned from it: these errors are no prediction." if learned_only(part) else ""
-    caption = (
-        f"All on {part.title} ({_flights(part)}), the same data for all.{learned} Each rigid body was fitted to what "
-        "its model learned from. ◂ marks the best of a column, of models and rigid bodies alike."
+def _alone(parts: Sequence[JudgedOn]) -> str:
+    """Say which model was judged on what, each model once."""
+    own: dict[str, list[JudgedOn]] = {}
+    for part in parts:
+        own.setdefault(part.models[0].label, []).append(part)
+    return "; ".join(
+        f"{label} on {joined(part.title for part in its)} ({hashes_words(sum((part.hashes for part in its), ()))})"
+        for label, its in own.items()
     )
-    lines = [_Line(_words(model), *_worst(model, MODEL, own)) for model, own in _pairs(part)]
-    lines += [_Line((label, "", "6", UNKNOWN), *_worst(model, RIGID_BODY, own)) for label, model, own in _bodies(part)]
-    return Table(name, caption, _OVERALL, _marked(lines), _SENTENCES, _SENTENCES)
-
-
-def _by_axis(name: str, part: JudgedOn) -> Table:
-    caption = (
-        f"The same by axis: root mean square error of the torque on {part.title}, and in brackets over the standard "
-        "deviation of the torque. ◂ as above."
-    )
-    lines = [_Line((model.label,), *_axes(model, MODEL, own)) for model, own in _pairs(part)]
-    lines += [_Line((label,), *_axes(model, RIGID_BODY, own)) for label, model, own in _bodies(part)]
-    return Table(name, caption, _BY_AXIS, _marked(lines), frozenset({0}), frozenset({0}))
-
-
-def _pairs(part: JudgedOn) -> Iterator[tuple[Source, str]]:
-    return zip(part.models, part.names, strict=True)
-
-
-def _marked(lines: Sequence[_Line]) -> list[list[str | Cell]]:
-    # Below rounding nobody is better than another.
-    best = np.fmax(np.fmin.reduce([line.errors for line in lines]) * _TIE, ROUNDING)
-    return [[*line.words, *map(_cell, line.shown, line.errors, best)] for line in lines]
-
-
-def _cell(text: str, error: float, least: float) -> Cell:
-    return Cell(f"{text} ◂", "good") if error <= least else Cell(text)
-
-
-def _words(model: Source) -> tuple[str, ...]:
-    artifact = model.artifact
-    label = artifact.text("verdict/label") if has(model, "verdict") else UNKNOWN
-    size = (count(artifact.number("solve/parameters")), number(artifact.number("solve/condition_number"), 4))
-    return (model.label, SHORT_VERDICTS.get(label, label), *size)
-
-
-def _bodies(part: JudgedOn) -> list[tuple[str, Source, str]]:
-    """Name each rigid body once: models that learned from the same samples have the same."""
-    owners: dict[tuple[str, ...], list[tuple[Source, str]]] = {}
-    for model, own in _pairs(part):
-        shown = (*_worst(model, RIGID_BODY, own)[1], *_axes(model, RIGID_BODY, own)[1])
-        owners.setdefault(shown, []).append((model, own))
-    if len(owners) == 1:
-        return [("rigid body", *next(_pairs(part)))]
-    return [(f"rigid body of {joined(model.label for model, _ in who)}", *who[0]) for who in owners.values()]
-
-
-def _worst(model: Source, kind: str, part: str) -> tuple[tuple[float, ...], tuple[str, ...]]:
-    """Read what is compared over all axes; R² as what it lacks, so that the least is the best of every column."""
-    scores = judged(model)
-    shares = scores.of("r2", kind, part)
-    r2 = float(np.nanmin(shares)) if np.isfinite(shares).any() else float("nan")
-    largest, relative = float(np.max(scores.of("max_error", kind, part))), scores.worst(kind, part)[0]
-    return (largest, relative, 1.0 - r2), (number(largest, 3), percent(relative), r_squared(r2))
-
-
-def _axes(model: Source, kind: str, part: str) -> tuple[tuple[float, ...], tuple[str, ...]]:
-    scores = judged(model)
-    error, share = np.sqrt(scores.of("mse", kind, part)), scores.nrmse(kind, part)
-    shown = (f"{number(float(e), 3)} ({percent(float(s))})" for e, s in zip(error, share, strict=True))
-    return tuple(map(float, error)), tuple(shown)
 
 
 def _curves(models: Sequence[Source]) -> Iterator[Block]:

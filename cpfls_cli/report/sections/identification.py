@@ -75,7 +75,7 @@ def _table(sources: Sources) -> Table:
         "condition number of the selected model, and its largest error over the largest torque (worst axis)."
     )
     numbered = caption if elsewhere else f"Table 5. {caption}"
-    return Table("table-5-identification", numbered, header, rows)
+    return Table("table-5-identification", numbered, header, rows, sentences=frozenset(range(1, len(header))))
 
 
 def _column(model: Source) -> list[str]:

@@ -31,13 +31,14 @@ def provenance_section(sources: Sources) -> Section:
             ("File", "Format", "cpfls", "Seed", "SHA-256 of the file", "SHA-256 of the config"),
             [_artifact(source) for source in sources.all],
             frozenset({0, 1, 2, 4, 5}),
+            frozenset({4, 5}),
         )
     ]
     inputs = [row for source in sources.all for row in _inputs(source, sources)]
     if inputs:
         header = ("File", "Role", "Made from", "Format", "SHA-256", "In this report")
         caption = "The files that they were made from."
-        blocks.append(Table("inputs", caption, header, inputs, frozenset(range(6))))
+        blocks.append(Table("inputs", caption, header, inputs, frozenset(range(6)), frozenset({2, 4})))
     blocks.append(Text(_REPEAT))
     blocks.append(Listing("Commands to repeat", commands(sources), shown=True))
     for config in dict.fromkeys(source.artifact.header.config for source in sources.all):

@@ -73,7 +73,14 @@ def _parameters(model: Source, index: int) -> Table:
         "lies in the interval of the rigid body that fits best."
     )
     last = len(header)
-    return Table(f"inertia-bands-{index}", caption, [*header, "Stated value"], rows, frozenset({0, last}))
+    return Table(
+        f"inertia-bands-{index}",
+        caption,
+        [*header, "Stated value"],
+        rows,
+        frozenset({0, last}),
+        frozenset(range(2, last)),
+    )
 
 
 def _with_band(value: float, low: float, high: float) -> str:

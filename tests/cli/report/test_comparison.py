@@ -8,7 +8,7 @@ import pytest
 
 from cpfls_cli.artifacts import InputFile, read_artifact, write_artifact
 from cpfls_cli.report.differences import differences
-from tests.cli.report.evidence_artifacts import curves, verdict
+from tests.cli.report.evidence_artifacts import curves, steps, verdict
 
 
 @pytest.fixture(scope="module")
@@ -201,3 +201,28 @@ def test_differences_are_found_at_every_depth_and_long_values_are_cut():
     assert found["a.c.d"][0] == "null"
     assert len(found["a.c.d"][1]) == 60
     assert found["new"] == ["not there", "2"]
+
+
+@pytest.mark.parametrize(("above", "marks"), [(1.0 + 1e-9, [True, True, False]), (1.01, [True, False, False])])
+def test_predictors_that_are_equal_are_both_the_least(cpfls, study, write, tmp_path, above, marks):
+    own = steps()
+    own["steps/attitude"][1] = above * own["steps/attitude"][0]
+    path, output = write("one.h5", **own), tmp_path / "steps.json"
+    assert cpfls("report", study, path, "-o", output).exit_code == 0
+    page = json.loads(output.read_text(encoding="utf-8"))
+    blocks = next(part["blocks"] for part in page["sections"] if part["name"] == "steps")
+    assert ["◂" in row[3] for row in named(blocks, "steps-table-1")["rows"][:3]] == marks
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_a_model_that_is_the_rigid_body_hides_its_line_and_the_caption_says_so(cpfls, study, write, tmp_path, same):
+    own = {path: values for path, values in curves().items() if path.startswith("curves/")}
+    own["curves/inertia"] = own["curves/rigid_body"] * (1.0 + 1e-12) if same else own["curves/inertia"]
+    output = tmp_path / "curves.json"
+    assert cpfls("report", study, write("one.h5", **own), "-o", output).exit_code == 0
+    page = json.loads(output.read_text(encoding="utf-8"))
+    blocks = next(part["blocks"] for part in page["sections"] if part["name"] == "uncertainty")
+    caption = named(blocks, "inertia-curves-1-1")["caption"]
+    assert ("the grey line lies under its own" in caption) == same
+    assert "what the structure does, not what the vehicle does" in caption
+    assert "a band need not hold the truth" in caption
