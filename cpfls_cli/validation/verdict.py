@@ -11,7 +11,8 @@ from cpfls_cli.arrays import BoolArray
 from cpfls_cli.identification.findings import AXES
 from cpfls_cli.identification.physics import why_unphysical
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
-from cpfls_cli.validation.reasons import AGAINST, DEFINITE_SHARE, FOR, NEITHER, Reason, numbers, reasons
+from cpfls_cli.validation.reason import AGAINST, FOR, NEITHER, Reason, numbers
+from cpfls_cli.validation.reasons import DEFINITE_SHARE, reasons
 from cpfls_cli.validation.region import region_in_words
 
 Label = Literal["good-for-control", "good-inside-region", "not-better-than-rigid-body", "do-not-use"]
