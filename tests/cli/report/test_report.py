@@ -35,8 +35,8 @@ report: {title: "<script>alert(1)</script> & a study", paper: true}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
-    "summary", "comparison", "models", "reproduction", "vehicle", "path", "flights", "reduction", "identification", "validation",
-    "replicates", "search", "partitions", "prediction", "rules", "provenance",
+    "summary", "comparison", "models", "reproduction", "vehicle", "path", "flights", "reduction", "identification",
+    "validation", "replicates", "search", "partitions", "prediction", "rules", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
