@@ -135,11 +135,13 @@ def test_ridge_weights_must_ascend():
     assert caught.value.key == "largest"
 
 
-def test_a_torque_of_zero_has_a_defined_end():
+def test_nothing_is_identified_from_a_torque_of_zero():
+    # It would be a body without inertia, of which no score, band or verdict makes sense.
     data = flight()
     still = TorqueData(data.time, data.motion, np.zeros_like(data.torque))
-    found = identified({**SMALL, "base": "rigid-body"}, still)
-    np.testing.assert_array_equal(found.model.torque(data.motion), np.zeros((100, 3)))
+    for base in ("rigid-body", "none"):
+        with pytest.raises(ComputationError, match="the torque is zero at all samples"):
+            identified({**SMALL, "base": base}, still)
 
 
 def test_a_vehicle_that_never_turns_cannot_be_identified():
