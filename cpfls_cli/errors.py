@@ -22,7 +22,6 @@ class StoppedError(CpflsError):
 
     Parameters
     ----------
-    message : str
     exit_code : int
         128 plus the number of the signal.
     """

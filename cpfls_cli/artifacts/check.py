@@ -15,10 +15,6 @@ _FIXED = {"axis": 3}
 def check_artifact(artifact: Artifact) -> list[str]:
     """Find everything in an artifact that its format does not allow.
 
-    Parameters
-    ----------
-    artifact : Artifact
-
     Returns
     -------
     list of str

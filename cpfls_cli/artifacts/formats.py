@@ -318,14 +318,5 @@ FORMATS = (TRAJECTORY, FLIGHT, SELECTION, MODEL, CHECKPOINT, SWEEP, PREDICTION, 
 
 
 def format_of(name: str) -> ArtifactSpec | None:
-    """Look up a format by the value of the root attribute ``format``.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    ArtifactSpec or None
-    """
+    """Look up a format by the value of the root attribute ``format``."""
     return next((spec for spec in FORMATS if spec.format == name), None)

@@ -18,11 +18,6 @@ def signal(path: str, dimensions: tuple[str, ...], units: str, frame: str, descr
         Below ``signals``.
     dimensions : tuple of str
         After the sample.
-    units, frame, description : str
-
-    Returns
-    -------
-    DatasetSpec
     """
     return DatasetSpec(f"signals/{path}", ("sample", *dimensions), units, frame, description, False, True)
 
@@ -32,15 +27,8 @@ def text(path: str, dimension: str | None, description: str, required: bool = Tr
 
     Parameters
     ----------
-    path : str
     dimension : str or None
         None for a single one.
-    description : str
-    required : bool
-
-    Returns
-    -------
-    DatasetSpec
     """
     dimensions = () if dimension is None else (dimension,)
     return DatasetSpec(path, dimensions, "text", NO_FRAME, description, required)
@@ -49,52 +37,19 @@ def text(path: str, dimension: str | None, description: str, required: bool = Tr
 def number(
     path: str, dimensions: tuple[str, ...], description: str, units: str = "1", frame: str = NO_FRAME
 ) -> DatasetSpec:
-    """Describe numbers that are known everywhere.
-
-    Parameters
-    ----------
-    path : str
-    dimensions : tuple of str
-    description : str
-    units, frame : str
-
-    Returns
-    -------
-    DatasetSpec
-    """
+    """Describe numbers that are known everywhere."""
     return DatasetSpec(path, dimensions, units, frame, description)
 
 
 def gappy(
     path: str, dimensions: tuple[str, ...], description: str, units: str = "1", frame: str = NO_FRAME
 ) -> DatasetSpec:
-    """Describe numbers that may be unknown.
-
-    Parameters
-    ----------
-    path : str
-    dimensions : tuple of str
-    description : str
-    units, frame : str
-
-    Returns
-    -------
-    DatasetSpec
-    """
+    """Describe numbers that may be unknown."""
     return DatasetSpec(path, dimensions, units, frame, description, gaps=True)
 
 
 def optional(*specs: DatasetSpec) -> tuple[DatasetSpec, ...]:
-    """Let an artifact lack datasets.
-
-    Parameters
-    ----------
-    *specs : DatasetSpec
-
-    Returns
-    -------
-    tuple of DatasetSpec
-    """
+    """Let an artifact lack datasets."""
     return tuple(replace(spec, required=False) for spec in specs)
 
 

@@ -9,10 +9,6 @@ from pathlib import Path
 def file_sha256(path: Path) -> str:
     """Hash a file.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     str
@@ -24,10 +20,6 @@ def file_sha256(path: Path) -> str:
 
 def text_sha256(text: str) -> str:
     """Hash a text.
-
-    Parameters
-    ----------
-    text : str
 
     Returns
     -------

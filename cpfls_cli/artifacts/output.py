@@ -16,7 +16,6 @@ def check_output(path: Path, force: bool) -> None:
 
     Parameters
     ----------
-    path : Path
     force : bool
         Allow an existing file to be replaced.
 
@@ -53,10 +52,6 @@ def atomic_path(path: Path) -> Iterator[Path]:
     path : Path
         The file to be written in the end; the caller moves the temporary file there with `os.replace`.
 
-    Yields
-    ------
-    Path
-
     Raises
     ------
     OutputError
@@ -80,11 +75,6 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file under a temporary name, then move it in place.
-
-    Parameters
-    ----------
-    path : Path
-    text : str
 
     Raises
     ------

@@ -22,13 +22,8 @@ def read_artifact(path: Path, *wanted: ArtifactSpec) -> Artifact:
 
     Parameters
     ----------
-    path : Path
     *wanted : ArtifactSpec
         Formats that the caller can use; any if none is named.
-
-    Returns
-    -------
-    Artifact
 
     Raises
     ------
@@ -53,10 +48,6 @@ def read_artifact(path: Path, *wanted: ArtifactSpec) -> Artifact:
 def format_name(path: Path) -> str | None:
     """Tell the format of a file without reading it whole.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     str or None
@@ -71,14 +62,6 @@ def format_name(path: Path) -> str | None:
 
 def read_header(path: Path) -> Header:
     """Read where an artifact comes from, and none of its data.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Header
 
     Raises
     ------

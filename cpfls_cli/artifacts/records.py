@@ -20,7 +20,6 @@ class InputFile:
     ----------
     name : str
         File name without its folder.
-    sha256 : str
     format : str
         Artifact format, or ``csv``.
     """
@@ -38,7 +37,6 @@ class Header:
     ----------
     version : str
         Version of the program.
-    seed : int
     config : str
         The resolved study as YAML.
     inputs : mapping of str to InputFile
@@ -57,8 +55,6 @@ class Artifact:
 
     Attributes
     ----------
-    spec : ArtifactSpec
-    header : Header
     data : mapping of str to array
         By dataset path; text as arrays of str.
     """

@@ -19,8 +19,6 @@ def count_rows(path: Path, spec: ArtifactSpec, first: str) -> int | None:
 
     Parameters
     ----------
-    path : Path
-    spec : ArtifactSpec
     first : str
         Path of the dataset.
 
@@ -43,8 +41,6 @@ def check_rows(path: Path, spec: ArtifactSpec, names: Sequence[str], rows: int) 
 
     Parameters
     ----------
-    path : Path
-    spec : ArtifactSpec
     names : sequence of str
         Paths of datasets; the first ascends.
     rows : int
@@ -82,7 +78,6 @@ def read_rows(path: Path, names: Sequence[str], start: int, stop: int, rows: int
 
     Parameters
     ----------
-    path : Path
     names : sequence of str
         Paths of datasets of equal length.
     start, stop : int

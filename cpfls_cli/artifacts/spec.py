@@ -31,8 +31,6 @@ class DatasetSpec:
         Labels of the axes; time or samples first. Digits fix the length, ``axis`` is 3.
     units : str
         SI units; ``1`` for a pure number, ``text`` for text.
-    frame : str
-    description : str
     required : bool
         Whether every artifact of the format holds it.
     gaps : bool
@@ -56,10 +54,8 @@ class ArtifactSpec:
     ----------
     format : str
         Value of the root attribute ``format``.
-    description : str
     made_by : str
         The command that writes it.
-    datasets : tuple of DatasetSpec
     inputs : tuple of str
         Roles of the files it was made from.
     """

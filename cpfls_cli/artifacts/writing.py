@@ -22,7 +22,6 @@ def write_artifact(path: Path, artifact: Artifact) -> None:
 
     Parameters
     ----------
-    path : Path
     artifact : Artifact
         Datasets that its format does not know are refused.
 

@@ -12,10 +12,6 @@ _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 def seconds(text: str) -> float:
     """Read a duration, such as ``90``, ``90s``, ``10m`` or ``2h``.
 
-    Parameters
-    ----------
-    text : str
-
     Returns
     -------
     float, s

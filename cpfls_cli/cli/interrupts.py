@@ -28,10 +28,6 @@ def interruptible() -> Iterator[None]:
     """Turn an interrupt into `KeyboardInterrupt`, and whatever comes of it into an exit code.
 
     The exit code is 128 plus the number of the signal: 130 after Ctrl-C, 143 after a request to terminate.
-
-    Yields
-    ------
-    None
     """
     received: list[int] = []
 

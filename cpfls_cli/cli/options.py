@@ -52,10 +52,6 @@ class Common:
 def with_common(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command the common options; it receives them as its keyword argument `common`.
 
-    Parameters
-    ----------
-    command : callable
-
     Returns
     -------
     callable

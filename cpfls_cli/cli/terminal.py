@@ -26,12 +26,7 @@ _CLOSED_PIPE = 141
 
 @contextmanager
 def messages_for_errors() -> Iterator[None]:
-    """End a command with one message and its exit code where a user can cause the error.
-
-    Yields
-    ------
-    None
-    """
+    """End a command with one message and its exit code where a user can cause the error."""
     try:
         yield
     except CpflsError as error:
@@ -54,13 +49,7 @@ def messages_for_errors() -> Iterator[None]:
 
 
 def tell(outcome: Outcome, common: Common) -> None:
-    """Print what a stage has to say.
-
-    Parameters
-    ----------
-    outcome : Outcome
-    common : Common
-    """
+    """Print what a stage has to say."""
     if common.as_json:
         print(json.dumps(plain(outcome.summary), allow_nan=False), flush=True)
     elif not common.quiet:
@@ -73,11 +62,6 @@ def tell(outcome: Outcome, common: Common) -> None:
 @contextmanager
 def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
     """Show the progress of long work on a terminal, with the time left.
-
-    Parameters
-    ----------
-    title : str
-    common : Common
 
     Yields
     ------

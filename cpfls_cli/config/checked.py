@@ -18,7 +18,6 @@ def checked(data: dict[str, Any], source: str) -> tuple[Study | None, list[str]]
 
     Parameters
     ----------
-    data : dict
     source : str
         Name of the file, for messages.
 

@@ -24,12 +24,7 @@ _EXAMPLES: Final = MappingProxyType(
 
 
 def commented_default() -> str:
-    """Write the default study as YAML with comments on every key: what it is, and what values it may have.
-
-    Returns
-    -------
-    str
-    """
+    """Write the default study as YAML with comments on every key: what it is, and what values it may have."""
     return "\n".join(_commented(Study, resolved(Study()), 0)) + "\n"
 
 

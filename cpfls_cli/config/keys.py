@@ -24,7 +24,6 @@ class Key:
 
     Attributes
     ----------
-    name : str
     doc : str
         One line; empty where none is declared.
     section : type or None
@@ -53,10 +52,6 @@ def keys_of(settings: type) -> tuple[Key, ...]:
     ----------
     settings : type
         A settings dataclass, or `Study`.
-
-    Returns
-    -------
-    tuple of Key
     """
     hints = get_type_hints(settings, include_extras=True)
     if settings is Study:

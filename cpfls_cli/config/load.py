@@ -28,10 +28,6 @@ def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = Non
     sweep : bool
         Check the settings of the sweep too.
 
-    Returns
-    -------
-    Study
-
     Raises
     ------
     ConfigError
@@ -47,14 +43,6 @@ def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = Non
 
 def read_config(path: Path) -> dict[str, Any]:
     """Read a config file as plain data.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    dict
 
     Raises
     ------
@@ -75,13 +63,8 @@ def parse_config(text: str, source: str) -> dict[str, Any]:
 
     Parameters
     ----------
-    text : str
     source : str
         Name of the file, for messages.
-
-    Returns
-    -------
-    dict
 
     Raises
     ------
@@ -101,15 +84,10 @@ def validate(data: dict[str, Any], source: str, *, sweep: bool = False) -> Study
 
     Parameters
     ----------
-    data : dict
     source : str
         Name of the file, for messages.
     sweep : bool
         Check the settings of the sweep too; only what sweeps needs them to fit the other keys.
-
-    Returns
-    -------
-    Study
 
     Raises
     ------

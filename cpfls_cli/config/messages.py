@@ -77,13 +77,8 @@ def without_unknown_keys(data: dict[str, Any], errors: Iterable[ErrorDetails]) -
 
     Parameters
     ----------
-    data : dict
     errors : iterable of ErrorDetails
         What the validating library says of the data.
-
-    Returns
-    -------
-    dict
     """
     kept = copy.deepcopy(data)
     for detail in errors:

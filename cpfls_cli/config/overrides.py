@@ -46,7 +46,6 @@ def override_key(data: dict[str, Any], key: str, value: Any) -> None:
         Changed in place. A list that the config leaves out is taken from the default study.
     key : str
         With dots; an entry of a list is named by its index, from 0.
-    value : object
 
     Raises
     ------

@@ -15,13 +15,8 @@ def resolved(study: Study, sections: Sequence[str] = ()) -> dict[str, Any]:
 
     Parameters
     ----------
-    study : Study
     sections : sequence of str
         Only these sections or single keys (``section.key``), and the seed; all if empty.
-
-    Returns
-    -------
-    dict
 
     Raises
     ------
@@ -54,9 +49,5 @@ def resolved_yaml(study: Study, sections: Sequence[str] = ()) -> str:
     ----------
     study, sections
         See `resolved`.
-
-    Returns
-    -------
-    str
     """
     return to_yaml(resolved(study, sections))

@@ -26,7 +26,6 @@ class Variant:
 
     Attributes
     ----------
-    name : str
     overrides : tuple of str
         ``section.key=value`` each; as options of ``--set`` they make the same study of the same config.
     study : Study
@@ -43,10 +42,6 @@ class Variant:
 
 def variants(study: Study) -> tuple[Variant, ...]:
     """Make the studies of a sweep.
-
-    Parameters
-    ----------
-    study : Study
 
     Returns
     -------

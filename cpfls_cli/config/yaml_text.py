@@ -85,10 +85,6 @@ def to_yaml(data: Any) -> str:
     ----------
     data : object
         Built of dict, list, str, int, float, bool and None.
-
-    Returns
-    -------
-    str
     """
     return str(yaml.dump(data, Dumper=_StudyDumper, sort_keys=False, default_flow_style=False, width=100))
 

@@ -91,10 +91,6 @@ def steps_of(period: float, rate: float, time_constant: float) -> int:
         Of the steps, at least.
     time_constant : float, s
         0 for none.
-
-    Returns
-    -------
-    int
     """
     fastest = max(rate, 2 / time_constant if time_constant > 0 else 0.0)
     return max(ceil(period * fastest - _ROUNDING), 1)

@@ -85,10 +85,6 @@ def gains(natural_frequency: tuple[float, float, float], damping: float) -> Gain
     natural_frequency : tuple of float, Hz
         Of roll, pitch and yaw.
     damping : float
-
-    Returns
-    -------
-    Gains
     """
     return Gains(2 * pi * np.array(natural_frequency), damping)
 
@@ -99,13 +95,7 @@ Law = Callable[[Array, Array, Array, Array], Array]
 
 @dataclass(frozen=True)
 class Controller:
-    """A law with a name.
-
-    Attributes
-    ----------
-    name : str
-    law : callable
-    """
+    """A law with a name."""
 
     name: str
     law: Law
@@ -115,14 +105,6 @@ def computed_torque(model: TorqueModel) -> Law:
     """Command the torque that the model asks for the wanted motion, ``tau = D(q) v + C(q, qd) qd``.
 
     ``v = qdd_planned + Kd e' + Kp e`` in Euler coordinates.
-
-    Parameters
-    ----------
-    model : TorqueModel
-
-    Returns
-    -------
-    callable
 
     References
     ----------
@@ -142,10 +124,6 @@ def proportional_derivative(inertia: Array) -> Law:
     ----------
     inertia : array, shape (3,), kg m^2
         D_ii.
-
-    Returns
-    -------
-    callable
     """
 
     def law(_attitude: Array, _rate: Array, feedback: Array, _acceleration: Array) -> Array:

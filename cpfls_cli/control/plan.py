@@ -59,10 +59,6 @@ def plan_of(time: Array, planned: Mapping[str, Array], control_rate: float) -> P
     control_rate : float, Hz
         Raised to the next multiple of the rate of the samples.
 
-    Returns
-    -------
-    Plan
-
     Raises
     ------
     SettingError

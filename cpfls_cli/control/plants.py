@@ -21,10 +21,6 @@ def rigid_plant(inertia: Array) -> Plant:
     Parameters
     ----------
     inertia : array, shape (3, 3), kg m^2, body frame
-
-    Returns
-    -------
-    callable
     """
     inverse = np.linalg.inv(inertia)
 
@@ -39,10 +35,6 @@ def rigid_plant(inertia: Array) -> Plant:
 
 def model_plant(model: TorqueModel) -> Plant:
     """Turn as a model in Euler coordinates does, ``D(q) qdd = W^T M - C(q, qd) qd``.
-
-    Parameters
-    ----------
-    model : TorqueModel
 
     Returns
     -------

@@ -53,10 +53,6 @@ def scores(plan: Plan, tracked: Tracked, settling_time: float) -> Scores:
     tracked : Tracked
     settling_time : float, s
         In which a perfect controller forgets an initial error.
-
-    Returns
-    -------
-    Scores
     """
     error = wrapped(plan.attitude - tracked.attitude)
     alive = np.all(np.isfinite(error), axis=2)

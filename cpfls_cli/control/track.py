@@ -100,10 +100,6 @@ def track(
     progress : callable
         Takes steps done and steps in all.
 
-    Returns
-    -------
-    Tracked
-
     Raises
     ------
     SettingError

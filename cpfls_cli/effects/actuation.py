@@ -48,7 +48,7 @@ def delayed(values: Array, time: Array, delay: float) -> Array:
 
     Returns
     -------
-    array of the same shape
+    array, shape of `values`
     """
     channels = values.reshape(len(time), -1).T
     moved = [np.interp(time - delay, time, channel) for channel in channels]
@@ -63,10 +63,6 @@ def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signal
     signals : Signals
     change : callable
         From a signal to the changed one, time first.
-
-    Returns
-    -------
-    Signals
     """
     if signals.rotor_speed is not None:
         return signals.with_rotor_speed(change(signals.rotor_speed))
@@ -77,10 +73,6 @@ def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signal
 
 def wrench_change(before: Signals, after: Signals) -> Columns:
     """Make a column of what another actuation does to the wrench.
-
-    Parameters
-    ----------
-    before, after : Signals
 
     Returns
     -------

@@ -43,10 +43,6 @@ class Coefficient:
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the coefficient on a vehicle.
 
-        Parameters
-        ----------
-        vehicle : VehicleSettings
-
         Returns
         -------
         tuple of float
@@ -172,16 +168,7 @@ class Effect:
     rate_derivative: bool = False
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
-        """Name the signals that the effect needs and the flight lacks.
-
-        Parameters
-        ----------
-        signals : Signals
-
-        Returns
-        -------
-        tuple of str
-        """
+        """Name the signals that the effect needs and the flight lacks."""
         return tuple(sorted(self.needs - signals.available))
 
 

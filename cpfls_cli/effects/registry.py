@@ -61,14 +61,6 @@ CATALOGUE: Mapping[str, Effect] = _discover()
 def effect(name: str) -> Effect:
     """Find an effect by its identifier.
 
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    Effect
-
     Raises
     ------
     InputError

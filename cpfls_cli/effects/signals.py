@@ -190,9 +190,5 @@ class Signals:
         Parameters
         ----------
         rotor_speed : array, shape (time, rotor), rad/s
-
-        Returns
-        -------
-        Signals
         """
         return replace(self, rotor_speed=rotor_speed)

@@ -72,12 +72,7 @@ def start(
     rng: np.random.Generator,
     initial: IntArray | None = None,
 ) -> EvolutionState:
-    """Evaluate the initial population; the parameters are those of `evolve`.
-
-    Returns
-    -------
-    EvolutionState
-    """
+    """Evaluate the initial population; the parameters are those of `evolve`."""
     genes = rng.integers(0, 2**BITS_PER_GENE, size=(settings.population, gene_count), dtype=np.int64)
     if initial is not None:
         _require_chromosomes(initial, genes.shape)

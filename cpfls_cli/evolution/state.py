@@ -72,12 +72,7 @@ class EvolutionState:
     rng: np.random.Generator
 
     def report(self) -> Generation:
-        """Report this generation, with the front of the archive.
-
-        Returns
-        -------
-        Generation
-        """
+        """Report this generation, with the front of the archive."""
         front = self.archive.front
         return Generation(
             index=self.index,
@@ -92,10 +87,6 @@ class EvolutionState:
 
 def best(generation: Generation) -> Array:
     """Give the smallest value of each objective among all chromosomes ever evaluated.
-
-    Parameters
-    ----------
-    generation : Generation
 
     Returns
     -------

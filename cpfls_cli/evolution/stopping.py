@@ -16,11 +16,6 @@ End = Literal["generations", "converged"]
 def ended(state: EvolutionState, settings: EvolutionSettings) -> End | None:
     """Tell whether an evolution has reached its end.
 
-    Parameters
-    ----------
-    state : EvolutionState
-    settings : EvolutionSettings
-
     Returns
     -------
     {"generations", "converged"} or None

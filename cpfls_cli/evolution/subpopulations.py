@@ -10,11 +10,6 @@ from cpfls_cli.arrays import IntArray
 def subpopulation_labels(population: int, subpopulations: int) -> IntArray:
     """Split a population as evenly as possible.
 
-    Parameters
-    ----------
-    population : int
-    subpopulations : int
-
     Returns
     -------
     array of int, shape (population,)

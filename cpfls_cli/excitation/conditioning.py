@@ -45,10 +45,6 @@ def conditioning(gram: Array, exponent: float) -> Conditioning:
     exponent : float
         p; one weighs all eigenvalues (the A criterion of design), a large one only the extremes (the K criterion).
 
-    Returns
-    -------
-    Conditioning
-
     References
     ----------
     Pukelsheim (1993), Optimal Design of Experiments, chapter 6: matrix means.

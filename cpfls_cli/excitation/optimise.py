@@ -78,10 +78,6 @@ def optimised_rotation(
     progress : callable, optional
         Called with the paths and iterations done, their final number, and a word on what was reached.
 
-    Returns
-    -------
-    Excitation
-
     Raises
     ------
     SettingError

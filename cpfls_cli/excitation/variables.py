@@ -58,10 +58,6 @@ class Design:
 def variables_of(path: RotationPath) -> Array:
     """Write a path as design variables.
 
-    Parameters
-    ----------
-    path : RotationPath
-
     Returns
     -------
     array, shape (3, 1 + 2 harmonics)
@@ -79,10 +75,6 @@ def path_of(variables: Array, like: RotationPath) -> RotationPath:
     variables : array, shape (3, 1 + 2 harmonics)
     like : RotationPath
         Gives turns and duration.
-
-    Returns
-    -------
-    RotationPath
     """
     sine, cosine = np.split(variables[:, 1:], 2, axis=1)
     frequency = _frequency(like)
@@ -97,10 +89,6 @@ def design(like: RotationPath, time: Array) -> Design:
     like : RotationPath
         Gives turns, number of harmonics and duration.
     time : array, shape (time,), s
-
-    Returns
-    -------
-    Design
     """
     frequency = _frequency(like)
     sine, cosine = np.sin(time[:, None] * frequency), np.cos(time[:, None] * frequency)

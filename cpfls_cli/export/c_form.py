@@ -22,12 +22,7 @@ _OUTSIDE, _VERTICAL = 1, 4
 
 @dataclass(frozen=True)
 class CSource:
-    """C source code.
-
-    Attributes
-    ----------
-    source, header : str
-    """
+    """C source code."""
 
     source: str
     header: str
@@ -38,15 +33,10 @@ def c_source(sheet: Sheet, points: Expected, stem: str) -> CSource:
 
     Parameters
     ----------
-    sheet : Sheet
     points : Expected
         For the self-test.
     stem : str
         Name of both files without ``.c`` and ``.h``.
-
-    Returns
-    -------
-    CSource
     """
     words = {
         **common_words(sheet),

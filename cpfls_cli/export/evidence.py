@@ -20,10 +20,6 @@ def evidence_of(artifact: Artifact) -> Evidence:
     ----------
     artifact : Artifact
         Of the format ``cpfls/model``.
-
-    Returns
-    -------
-    Evidence
     """
     data = artifact.data
     return Evidence(

@@ -14,10 +14,6 @@ _SIGNS = {1.0: "for", -1.0: "against"}
 def banner(sheet: Sheet) -> list[str]:
     """Say first what must not be overlooked.
 
-    Parameters
-    ----------
-    sheet : Sheet
-
     Returns
     -------
     list of str
@@ -30,16 +26,7 @@ def banner(sheet: Sheet) -> list[str]:
 
 
 def facts(sheet: Sheet) -> list[str]:
-    """Say what the model is, what it is worth and where it comes from.
-
-    Parameters
-    ----------
-    sheet : Sheet
-
-    Returns
-    -------
-    list of str
-    """
+    """Say what the model is, what it is worth and where it comes from."""
     return [_structure(sheet), "", *_worth(sheet.evidence), "", *_origin(sheet.provenance)]
 
 

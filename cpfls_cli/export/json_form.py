@@ -27,11 +27,6 @@ _ANGLES = ("roll", "pitch")
 def json_text(sheet: Sheet, points: Expected) -> str:
     """Write a model as strict JSON.
 
-    Parameters
-    ----------
-    sheet : Sheet
-    points : Expected
-
     Returns
     -------
     str

@@ -27,7 +27,6 @@ class Expected:
 
     Attributes
     ----------
-    motion : Motion
     inertia, coriolis : array, shape (samples, 3, 3)
     torque, body : array, shape (samples, 3), N m
     inside : array of bool, shape (samples,)
@@ -50,11 +49,6 @@ class Expected:
 
 def expected(model: Model, motion: Motion) -> Expected:
     """Compute what an export has to give along a motion.
-
-    Parameters
-    ----------
-    model : Model
-    motion : Motion
 
     Returns
     -------
@@ -91,11 +85,6 @@ def _scale(inertia: InertiaValues, motion: Motion, fuzzy: bool) -> Array:
 
 def reference_points(model: Model, rng: np.random.Generator) -> Expected:
     """Draw a few states, half of them where training went, and compute what the model gives there.
-
-    Parameters
-    ----------
-    model : Model
-    rng : Generator
 
     Returns
     -------

@@ -20,15 +20,10 @@ def python_source(sheet: Sheet, points: Expected, file: str) -> str:
 
     Parameters
     ----------
-    sheet : Sheet
     points : Expected
         For the self-test.
     file : str
         Name of the file.
-
-    Returns
-    -------
-    str
     """
     verdict = sheet.evidence.verdict
     words = {
@@ -43,10 +38,6 @@ def python_source(sheet: Sheet, points: Expected, file: str) -> str:
 
 def visited_rows(model: Model) -> list[str]:
     """Draw the region that training visited.
-
-    Parameters
-    ----------
-    model : Model
 
     Returns
     -------

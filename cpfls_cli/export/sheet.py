@@ -39,7 +39,6 @@ class Verdict:
 
     Attributes
     ----------
-    label, region : str
     reasons : tuple of (str, float)
         Each with 1 where it speaks for the model, -1 against it, 0 neither.
     """
@@ -57,10 +56,8 @@ class Evidence:
     ----------
     complete : bool
         Whether the search came to its end.
-    stop_reason : str
     judged : mapping
         Scores by model and part, as JSON has them; numbers that are not known are not finite.
-    findings : tuple of str
     verdict : Verdict or None
         None where the model holds no validation.
     """
@@ -80,11 +77,8 @@ class Sheet:
     ----------
     name : str
         Prefix of all names in source code, an identifier.
-    model : Model
     base : str
         ``none`` or ``rigid-body``.
-    provenance : Provenance
-    evidence : Evidence
     """
 
     name: str

@@ -24,10 +24,6 @@ def fill(template: str, words: dict[str, Any]) -> str:
         File name.
     words : dict
         All that it asks for.
-
-    Returns
-    -------
-    str
     """
     environment = Environment(
         loader=PackageLoader("cpfls_cli.export"),
@@ -41,16 +37,7 @@ def fill(template: str, words: dict[str, Any]) -> str:
 
 
 def common_words(sheet: Sheet) -> dict[str, Any]:
-    """Gather what all languages ask for: names, numbers, and which parts of the code the structure needs.
-
-    Parameters
-    ----------
-    sheet : Sheet
-
-    Returns
-    -------
-    dict
-    """
+    """Gather what all languages ask for: names, numbers, and which parts of the code the structure needs."""
     verdict = sheet.evidence.verdict
     return {
         "name": sheet.name,

@@ -12,30 +12,12 @@ _COLUMNS = 116
 
 
 def number(value: float) -> str:
-    """Write a number with as many digits as bring it back.
-
-    Parameters
-    ----------
-    value : float
-
-    Returns
-    -------
-    str
-    """
+    """Write a number with as many digits as bring it back."""
     return repr(float(value))
 
 
 def c_row(values: Iterable[float]) -> str:
-    """Write numbers for an array of C.
-
-    Parameters
-    ----------
-    values : iterable of float
-
-    Returns
-    -------
-    str
-    """
+    """Write numbers for an array of C."""
     return ", ".join(f"R({number(value)})" for value in values)
 
 
@@ -47,10 +29,6 @@ def c_rows(values: Array, labels: Sequence[str]) -> str:
     values : array, shape (rows, columns)
     labels : sequence of str
         One for each row.
-
-    Returns
-    -------
-    str
     """
     return "\n".join(
         f"    /* {label} */\n    {{\n{filled(c_row(row), 8)}\n    }},"
@@ -66,10 +44,6 @@ def python_rows(values: Array, indent: int) -> str:
     values : array, shape (columns,) or (rows, columns)
     indent : int
         Spaces before each line.
-
-    Returns
-    -------
-    str
     """
     if values.ndim == 1:
         return filled("[" + ", ".join(number(value) for value in values) + "]", indent)
@@ -82,13 +56,8 @@ def filled(text: str, indent: int) -> str:
 
     Parameters
     ----------
-    text : str
     indent : int
         Spaces before each line.
-
-    Returns
-    -------
-    str
     """
     blank = " " * indent
     wide = {"break_long_words": False, "break_on_hyphens": False}
@@ -96,17 +65,7 @@ def filled(text: str, indent: int) -> str:
 
 
 def rule_labels(block: Block, structure: ModelStructure) -> list[str]:
-    """Name the rules of an inertia function by their places along its inputs.
-
-    Parameters
-    ----------
-    block : Block
-    structure : ModelStructure
-
-    Returns
-    -------
-    list of str
-    """
+    """Name the rules of an inertia function by their places along its inputs."""
     names = [("roll", "pitch")[angle] for angle in block.function.inputs]
     last = rules_along(structure, block.partitions[-1])
     if len(names) == 1:
@@ -119,13 +78,8 @@ def rules_along(structure: ModelStructure, partition: int) -> int:
 
     Parameters
     ----------
-    structure : ModelStructure
     partition : int
         Index.
-
-    Returns
-    -------
-    int
     """
     functions = structure.partitions[partition].functions
     return max(functions - 1, 1) if structure.circular else functions

@@ -34,16 +34,7 @@ def comment_lines(paragraphs: Sequence[str]) -> list[str]:
 
 
 def comment_text(text: str) -> str:
-    """Make text fit for a comment: printable ASCII in one line, without the signs that comments end and begin with.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    str
-    """
+    """Make text fit for a comment: printable ASCII in one line, without the signs that comments end and begin with."""
     ascii_only = re.sub(r"[^\x20-\x7e]", "?", text).replace("\\", "|")
     # Two question marks would begin a trigraph, which C99 reads before it knows of comments.
     single = re.sub(r"\?{2,}", "?", ascii_only)
@@ -51,25 +42,12 @@ def comment_text(text: str) -> str:
 
 
 def literal_text(text: str) -> str:
-    """Make text fit for a string literal of C: letters, digits and a few signs.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    str
-    """
+    """Make text fit for a string literal of C: letters, digits and a few signs."""
     return re.sub(r"[^A-Za-z0-9 .,:;_+()=-]", "_", text)
 
 
 def identifier(stem: str) -> str:
     """Make a prefix for the names in source code out of the name of a file.
-
-    Parameters
-    ----------
-    stem : str
 
     Returns
     -------
@@ -82,14 +60,6 @@ def identifier(stem: str) -> str:
 
 def checked_identifier(name: str) -> str:
     """Refuse a prefix that is no identifier.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    str
 
     Raises
     ------

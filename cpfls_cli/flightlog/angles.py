@@ -46,10 +46,6 @@ def warn_of_angles(signals: Mapping[str, Array]) -> tuple[str, ...]:
     ----------
     signals : mapping from signal name to array, shape (sample, column), SI
         As logged; absent values are NaN.
-
-    Returns
-    -------
-    tuple of str
     """
     if "attitude" not in signals or {"body_rate", "attitude_rate"} & signals.keys():
         return ()

@@ -82,10 +82,6 @@ def estimate_delay(
     share : float
         Leading share of the samples that is looked at, so that data held out for a test stay unseen.
 
-    Returns
-    -------
-    DelayEstimate
-
     Raises
     ------
     SettingError

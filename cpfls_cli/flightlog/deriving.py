@@ -36,10 +36,6 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     settings : ImportSettings
         `lowpass_hz`, `lowpass_order` and `rate_hz`.
 
-    Returns
-    -------
-    ImportedFlight
-
     Raises
     ------
     SettingError

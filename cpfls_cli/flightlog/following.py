@@ -20,10 +20,6 @@ def followed(signals: LogSignals, time_constant: float) -> LogSignals:
         On a uniform clock.
     time_constant : float
         tau, s; 0 for rotors that follow at once.
-
-    Returns
-    -------
-    LogSignals
     """
     command = signals.rotor_command
     if command is None or time_constant == 0:

@@ -36,10 +36,6 @@ def import_log(
     delay_share : float
         Leading share of the flight that an estimate of the delay may look at.
 
-    Returns
-    -------
-    ImportedFlight
-
     Raises
     ------
     InputError

@@ -47,10 +47,6 @@ def count_values(table: Table, spikes: Mapping[str, BoolArray], settings: Import
         Where its spikes are.
     settings : ImportSettings
         The names of the columns, `spike_deviations` and `saturation_samples`.
-
-    Returns
-    -------
-    ValueCounts
     """
     found = _by_column(spikes, settings, lambda column: int(column.sum()))
     repaired = settings.spike_deviations is not None
@@ -73,16 +69,7 @@ def _saturated(table: Table, settings: ImportSettings) -> dict[str, int]:
 
 
 def warn_of_values(counts: ValueCounts) -> tuple[str, ...]:
-    """Say which columns hold values that look wrong and are used as they are.
-
-    Parameters
-    ----------
-    counts : ValueCounts
-
-    Returns
-    -------
-    tuple of str
-    """
+    """Say which columns hold values that look wrong and are used as they are."""
     saturated = (
         f"{column} stands at its extreme for {count} samples in all: saturated?"
         for column, count in counts.saturated.items()

@@ -75,11 +75,6 @@ class SignalMap(Settings):
 def check_signal(name: SignalName, signal: SignalMap) -> None:
     """Check the number of columns and the unit against the kind of signal.
 
-    Parameters
-    ----------
-    name : SignalName
-    signal : SignalMap
-
     Raises
     ------
     SettingError

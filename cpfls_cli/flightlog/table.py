@@ -101,10 +101,6 @@ def _require_values(table: Table, settings: ImportSettings) -> None:
 def made_continuous(table: Table) -> Table:
     """Remove what is no motion: full turns of roll and yaw, and the change of sign of a quaternion.
 
-    Parameters
-    ----------
-    table : Table
-
     Returns
     -------
     Table
@@ -150,10 +146,6 @@ def without(table: Table, marked: Mapping[str, BoolArray]) -> Table:
     ----------
     table : Table
     marked : mapping from signal name to array of bool, shape (sample, column)
-
-    Returns
-    -------
-    Table
     """
     signals = {name: np.where(marked[name], np.nan, values) for name, values in table.signals.items()}
     return Table(table.time, signals)

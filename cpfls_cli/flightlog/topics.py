@@ -29,10 +29,6 @@ _THINNED = 1.5
 def topic_and_field(column: str) -> tuple[str, str]:
     """Split the name of a column, ``topic.field`` or ``topic[instance].field``; the first instance needs no number.
 
-    Parameters
-    ----------
-    column : str
-
     Returns
     -------
     tuple of str

@@ -65,10 +65,6 @@ def antecedent(mapped: MappedInput, breakpoints: Array, circular: bool) -> Antec
     circular : bool
         True joins the first and the last function: functions - 1 rules.
 
-    Returns
-    -------
-    Antecedent
-
     References
     ----------
     Equations (6)-(9), Tables 1 and 2.
@@ -87,10 +83,6 @@ def antecedent_sensitivity(mapped: MappedInput, breakpoints: Array, circular: bo
     ----------
     mapped, breakpoints, circular
         See `antecedent`.
-
-    Returns
-    -------
-    AntecedentSensitivity
     """
     by_breakpoint = membership_sensitivity(mapped.antecedent, breakpoints)
     slope = by_breakpoint.slope * mapped.antecedent_slope[:, None, None]
@@ -122,15 +114,6 @@ def rule_firing(antecedents: list[Antecedent]) -> tuple[Array, Array]:
 
 def basis(antecedents: list[Antecedent], consequent: Features) -> Basis:
     """Combine rule firing and consequent features by the product rule.
-
-    Parameters
-    ----------
-    antecedents : list of Antecedent
-    consequent : Features
-
-    Returns
-    -------
-    Basis
 
     References
     ----------

@@ -41,10 +41,6 @@ def feature_count(inputs: int, consequents: Consequents, harmonic_order: int, pr
     harmonic_order : int
         Highest harmonic; used by `harmonic` only.
     products : {"additive", "tensor"}
-
-    Returns
-    -------
-    int
     """
     single = 1 if consequents == "seesaw" else 2 * harmonic_order
     return int((1 + single) ** inputs) if products == "tensor" else 1 + single * inputs
@@ -70,10 +66,6 @@ def features(
         The same angles as the system sees them.
     consequents, harmonic_order, products
         See `feature_count`.
-
-    Returns
-    -------
-    Features
 
     References
     ----------

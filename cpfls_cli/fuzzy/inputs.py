@@ -94,10 +94,6 @@ def input_range(angle: Array, circular: bool) -> InputRange:
     angle : array, shape (samples,), rad
     circular : bool
         True for continuous periodic systems (range of the seesaw), False for classic ones (range of the angle).
-
-    Returns
-    -------
-    InputRange
     """
     value = seesaw(angle)[0] if circular else wrap(angle)
     return InputRange(float(np.min(value)), float(np.max(value)))
@@ -116,10 +112,6 @@ def map_input(angle: Array, input_map: InputMap, circular: bool, data_range: Inp
         False for the classic system of [14], which takes the angle itself in place of the seesaw.
     data_range : InputRange
         Used by `data-range` only.
-
-    Returns
-    -------
-    MappedInput
 
     References
     ----------

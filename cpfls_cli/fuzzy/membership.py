@@ -62,10 +62,6 @@ def memberships(scaled_input: Array, breakpoints: Array) -> Memberships:
     breakpoints : array, shape (functions,)
         Ascending peaks from 0 to 1; equal neighbours make a function of zero width.
 
-    Returns
-    -------
-    Memberships
-
     References
     ----------
     Equation (8) with the squares that its print lost; method.md section 4.
@@ -90,10 +86,6 @@ def membership_sensitivity(scaled_input: Array, breakpoints: Array) -> Membershi
     ----------
     scaled_input : array, shape (samples,)
     breakpoints : array, shape (functions,)
-
-    Returns
-    -------
-    MembershipSensitivity
     """
     samples, functions = len(scaled_input), len(breakpoints)
     value = np.zeros((samples, functions, functions))

@@ -42,10 +42,6 @@ def fit_periodic(
     **keys
         Single settings by name, in place of those of `settings`.
 
-    Returns
-    -------
-    PeriodicSystem
-
     Raises
     ------
     ValueError

@@ -66,10 +66,6 @@ class PeriodicStructure:
         Parameters
         ----------
         angles : array, shape (samples, inputs), rad
-
-        Returns
-        -------
-        Basis
         """
         return basis(*self._parts(angles))
 

@@ -52,10 +52,6 @@ def solve_ridge(blocks: Blocks, weight: float, rank_tolerance: float) -> RidgeSo
     rank_tolerance : float
         Singular values below this share of the largest count as zero.
 
-    Returns
-    -------
-    RidgeSolution
-
     References
     ----------
     Björck, Numerical Methods for Least Squares Problems (1996), sections 2.9 and 6.6.

@@ -97,16 +97,7 @@ def as_values(values: npt.ArrayLike, samples: int) -> Array:
 
 
 def blocks(samples: int) -> Iterator[slice]:
-    """Cut samples into blocks.
-
-    Parameters
-    ----------
-    samples : int
-
-    Returns
-    -------
-    iterator of slice
-    """
+    """Cut samples into blocks."""
     return (slice(start, min(start + _BLOCK, samples)) for start in range(0, samples, _BLOCK))
 
 

@@ -107,10 +107,6 @@ def compare(
     progress : callable
         Takes the share of the work that is done and a note.
 
-    Returns
-    -------
-    Disagreement
-
     Raises
     ------
     InputError

@@ -84,10 +84,6 @@ def diagnose(
     progress : callable
         Takes the share of the work that is done and a note.
 
-    Returns
-    -------
-    Diagnosed
-
     Raises
     ------
     InputError
@@ -119,16 +115,7 @@ def diagnose(
 
 
 def considered(settings: GapSettings) -> list[Effect]:
-    """List the effects that the search tries.
-
-    Parameters
-    ----------
-    settings : GapSettings
-
-    Returns
-    -------
-    list of Effect
-    """
+    """List the effects that the search tries."""
     return [
         effect
         for name, effect in CATALOGUE.items()

@@ -84,17 +84,7 @@ class Evidence:
 
 
 def model_of(diagnosed: Diagnosed, base: InertiaModel | None) -> ExtendedModel:
-    """Give the model that a diagnosis arrives at.
-
-    Parameters
-    ----------
-    diagnosed : Diagnosed
-    base : InertiaModel or None
-
-    Returns
-    -------
-    ExtendedModel
-    """
+    """Give the model that a diagnosis arrives at."""
     found, chosen = diagnosed.found, diagnosed.hypothesis.chosen
     effects = tuple(FittedEffect(*pair) for pair in zip(chosen, found.of_effect, strict=True))
     own = len(found.linear) - sum(len(linear) for linear in found.of_effect)
@@ -112,10 +102,6 @@ def evidence(held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, s
         Their residuals.
     model : ExtendedModel
     settings : GapSettings
-
-    Returns
-    -------
-    Evidence
     """
     own = common_windows(held, settings)
     signals = [recording.signals for recording in held]

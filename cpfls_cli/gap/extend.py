@@ -75,10 +75,6 @@ def extend(
     base : InertiaModel or None
         None for the rigid body of the vehicle.
 
-    Returns
-    -------
-    Extension
-
     Raises
     ------
     ComputationError
@@ -116,10 +112,6 @@ def worse_axes(before: Array, after: Array) -> list[int]:
     Parameters
     ----------
     before, after : array, shape (6,), floors
-
-    Returns
-    -------
-    list of int
     """
     return [int(c) for c in np.flatnonzero((before[:3] > _CLEAR) & (after[:3] > _WORSE * before[:3]))]
 

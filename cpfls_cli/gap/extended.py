@@ -70,16 +70,7 @@ class ExtendedModel:
         return np.concatenate([self.parameters, *(e.linear for e in self.effects if is_free(e.candidate))])
 
     def repaired(self, signals: Signals) -> Signals:
-        """Take the faults of the sensors out.
-
-        Parameters
-        ----------
-        signals : Signals
-
-        Returns
-        -------
-        Signals
-        """
+        """Take the faults of the sensors out."""
         return signals if self.audit is None else self.audit.repaired(signals)
 
     def system(self, flights: Sequence[WeakFlight]) -> System:
@@ -89,10 +80,6 @@ class ExtendedModel:
         ----------
         flights : sequence of WeakFlight
             Made with `base`, of repaired signals.
-
-        Returns
-        -------
-        System
 
         Raises
         ------
@@ -105,10 +92,6 @@ class ExtendedModel:
 
     def residual(self, flights: Sequence[WeakFlight]) -> Array:
         """Compute the gap that the model leaves.
-
-        Parameters
-        ----------
-        flights : sequence of WeakFlight
 
         Returns
         -------
@@ -180,10 +163,6 @@ class ExtendedModel:
         ----------
         signals : Signals
             With the faults of sensors taken out.
-
-        Returns
-        -------
-        ReplayModel
         """
         coupling = np.where(np.isin(np.arange(len(self.parameters)), _COUPLING), self.parameters, 0.0)
         left = instantaneous(columns_of(nuisance(), signals), coupling, signals.time)
@@ -238,16 +217,7 @@ class _Corrected:
 
 
 def plain(base: InertiaModel | None) -> ExtendedModel:
-    """Make a model without effects.
-
-    Parameters
-    ----------
-    base : InertiaModel or None
-
-    Returns
-    -------
-    ExtendedModel
-    """
+    """Make a model without effects."""
     return ExtendedModel(base, np.zeros(len(nuisance().effect.coefficients)))
 
 

@@ -43,10 +43,6 @@ def replayed(flights: Sequence[Signals], model: ExtendedModel | None, horizon: i
         None for rates that stay what they are.
     horizon : int
         Samples, at most.
-
-    Returns
-    -------
-    Replayed
     """
     longest = min(horizon, *(len(signals) - 1 - _EVERY for signals in flights))
     return _joined([_run(model)(signals, longest) for signals in flights])

@@ -38,17 +38,7 @@ class AxisEvidence:
 
 
 def axis_evidence(source: TorqueSource, rank_tolerance: float) -> AxisEvidence:
-    """Fit six inertia parameters and a constant body torque.
-
-    Parameters
-    ----------
-    source : TorqueSource
-    rank_tolerance : float
-
-    Returns
-    -------
-    AxisEvidence
-    """
+    """Fit six inertia parameters and a constant body torque."""
     scale = 1.0 / axis_scale(source)
     rows = ((_columns(data) * scale[:, None], data.torque * scale) for data in source.chunks())
     triangle = Triangle.of((columns.reshape(-1, columns.shape[2]), torque.reshape(-1)) for columns, torque in rows)

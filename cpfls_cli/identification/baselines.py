@@ -41,10 +41,6 @@ class Baseline:
 def constant_inertia_columns(motion: Motion) -> Array:
     """Columns of a constant symmetric J in ``J qdd``: J11, J22, J33, J12, J13, J23.
 
-    Parameters
-    ----------
-    motion : Motion
-
     Returns
     -------
     array, shape (samples, 3, 6)
@@ -54,10 +50,6 @@ def constant_inertia_columns(motion: Motion) -> Array:
 
 def no_torque_columns(motion: Motion) -> Array:
     """Columns of the prediction that no torque acts: none.
-
-    Parameters
-    ----------
-    motion : Motion
 
     Returns
     -------

@@ -69,10 +69,6 @@ def weight_jacobian(structure: ModelStructure, weights: Array) -> Array:
 def uniform_chromosome(structure: ModelStructure) -> IntArray:
     """Encode the equidistant partitions.
 
-    Parameters
-    ----------
-    structure : ModelStructure
-
     Returns
     -------
     array of int, shape (genes,)

@@ -67,10 +67,6 @@ def contiguous_blocks(judged: Array, learned: Array, folds: int, embargo: float)
     embargo : float
         Seconds before and after a block that do not train with it held out.
 
-    Returns
-    -------
-    Blocks
-
     Raises
     ------
     SettingError
@@ -108,10 +104,6 @@ def ridge_curve(learned: Products, judged: Products, left_out: BoolArray, weight
         Finite ridge weights, ascending, as shares of the number of rows.
     size : array, shape (parameters,)
         What the penalised columns are divided by.
-
-    Returns
-    -------
-    RidgeCurve
 
     References
     ----------

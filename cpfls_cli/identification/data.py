@@ -73,12 +73,7 @@ class TorqueData:
 
 @dataclass(frozen=True)
 class Flights:
-    """Several flights, one after the other with a pause between.
-
-    Attributes
-    ----------
-    flights : tuple of TorqueSource
-    """
+    """Several flights, one after the other with a pause between."""
 
     flights: tuple[TorqueSource, ...]
 
@@ -99,10 +94,6 @@ class Flights:
 def joined(flights: Sequence[TorqueSource]) -> TorqueSource:
     """Take several flights as one source.
 
-    Parameters
-    ----------
-    flights : sequence of TorqueSource
-
     Returns
     -------
     TorqueSource
@@ -119,10 +110,6 @@ def gathered(source: TorqueSource, samples: IntArray) -> TorqueData:
     source : TorqueSource
     samples : array of int
         Indices, ascending.
-
-    Returns
-    -------
-    TorqueData
     """
     parts, start = [], 0
     for data in source.chunks():
@@ -139,10 +126,6 @@ def gathered(source: TorqueSource, samples: IntArray) -> TorqueData:
 
 def sample_times(source: TorqueSource) -> Array:
     """Gather the times of all samples.
-
-    Parameters
-    ----------
-    source : TorqueSource
 
     Returns
     -------
@@ -177,10 +160,6 @@ def split_flight(time: Array, training_share: float, embargo: float) -> Split:
         Share of the samples that trains, in (0, 1].
     embargo : float
         Seconds between the parts used by neither, for the memory of zero-phase filters.
-
-    Returns
-    -------
-    Split
     """
     samples = len(time)
     end = max(round(training_share * samples), 1)
@@ -192,10 +171,6 @@ def split_flight(time: Array, training_share: float, embargo: float) -> Split:
 
 def axis_scale(source: TorqueSource) -> Array:
     """Scale of the torque about each axis.
-
-    Parameters
-    ----------
-    source : TorqueSource
 
     Returns
     -------

@@ -53,16 +53,7 @@ def decomposed(learned: Samples, partitions: Breakpoints, fit: Fit, rank_toleran
 
 
 def regressor_blocks(learned: Samples) -> Iterator[tuple[TorqueData, Regressor]]:
-    """Yield the samples block by block, small enough to write out, with their regressors.
-
-    Parameters
-    ----------
-    learned : Samples
-
-    Yields
-    ------
-    tuple of TorqueData and Regressor
-    """
+    """Yield the samples block by block, small enough to write out, with their regressors."""
     for data in learned.ready.source.chunks():
         for start in range(0, len(data), _BLOCK):
             block = data[start : start + _BLOCK]

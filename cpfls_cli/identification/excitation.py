@@ -98,10 +98,6 @@ def rule_excitation(
     inertia : float, kg m^2
         Typical moment of inertia.
     rank_tolerance : float
-
-    Returns
-    -------
-    RuleExcitation
     """
     blocks, singular_values, Vt = learned.structure.blocks, *_decomposed(learned, partitions)
     floor = max(rank_tolerance * singular_values[0], noise / inertia if inertia > 0 else 0.0)

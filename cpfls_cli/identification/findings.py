@@ -67,16 +67,7 @@ class Evidence:
 
 
 def findings(evidence: Evidence) -> list[str]:
-    """Say in words what failed or was not excited, what matters most first.
-
-    Parameters
-    ----------
-    evidence : Evidence
-
-    Returns
-    -------
-    list of str
-    """
+    """Say in words what failed or was not excited, what matters most first."""
     of_the_model = (_physics, _scale, _axes, _rank, _silent_rules, _fuzzy_part_off)
     of_its_errors = (_beaten, _badly_explained, _outside, _vertical)
     return [finding for rule in of_the_model + of_its_errors for finding in rule(evidence)]

@@ -66,10 +66,6 @@ def identify(
         Data to choose on among the members of the Pareto front, for the choice `held-out`; neither learned from nor
         judged in the end.
 
-    Returns
-    -------
-    Identification
-
     Raises
     ------
     ComputationError
@@ -121,10 +117,6 @@ def model_evaluator(training: TorqueSource, learned: TorqueSource, settings: Ide
     learned : TorqueSource
         Solves.
     settings : IdentificationSettings
-
-    Returns
-    -------
-    Evaluator
 
     Raises
     ------

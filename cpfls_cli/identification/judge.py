@@ -57,10 +57,6 @@ def score(data: TorqueData, predicted: Array) -> Score:
     data : TorqueData
     predicted : array, shape (samples, 3), N m
         Generalised torque.
-
-    Returns
-    -------
-    Score
     """
     sums = _Sums()
     sums.add(data, predicted)
@@ -75,10 +71,6 @@ def score_of(source: TorqueSource, torque: Callable[[Motion], Array]) -> Score:
     source : TorqueSource
     torque : callable
         Predicts the generalised torque of a motion.
-
-    Returns
-    -------
-    Score
     """
     sums = _Sums()
     for data in source.chunks():

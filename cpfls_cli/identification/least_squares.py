@@ -68,10 +68,6 @@ class Triangle:
         ----------
         blocks : iterable of tuple of array
             Columns, shape (rows, parameters), and right-hand side, shape (rows,), block by block.
-
-        Returns
-        -------
-        Triangle
         """
         triangle: Array | None = None
         for columns, right_side in blocks:
@@ -98,10 +94,6 @@ class Triangle:
         ----------
         rank_tolerance : float
             Singular values below this share of the largest count as zero.
-
-        Returns
-        -------
-        LeastSquares
         """
         return solve(self.matrix[:, :-1], self.matrix[:, -1], rank_tolerance)
 
@@ -115,10 +107,6 @@ def solve(matrix: Array, right_side: Array, rank_tolerance: float) -> LeastSquar
     right_side : array, shape (rows,)
     rank_tolerance : float
         Singular values below this share of the largest count as zero.
-
-    Returns
-    -------
-    LeastSquares
 
     References
     ----------

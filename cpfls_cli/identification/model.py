@@ -47,10 +47,6 @@ class Model:
     def torque(self, motion: Motion) -> Array:
         """Predict the generalised torque, ``J qdd + C qd``.
 
-        Parameters
-        ----------
-        motion : Motion
-
         Returns
         -------
         array, shape (samples, 3), N m
@@ -64,10 +60,6 @@ class Model:
         Parameters
         ----------
         attitude : array, shape (samples, 3), rad
-
-        Returns
-        -------
-        InertiaValues
         """
         still = Motion(attitude, np.zeros_like(attitude), np.zeros_like(attitude))
         fuzzy = Regressor(self.structure, still, self.ranges).inertia(self.partitions, self.coefficients)

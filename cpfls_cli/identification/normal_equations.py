@@ -78,10 +78,6 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
     project : callable
         Takes parameters x and directions V, gives ``(A V)^T (A V)`` and ``A^T (tau - A x)``.
 
-    Returns
-    -------
-    NormalSolution
-
     References
     ----------
     Björck, Numerical Methods for Least Squares Problems (1996), sections 2.9 and 6.6 (accuracy of the normal equations,
@@ -108,10 +104,6 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
 
 def quick_solution(equations: NormalEquations) -> tuple[Array, tuple[Array, bool], Array]:
     """Solve normal equations by Cholesky decomposition, with a trace of ridge where columns are dependent.
-
-    Parameters
-    ----------
-    equations : NormalEquations
 
     Returns
     -------

@@ -13,10 +13,6 @@ RIGID = 6
 def rigid_columns(motion: Motion) -> Array:
     """Columns of the six inertia parameters Ixx, Iyy, Izz, Ixy, Ixz, Iyz in the generalised torque.
 
-    Parameters
-    ----------
-    motion : Motion
-
     Returns
     -------
     array, shape (samples, 3, 6)

@@ -141,10 +141,6 @@ class Samples:
         Parameters
         ----------
         partitions : sequence of array, shape (functions,)
-
-        Returns
-        -------
-        Products
         """
         P, dense = self.table.parameters, self._dense_products
         gram, moment = np.zeros((self.labels, P, P)), np.zeros((self.labels, P, dense.shape[1]))
@@ -219,10 +215,6 @@ class Samples:
         coefficients : array, shape (parameters,)
         rigid_body : array, shape (6,)
             Not used without a rigid body.
-
-        Returns
-        -------
-        MovedProducts
         """
         B, weights = self.table.breakpoints, self._weights(rigid_body)[0]
         cross, square = np.zeros((self.table.parameters, B + 1)), np.zeros((B + 1, B + 1))

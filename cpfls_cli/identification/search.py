@@ -83,10 +83,6 @@ def search(
     kept : TorqueSource, optional
         Flights to choose on, for the choice `held-out`.
 
-    Returns
-    -------
-    SearchResult
-
     Raises
     ------
     NothingFoundError

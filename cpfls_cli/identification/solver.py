@@ -102,10 +102,6 @@ class Solver:
             Finite.
         size : array, shape (parameters,)
             What the columns of the fuzzy part are divided by.
-
-        Returns
-        -------
-        NormalEquations
         """
         return self._equations(self.learned.products(partitions).sum(), weight, size)
 

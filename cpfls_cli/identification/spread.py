@@ -40,10 +40,6 @@ def spread(values: Array) -> Spread:
     ----------
     values : array, shape (replicates,)
         Not finite where a replicate found nothing.
-
-    Returns
-    -------
-    Spread
     """
     known = values[np.isfinite(values)]
     mean = float(np.mean(known)) if len(known) else float("nan")

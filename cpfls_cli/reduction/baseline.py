@@ -30,10 +30,6 @@ def random_selections(
     rank_tolerance : float
         Singular values below this fraction of the largest count as zero.
 
-    Returns
-    -------
-    tuple of Subset
-
     Raises
     ------
     ComputationError
@@ -54,10 +50,6 @@ def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Gene
     count : int
         Subsets to choose, independently of each other.
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    tuple of Subset
 
     Raises
     ------

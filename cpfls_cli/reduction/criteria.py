@@ -22,10 +22,6 @@ def make_criterion(space: RowSpace, name: CriterionName) -> Criterion:
     ----------
     space : RowSpace
     name : {"sigma_min", "A", "D", "paper-literal"}
-
-    Returns
-    -------
-    Criterion
     """
     if name == "paper-literal":
         full_column_rank = space.rank == space.parameters

@@ -20,9 +20,5 @@ class Criterion(Protocol):
             Factor of the samples chosen so far.
         available : array of bool, shape (samples,)
             Samples that are not chosen yet.
-
-        Returns
-        -------
-        int
         """
         ...

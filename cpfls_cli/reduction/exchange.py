@@ -67,10 +67,6 @@ def exchange_samples(
     target : float, optional
         Stop growing at the first size that reaches this condition number.
 
-    Returns
-    -------
-    Exchanged
-
     References
     ----------
     Fedorov 1972: Theory of Optimal Experiments.

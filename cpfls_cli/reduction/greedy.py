@@ -32,10 +32,6 @@ def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = No
     progress : callable, optional
         Called with the samples chosen and the most there can be.
 
-    Returns
-    -------
-    Selection
-
     Raises
     ------
     ComputationError
@@ -69,16 +65,6 @@ def check_reducible(Q: Array, settings: ReductionSettings) -> None:
 def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
     """Choose samples of a row space as `reduce` does.
 
-    Parameters
-    ----------
-    space : RowSpace
-    settings : ReductionSettings
-    progress : callable, optional
-
-    Returns
-    -------
-    Selection
-
     Raises
     ------
     SettingError
@@ -94,11 +80,6 @@ def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | No
 
 def check_space(space: RowSpace, settings: ReductionSettings) -> None:
     """Refuse what `choose` would refuse, without the work of choosing.
-
-    Parameters
-    ----------
-    space : RowSpace
-    settings : ReductionSettings
 
     Raises
     ------

@@ -45,10 +45,6 @@ def lazy_best(
         the first few vectors only, it may err in favour of a sample, never against one.
     bound_vectors : tuple of int
         Counts of vectors for the sharper bounds.
-
-    Returns
-    -------
-    int
     """
     highest = float(bounds.max())
     scouts = _highest(bounds)

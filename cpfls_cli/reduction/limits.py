@@ -16,15 +16,6 @@ from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
 def sample_limit(space: RowSpace, settings: ReductionSettings) -> int:
     """Return the most samples that may be chosen.
 
-    Parameters
-    ----------
-    space : RowSpace
-    settings : ReductionSettings
-
-    Returns
-    -------
-    int
-
     Raises
     ------
     SettingError
@@ -50,10 +41,6 @@ def starting_samples(space: RowSpace, criterion: CriterionName, limit: int) -> I
     limit : int
         Most samples that may be chosen.
 
-    Returns
-    -------
-    array of int
-
     Raises
     ------
     SettingError
@@ -76,10 +63,6 @@ def stop_reason(run: Run, settings: ReductionSettings, limit: int) -> StopReason
     settings : ReductionSettings
     limit : int
         Most samples that may be chosen.
-
-    Returns
-    -------
-    str or None
     """
     target = settings.condition_number
     if target is not None and run.indices and run.factor.condition_number <= target:

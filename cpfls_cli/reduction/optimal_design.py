@@ -41,10 +41,6 @@ class OptimalDesign:
             sample was added.
         available : array of bool, shape (samples,)
 
-        Returns
-        -------
-        int
-
         References
         ----------
         method.md, section 6.

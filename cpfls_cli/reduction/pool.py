@@ -47,10 +47,6 @@ def draw_pool(surveyed: Survey, size: int, rng: np.random.Generator) -> Pool:
     rng : numpy.random.Generator
         One number per sample is drawn, in order, and none where all samples fit.
 
-    Returns
-    -------
-    Pool
-
     Raises
     ------
     ComputationError

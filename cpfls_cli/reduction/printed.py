@@ -43,10 +43,6 @@ class PrintedRule:
         factor : TriangularFactor
         available : array of bool, shape (samples,)
 
-        Returns
-        -------
-        int
-
         References
         ----------
         Paper, section 8, step 1.

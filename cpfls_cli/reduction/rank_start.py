@@ -20,10 +20,6 @@ def rank_growing_start(space: RowSpace) -> IntArray:
     The sample taken adds the most rank, three at best; among those, it is the one whose smallest added
     singular value ``sigma_k(R_i (I - U U^T))`` is largest, where U is a basis of the span so far.
 
-    Parameters
-    ----------
-    space : RowSpace
-
     Returns
     -------
     array of int

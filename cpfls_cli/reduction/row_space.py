@@ -51,10 +51,6 @@ def row_space(Q: Array, rank_tolerance: float) -> RowSpace:
     rank_tolerance : float
         Singular values below this fraction of the largest count as zero.
 
-    Returns
-    -------
-    RowSpace
-
     Raises
     ------
     ComputationError
@@ -72,9 +68,5 @@ def space_of(surveyed: Survey, rows: Array) -> RowSpace:
     surveyed : Survey
     rows : array, shape (samples, 3, rank)
         Some or all of its samples, projected.
-
-    Returns
-    -------
-    RowSpace
     """
     return RowSpace(rows, surveyed.singular_values, surveyed.parameters, surveyed.rank_tolerance)

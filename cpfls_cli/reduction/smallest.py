@@ -37,10 +37,6 @@ class SmallestSingularValue:
         factor : TriangularFactor
         available : array of bool, shape (samples,)
 
-        Returns
-        -------
-        int
-
         References
         ----------
         Paper, section 8, step 1; method.md, section 6.

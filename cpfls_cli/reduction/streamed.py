@@ -57,12 +57,6 @@ def reduce_streamed(
 def check_streamed(surveyed: Survey, settings: ReductionSettings, rng: np.random.Generator) -> None:
     """Refuse what `reduce_streamed` would refuse, without the work of choosing.
 
-    Parameters
-    ----------
-    surveyed : Survey
-    settings : ReductionSettings
-    rng : numpy.random.Generator
-
     Raises
     ------
     ComputationError, SettingError

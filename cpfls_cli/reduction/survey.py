@@ -82,10 +82,6 @@ def survey(chunks: Chunks, rank_tolerance: float) -> Survey:
     rank_tolerance : float
         Singular values below this fraction of the largest count as zero.
 
-    Returns
-    -------
-    Survey
-
     Raises
     ------
     ComputationError

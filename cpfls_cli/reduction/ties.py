@@ -17,10 +17,6 @@ def first_best(scores: Array, available: BoolArray) -> int:
     ----------
     scores : array, shape (samples,)
     available : array of bool, shape (samples,)
-
-    Returns
-    -------
-    int
     """
     allowed = np.where(available, scores, -np.inf)
     best = allowed.max()

@@ -67,15 +67,6 @@ class Carrier:
 def carrier(function: InertiaFunction, motion: Motion) -> Carrier:
     """Evaluate how an inertia function enters the torque along a motion.
 
-    Parameters
-    ----------
-    function : InertiaFunction
-    motion : Motion
-
-    Returns
-    -------
-    Carrier
-
     References
     ----------
     method.md section 2: ``tau = J qdd + (dJ/dt) qd - 1/2 grad_q (qd^T J qd)``.

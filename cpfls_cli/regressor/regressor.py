@@ -37,10 +37,6 @@ class InertiaValues:
 def uniform_breakpoints(structure: ModelStructure) -> tuple[Array, ...]:
     """Give the equidistant partitions of a model.
 
-    Parameters
-    ----------
-    structure : ModelStructure
-
     Returns
     -------
     tuple of array, shape (functions,)
@@ -72,10 +68,6 @@ def joined_ranges(ranges: Iterable[tuple[InputRange, InputRange]]) -> tuple[Inpu
     ----------
     ranges : iterable of tuple of InputRange
         Roll and pitch, part by part.
-
-    Returns
-    -------
-    tuple of InputRange
     """
     roll, pitch = (
         InputRange(min(part.minimum for part in parts), max(part.maximum for part in parts))
@@ -162,10 +154,6 @@ class Regressor:
         index : int
             Index of the block.
         partitions : sequence of array
-
-        Returns
-        -------
-        Basis
         """
         consequent = self.features[index]
         if consequent is None:
@@ -180,10 +168,6 @@ class Regressor:
         index : int
             Index of the block.
         partitions : sequence of array
-
-        Returns
-        -------
-        list of Antecedent
         """
         block = self.structure.blocks[index]
         return [
@@ -215,10 +199,6 @@ class Regressor:
         ----------
         partitions : sequence of array
         coefficients : array, shape (parameters,)
-
-        Returns
-        -------
-        InertiaValues
         """
         J = np.zeros((len(self.motion), 3, 3))
         dJ = np.zeros((len(self.motion), 3, 3, 3))

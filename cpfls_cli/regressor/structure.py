@@ -171,14 +171,6 @@ class ModelStructure:
 def model_structure(settings: StructureSettings) -> ModelStructure:
     """Count out the partitions, rules and coefficients of a model.
 
-    Parameters
-    ----------
-    settings : StructureSettings
-
-    Returns
-    -------
-    ModelStructure
-
     References
     ----------
     Paper section 5; method.md section 5: 113 parameters for five functions, circular, seesaw consequents.

@@ -19,10 +19,6 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
     structure : ModelStructure
     ranges : tuple of InputRange
         Of roll and pitch over the training data.
-
-    Returns
-    -------
-    Table
     """
     settings = structure.settings
     assert all(partition.functions <= MOST_FUNCTIONS for partition in structure.partitions)

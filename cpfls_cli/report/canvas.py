@@ -69,17 +69,12 @@ def plot(name: str, caption: str, description: str, height: float, draw: Callabl
     ----------
     name : str
         Unique on the page.
-    caption : str
     description : str
         What the figure shows, for those who do not see it.
     height : float
         Inches, at a width of 7.6.
     draw : callable
         Fills an empty figure.
-
-    Returns
-    -------
-    Plot
     """
     style: Any = {**_STYLE, "svg.hashsalt": name}
     with matplotlib.rc_context():
@@ -96,7 +91,6 @@ def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
     x, y : array, shape (samples,)
     **style
         As `Axes.plot` takes it.
@@ -113,7 +107,6 @@ def band(axes: Axes, x: Array, low: Array, high: Array, **style: Any) -> None:
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
     x, low, high : array, shape (samples,)
     **style
         As `Axes.fill_between` takes it.
@@ -123,28 +116,12 @@ def band(axes: Axes, x: Array, low: Array, high: Array, **style: Any) -> None:
 
 
 def stacked(figure: Figure, rows: int) -> list[Axes]:
-    """Make plots one above the other with one x axis.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    rows : int
-
-    Returns
-    -------
-    list of matplotlib.axes.Axes
-    """
+    """Make plots one above the other with one x axis."""
     return list(figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0])
 
 
 def legend_above(axes: Axes, columns: int = 4) -> None:
-    """Put a legend above a plot, where it hides no curve.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    columns : int
-    """
+    """Put a legend above a plot, where it hides no curve."""
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1)
 
 
@@ -160,14 +137,5 @@ def plain_ticks(axis: Axis) -> None:
 
 
 def style_of(index: int) -> dict[str, Any]:
-    """Get the style of the curve with this number; styles repeat after six.
-
-    Parameters
-    ----------
-    index : int
-
-    Returns
-    -------
-    dict
-    """
+    """Get the style of the curve with this number; styles repeat after six."""
     return STYLES[index % len(STYLES)]

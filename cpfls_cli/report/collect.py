@@ -20,10 +20,6 @@ _COLORBAR = "<colorbar>"
 def panels_of(figure: Figure) -> list[Panel]:
     """Collect the panels of a figure with all that is drawn in them.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-
     Returns
     -------
     list of Panel

@@ -23,10 +23,6 @@ SPREAD = "_evenly_spread"
 def drawn_in(axes: Axes) -> list[Series]:
     """Collect everything that stands for data in a set of axes.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-
     Returns
     -------
     list of Series

@@ -17,7 +17,6 @@ class Text:
 
     Attributes
     ----------
-    text : str
     tone : {"plain", "note", "good", "warning"}
         How much it stands out.
     """
@@ -46,7 +45,6 @@ class Cell:
 
     Attributes
     ----------
-    text : str
     tone : {"plain", "note", "good", "warning"}
     """
 
@@ -62,8 +60,6 @@ class Table:
     ----------
     name : str
         Unique on the page.
-    caption : str
-    header : sequence of str
     rows : sequence of sequence of (str or Cell)
     words : frozenset of int
         Columns that hold words and are aligned left; all others hold numbers.
@@ -93,7 +89,6 @@ class Plot:
     ----------
     name : str
         Unique on the page.
-    caption : str
     svg : str
         One ``svg`` element without external references.
     description : str
@@ -116,8 +111,6 @@ class Listing:
 
     Attributes
     ----------
-    summary : str
-    text : str
     shown : bool
         Whether it is folded out from the start.
     """
@@ -130,13 +123,7 @@ class Listing:
 
 @dataclass(frozen=True)
 class Folded:
-    """Tables that only some readers want, folded away.
-
-    Attributes
-    ----------
-    summary : str
-    tables : sequence of Table
-    """
+    """Tables that only some readers want, folded away."""
 
     summary: str
     tables: Sequence[Table]
@@ -145,12 +132,7 @@ class Folded:
 
 @dataclass(frozen=True)
 class Heading:
-    """A heading inside a section.
-
-    Attributes
-    ----------
-    text : str
-    """
+    """A heading inside a section."""
 
     text: str
     kind: ClassVar[str] = "heading"
@@ -164,8 +146,6 @@ class Box:
     ----------
     label : str
         One word, such as the name of a verdict.
-    title : str
-    sentences : sequence of str
     tone : {"plain", "note", "good", "warning"}
     """
 
@@ -187,8 +167,6 @@ class Section:
     ----------
     name : str
         Unique on the page; its anchor.
-    title : str
-    blocks : sequence of Block
     """
 
     name: str

@@ -40,7 +40,6 @@ def evenly_spread(samples: int, rows: int = ROWS) -> IntArray:
 
     Parameters
     ----------
-    samples : int
     rows : int
         At most so many.
 

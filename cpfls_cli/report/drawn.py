@@ -48,7 +48,6 @@ class Panel:
     ----------
     title, x_label, y_label : str
         Labels with units.
-    series : sequence of Series
     x_names, y_names : mapping of float to str
         Words that stand at positions of an axis in place of numbers.
     """

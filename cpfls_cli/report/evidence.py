@@ -44,31 +44,12 @@ SHORT_VERDICTS = {
 
 
 def has(model: Source, part: Part) -> bool:
-    """Tell whether a model holds a part of the evidence.
-
-    Parameters
-    ----------
-    model : Source
-    part : str
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether a model holds a part of the evidence."""
     return _KEYS[part] in model.artifact.data
 
 
 def validated(model: Source) -> bool:
-    """Tell whether any evidence was gathered for a model.
-
-    Parameters
-    ----------
-    model : Source
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether any evidence was gathered for a model."""
     return any(key in model.artifact.data for key in _KEYS.values())
 
 
@@ -82,7 +63,6 @@ def verdict_words(model: Source) -> tuple[str, Tone]:
 
     Returns
     -------
-    words : str
     tone : {"plain", "note", "good", "warning"}
     """
     label = model.artifact.text("verdict/label")
@@ -90,45 +70,18 @@ def verdict_words(model: Source) -> tuple[str, Tone]:
 
 
 def complete(model: Source) -> bool:
-    """Tell whether the search for a model came to its end.
-
-    Parameters
-    ----------
-    model : Source
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether the search for a model came to its end."""
     return "search/complete" not in model.artifact.data or model.artifact.number("search/complete") != 0
 
 
 def same_everywhere(model: Source) -> bool:
-    """Tell whether one rule acts at all attitudes, and training went all the way round in roll and in pitch.
-
-    Parameters
-    ----------
-    model : Source
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether one rule acts at all attitudes, and training went all the way round in roll and in pitch."""
     visited = model.artifact.array("model/visited") != 0
     return not model.searched and all(bool(visited.any(axis=angle).all()) for angle in (0, 1))
 
 
 def known_everywhere(model: Source) -> bool:
-    """Tell whether the one rule of a model is known well enough to hold where training was not.
-
-    Parameters
-    ----------
-    model : Source
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether the one rule of a model is known well enough to hold where training was not."""
     rank, parameters, condition = (
         model.artifact.number(f"solve/{key}") for key in ("rank", "parameters", "condition_number")
     )

@@ -37,10 +37,6 @@ class _Side:
 def figure_tables(panels: Sequence[Panel]) -> list[Table]:
     """Write the data of a figure as tables of at most 25 rows, curves over the same x side by side.
 
-    Parameters
-    ----------
-    panels : sequence of Panel
-
     Returns
     -------
     list of Table

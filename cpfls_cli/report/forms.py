@@ -20,10 +20,6 @@ _SUFFIXES = {".md": Form.MARKDOWN, ".markdown": Form.MARKDOWN, ".json": Form.JSO
 def form_of(path: Path) -> Form:
     """Choose a form by the suffix of a file.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     Form

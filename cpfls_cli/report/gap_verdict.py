@@ -36,32 +36,14 @@ _ENERGY = {
 
 
 def verdict_box(diagnosis: Source) -> Box:
-    """Say what a diagnosis found.
-
-    Parameters
-    ----------
-    diagnosis : Source
-
-    Returns
-    -------
-    Box
-    """
+    """Say what a diagnosis found."""
     verdict = diagnosis.artifact.text("verdict")
     sentences = [*_named(diagnosis), *rivals(diagnosis), *unexplained(diagnosis), *_shrunk(diagnosis, verdict)]
     return Box(verdict.replace("_", " "), _headline(diagnosis, verdict), sentences, _TONES.get(verdict, "note"))
 
 
 def rivals(diagnosis: Source) -> Iterator[str]:
-    """Say which effects look alike and which flight would tell them apart.
-
-    Parameters
-    ----------
-    diagnosis : Source
-
-    Yields
-    ------
-    str
-    """
+    """Say which effects look alike and which flight would tell them apart."""
     artifact = diagnosis.artifact
     columns = (artifact.texts(f"alternative/{key}") for key in ("name", "instead_of", "separated_by"))
     for name, instead_of, flight in zip(*columns, strict=True):
@@ -69,16 +51,7 @@ def rivals(diagnosis: Source) -> Iterator[str]:
 
 
 def unexplained(diagnosis: Source) -> Iterator[str]:
-    """Say on which axis something is left, and what it follows.
-
-    Parameters
-    ----------
-    diagnosis : Source
-
-    Yields
-    ------
-    str
-    """
+    """Say on which axis something is left, and what it follows."""
     artifact = diagnosis.artifact
     words = (artifact.texts(f"unexplained/{key}") for key in ("axis", "signal", "energy"))
     numbers = (artifact.array(f"unexplained/{key}") for key in ("floors", "share", "frequency"))
@@ -93,10 +66,6 @@ def unexplained(diagnosis: Source) -> Iterator[str]:
 
 def levels(diagnosis: Source) -> str:
     """Explain why torque alone, and torque and force together, name different effects.
-
-    Parameters
-    ----------
-    diagnosis : Source
 
     Returns
     -------

@@ -41,59 +41,23 @@ _LEAST_P = 1e-6
 
 
 def channel_words(channel: str) -> str:
-    """Say what a channel is.
-
-    Parameters
-    ----------
-    channel : str
-
-    Returns
-    -------
-    str
-    """
+    """Say what a channel is."""
     return CHANNELS.get(channel, channel)
 
 
 def channel_unit(channel: str) -> str:
-    """Give the unit of a channel.
-
-    Parameters
-    ----------
-    channel : str
-
-    Returns
-    -------
-    str
-    """
+    """Give the unit of a channel."""
     return _TORQUE if channel.startswith("torque") else _FORCE
 
 
 def signal_words(signal: str) -> str:
-    """Name a signal with its unit.
-
-    Parameters
-    ----------
-    signal : str
-
-    Returns
-    -------
-    str
-    """
+    """Name a signal with its unit."""
     unit = _SIGNAL_UNITS.get(signal) or _SIGNAL_UNITS.get(signal.rsplit(" ", 1)[0])
     return f"{signal}, {unit}" if unit else signal
 
 
 def effect_title(name: str) -> str:
-    """Say what people call an effect.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    str
-    """
+    """Say what people call an effect."""
     return CATALOGUE[name].title if name in CATALOGUE else name.replace("_", " ")
 
 
@@ -102,13 +66,8 @@ def joined(words: Iterable[str], last: str = "and") -> str:
 
     Parameters
     ----------
-    words : iterable of str
     last : str
         Before the last word.
-
-    Returns
-    -------
-    str
     """
     *others, final = dict.fromkeys(words)
     return f"{', '.join(others)} {last} {final}" if others else final
@@ -121,20 +80,12 @@ def unit_words(unit: str) -> str:
     ----------
     unit : str
         With powers such as ``^2``; ``1`` for none.
-
-    Returns
-    -------
-    str
     """
     return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³")
 
 
 def sentence(text: str) -> str:
     """Write words as a sentence.
-
-    Parameters
-    ----------
-    text : str
 
     Returns
     -------
@@ -147,30 +98,12 @@ def sentence(text: str) -> str:
 
 
 def probability(value: float) -> str:
-    """Write a probability; the smallest ones by a bound.
-
-    Parameters
-    ----------
-    value : float
-
-    Returns
-    -------
-    str
-    """
+    """Write a probability; the smallest ones by a bound."""
     return "< 10⁻⁶" if value < _LEAST_P else number(value, 2)
 
 
 def whole_percent(share: float) -> str:
-    """Write a share in whole per cent.
-
-    Parameters
-    ----------
-    share : float
-
-    Returns
-    -------
-    str
-    """
+    """Write a share in whole per cent."""
     if not math.isfinite(share):
         return number(share)
     if 0 < abs(share) < 0.005:
@@ -183,7 +116,6 @@ def known_channels(source: Source, path: str) -> list[tuple[int, str]]:
 
     Parameters
     ----------
-    source : Source
     path : str
         Of the sizes, by channel.
 
@@ -205,10 +137,6 @@ def titles_of(source: Source, kinds: Sequence[str] = ("wrench", "actuator", "sen
         A diagnosis or an extended model.
     kinds : sequence of str
         Kinds of effects to list.
-
-    Returns
-    -------
-    list of str
     """
     artifact = source.artifact
     rows = zip(

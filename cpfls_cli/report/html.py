@@ -17,14 +17,8 @@ def html_page(sections: Sequence[Section], sources: Sources, version: str) -> st
 
     Parameters
     ----------
-    sections : sequence of Section
-    sources : Sources
     version : str
         Of the program.
-
-    Returns
-    -------
-    str
     """
     environment = Environment(
         loader=PackageLoader("cpfls_cli.report", "templates"),

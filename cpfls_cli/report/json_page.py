@@ -22,8 +22,6 @@ def json_page(sections: Sequence[Section], sources: Sources, version: str) -> st
 
     Parameters
     ----------
-    sections : sequence of Section
-    sources : Sources
     version : str
         Of the program.
 

@@ -24,7 +24,6 @@ class Judged:
 
     Attributes
     ----------
-    models, parts : list of str
     samples : array, shape (parts,)
     mse, max_error, relative_error, r2, r2_body : array, shape (models, parts, 3)
     """
@@ -61,11 +60,6 @@ class Judged:
     def winner(self, part: str, axis: int) -> Winner:
         """Tell whether the model or the rigid body has the smaller mean squared error about an axis.
 
-        Parameters
-        ----------
-        part : str
-        axis : int
-
         Returns
         -------
         {"model", "rigid-body", "tie"}
@@ -83,16 +77,7 @@ class Judged:
 
 
 def judged(model: Source) -> Judged:
-    """Read the scores of a model.
-
-    Parameters
-    ----------
-    model : Source
-
-    Returns
-    -------
-    Judged
-    """
+    """Read the scores of a model."""
     artifact = model.artifact
     measures = ("mse", "max_error", "relative_error", "r2", "r2_body")
     return Judged(

@@ -19,7 +19,6 @@ class JudgedOn:
         What each model calls it.
     hashes : tuple of str
         Of the flights that it is taken from.
-    models : tuple of Source
     """
 
     names: tuple[str, ...]
@@ -34,10 +33,6 @@ class JudgedOn:
 
 def judged_on(models: Sequence[Source]) -> list[JudgedOn]:
     """Group what models were judged on by the data themselves, not by their names.
-
-    Parameters
-    ----------
-    models : sequence of Source
 
     Returns
     -------
@@ -66,14 +61,5 @@ def _parts(model: Source) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
 
 
 def learned_only(part: JudgedOn) -> bool:
-    """Tell whether models learned from this part: errors there are no prediction.
-
-    Parameters
-    ----------
-    part : JudgedOn
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether models learned from this part: errors there are no prediction."""
     return set(part.names) == {TRAINING}

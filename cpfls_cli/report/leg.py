@@ -29,16 +29,7 @@ class FirstLeg:
 
 
 def first_leg(trajectory: Artifact) -> FirstLeg:
-    """Take the first leg of a path, from rest to rest.
-
-    Parameters
-    ----------
-    trajectory : Artifact
-
-    Returns
-    -------
-    FirstLeg
-    """
+    """Take the first leg of a path, from rest to rest."""
     time, position = trajectory.array("time"), trajectory.array("position")
     part, direction = _first(trajectory)
     curves = {name: trajectory.array(name)[part] @ direction for name in DERIVATIVES[:-1]}
@@ -60,16 +51,7 @@ def _first(trajectory: Artifact) -> tuple[slice, Array]:
 
 
 def peaks(trajectory: Artifact) -> dict[str, float]:
-    """Find the largest length of every derivative over the whole path, at its samples.
-
-    Parameters
-    ----------
-    trajectory : Artifact
-
-    Returns
-    -------
-    dict of str to float
-    """
+    """Find the largest length of every derivative over the whole path, at its samples."""
     lengths = {name: float(np.linalg.norm(trajectory.array(name), axis=1).max()) for name in DERIVATIVES[:-1]}
     away = trajectory.array("position") - trajectory.array("position")[0]
     return lengths | {"displacement": float(np.linalg.norm(away, axis=1).max())}

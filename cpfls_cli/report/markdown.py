@@ -18,8 +18,6 @@ def markdown_page(sections: Sequence[Section], sources: Sources, version: str) -
 
     Parameters
     ----------
-    sections : sequence of Section
-    sources : Sources
     version : str
         Of the program.
 

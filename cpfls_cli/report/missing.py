@@ -38,10 +38,6 @@ _GAP_LACKS: tuple[tuple[ArtifactSpec, str, str], ...] = (
 def missing(sources: Sources) -> dict[str, str]:
     """Name the formats of which no artifact was given.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     dict of str to str

@@ -13,11 +13,6 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 def number(value: float, digits: int = 4) -> str:
     """Write a number with so many significant digits.
 
-    Parameters
-    ----------
-    value : float
-    digits : int
-
     Returns
     -------
     str
@@ -42,13 +37,8 @@ def plain(value: float, smallest: float = 1e-3) -> str:
 
     Parameters
     ----------
-    value : float
     smallest : float
         What is smaller than this gets a power of ten.
-
-    Returns
-    -------
-    str
     """
     if value == 0 or not math.isfinite(value) or smallest <= abs(value) < _LARGE:
         return (f"{value:.6g}" if math.isfinite(value) else number(value)).replace("-", "−")
@@ -57,47 +47,19 @@ def plain(value: float, smallest: float = 1e-3) -> str:
 
 
 def count(value: float) -> str:
-    """Write a whole number.
-
-    Parameters
-    ----------
-    value : float
-
-    Returns
-    -------
-    str
-    """
+    """Write a whole number."""
     return UNKNOWN if math.isnan(value) else str(round(value))
 
 
 def percent(share: float, digits: int = 3) -> str:
-    """Write a share as per cent; what only rounding leaves is written as zero.
-
-    Parameters
-    ----------
-    share : float
-    digits : int
-
-    Returns
-    -------
-    str
-    """
+    """Write a share as per cent; what only rounding leaves is written as zero."""
     if math.isnan(share) or math.isinf(share):
         return number(share)
     return "0 %" if abs(share) < ROUNDING else f"{number(100 * share, digits)} %"
 
 
 def change(share: float) -> str:
-    """Write a relative change as per cent with its sign.
-
-    Parameters
-    ----------
-    share : float
-
-    Returns
-    -------
-    str
-    """
+    """Write a relative change as per cent with its sign."""
     if not math.isfinite(share):
         return UNKNOWN
     text = f"{100 * share:+.2f} %"
@@ -105,16 +67,7 @@ def change(share: float) -> str:
 
 
 def r_squared(value: float) -> str:
-    """Write a share of variance explained; it reads 1 only where nothing but rounding is missing.
-
-    Parameters
-    ----------
-    value : float
-
-    Returns
-    -------
-    str
-    """
+    """Write a share of variance explained; it reads 1 only where nothing but rounding is missing."""
     if not math.isfinite(value):
         return UNKNOWN
     if 1.0 - value < ROUNDING:

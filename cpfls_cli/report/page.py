@@ -73,7 +73,6 @@ class Page:
 
     Attributes
     ----------
-    text : str
     sections, figures, tables : tuple of str
         Names of what it shows, in order.
     missing : tuple of str
@@ -92,10 +91,8 @@ def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
 
     Parameters
     ----------
-    sources : Sources
     version : str
         Of the program.
-    form : Form
 
     Returns
     -------

@@ -12,7 +12,6 @@ class PrintedSet:
 
     Attributes
     ----------
-    samples, condition_number : int
     change : float
         Against the full set.
     """

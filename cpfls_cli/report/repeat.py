@@ -39,16 +39,7 @@ _IMPORT = _Command("import", ("log",))
 
 
 def config_name(source: Source) -> str:
-    """Name the file that the config of an artifact is saved as.
-
-    Parameters
-    ----------
-    source : Source
-
-    Returns
-    -------
-    str
-    """
+    """Name the file that the config of an artifact is saved as."""
     return f"study-{source.config_sha256[:HASH_SHOWN]}.yaml"
 
 
@@ -56,10 +47,6 @@ def commands(sources: Sources) -> str:
     """Write the commands that make all artifacts of a report again, in an order that works.
 
     An artifact holds the names of its inputs, so that equal bytes need equal names.
-
-    Parameters
-    ----------
-    sources : Sources
 
     Returns
     -------

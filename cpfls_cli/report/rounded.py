@@ -20,10 +20,6 @@ _FEWEST, _MOST = 2, 15
 def with_interval(value: float, low: float, high: float) -> tuple[str, str, str]:
     """Write a value and the ends of its interval alike, half the width of the interval to two digits.
 
-    Parameters
-    ----------
-    value, low, high : float
-
     Returns
     -------
     tuple of str
@@ -39,10 +35,6 @@ def with_interval(value: float, low: float, high: float) -> tuple[str, str, str]
 
 def printed(text: str) -> str:
     """Write a number of `with_interval` as in print.
-
-    Parameters
-    ----------
-    text : str
 
     Returns
     -------

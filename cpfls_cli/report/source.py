@@ -29,8 +29,6 @@ class Source:
     ----------
     label : str
         File name, unique in the report.
-    sha256 : str
-    artifact : Artifact
     config : mapping
         The resolved study that made it, by section and key.
     vehicle : VehicleSettings
@@ -82,7 +80,6 @@ class Sources:
         In the order given.
     vehicle : VehicleSettings
         Of the study that the report is made with.
-    settings : ReportSettings
     """
 
     all: Sequence[Source]
@@ -165,11 +162,6 @@ def unique_labels(names: Sequence[str], hashes: Sequence[str]) -> list[str]:
     ----------
     names : sequence of str
         File names without folders.
-    hashes : sequence of str
-
-    Returns
-    -------
-    list of str
     """
     count = Counter(names)
     return [

@@ -19,15 +19,10 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
 
     Parameters
     ----------
-    figure : matplotlib.figure.Figure
     name : str
         Unique on the page; ids inside the figure start with it.
     description : str
         What the figure shows, for those who do not see it.
-
-    Returns
-    -------
-    str
     """
     stream = io.StringIO()
     figure.savefig(stream, format="svg", metadata={"Date": None})

@@ -80,10 +80,6 @@ class Sweep:
 def joined_sweeps(sweeps: Sequence[Source]) -> list[Sweep]:
     """Take sweeps of equal settings and inputs as one, unless a seed stands in both.
 
-    Parameters
-    ----------
-    sweeps : sequence of Source
-
     Returns
     -------
     list of Sweep
@@ -118,10 +114,6 @@ def _identity(source: Source) -> tuple[object, ...]:
 def printed_beside(settings: list[SweptSetting]) -> list[PrintedColumn | None]:
     """Find the column of the paper that each setting repeats.
 
-    Parameters
-    ----------
-    settings : list of SweptSetting
-
     Returns
     -------
     list of PrintedColumn or None
@@ -137,16 +129,7 @@ def printed_beside(settings: list[SweptSetting]) -> list[PrintedColumn | None]:
 
 
 def repeats_table_5(sweeps: Sequence[Source]) -> bool:
-    """Tell whether sweeps repeat any column of the paper.
-
-    Parameters
-    ----------
-    sweeps : sequence of Source
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether sweeps repeat any column of the paper."""
     return any(column for sweep in joined_sweeps(sweeps) for column in printed_beside(sweep.settings))
 
 

@@ -18,10 +18,8 @@ class SweptSetting:
 
     Attributes
     ----------
-    name, structure : str
     criterion : str
         What chose its samples; ``all`` where nothing did.
-    samples, population, generations : int
     seeds, evaluations : array of int, shape (runs,)
     mse, max_error, relative_error : array, shape (runs, parts)
         Not finite where a run found no model.

@@ -11,10 +11,8 @@ class PrintedColumn:
 
     Attributes
     ----------
-    system : str
     structure : str
         As the config calls it.
-    samples, population, generations : int
     mse, max_error, condition_number : str
         Of the selected model.
     mse_of_runs, max_error_of_runs, condition_number_of_runs : tuple of (str, str)

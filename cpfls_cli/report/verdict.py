@@ -17,13 +17,8 @@ def verdict(model: Source, sources: Sources) -> Iterator[Text]:
 
     Parameters
     ----------
-    model : Source
     sources : Sources
         To learn whether the flight was simulated without noise.
-
-    Yields
-    ------
-    Text
     """
     scores = judged(model)
     if fuzzy_part_off(model):
@@ -52,31 +47,13 @@ def verdict(model: Source, sources: Sources) -> Iterator[Text]:
 
 
 def noise_free(flight: Source) -> bool:
-    """Tell whether a flight was simulated and nothing was added to it.
-
-    Parameters
-    ----------
-    flight : Source
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether a flight was simulated and nothing was added to it."""
     added = [*flight.config["simulation"]["noise"].values(), *flight.config["simulation"]["relative_noise"].values()]
     return flight.made_from("trajectory") is not None and not any(added)
 
 
 def fuzzy_part_off(model: Source) -> bool:
-    """Tell whether cross-validation switched the fuzzy part of a model off.
-
-    Parameters
-    ----------
-    model : Source
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether cross-validation switched the fuzzy part of a model off."""
     return bool(np.isinf(model.artifact.number("model/ridge_weight")))
 
 

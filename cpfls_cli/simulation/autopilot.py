@@ -16,12 +16,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 class Autopilot:
     """Follow a planned motion with the vehicle's model; what the model lacks, it does not know.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-    settings : ClosedLoopSettings
-    planned : Reference
-
     References
     ----------
     Lee, Leok and McClamroch 2010, Geometric tracking control of a quadrotor UAV on SE(3).

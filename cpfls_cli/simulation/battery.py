@@ -40,10 +40,6 @@ class Battery:
         time : float, s
             From take-off.
         rotor_speed : array, shape (rotor,), rad/s
-
-        Returns
-        -------
-        float
         """
         power = float(np.sum(rotor_speed**3)) / self.hover_cubed
         return max(1 - self.use * time / self.duration - self.load * (power - 1), _LOWEST)

@@ -42,10 +42,6 @@ def clock_of(time: Array, rate: float) -> Clock:
     rate : float, Hz
         Of the steps, at least.
 
-    Returns
-    -------
-    Clock
-
     Raises
     ------
     ComputationError

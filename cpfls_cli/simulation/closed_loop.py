@@ -73,10 +73,6 @@ def fly(
     progress : callable
         Takes steps done and steps in all.
 
-    Returns
-    -------
-    FlownMotion
-
     Raises
     ------
     ComputationError

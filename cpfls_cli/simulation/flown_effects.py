@@ -55,21 +55,12 @@ class FlownEffect:
 
 @dataclass(frozen=True)
 class FlownEffects:
-    """All effects of a flight.
-
-    Attributes
-    ----------
-    flown : tuple of FlownEffect
-    """
+    """All effects of a flight."""
 
     flown: tuple[FlownEffect, ...] = ()
 
     def values(self, name: str) -> Mapping[str, float] | None:
         """Give the values of an effect, None where it is not flown.
-
-        Parameters
-        ----------
-        name : str
 
         Returns
         -------
@@ -93,10 +84,6 @@ def flown_effects(asked: Mapping[str, Sequence[float] | Mapping[str, float]], ve
         coefficients without a value are 0.
     vehicle : VehicleSettings
 
-    Returns
-    -------
-    FlownEffects
-
     Raises
     ------
     InputError
@@ -111,10 +98,6 @@ def flown_effects(asked: Mapping[str, Sequence[float] | Mapping[str, float]], ve
 
 def refuse_conflict(chosen: FlownEffects) -> None:
     """Refuse effects that do not go together.
-
-    Parameters
-    ----------
-    chosen : FlownEffects
 
     Raises
     ------

@@ -30,14 +30,6 @@ class FlownModel:
     def with_effects(self, asked: FlownEffects) -> FlownModel:
         """Add effects to those of the model; errors of the vehicle's own numbers add up.
 
-        Parameters
-        ----------
-        asked : FlownEffects
-
-        Returns
-        -------
-        FlownModel
-
         Raises
         ------
         SettingError
@@ -64,10 +56,6 @@ def flown_model(
     fitted : mapping
         By name of the effect: its values by name.
     vehicle : VehicleSettings
-
-    Returns
-    -------
-    FlownModel
 
     Raises
     ------

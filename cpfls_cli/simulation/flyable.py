@@ -69,10 +69,6 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     tilt_max : float or None, rad
         Largest tilt allowed; None for any.
 
-    Returns
-    -------
-    Flyability
-
     Raises
     ------
     ComputationError
@@ -94,10 +90,6 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
 
 def single_axis_torque(vehicle: VehicleSettings) -> Array:
     """Find the largest torque about each axis alone, either way, that the rotors of a held vehicle can give.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
 
     Returns
     -------

@@ -73,10 +73,6 @@ class Loop:
         ----------
         number : int
             Steps done so far.
-
-        Returns
-        -------
-        Step
         """
         middle = self.state + 0.5 * self.actuators.step * self.change
         # The plan has the start before the middle of each step.
@@ -107,10 +103,6 @@ def loop(
     autopilot : Autopilot
     state : array, shape (18,)
     step, duration : float, s
-
-    Returns
-    -------
-    Loop
     """
     mix = mixer(vehicle)
     speed = mix.command(_wrench(autopilot, 0, state))

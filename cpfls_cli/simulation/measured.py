@@ -72,10 +72,6 @@ def measure(
     model : FlownModel or None
         What is flown in place of the vehicle; effects of the settings come on top of its own.
 
-    Returns
-    -------
-    MeasuredFlight
-
     Raises
     ------
     InputError

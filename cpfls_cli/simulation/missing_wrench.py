@@ -62,10 +62,6 @@ def missing_wrench(effects: FlownEffects, hover: Signals) -> MissingWrench:
     effects : FlownEffects
     hover : Signals
         One instant, of any motion.
-
-    Returns
-    -------
-    MissingWrench
     """
     flown = tuple(one for one in effects.flown if one.effect.columns and one.effect.name not in _OTHERWISE)
     rates = [replace(hover, body_rate=rate[None]) for rate in np.eye(3)]

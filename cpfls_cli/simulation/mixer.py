@@ -63,14 +63,6 @@ class Mixer:
 def mixer(vehicle: VehicleSettings) -> Mixer:
     """Invert the allocation of a vehicle.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-
-    Returns
-    -------
-    Mixer
-
     Raises
     ------
     ComputationError

@@ -92,10 +92,6 @@ class Payload:
             What the carrier would do without the load.
         cable, rate : array, shape (3,), 1 and 1/s, world frame
             Direction from the hook to the load, and its derivative.
-
-        Returns
-        -------
-        Pull
         """
         hook = np.array([0.0, 0.0, -self.depth])
         pulled = self.mass / carrier.mass * cable
@@ -119,10 +115,6 @@ def payload(values: Mapping[str, float], gravity: float) -> Payload:
     values : mapping of str to float
         Of the effect payload.
     gravity : float, m/s^2
-
-    Returns
-    -------
-    Payload
     """
     lever = sum((value * np.array(_HOOK[name]) for name, value in values.items() if name in _HOOK), np.zeros(3))
     depth = values.get("depth_m", 0.0)

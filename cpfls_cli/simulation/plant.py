@@ -82,10 +82,6 @@ def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signa
     vehicle : VehicleSettings
     state : array, shape (18,)
     rotor_speed : array, shape (rotor,), rad/s
-
-    Returns
-    -------
-    Signals
     """
     row = state[None]
     return Signals(

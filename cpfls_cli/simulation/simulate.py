@@ -53,10 +53,6 @@ def simulate(
     rng : numpy.random.Generator
         Source of the noise.
 
-    Returns
-    -------
-    SimulatedFlight
-
     Raises
     ------
     SettingError

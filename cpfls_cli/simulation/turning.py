@@ -43,10 +43,6 @@ def rigid_turning(inertia: Array) -> TurningLaw:
     Parameters
     ----------
     inertia : array, shape (3, 3), kg m^2, body frame
-
-    Returns
-    -------
-    callable
     """
     return lambda _attitude, body_rate: Turning(inertia, np.cross(body_rate, inertia @ body_rate))
 
@@ -56,14 +52,6 @@ def identified_turning(model: InertiaModel) -> TurningLaw:
 
     With ``omega = W qd`` its inertia in body axes is ``W^-T J W^-1``, and what is left is ``W^-T ((dJ/dt) qd -
     1/2 grad (qd^T J qd) - J W^-1 (dW/dt) qd)``.
-
-    Parameters
-    ----------
-    model : InertiaModel
-
-    Returns
-    -------
-    callable
     """
 
     def turning(attitude: Array, body_rate: Array) -> Turning:

@@ -14,16 +14,7 @@ _NUMBER = (("finding", "name", "unit"), ("value", "low", "high", "named"))
 
 
 def audit_data(audit: Audit) -> dict[str, Any]:
-    """Arrange an audit as datasets.
-
-    Parameters
-    ----------
-    audit : Audit
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Arrange an audit as datasets."""
     found = [
         {"finding": f.name, "sentence": f.sentence, "named": f.named, "p_value": f.p_value} for f in audit.findings
     ]
@@ -38,16 +29,7 @@ def audit_data(audit: Audit) -> dict[str, Any]:
 
 
 def audit_of(artifact: Artifact) -> Audit:
-    """Rebuild an audit, as far as repairs need it.
-
-    Parameters
-    ----------
-    artifact : Artifact
-
-    Returns
-    -------
-    Audit
-    """
+    """Rebuild an audit, as far as repairs need it."""
     numbers = rows_of(artifact, "audit_coefficient", *_NUMBER)
     findings = tuple(
         AuditFinding(
@@ -61,16 +43,7 @@ def audit_of(artifact: Artifact) -> Audit:
 
 
 def audit_summary(audit: Audit) -> dict[str, Any]:
-    """Describe an audit for machines.
-
-    Parameters
-    ----------
-    audit : Audit
-
-    Returns
-    -------
-    dict
-    """
+    """Describe an audit for machines."""
     return {
         "findings": [
             {
@@ -92,16 +65,7 @@ def audit_summary(audit: Audit) -> dict[str, Any]:
 
 
 def audit_lines(audit: Audit) -> list[str]:
-    """Say what an audit found.
-
-    Parameters
-    ----------
-    audit : Audit
-
-    Returns
-    -------
-    list of str
-    """
+    """Say what an audit found."""
     named = [f"sensors: {finding.sentence}" for finding in audit.named]
     if not audit.findings:
         reason = next(iter(audit.untested.values()), "nothing to compare them with")

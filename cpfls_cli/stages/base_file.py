@@ -21,15 +21,6 @@ _COPIED = ("weights", "coefficients", "rigid_body", "input_range", "visited")
 def model_base(path: Path, study: Study) -> Artifact:
     """Read an identified model as the base of a comparison.
 
-    Parameters
-    ----------
-    path : Path
-    study : Study
-
-    Returns
-    -------
-    Artifact
-
     Raises
     ------
     InputError
@@ -47,10 +38,6 @@ def base_data(model: Artifact | None) -> dict[str, Any]:
     ----------
     model : Artifact or None
         None for the rigid body of the vehicle.
-
-    Returns
-    -------
-    dict of str to array
     """
     if model is None:
         return {"base/kind": np.array("rigid-body")}
@@ -60,10 +47,6 @@ def base_data(model: Artifact | None) -> dict[str, Any]:
 
 def base_artifact(artifact: Artifact) -> Artifact | None:
     """Take the identified model out of an artifact that was made with one.
-
-    Parameters
-    ----------
-    artifact : Artifact
 
     Returns
     -------
@@ -81,7 +64,6 @@ def base_model(model: Artifact | None, path: Path) -> Model | None:
 
     Parameters
     ----------
-    model : Artifact or None
     path : Path
         For messages.
 

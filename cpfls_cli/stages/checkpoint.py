@@ -29,7 +29,6 @@ class Checkpoint:
 
     Attributes
     ----------
-    path : Path
     header : Header
         Of the search that is run now: its config, seed and inputs.
     """
@@ -72,10 +71,6 @@ class Checkpoint:
 
     def read(self) -> StoppedSearch:
         """Take up what was left.
-
-        Returns
-        -------
-        StoppedSearch
 
         Raises
         ------

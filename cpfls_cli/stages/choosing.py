@@ -14,16 +14,7 @@ _ROLE = "choose-on"
 
 
 def choosing_roles(flights: Sequence[Path]) -> dict[str, Path]:
-    """Give flights to choose on their roles as inputs: ``choose-on-1``, ``choose-on-2`` and so on.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-
-    Returns
-    -------
-    dict of str to Path
-    """
+    """Give flights to choose on their roles as inputs: ``choose-on-1``, ``choose-on-2`` and so on."""
     return {f"{_ROLE}-{number}": path for number, path in enumerate(flights, start=1)}
 
 
@@ -32,7 +23,6 @@ def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) ->
 
     Parameters
     ----------
-    flights : sequence of Path
     inputs : mapping of str to InputFile
         All inputs of the command by role.
 

@@ -29,15 +29,10 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
 
     Parameters
     ----------
-    job : Job
     flights : sequence of Path
         Artifacts, or logs that the config describes.
     model : Path or None
         An identified model, or one with effects; None for the rigid body of the vehicle.
-
-    Returns
-    -------
-    Outcome
     """
     started = begin(job, flight_roles("flight", flights) | ({} if model is None else {"model": model}))
     check_ignored(job.study)
@@ -66,43 +61,17 @@ def _model(path: Path | None, study: Study) -> tuple[ExtendedModel, Artifact | N
 def compared(
     study: Study, given: Flights, model: ExtendedModel, progress: Callable[[float, str], None]
 ) -> Disagreement:
-    """Compare a model with flights.
-
-    Parameters
-    ----------
-    study : Study
-    given : Flights
-    model : ExtendedModel
-    progress : callable
-
-    Returns
-    -------
-    Disagreement
-    """
+    """Compare a model with flights."""
     return compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
 
 
 def flight_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
-    """Give flights the roles of numbered inputs.
-
-    Parameters
-    ----------
-    role : str
-    flights : sequence of Path
-
-    Returns
-    -------
-    dict of str to Path
-    """
+    """Give flights the roles of numbered inputs."""
     return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}
 
 
 def check_ignored(study: Study) -> None:
     """Refuse names in `gap.ignore` that no effect has.
-
-    Parameters
-    ----------
-    study : Study
 
     Raises
     ------
@@ -120,7 +89,6 @@ def progress_of(progress: Progress, start: float = 0.0, end: float = 1.0) -> Cal
 
     Parameters
     ----------
-    progress : Progress
     start, end : float
         Shares of the whole.
 

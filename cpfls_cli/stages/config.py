@@ -21,12 +21,6 @@ def show(path: Path | None, sections: Sequence[str], overrides: Sequence[str], s
         None shows the commented default.
     sections : sequence of str
         Only these, and the seed.
-    overrides : sequence of str
-    seed : int or None
-
-    Returns
-    -------
-    Outcome
 
     Raises
     ------

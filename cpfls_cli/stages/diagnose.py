@@ -29,15 +29,7 @@ from cpfls_cli.stages.study import generator
 
 @dataclass(frozen=True)
 class Answer:
-    """A diagnosis with all that shows it.
-
-    Attributes
-    ----------
-    found : Diagnosed
-    shown : Evidence
-    model : ExtendedModel
-    split : Split
-    """
+    """A diagnosis with all that shows it."""
 
     found: Diagnosed
     shown: Evidence
@@ -68,15 +60,10 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
 
     Parameters
     ----------
-    job : Job
     disagreement : Path
         Holds the flights and the model.
     held_out : sequence of Path
         Flights to judge on.
-
-    Returns
-    -------
-    Outcome
     """
     started = begin(job, {"disagreement": disagreement} | flight_roles("held-out", held_out))
     check_ignored(job.study)
@@ -107,17 +94,10 @@ def answered(
 
     Parameters
     ----------
-    study : Study
-    split : Split
     base : Artifact or None
         The identified model; None for the rigid body of the vehicle.
     path : Path
         For messages.
-    progress : callable
-
-    Returns
-    -------
-    Answer
     """
     model = base_model(base, path)
     rng = generator(study, "diagnose")

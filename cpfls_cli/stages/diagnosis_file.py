@@ -20,19 +20,7 @@ from cpfls_cli.stages.tables import table, texts
 
 
 def diagnosis_data(found: Diagnosed, shown: Evidence, model: ExtendedModel, split: Split) -> dict[str, Any]:
-    """Arrange a diagnosis as datasets.
-
-    Parameters
-    ----------
-    found : Diagnosed
-    shown : Evidence
-    model : ExtendedModel
-    split : Split
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Arrange a diagnosis as datasets."""
     diagnosis = found.diagnosis
     effects = diagnosis.effects or diagnosis.closest
     return {
@@ -58,12 +46,7 @@ def shrunk_data(before: GapSize, after: GapSize, floor: Array) -> dict[str, Any]
 
     Parameters
     ----------
-    before, after : GapSize
     floor : array, shape (6,), N m and N
-
-    Returns
-    -------
-    dict of str to array
     """
     return {
         "gap/channel": np.array(CHANNELS),
@@ -76,16 +59,7 @@ def shrunk_data(before: GapSize, after: GapSize, floor: Array) -> dict[str, Any]
 
 
 def replay_data(before: Replayed, after: Replayed, held: Replayed) -> dict[str, Any]:
-    """Arrange replays before and after as datasets.
-
-    Parameters
-    ----------
-    before, after, held : Replayed
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Arrange replays before and after as datasets."""
     data: dict[str, Any] = {
         "replay/horizon": np.arange(1, len(held.horizon_s) + 1),
         "replay/horizon_s": held.horizon_s,

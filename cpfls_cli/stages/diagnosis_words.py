@@ -31,18 +31,7 @@ _VERDICTS = {
 
 
 def diagnosis_lines(found: Diagnosed, shown: Evidence, split: str) -> list[str]:
-    """Say what a model misses.
-
-    Parameters
-    ----------
-    found : Diagnosed
-    shown : Evidence
-    split : str
-
-    Returns
-    -------
-    list of str
-    """
+    """Say what a model misses."""
     diagnosis = found.diagnosis
     return [
         *headline(diagnosis),
@@ -60,18 +49,7 @@ def diagnosis_lines(found: Diagnosed, shown: Evidence, split: str) -> list[str]:
 
 
 def diagnosis_summary(found: Diagnosed, shown: Evidence, split: str) -> dict[str, Any]:
-    """Describe a diagnosis for machines.
-
-    Parameters
-    ----------
-    found : Diagnosed
-    shown : Evidence
-    split : str
-
-    Returns
-    -------
-    dict
-    """
+    """Describe a diagnosis for machines."""
     diagnosis = found.diagnosis
     return {
         "verdict": str(diagnosis.verdict),
@@ -97,16 +75,7 @@ def diagnosis_summary(found: Diagnosed, shown: Evidence, split: str) -> dict[str
 
 
 def effect_summary(effect: NamedEffect) -> dict[str, Any]:
-    """Describe a named effect for machines.
-
-    Parameters
-    ----------
-    effect : NamedEffect
-
-    Returns
-    -------
-    dict
-    """
+    """Describe a named effect for machines."""
     return {
         "name": effect.name,
         "coefficients": {c.name: _estimate(c) for c in effect.coefficients},
@@ -118,16 +87,7 @@ def effect_summary(effect: NamedEffect) -> dict[str, Any]:
 
 
 def headline(diagnosis: Diagnosis) -> Iterator[str]:
-    """Say the verdict and each effect; before them the flight that would tell, where the verdict hangs on it.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-
-    Yields
-    ------
-    str
-    """
+    """Say the verdict and each effect; before them the flight that would tell, where the verdict hangs on it."""
     yield f"{diagnosis.verdict}: {_VERDICTS[diagnosis.verdict]}"
     rivals = [_rival_line(rival) for rival in diagnosis.alternatives]
     ambiguous = diagnosis.verdict is Verdict.AMBIGUOUS
@@ -140,16 +100,7 @@ def headline(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def gap_lines(before: GapSize, after: GapSize) -> Iterator[str]:
-    """Say how the gap of each channel shrinks on held-out flights.
-
-    Parameters
-    ----------
-    before, after : GapSize
-
-    Yields
-    ------
-    str
-    """
+    """Say how the gap of each channel shrinks on held-out flights."""
     for place, channel in enumerate(CHANNELS):
         if np.isfinite(before.value[place]):
             size = f"{before.value[place]:.3g} -> {after.value[place]:.3g} {UNITS[place]}"
@@ -157,16 +108,7 @@ def gap_lines(before: GapSize, after: GapSize) -> Iterator[str]:
 
 
 def effect_line(effect: NamedEffect) -> str:
-    """Say an effect in one sentence with its numbers.
-
-    Parameters
-    ----------
-    effect : NamedEffect
-
-    Returns
-    -------
-    str
-    """
+    """Say an effect in one sentence with its numbers."""
     numbers = "; ".join(_coefficient(c) for c in effect.coefficients)
     chance = "p < 1e-6" if effect.p_value < 1e-6 else f"p = {effect.p_value:.2g}"
     return f"{effect.name}: {effect.sentence} {numbers} ({chance}, {_share_words(effect.share)} of the gap)"

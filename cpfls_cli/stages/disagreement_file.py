@@ -14,17 +14,7 @@ from cpfls_cli.stages.tables import table, texts
 
 
 def disagreement_data(found: Disagreement, given: Flights) -> dict[str, Any]:
-    """Arrange a disagreement as datasets.
-
-    Parameters
-    ----------
-    found : Disagreement
-    given : Flights
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Arrange a disagreement as datasets."""
     return {
         "gap/channel": np.array(CHANNELS),
         "gap/rms": found.rms,

@@ -23,17 +23,7 @@ UNITS = ("N m",) * 3 + ("N",) * 3
 
 
 def disagreement_lines(found: Disagreement, given: Flights) -> list[str]:
-    """Say where a model and flights disagree.
-
-    Parameters
-    ----------
-    found : Disagreement
-    given : Flights
-
-    Returns
-    -------
-    list of str
-    """
+    """Say where a model and flights disagree."""
     return [
         *where_lines(found, given),
         *replay_lines("simulated from the measured rotors", found.replayed, found.held),
@@ -43,34 +33,14 @@ def disagreement_lines(found: Disagreement, given: Flights) -> list[str]:
 
 
 def where_lines(found: Disagreement, given: Flights) -> Iterator[str]:
-    """Say on which axis, when and with which signal a model and flights disagree.
-
-    Parameters
-    ----------
-    found : Disagreement
-    given : Flights
-
-    Yields
-    ------
-    str
-    """
+    """Say on which axis, when and with which signal a model and flights disagree."""
     yield from (_channel_line(found, place) for place in range(len(CHANNELS)) if np.isfinite(found.rms[place]))
     yield from _stretch_lines(found, given)
     yield from _signal_lines(found)
 
 
 def disagreement_summary(found: Disagreement, given: Flights) -> dict[str, Any]:
-    """Describe a disagreement for machines.
-
-    Parameters
-    ----------
-    found : Disagreement
-    given : Flights
-
-    Returns
-    -------
-    dict
-    """
+    """Describe a disagreement for machines."""
     names = [recording.name for recording in given.recordings]
     return {
         "flights": names,
@@ -120,10 +90,6 @@ def replay_summary(clock: Replayed, **models: Replayed) -> dict[str, Any]:
         Gives the horizons.
     **models : Replayed
         By name.
-
-    Returns
-    -------
-    dict
     """
     rates = {f"rate_{name}_rad_s": model.rate.tolist() for name, model in models.items()}
     attitudes = {f"attitude_{name}_rad": model.attitude.tolist() for name, model in models.items()}
@@ -137,10 +103,6 @@ def unseen_lines(unseen: Iterator[tuple[str, str]]) -> Iterator[str]:
     ----------
     unseen : iterator of (str, str)
         Names and reasons.
-
-    Yields
-    ------
-    str
     """
     reasons: dict[str, list[str]] = {}
     for name, reason in unseen:
@@ -150,17 +112,7 @@ def unseen_lines(unseen: Iterator[tuple[str, str]]) -> Iterator[str]:
 
 
 def replay_lines(what: str, model: Replayed, held: Replayed) -> Iterator[str]:
-    """Say how far a simulation is off at its longest horizon; nothing of flights without rates.
-
-    Parameters
-    ----------
-    what : str
-    model, held : Replayed
-
-    Yields
-    ------
-    str
-    """
+    """Say how far a simulation is off at its longest horizon; nothing of flights without rates."""
     # Rates that never change are those of a log that has none.
     if not held.rate.any():
         return

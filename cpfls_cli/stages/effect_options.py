@@ -18,7 +18,6 @@ def simulation_overrides(mode: str | None, effects: Sequence[str]) -> list[str]:
     ----------
     mode : str or None
         None keeps that of the config.
-    effects : sequence of str
 
     Returns
     -------

@@ -23,10 +23,6 @@ def show(name: str | None) -> Outcome:
     name : str or None
         Identifier; None lists all.
 
-    Returns
-    -------
-    Outcome
-
     Raises
     ------
     InputError

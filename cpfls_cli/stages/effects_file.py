@@ -31,17 +31,12 @@ def effects_data(
 
     Parameters
     ----------
-    effects : sequence of NamedEffect
     named : bool
         Whether the verdict names them.
     parameters : mapping of str to Estimate
         The vehicle's own numbers, as far as they are sure.
     linear : array, shape (parameter,)
         All of them, in the order of the effect ``parameter_error``.
-
-    Returns
-    -------
-    dict of str to array
     """
     heads = [{**vars(e), "kind": CATALOGUE[e.name].kind, "named": named} for e in effects]
     shapes = [(e.name, *item) for e in effects if e.candidate is not None for item in e.candidate.shape.items()]
@@ -55,31 +50,13 @@ def effects_data(
 
 
 def coefficient_row(effect_name: str, estimate: Estimate) -> dict[str, Any]:
-    """Describe a coefficient as a record.
-
-    Parameters
-    ----------
-    effect_name : str
-    estimate : Estimate
-
-    Returns
-    -------
-    dict
-    """
+    """Describe a coefficient as a record."""
     low, high = estimate.plausible
     return {**vars(estimate), "effect": effect_name, "plausible_low": low, "plausible_high": high}
 
 
 def effects_of(artifact: Artifact) -> list[NamedEffect]:
     """Rebuild the effects of an artifact.
-
-    Parameters
-    ----------
-    artifact : Artifact
-
-    Returns
-    -------
-    list of NamedEffect
 
     Raises
     ------
@@ -90,17 +67,7 @@ def effects_of(artifact: Artifact) -> list[NamedEffect]:
 
 
 def extended_of(artifact: Artifact, base: InertiaModel | None) -> ExtendedModel:
-    """Rebuild the model with effects that an artifact holds.
-
-    Parameters
-    ----------
-    artifact : Artifact
-    base : InertiaModel or None
-
-    Returns
-    -------
-    ExtendedModel
-    """
+    """Rebuild the model with effects that an artifact holds."""
     fitted = (FittedEffect(e.candidate, e.linear) for e in effects_of(artifact) if e.candidate is not None)
     return ExtendedModel(base, artifact.array("parameter/value"), tuple(fitted), audit_of(artifact))
 

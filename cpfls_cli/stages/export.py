@@ -38,15 +38,10 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     ----------
     job : Job
         Its study is not used: a model holds its own.
-    model : Path
     form : {"json", "c", "python"} or None
         None takes the suffix of the output.
     name : str or None
         Prefix of the names in C, name of the model in JSON; None takes the name of the output.
-
-    Returns
-    -------
-    Outcome
     """
     form = form or form_of(job.output)
     prefix = prefix_of(job.output, form, name)

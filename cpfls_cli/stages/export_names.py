@@ -17,10 +17,6 @@ _IMPORTED = ("numpy", "sys", "warnings")
 def form_of(output: Path) -> str:
     """Choose a form by the suffix of a file.
 
-    Parameters
-    ----------
-    output : Path
-
     Returns
     -------
     {"json", "c", "python"}
@@ -41,14 +37,8 @@ def prefix_of(output: Path, form: str, name: str | None) -> str:
 
     Parameters
     ----------
-    output : Path
-    form : str
     name : str or None
         What was asked for.
-
-    Returns
-    -------
-    str
 
     Raises
     ------
@@ -63,15 +53,6 @@ def prefix_of(output: Path, form: str, name: str | None) -> str:
 
 def outputs_of(output: Path, form: str) -> list[Path]:
     """Name the files to be written, the one that needs the others last.
-
-    Parameters
-    ----------
-    output : Path
-    form : str
-
-    Returns
-    -------
-    list of Path
 
     Raises
     ------

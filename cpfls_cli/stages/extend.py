@@ -37,15 +37,7 @@ _EXTENDS = (Verdict.NAMED, Verdict.PARTIAL, Verdict.AMBIGUOUS)
 
 @dataclass(frozen=True)
 class Grown:
-    """An extension with its sizes on held-out flights.
-
-    Attributes
-    ----------
-    extension : Extension
-    study : Study
-    before, after : GapSize
-    replay_before, replay_after, held : Replayed
-    """
+    """An extension with its sizes on held-out flights."""
 
     extension: Extension
     study: Study
@@ -104,15 +96,10 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
 
     Parameters
     ----------
-    job : Job
     diagnosis : Path
         Holds the flights, the effects and the model that it was made with.
     model : Path or None
         Another identified model to extend.
-
-    Returns
-    -------
-    Outcome
 
     Raises
     ------
@@ -135,14 +122,6 @@ def run(job: Job, diagnosis: Path, model: Path | None) -> Outcome:
 def named_effects(diagnosis: Artifact) -> list[NamedEffect]:
     """Take the effects that a diagnosis names.
 
-    Parameters
-    ----------
-    diagnosis : Artifact
-
-    Returns
-    -------
-    list of NamedEffect
-
     Raises
     ------
     ComputationError
@@ -160,7 +139,6 @@ def require_named(verdict: str, effects: Sequence[NamedEffect]) -> None:
 
     Parameters
     ----------
-    verdict : str
     effects : sequence of NamedEffect
         Those that it names.
 
@@ -188,18 +166,10 @@ def extended(
 
     Parameters
     ----------
-    study : Study
-    training, held : sequence of Recording
-    effects : sequence of NamedEffect
-    audit : Audit
     base : Artifact or None
         The identified model; None for the rigid body of the vehicle.
     path : Path
         For messages.
-
-    Returns
-    -------
-    Grown
     """
     model = base_model(base, path)
     found = extend(training, held, effects, audit, study.gap, model)

@@ -15,30 +15,12 @@ from cpfls_cli.stages.sources import read_good
 
 
 def is_extended(path: Path) -> bool:
-    """Tell whether a file is a model with effects.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether a file is a model with effects."""
     return path.is_file() and format_name(path) == EXTENDED.format
 
 
 def read_extended(path: Path, study: Study) -> ExtendedModel:
     """Read a model with effects.
-
-    Parameters
-    ----------
-    path : Path
-    study : Study
-
-    Returns
-    -------
-    ExtendedModel
 
     Raises
     ------

@@ -26,16 +26,7 @@ IN_MEMORY = 500_000
 
 
 def flight_motion(flight: Artifact) -> Motion:
-    """Take the motion of a flight that was read whole.
-
-    Parameters
-    ----------
-    flight : Artifact
-
-    Returns
-    -------
-    Motion
-    """
+    """Take the motion of a flight that was read whole."""
     attitude, rate, acceleration = (flight.array(name) for name in MOTION)
     return Motion(attitude, rate, acceleration)
 
@@ -99,13 +90,8 @@ def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
 
     Parameters
     ----------
-    path : Path
     torque : bool
         Whether its torque is needed; without, it counts as zero.
-
-    Returns
-    -------
-    TorqueSource
 
     Raises
     ------
@@ -136,10 +122,6 @@ def part_of(source: TorqueSource, samples: slice) -> TorqueSource:
         As `flight_source` gives it.
     samples : slice
         With a start and a stop.
-
-    Returns
-    -------
-    TorqueSource
     """
     if isinstance(source, FlightFile):
         return replace(source, start=source.start + samples.start, stop=source.start + samples.stop)

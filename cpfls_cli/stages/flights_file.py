@@ -31,13 +31,8 @@ def flights_data(recordings: Sequence[Recording], roles: Sequence[str]) -> dict[
 
     Parameters
     ----------
-    recordings : sequence of Recording
     roles : sequence of str
         Of each: given, training or held-out.
-
-    Returns
-    -------
-    dict of str to array
     """
     lengths = [len(recording.signals) for recording in recordings]
     data: dict[str, Any] = {
@@ -60,14 +55,8 @@ def flights_of(artifact: Artifact, study: Study, *roles: str) -> list[Recording]
 
     Parameters
     ----------
-    artifact : Artifact
-    study : Study
     *roles : str
         Only these; all if none is named.
-
-    Returns
-    -------
-    list of Recording
     """
     first = artifact.array("flight/first").astype(int)
     last = [*first[1:], len(artifact.array("signals/time"))]

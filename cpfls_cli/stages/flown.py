@@ -18,14 +18,9 @@ def exact_outcome(flight: SimulatedFlight, time: Array, problems: tuple[str, ...
 
     Parameters
     ----------
-    flight : SimulatedFlight
     time : array, shape (time,), s
     problems : tuple of str
         Demands that no rotor can meet, in words.
-
-    Returns
-    -------
-    Outcome
     """
     largest = _largest(flight.signals)
     summary = {**_summary(flight, time), "max_torque": largest}
@@ -37,12 +32,7 @@ def closed_loop_outcome(flight: MeasuredFlight, time: Array) -> Outcome:
 
     Parameters
     ----------
-    flight : MeasuredFlight
     time : array, shape (time,), s
-
-    Returns
-    -------
-    Outcome
     """
     tracking = _tracking(flight)
     record = dict(_effect_rows(flight.effects))
@@ -73,12 +63,7 @@ def violation_sentence(violation: RotorViolation, time: Array) -> str:
 
     Parameters
     ----------
-    violation : RotorViolation
     time : array, shape (time,), s
-
-    Returns
-    -------
-    str
     """
     start, end = time[violation.first], time[violation.last]
     return (
@@ -88,25 +73,12 @@ def violation_sentence(violation: RotorViolation, time: Array) -> str:
 
 
 def samples(count: int) -> str:
-    """Count samples in words.
-
-    Parameters
-    ----------
-    count : int
-
-    Returns
-    -------
-    str
-    """
+    """Count samples in words."""
     return f"{count} sample{'' if count == 1 else 's'}"
 
 
 def noise_record(noise_std: Mapping[str, Array]) -> dict[str, Any]:
     """Arrange the noise of signals with three axes as datasets.
-
-    Parameters
-    ----------
-    noise_std : mapping of str to array
 
     Returns
     -------
@@ -121,10 +93,6 @@ def noise_record(noise_std: Mapping[str, Array]) -> dict[str, Any]:
 
 def effect_record(effects: FlownEffects) -> dict[str, Any]:
     """Arrange the effects that were flown as datasets: the truth, for who wants to compare.
-
-    Parameters
-    ----------
-    effects : FlownEffects
 
     Returns
     -------

@@ -27,7 +27,6 @@ class Checked:
 
     Attributes
     ----------
-    found : Flyability
     problems : tuple of str
         What is asked for beyond what the vehicle has.
     """
@@ -41,15 +40,8 @@ def checked_plan(study: Study, settings: TrajectorySettings, planned: PlannedRot
 
     Parameters
     ----------
-    study : Study
-    settings : TrajectorySettings
-    planned : PlannedRotation
     at : callable
         Samples the same plan with another sample time.
-
-    Returns
-    -------
-    Checked
 
     Raises
     ------
@@ -78,17 +70,7 @@ def _shortest_part(planned: PlannedRotation, settings: TrajectorySettings) -> fl
 
 
 def remedy(study: Study, settings: TrajectorySettings) -> str:
-    """Say what to change about a plan that asks for too much, of what the config holds.
-
-    Parameters
-    ----------
-    study : Study
-    settings : TrajectorySettings
-
-    Returns
-    -------
-    str
-    """
+    """Say what to change about a plan that asks for too much, of what the config holds."""
     if settings.held:
         alone = " ".join(f"{torque:.3g}" for torque in single_axis_torque(study.vehicle))
         return f"set trajectory.rotation.torque_max_n_m (about one axis at a time the rotors give up to {alone} N m)"

@@ -15,11 +15,6 @@ from cpfls_cli.trajectory.planned import PlannedRotation, Trajectory
 def flyability_sentences(found: Flyability, planned: PlannedRotation) -> tuple[str, ...]:
     """Say what is too much, with its time and place.
 
-    Parameters
-    ----------
-    found : Flyability
-    planned : PlannedRotation
-
     Returns
     -------
     tuple of str

@@ -69,10 +69,6 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
         Flights to judge on.
     model : Path or None
         An identified model; None for the rigid body of the vehicle.
-
-    Returns
-    -------
-    Outcome
     """
     given = _begin(job, flights, held_out, model)
     if job.dry_run:

@@ -49,8 +49,6 @@ def run(
 
     Parameters
     ----------
-    job : Job
-    flights : sequence of Path
     selection : Path or None
         Samples to learn from; all of the training part if None.
     validate : sequence of Path
@@ -59,10 +57,6 @@ def run(
         How the search is run.
     choose_on : sequence of Path
         Other flights to choose the model on, for `identification.choice: held-out`.
-
-    Returns
-    -------
-    Outcome
     """
     started, search = begin_search(job, input_roles(flights, selection, validate, choose_on), options)
     data = read_training(flights, selection, job.study, started.inputs)
@@ -101,15 +95,10 @@ def input_roles(
     ----------
     flights : sequence of Path
         That train.
-    selection : Path or None
     validate : sequence of Path
         That judge.
     choose_on : sequence of Path
         That the model is chosen on.
-
-    Returns
-    -------
-    dict of str to Path
     """
     roles = flight_roles(flights) | ({"selection": selection} if selection else {}) | choosing_roles(choose_on)
     return roles | {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
@@ -155,17 +144,12 @@ def held_out_parts(
 
     Parameters
     ----------
-    study : Study
     rests : mapping of str to TorqueSource
         What of the flights that train is held out.
     inputs : mapping of str to InputFile
         By role, see `input_roles`.
     validate : sequence of Path
         Other flights.
-
-    Returns
-    -------
-    dict of str to TorqueSource
 
     Raises
     ------

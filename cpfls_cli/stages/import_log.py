@@ -28,13 +28,8 @@ def run(job: Job, log: Path) -> Outcome:
 
     Parameters
     ----------
-    job : Job
     log : Path
         CSV, plain or gzip-compressed, Parquet or ULog.
-
-    Returns
-    -------
-    Outcome
 
     Raises
     ------
@@ -54,15 +49,6 @@ def run(job: Job, log: Path) -> Outcome:
 
 def imported(log: Path, study: Study) -> ImportedFlight:
     """Import a log in memory.
-
-    Parameters
-    ----------
-    log : Path
-    study : Study
-
-    Returns
-    -------
-    ImportedFlight
 
     Raises
     ------
@@ -105,16 +91,7 @@ def _with_warnings(flight: ImportedFlight, warnings: tuple[str, ...]) -> Importe
 
 
 def flight_signals(flight: ImportedFlight) -> dict[str, Array]:
-    """Arrange the signals of an import as datasets of a flight.
-
-    Parameters
-    ----------
-    flight : ImportedFlight
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Arrange the signals of an import as datasets of a flight."""
     names = [spec.path for spec in FLIGHT.datasets if "/" not in spec.path]
     return {name: values for name in names if (values := getattr(flight, name)) is not None}
 

@@ -16,16 +16,7 @@ _SHORT = 8
 
 
 def info(path: Path) -> Outcome:
-    """Describe an artifact: where it comes from and what it holds.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Outcome
-    """
+    """Describe an artifact: where it comes from and what it holds."""
     artifact = read_artifact(path)
     header = artifact.header
     datasets = {name: _describe(artifact, name) for name in artifact.data}
@@ -47,17 +38,7 @@ def info(path: Path) -> Outcome:
 
 
 def check(path: Path) -> tuple[Outcome, bool]:
-    """Check an artifact against its format.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    outcome : Outcome
-    good : bool
-    """
+    """Check an artifact against its format."""
     artifact = read_artifact(path)
     found = check_artifact(artifact)
     summary = {"file": str(path), "format": artifact.spec.format, "good": not found, "findings": found}

@@ -42,13 +42,10 @@ class Job:
 
     Attributes
     ----------
-    study : Study
-    output : Path
     force : bool
         Replace an existing output.
     dry_run : bool
         Check everything, compute and write nothing.
-    progress : Progress
     reads : callable
         Takes note of every input file.
     deferred_interrupts : callable
@@ -74,7 +71,6 @@ class Outcome:
         The object that `--json` prints.
     lines : tuple of str
         The same for people.
-    warnings : tuple of str
     exit_code : int
         Of the command, which has done what it could.
     """
@@ -106,13 +102,8 @@ def begin(job: Job, inputs: Mapping[str, Path]) -> Started:
 
     Parameters
     ----------
-    job : Job
     inputs : mapping of str to Path
         By role.
-
-    Returns
-    -------
-    Started
 
     Raises
     ------
@@ -126,10 +117,6 @@ def begin(job: Job, inputs: Mapping[str, Path]) -> Started:
 
 def dry_run(job: Job) -> Outcome | None:
     """Say that all is good, where that is all that is asked for.
-
-    Parameters
-    ----------
-    job : Job
 
     Returns
     -------
@@ -145,13 +132,8 @@ def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
 
     Parameters
     ----------
-    job : Job
     inputs : mapping of str to Path
         By role.
-
-    Returns
-    -------
-    dict of str to InputFile
 
     Raises
     ------
@@ -178,9 +160,6 @@ def finish(job: Job, spec: ArtifactSpec, data: Mapping[str, Any], inputs: Mappin
 
     Parameters
     ----------
-    job : Job
-    spec : ArtifactSpec
-    data : mapping of str to array
     inputs : mapping of str to InputFile
         By role.
     """
@@ -192,26 +171,12 @@ def header_of(study: Study, inputs: Mapping[str, InputFile]) -> Header:
 
     Parameters
     ----------
-    study : Study
     inputs : mapping of str to InputFile
         By role.
-
-    Returns
-    -------
-    Header
     """
     return Header(cpfls_cli.__version__, study.seed, resolved_yaml(study), inputs)
 
 
 def input_file(path: Path) -> InputFile:
-    """Describe an input file by name, hash and format.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    InputFile
-    """
+    """Describe an input file by name, hash and format."""
     return InputFile(path.name, file_sha256(path), format_name(path) or path.suffix.lstrip("."))

@@ -32,16 +32,7 @@ class LogColumns:
 
 
 def is_log(path: Path) -> bool:
-    """Tell by its name whether a file is a log.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    bool
-    """
+    """Tell by its name whether a file is a log."""
     return path.name.lower().endswith(LOG_SUFFIXES)
 
 
@@ -50,13 +41,8 @@ def read_log(path: Path, settings: ImportSettings) -> LogColumns:
 
     Parameters
     ----------
-    path : Path
     settings : ImportSettings
         The section `import`.
-
-    Returns
-    -------
-    LogColumns
 
     Raises
     ------

@@ -22,10 +22,6 @@ _DROPPED: Final = MappingProxyType(
 def found_and_done(report: ImportReport) -> dict[str, int]:
     """Count what was found in a log by reason and treatment, and leave out what was not.
 
-    Parameters
-    ----------
-    report : ImportReport
-
     Returns
     -------
     dict of str to int
@@ -44,16 +40,7 @@ def found_and_done(report: ImportReport) -> dict[str, int]:
 
 
 def missing_signals(flight: ImportedFlight) -> tuple[str, ...]:
-    """Say which later stages will refuse a flight for what its log lacks, and which key would provide it.
-
-    Parameters
-    ----------
-    flight : ImportedFlight
-
-    Returns
-    -------
-    tuple of str
-    """
+    """Say which later stages will refuse a flight for what its log lacks, and which key would provide it."""
     sentences = []
     if flight.attitude is None:
         sentences.append(

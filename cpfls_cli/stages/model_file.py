@@ -25,15 +25,10 @@ def model_data(result: Identification, base: str, learned: IntArray) -> dict[str
 
     Parameters
     ----------
-    result : Identification
     base : str
         ``none`` or ``rigid-body``.
     learned : array of int
         Indices of the samples that trained.
-
-    Returns
-    -------
-    dict of str to array
     """
     return {
         **_model(result, base),
@@ -50,13 +45,8 @@ def read_model(artifact: Artifact, path: object) -> Model:
 
     Parameters
     ----------
-    artifact : Artifact
     path : Path
         For messages.
-
-    Returns
-    -------
-    Model
 
     Raises
     ------

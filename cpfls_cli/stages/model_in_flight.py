@@ -25,11 +25,6 @@ def model_in_flight(path: Path, study: Study) -> FlownModel:
     ----------
     path : Path
         A model with effects, or an identified one.
-    study : Study
-
-    Returns
-    -------
-    FlownModel
 
     Raises
     ------

@@ -14,15 +14,10 @@ def require_package(module: str, extra: str, path: Path) -> ModuleType:
 
     Parameters
     ----------
-    module : str
     extra : str
         The extra of this program that installs it.
     path : Path
         The file to read.
-
-    Returns
-    -------
-    module
 
     Raises
     ------

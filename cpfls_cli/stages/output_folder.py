@@ -17,7 +17,6 @@ def check_folder(folder: Path, force: bool) -> None:
 
     Parameters
     ----------
-    folder : Path
     force : bool
         Allow files in it to be replaced.
 
@@ -43,10 +42,6 @@ def filled_folder(folder: Path, names: Sequence[str]) -> Iterator[Path]:
         Made where it does not exist.
     names : sequence of str
         Files that may be written; those of an earlier run that are not written again are removed.
-
-    Yields
-    ------
-    Path
 
     Raises
     ------

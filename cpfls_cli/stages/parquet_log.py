@@ -21,7 +21,6 @@ def read_parquet(path: Path, time_column: str, time_unit: str, wanted: set[str])
 
     Parameters
     ----------
-    path : Path
     time_column, time_unit : str
         Stamps whose type states a unit are converted to `time_unit`, from the first one; others are taken as they are.
     wanted : set of str

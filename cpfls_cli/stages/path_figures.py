@@ -20,7 +20,6 @@ def figure_paths(job: Job, held: bool) -> tuple[Path, ...]:
 
     Parameters
     ----------
-    job : Job
     held : bool
         Whether the vehicle is held and only turns.
 
@@ -36,11 +35,6 @@ def figure_paths(job: Job, held: bool) -> tuple[Path, ...]:
 def check_figures(job: Job, held: bool) -> None:
     """Refuse pictures that cannot or must not be written, before anything is computed.
 
-    Parameters
-    ----------
-    job : Job
-    held : bool
-
     Raises
     ------
     InputError
@@ -51,11 +45,6 @@ def check_figures(job: Job, held: bool) -> None:
 
 def write_figures(job: Job, trajectory: Artifact) -> tuple[Path, ...]:
     """Draw a path.
-
-    Parameters
-    ----------
-    job : Job
-    trajectory : Artifact
 
     Returns
     -------

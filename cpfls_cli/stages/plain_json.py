@@ -14,10 +14,6 @@ def plain(value: Any) -> Any:
     ----------
     value : object
         Nested mappings, lists and tuples of numbers and text.
-
-    Returns
-    -------
-    object
     """
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}

@@ -33,18 +33,7 @@ _WELL_CONDITIONED = 100.0
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:
-    """Predict along a flight and write it.
-
-    Parameters
-    ----------
-    job : Job
-    model : Path
-    flight : Path
-
-    Returns
-    -------
-    Outcome
-    """
+    """Predict along a flight and write it."""
     started = begin(job, {"model": model, "flight": flight})
     if is_extended(model):
         data = extended_prediction(model, flight, job.study)

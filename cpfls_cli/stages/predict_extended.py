@@ -24,11 +24,6 @@ from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient
 def extended_prediction(model: Path, flight: Path, study: Study) -> dict[str, Any]:
     """Predict the rotors' torque along a flight, so that what is measured less that is the gap that remains.
 
-    Parameters
-    ----------
-    model, flight : Path
-    study : Study
-
     Returns
     -------
     dict of str to array

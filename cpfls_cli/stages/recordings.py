@@ -31,13 +31,7 @@ _UNIFORM = 0.01
 
 @dataclass(frozen=True)
 class Flights:
-    """Flights and what to know about them.
-
-    Attributes
-    ----------
-    recordings : tuple of Recording
-    warnings : tuple of str
-    """
+    """Flights and what to know about them."""
 
     recordings: tuple[Recording, ...]
     warnings: tuple[str, ...]
@@ -60,11 +54,6 @@ def read_flights(paths: Sequence[Path], study: Study) -> Flights:
     ----------
     paths : sequence of Path
         Artifacts of the format ``cpfls/flight``, or logs that the section `import` describes.
-    study : Study
-
-    Returns
-    -------
-    Flights
 
     Raises
     ------

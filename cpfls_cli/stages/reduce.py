@@ -32,17 +32,7 @@ _BLOCK = 4096
 
 
 def run(job: Job, flights: Sequence[Path]) -> Outcome:
-    """Select samples of flights and write their indices.
-
-    Parameters
-    ----------
-    job : Job
-    flights : sequence of Path
-
-    Returns
-    -------
-    Outcome
-    """
+    """Select samples of flights and write their indices."""
     started = begin(job, flight_roles(flights))
     split = split_training(flights, job.study, started.inputs, torque=False)
     settings, rng = job.study.reduction, generator(job.study, "reduce")
@@ -74,7 +64,6 @@ def uniform_regressor(training: TorqueSource, study: Study) -> Callable[[], Iter
     ----------
     training : TorqueSource
         The parts of flights that train.
-    study : Study
 
     Returns
     -------

@@ -24,15 +24,10 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
 
     Parameters
     ----------
-    job : Job
     artifacts : sequence of Path
         Of any format and from any flights; a file given twice counts once.
     form : Form or None
         None to choose it by the suffix of the output.
-
-    Returns
-    -------
-    Outcome
     """
     started = begin(job, {str(path): path for path in artifacts})
     files = {path: started.inputs[str(path)].sha256 for path in artifacts}

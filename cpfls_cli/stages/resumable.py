@@ -69,7 +69,6 @@ class Watch:
 
     Parameters
     ----------
-    job : Job
     time_limit_s : float or None
         From now on.
     """
@@ -103,7 +102,6 @@ class Resumable:
 
     Attributes
     ----------
-    checkpoint : Checkpoint
     stopped : StoppedSearch or None
         Where to go on, or None to start.
     """
@@ -113,12 +111,6 @@ class Resumable:
 
     def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
         """Say how the search is run; from here on a checkpoint that is not resumed is given up.
-
-        Parameters
-        ----------
-        options : SearchOptions
-        watch : Watch
-        progress : callable
 
         Returns
         -------
@@ -149,12 +141,7 @@ class Resumable:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Say of whatever fails inside that the search can go on nevertheless.
-
-        Yields
-        ------
-        None
-        """
+        """Say of whatever fails inside that the search can go on nevertheless."""
         try:
             yield
         except (ComputationError, OutputError) as error:
@@ -179,15 +166,8 @@ def begin_search(job: Job, inputs: Mapping[str, Path], options: SearchOptions) -
 
     Parameters
     ----------
-    job : Job
     inputs : mapping of str to Path
         By role.
-    options : SearchOptions
-
-    Returns
-    -------
-    started : Started
-    search : Resumable
 
     Raises
     ------
@@ -211,13 +191,8 @@ def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Res
         What the search is for; the checkpoint lies beside it.
     header : Header
         Config, seed and inputs of the search.
-    resume : bool
     force : bool
         Allow a checkpoint to be given up.
-
-    Returns
-    -------
-    Resumable
 
     Raises
     ------

@@ -30,10 +30,6 @@ def nothing_to_resume(left: Path, output: Path, spec: ArtifactSpec) -> InputErro
         What the command is for.
     spec : ArtifactSpec
         Of the output.
-
-    Returns
-    -------
-    InputError
     """
     if _is_complete(output, spec):
         return InputError(f"{output}: is complete; nothing to resume")
@@ -53,15 +49,10 @@ def differences(
 
     Parameters
     ----------
-    then, now : Header
     old, new : mapping of str to object
         The keys that the result depends on, with dots.
     unimportant : str, optional
         What the roles of inputs begin with that the result does not depend on.
-
-    Yields
-    ------
-    str
     """
     if then.version != now.version:
         yield f"written by cpfls {then.version}, this is {now.version}"
@@ -81,7 +72,6 @@ def require_same(left: Path, what: str, differing: Iterable[str]) -> None:
 
     Parameters
     ----------
-    left : Path
     what : str
         ``search`` or ``sweep``.
     differing : iterable of str

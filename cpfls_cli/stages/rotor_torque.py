@@ -16,10 +16,6 @@ _SPEED_UNITS = {"rad/s", "rpm"}
 def rotor_torque(study: Study) -> Callable[[LogSignals], Array]:
     """Make the body torque of the rotors from their speeds, or from commands taken for speeds.
 
-    Parameters
-    ----------
-    study : Study
-
     Returns
     -------
     callable
@@ -44,10 +40,6 @@ def rotor_torque(study: Study) -> Callable[[LogSignals], Array]:
 
 def rotor_torque_words(study: Study) -> list[str]:
     """Say how the torque was computed, where it comes from the rotors.
-
-    Parameters
-    ----------
-    study : Study
 
     Returns
     -------

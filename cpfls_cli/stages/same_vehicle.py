@@ -19,7 +19,6 @@ def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettin
 
     Parameters
     ----------
-    path : Path
     own : VehicleSettings
         Of the file.
     wanted : VehicleSettings
@@ -41,12 +40,6 @@ def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettin
 def require_vehicle_of(path: Path, artifact: Artifact, study: Study) -> None:
     """Refuse an artifact that was made with another vehicle than that of the config.
 
-    Parameters
-    ----------
-    path : Path
-    artifact : Artifact
-    study : Study
-
     Raises
     ------
     InputError
@@ -61,7 +54,6 @@ def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
     ----------
     paths : sequence of Path
         That judge a model, or choose it; one whose config this version cannot read is passed over.
-    study : Study
 
     Returns
     -------

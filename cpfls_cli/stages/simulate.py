@@ -26,17 +26,11 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
 
     Parameters
     ----------
-    job : Job
-    trajectory : Path
     model : Path or None
         In mode closed-loop flown in place of the vehicle of the config: one with effects, or an identified one. Without
         a mode an identified one, with which the attitude of that vehicle is controlled.
     mode : str or None
         Of the command line, which the config has too; None where it gives none.
-
-    Returns
-    -------
-    Outcome
 
     Raises
     ------

@@ -16,14 +16,8 @@ def read_with(path: Path, spec: ArtifactSpec, *needed: str) -> Artifact:
 
     Parameters
     ----------
-    path : Path
-    spec : ArtifactSpec
     *needed : str
         Dataset paths.
-
-    Returns
-    -------
-    Artifact
 
     Raises
     ------
@@ -41,15 +35,6 @@ def read_with(path: Path, spec: ArtifactSpec, *needed: str) -> Artifact:
 
 def read_good(path: Path, spec: ArtifactSpec) -> Artifact:
     """Read an artifact that keeps to its format.
-
-    Parameters
-    ----------
-    path : Path
-    spec : ArtifactSpec
-
-    Returns
-    -------
-    Artifact
 
     Raises
     ------

@@ -17,13 +17,7 @@ from cpfls_cli.gap.settings import GapSettings
 
 @dataclass(frozen=True)
 class Split:
-    """Flights to learn from, flights to judge on, and why.
-
-    Attributes
-    ----------
-    training, held_out : tuple of Recording
-    sentence : str
-    """
+    """Flights to learn from, flights to judge on, and why."""
 
     training: tuple[Recording, ...]
     held_out: tuple[Recording, ...]
@@ -35,14 +29,8 @@ def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], set
 
     Parameters
     ----------
-    given : sequence of Recording
     held_out : sequence of Recording
         Flights that are held out; if there are none, the last third of the flights is, or of one flight its last third.
-    settings : GapSettings
-
-    Returns
-    -------
-    Split
 
     Raises
     ------
@@ -61,16 +49,7 @@ def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], set
 
 
 def seen_twice(given: Iterable[InputFile], held_out: Iterable[InputFile]) -> tuple[str, ...]:
-    """Warn of files that stand for two flights: what is learned and judged on one flight says nothing of another.
-
-    Parameters
-    ----------
-    given, held_out : iterable of InputFile
-
-    Returns
-    -------
-    tuple of str
-    """
+    """Warn of files that stand for two flights: what is learned and judged on one flight says nothing of another."""
     learned: dict[str, str] = {}
     said = []
     for file in given:

@@ -39,16 +39,7 @@ class StoppedSearch:
 
 
 def state_data(state: EvolutionState) -> dict[str, Any]:
-    """Arrange the state of a search as the datasets of a checkpoint.
-
-    Parameters
-    ----------
-    state : EvolutionState
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Arrange the state of a search as the datasets of a checkpoint."""
     data = {
         "generation": state.index,
         "generator": np.array(json.dumps(state.rng.bit_generator.state)),
@@ -68,10 +59,6 @@ def nothing_data(unfinished: Unfinished) -> dict[str, Any]:
     ----------
     unfinished : Unfinished
         What it has evaluated of it.
-
-    Returns
-    -------
-    dict of str to array
     """
     genes, objectives = unfinished.submitted[:0], unfinished.evaluation.objectives[:0]
     data = {
@@ -87,17 +74,7 @@ def nothing_data(unfinished: Unfinished) -> dict[str, Any]:
 
 
 def with_unfinished(data: Mapping[str, Any], unfinished: Unfinished) -> dict[str, Any]:
-    """Add what was evaluated of the next generation to the datasets of a checkpoint.
-
-    Parameters
-    ----------
-    data : mapping of str to array
-    unfinished : Unfinished
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Add what was evaluated of the next generation to the datasets of a checkpoint."""
     added = {**data, **_evaluated("unfinished", unfinished.submitted, unfinished.evaluation)}
     return {**added, _SEAL: np.array(_seal(added))}
 

@@ -20,7 +20,6 @@ def stopped(outcome: Outcome, reason: StopReason, signal: int | None, output: Pa
 
     Parameters
     ----------
-    outcome : Outcome
     reason : str
         Why the search ended.
     signal : int or None

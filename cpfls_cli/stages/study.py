@@ -23,11 +23,6 @@ def settings_of(section: str, study: Study) -> Iterator[None]:
     ----------
     section : str
         Section of the config whose settings are in use.
-    study : Study
-
-    Yields
-    ------
-    None
 
     Raises
     ------
@@ -48,15 +43,5 @@ def _value(study: Study, key: str) -> Any:
 
 
 def generator(study: Study, stage: str) -> np.random.Generator:
-    """Make the random generator of a stage, so that stages draw independently of each other.
-
-    Parameters
-    ----------
-    study : Study
-    stage : str
-
-    Returns
-    -------
-    numpy.random.Generator
-    """
+    """Make the random generator of a stage, so that stages draw independently of each other."""
     return np.random.default_rng([study.seed, zlib.crc32(stage.encode())])

@@ -43,7 +43,6 @@ def run(
 
     Parameters
     ----------
-    job : Job
     flights : sequence of Path
         That train.
     validate : sequence of Path
@@ -52,10 +51,6 @@ def run(
         How each search is run; the time limit is for all of them together.
     choose_on : sequence of Path
         Other flights to choose models on, for settings with `identification.choice: held-out`.
-
-    Returns
-    -------
-    Outcome
     """
     options.require_one_place()
     inputs = take_inputs(job, input_roles(flights, None, validate, choose_on))

@@ -32,7 +32,6 @@ class PartialSweep:
 
     Attributes
     ----------
-    path : Path
     output : Path
         What the sweep is for.
     header : Header
@@ -53,7 +52,6 @@ class PartialSweep:
 
         Parameters
         ----------
-        resume : bool
         force : bool
             Allow it to be given up.
 
@@ -80,13 +78,8 @@ class PartialSweep:
 
         Parameters
         ----------
-        plan : SweepPlan
         left : Artifact or None
             By a stopped sweep.
-
-        Returns
-        -------
-        dict of str to array
 
         Raises
         ------

@@ -34,8 +34,6 @@ class SweptSetting:
 
     Attributes
     ----------
-    variant : Variant
-    data : TrainingData
     held_out : mapping of str to TorqueSource
         What is judged beside the training part, by name.
     kept : TorqueSource or None
@@ -72,8 +70,6 @@ class SweepPlan:
 
     Attributes
     ----------
-    settings : tuple of SweptSetting
-    seeds : tuple of int
     parts : tuple of str
         What models are judged on; the training part first.
     """
@@ -121,7 +117,6 @@ def sweep_plan(
 
     Parameters
     ----------
-    job : Job
     flights : sequence of Path
         That train.
     validate : sequence of Path
@@ -130,10 +125,6 @@ def sweep_plan(
         By role.
     choose_on : sequence of Path
         That models are chosen on, in settings whose choice is `held-out`.
-
-    Returns
-    -------
-    SweepPlan
 
     Raises
     ------
@@ -163,16 +154,7 @@ def _kept(variant: Variant, kept: TorqueSource | None) -> TorqueSource | None:
 
 @contextmanager
 def naming(what: str) -> Iterator[None]:
-    """Say where something failed.
-
-    Parameters
-    ----------
-    what : str
-
-    Yields
-    ------
-    None
-    """
+    """Say where something failed."""
     try:
         yield
     except (ComputationError, ConfigError) as error:

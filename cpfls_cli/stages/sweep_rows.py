@@ -23,28 +23,14 @@ def sweep_data(plan: SweepPlan, rows: Rows) -> dict[str, Any]:
 
     Parameters
     ----------
-    plan : SweepPlan
     rows : dict of str to array
         Of the runs that are finished.
-
-    Returns
-    -------
-    dict of str to array
     """
     return {**_settings(plan), **rows, COMPLETE: np.uint8(len(rows[f"{RUN}seed"]) == plan.runs)}
 
 
 def no_rows(plan: SweepPlan) -> Rows:
-    """Begin a sweep of which no run is finished.
-
-    Parameters
-    ----------
-    plan : SweepPlan
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Begin a sweep of which no run is finished."""
     return {path: values[None][:0] for path, values in run_row(plan, 0, None).items()}
 
 
@@ -53,13 +39,8 @@ def with_row(rows: Rows, row: Mapping[str, Any]) -> Rows:
 
     Parameters
     ----------
-    rows : dict of str to array
     row : mapping of str to array
         See `run_row`.
-
-    Returns
-    -------
-    dict of str to array
     """
     return {path: np.concatenate([values, row[path][None]]) for path, values in rows.items()}
 
@@ -69,8 +50,6 @@ def run_row(plan: SweepPlan, run: int, result: Identification | None) -> dict[st
 
     Parameters
     ----------
-    plan : SweepPlan
-    run : int
     result : Identification or None
         None where no chromosome gave a finite model.
 

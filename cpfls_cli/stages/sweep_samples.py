@@ -29,7 +29,6 @@ class SweepSamples:
     ----------
     job : Job
         A dry run only checks that samples could be chosen.
-    flights : sequence of Path
     inputs : mapping of str to InputFile
         By role; the flights among them.
     """
@@ -41,14 +40,6 @@ class SweepSamples:
 
     def of(self, variant: Variant) -> TrainingData:
         """Choose the samples of a setting, as `cpfls reduce` would.
-
-        Parameters
-        ----------
-        variant : Variant
-
-        Returns
-        -------
-        TrainingData
 
         Raises
         ------

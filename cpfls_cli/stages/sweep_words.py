@@ -27,10 +27,6 @@ def sweep_outcome(data: Mapping[str, Any], runs: int, seconds: float) -> Outcome
         Finished or not.
     seconds : float
         That it took.
-
-    Returns
-    -------
-    Outcome
     """
     done = len(data["run/seed"])
     settings = [_setting(data, index) for index in range(len(data["setting/name"]))]

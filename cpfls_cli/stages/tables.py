@@ -11,16 +11,7 @@ from cpfls_cli.artifacts.records import Artifact
 
 
 def texts(values: Iterable[str]) -> Any:
-    """Make a text dataset; an empty one is text too.
-
-    Parameters
-    ----------
-    values : iterable of str
-
-    Returns
-    -------
-    array of str
-    """
+    """Make a text dataset; an empty one is text too."""
     listed = list(values)
     return np.array(listed) if listed else np.array([], dtype="U1")
 
@@ -32,14 +23,8 @@ def table(
 
     Parameters
     ----------
-    group : str
-    rows : sequence of mapping
     words, numbers : sequence of str
         Fields that hold text, and fields that hold numbers.
-
-    Returns
-    -------
-    dict of str to array
     """
     return {
         **{f"{group}/{field}": texts(row[field] for row in rows) for field in words},
@@ -48,18 +33,7 @@ def table(
 
 
 def rows_of(artifact: Artifact, group: str, words: Sequence[str], numbers: Sequence[str]) -> list[dict[str, Any]]:
-    """Rebuild the records of datasets.
-
-    Parameters
-    ----------
-    artifact : Artifact
-    group : str
-    words, numbers : sequence of str
-
-    Returns
-    -------
-    list of dict
-    """
+    """Rebuild the records of datasets."""
     columns: dict[str, list[Any]] = {field: artifact.texts(f"{group}/{field}") for field in words}
     columns |= {field: artifact.array(f"{group}/{field}").tolist() for field in numbers}
     return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]

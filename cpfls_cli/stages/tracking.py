@@ -31,14 +31,8 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
 
     Parameters
     ----------
-    job : Job
-    trajectory : Path
     model : Path
         Identified.
-
-    Returns
-    -------
-    Outcome
 
     Raises
     ------

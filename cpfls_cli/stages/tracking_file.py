@@ -22,17 +22,10 @@ def tracking_data(plan: Plan, names: Sequence[str], found: Scores, model: Model,
 
     Parameters
     ----------
-    plan : Plan
     names : sequence of str
         Of the controllers.
-    found : Scores
-    model : Model
     attitude : array, shape (time, 3), rad
         Of the flight under the model's controller.
-
-    Returns
-    -------
-    dict of str to array
     """
     return {
         "tracking/controller": np.array(names),
@@ -61,12 +54,9 @@ def logged_signals(
     ----------
     exact : mapping of str to array
         By the names of the flight artifact.
-    study : Study
-    rng : numpy.random.Generator
 
     Returns
     -------
-    signals : dict of str to array
     noise_std : dict of str to array
         Standard deviation of the noise of each channel, of the signals that have noise.
     """

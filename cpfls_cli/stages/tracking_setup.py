@@ -30,17 +30,12 @@ def controllers_of(plan: Plan, model: TorqueModel, rigid_body: Array, vehicle: V
 
     Parameters
     ----------
-    plan : Plan
     model : TorqueModel
         Identified.
     rigid_body : array, shape (6,), kg m^2
         That fits the same samples; its D_ii at the planned start scale the feedback of the controller without a model.
     vehicle : VehicleSettings
         Whose exact inertia no other controller can beat, where it is what is controlled.
-
-    Returns
-    -------
-    list of Controller
     """
     tensor = symmetric(rigid_body)
     return [
@@ -62,17 +57,10 @@ def loop_of(
 
     Parameters
     ----------
-    plan : Plan
-    settings : ComputedTorqueSettings
     model : TorqueModel
         Controlled where the settings say so.
-    vehicle : VehicleSettings
     rng : numpy.random.Generator
         Source of the noise that the controllers measure.
-
-    Returns
-    -------
-    Loop
     """
     limit, noise = settings.torque_max_n_m, (settings.attitude_noise_rad, settings.body_rate_noise_rad_s)
     measured = (std * rng.standard_normal(plan.attitude.shape) for std in noise)
@@ -87,11 +75,6 @@ def loop_of(
 
 def planned_torque(plan: Plan, vehicle: VehicleSettings) -> Array:
     """Compute the torque that the exact vehicle needs at the start of the plan.
-
-    Parameters
-    ----------
-    plan : Plan
-    vehicle : VehicleSettings
 
     Returns
     -------

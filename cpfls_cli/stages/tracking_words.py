@@ -32,10 +32,6 @@ def tracking_outcome(
         What to know of the model.
     same_everywhere : bool
         Whether the model has the same coefficients at all attitudes.
-
-    Returns
-    -------
-    Outcome
     """
     summary = {
         "samples": len(signals["time"]),

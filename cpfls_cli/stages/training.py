@@ -24,14 +24,7 @@ _FLIGHTS, _ARE = ("flight", "flights"), ("is", "are")
 
 @dataclass(frozen=True)
 class SplitFlights:
-    """Flights, each with a leading part that trains and a rest that is held out.
-
-    Attributes
-    ----------
-    paths : tuple of Path
-    flights : tuple of TorqueSource
-    splits : tuple of Split
-    """
+    """Flights, each with a leading part that trains and a rest that is held out."""
 
     paths: tuple[Path, ...]
     flights: tuple[TorqueSource, ...]
@@ -86,16 +79,7 @@ class TrainingData:
 
 
 def flight_roles(flights: Sequence[Path]) -> dict[str, Path]:
-    """Give the flights that train their roles as inputs: ``flight``, ``flight-2`` and so on.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-
-    Returns
-    -------
-    dict of str to Path
-    """
+    """Give the flights that train their roles as inputs: ``flight``, ``flight-2`` and so on."""
     return {"flight" if number == 1 else f"flight-{number}": path for number, path in enumerate(flights, start=1)}
 
 
@@ -106,16 +90,10 @@ def split_training(
 
     Parameters
     ----------
-    flights : sequence of Path
-    study : Study
     inputs : mapping of str to InputFile, optional
         The flights by role, where they are hashed already.
     torque : bool
         Whether their torque is needed.
-
-    Returns
-    -------
-    SplitFlights
 
     Raises
     ------
@@ -135,16 +113,10 @@ def read_training(
 
     Parameters
     ----------
-    flights : sequence of Path
     selection : Path, optional
         Made from these very flights.
-    study : Study
     inputs : mapping of str to InputFile, optional
         The flights by role, where they are hashed already.
-
-    Returns
-    -------
-    TrainingData
 
     Raises
     ------

@@ -31,15 +31,10 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
 
     Parameters
     ----------
-    job : Job
     waypoints : Path or None
         CSV of the points to fly to, in place of the path of the config.
     plot : bool
         Draw the path beside the output.
-
-    Returns
-    -------
-    Outcome
 
     Raises
     ------

@@ -22,16 +22,7 @@ _LEGS_SHOWN = 12
 
 
 def trajectory_data(planned: PlannedRotation) -> dict[str, Any]:
-    """Arrange a plan as datasets.
-
-    Parameters
-    ----------
-    planned : PlannedRotation
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Arrange a plan as datasets."""
     values = vars(planned)
     data = {spec.path: values[spec.path] for spec in TRAJECTORY.datasets if spec.path in values}
     if not isinstance(planned, Trajectory):
@@ -49,15 +40,10 @@ def trajectory_outcome(planned: PlannedRotation, checked: Checked, figures: tupl
 
     Parameters
     ----------
-    planned : PlannedRotation
     checked : Checked
         What it asks of the vehicle.
     figures : tuple of Path
         Pictures that were drawn.
-
-    Returns
-    -------
-    Outcome
     """
     found, problems = checked.found, checked.problems
     common: dict[str, Any] = {
@@ -83,13 +69,8 @@ def with_excitation(outcome: Outcome, found: Excitation | None) -> Outcome:
 
     Parameters
     ----------
-    outcome : Outcome
     found : Excitation or None
         None leaves the outcome as it is.
-
-    Returns
-    -------
-    Outcome
     """
     if found is None:
         return outcome

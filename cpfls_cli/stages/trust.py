@@ -15,7 +15,6 @@ def trust_notes(model: Artifact, path: Path) -> Iterator[str]:
     ----------
     model : Artifact
         In the format of identified models.
-    path : Path
 
     Yields
     ------

@@ -27,7 +27,6 @@ def read_ulog(path: Path, settings: ImportSettings) -> tuple[dict[str, Array], t
 
     Parameters
     ----------
-    path : Path
     settings : ImportSettings
         `time_column` names the stamps that are the clock; stamps are converted to `time_unit`.
 

@@ -46,15 +46,8 @@ def gather_evidence(
 
     Parameters
     ----------
-    job : Job
-    result : Identification
-    data : TrainingData
     held_out : mapping of str to TorqueSource
         What nothing was learned from, by name.
-
-    Returns
-    -------
-    Gathered
     """
     settings = job.study.identification
     if not settings.validation.enabled or result.stop_reason == "interrupted":
@@ -78,14 +71,8 @@ def without_evidence(outcome: Outcome, gathered: Gathered, output: Path) -> Outc
 
     Parameters
     ----------
-    outcome : Outcome
-    gathered : Gathered
     output : Path
         The model.
-
-    Returns
-    -------
-    Outcome
     """
     if gathered.signal is None:
         return outcome
@@ -96,16 +83,7 @@ def without_evidence(outcome: Outcome, gathered: Gathered, output: Path) -> Outc
 
 
 def verdict_summary(verdict: Verdict | None) -> dict[str, Any] | None:
-    """Arrange a verdict for programs.
-
-    Parameters
-    ----------
-    verdict : Verdict or None
-
-    Returns
-    -------
-    dict or None
-    """
+    """Arrange a verdict for programs."""
     if verdict is None:
         return None
     reasons = zip(verdict.reason, verdict.speaks, strict=True)
@@ -114,16 +92,7 @@ def verdict_summary(verdict: Verdict | None) -> dict[str, Any] | None:
 
 
 def verdict_lines(verdict: Verdict | None) -> list[str]:
-    """Say a verdict to people: what it is, where, and what speaks for the model (+) and against it (-).
-
-    Parameters
-    ----------
-    verdict : Verdict or None
-
-    Returns
-    -------
-    list of str
-    """
+    """Say a verdict to people: what it is, where, and what speaks for the model (+) and against it (-)."""
     if verdict is None:
         return []
     lines = [f"verdict: {verdict.label.replace('-', ' ')}; {verdict.region}"]

@@ -20,10 +20,6 @@ _GROUPS = {"draws": "uncertainty"}
 def validation_data(evidence: Validation) -> dict[str, Any]:
     """Arrange the evidence on a model as the datasets of its artifact.
 
-    Parameters
-    ----------
-    evidence : Validation
-
     Returns
     -------
     dict of str to array
@@ -40,10 +36,6 @@ def validation_data(evidence: Validation) -> dict[str, Any]:
 
 def read_draws(artifact: Artifact) -> Draws | None:
     """Read the draws behind the bands of a model.
-
-    Parameters
-    ----------
-    artifact : Artifact
 
     Returns
     -------

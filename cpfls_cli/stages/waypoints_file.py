@@ -26,10 +26,6 @@ def read_waypoints(path: Path, paused: bool) -> tuple[WaypointSettings, ...]:
     paused : bool
         Whether the points may have pauses of their own.
 
-    Returns
-    -------
-    tuple of WaypointSettings
-
     Raises
     ------
     InputError

@@ -45,10 +45,6 @@ def flat_attitude(time: Array, translation: Array, heading: Array, gravity: floa
         Yaw in rad, its rate in rad/s, its acceleration in rad/s^2.
     gravity : float, m/s^2
 
-    Returns
-    -------
-    FlatAttitude
-
     Raises
     ------
     ComputationError

@@ -20,10 +20,6 @@ _MAY_JUMP = ("crackle", "pop")
 def check_consistency(settings: TrajectorySettings) -> None:
     """Refuse combinations that do not describe a path.
 
-    Parameters
-    ----------
-    settings : TrajectorySettings
-
     Raises
     ------
     SettingError

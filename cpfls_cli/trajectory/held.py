@@ -17,10 +17,6 @@ def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
     ----------
     path : RotationPath
     sample_time : float, s
-
-    Returns
-    -------
-    PlannedRotation
     """
     time = sample_times(path.duration, sample_time)
     motion = path.sample(time)

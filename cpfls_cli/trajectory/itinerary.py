@@ -19,10 +19,6 @@ from cpfls_cli.trajectory.waypoint_settings import check_waypoints
 def itinerary(settings: TrajectorySettings) -> tuple[Leg, ...]:
     """Plan the legs of a path in space.
 
-    Parameters
-    ----------
-    settings : TrajectorySettings
-
     Returns
     -------
     tuple of Leg
@@ -46,11 +42,6 @@ def itinerary(settings: TrajectorySettings) -> tuple[Leg, ...]:
 
 def duration_of(settings: TrajectorySettings, legs: tuple[Leg, ...]) -> float:
     """Tell how long a path takes.
-
-    Parameters
-    ----------
-    settings : TrajectorySettings
-    legs : tuple of Leg
 
     Returns
     -------
@@ -113,10 +104,6 @@ def _last_pause(settings: TrajectorySettings) -> float:
 
 def maxima(legs: tuple[Leg, ...]) -> dict[str, float]:
     """Find the largest peak of every derivative over all legs.
-
-    Parameters
-    ----------
-    legs : tuple of Leg
 
     Returns
     -------

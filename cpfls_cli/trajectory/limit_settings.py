@@ -56,10 +56,6 @@ class LimitSettings(Settings):
         direction : array, shape (3,)
             World vector that one metre of the move moves along. Limits axis by axis hold for each component, a
             single number for the move itself.
-
-        Returns
-        -------
-        Limits
         """
         return Limits(**{_derivative(key): _along(value, direction) for key, value in self.given.items()})
 

@@ -41,10 +41,6 @@ class Limits:
     def broadcast(self, moves: int) -> Array:
         """Give every move its limits.
 
-        Parameters
-        ----------
-        moves : int
-
         Returns
         -------
         array, shape (6, moves)

@@ -143,10 +143,6 @@ def moves_of(displacement: Array, spans: Array, bounds: Array, outcome: IntArray
         Limits.
     outcome : array, shape (moves,)
         Values of `Outcome`; what is not solved rests.
-
-    Returns
-    -------
-    Moves
     """
     moving = outcome == Outcome.SOLVED
     exact = np.where(moving, spans, 0.0)

@@ -25,10 +25,6 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
         Of a path that is not held.
     gravity : float, m/s^2
 
-    Returns
-    -------
-    Trajectory
-
     Raises
     ------
     SettingError

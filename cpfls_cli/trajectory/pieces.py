@@ -64,10 +64,6 @@ class Piece:
             Sign of each derivative of the mirror image.
         displacement : float, m
             Of the whole move.
-
-        Returns
-        -------
-        Piece
         """
         coefficients = self.coefficients * parity[:5, np.newaxis]
         coefficients[0, 0] += displacement

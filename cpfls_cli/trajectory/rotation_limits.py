@@ -46,10 +46,6 @@ class RotationLimits:
     def loads(self, motion: RotationMotion) -> Array:
         """Divide what a motion asks for by the limits.
 
-        Parameters
-        ----------
-        motion : RotationMotion
-
         Returns
         -------
         array, shape (time, 12 or 15)
@@ -74,10 +70,6 @@ class RotationLimits:
         Between two samples a curve exceeds both by at most an eighth of its second difference, as long as that
         hardly changes from one sample to the next; a quarter is added.
 
-        Parameters
-        ----------
-        path : RotationPath
-
         Returns
         -------
         array, shape (3,)
@@ -91,10 +83,6 @@ class RotationLimits:
 
     def fitted(self, path: RotationPath) -> RotationPath:
         """Scale the harmonics of a path to the largest amplitudes that the limits allow.
-
-        Parameters
-        ----------
-        path : RotationPath
 
         Returns
         -------
@@ -121,10 +109,6 @@ class RotationLimits:
 
     def enforced(self, path: RotationPath) -> RotationPath:
         """Scale the harmonics of a path down where it exceeds a limit.
-
-        Parameters
-        ----------
-        path : RotationPath
 
         Returns
         -------

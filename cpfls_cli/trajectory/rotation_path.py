@@ -67,10 +67,6 @@ class RotationPath:
         ----------
         time : array, shape (time,), s
             Any order and any value; the path goes on for ever.
-
-        Returns
-        -------
-        RotationMotion
         """
         base = 2 * np.pi / self.duration
         frequency = base * np.arange(1, self.harmonics + 1)
@@ -87,10 +83,6 @@ class RotationPath:
     def times(self, count: int) -> Array:
         """Divide the duration into equal steps.
 
-        Parameters
-        ----------
-        count : int
-
         Returns
         -------
         array, shape (count,), s
@@ -101,10 +93,6 @@ class RotationPath:
 
     def scaled(self, factor: float) -> RotationPath:
         """Multiply the amplitudes of the harmonics.
-
-        Parameters
-        ----------
-        factor : float
 
         Returns
         -------

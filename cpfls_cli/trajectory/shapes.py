@@ -95,10 +95,6 @@ def shape_of(vector: Array, timing: Timing) -> Shape:
         Not zero.
     timing : Timing
 
-    Returns
-    -------
-    Shape
-
     Raises
     ------
     SettingError

@@ -33,10 +33,6 @@ def synchronised(
         stretched in time to the slowest. Both take as long as the slowest axis alone, or longer; on a straight line
         the slowest derivative of any axis may set the pace.
 
-    Returns
-    -------
-    tuple of Move
-
     Raises
     ------
     SettingError

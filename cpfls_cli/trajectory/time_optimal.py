@@ -31,10 +31,6 @@ def plan_moves(displacement: Array, limits: Limits, period: float | Array | None
         The paper's parameter P; chosen where it is not given. With crackle and pop not limited the choice is 0,
         and the snap jumps.
 
-    Returns
-    -------
-    Moves
-
     Raises
     ------
     SettingError
@@ -58,10 +54,6 @@ def plan_move(displacement: float, limits: Limits, period: float | None = None) 
     displacement : float, m
     limits : Limits
     period : float, s, optional
-
-    Returns
-    -------
-    Move
 
     Raises
     ------

@@ -52,10 +52,6 @@ def autocorrelation(errors: Array, number: IntArray, without: BoolArray, lags: i
     lags : int
         Largest lag, in samples.
 
-    Returns
-    -------
-    Autocorrelation
-
     References
     ----------
     Box, Jenkins and Reinsel, Time Series Analysis, section 2.1.6; Ljung and Box, Biometrika 65 (1978), 297; with

@@ -71,12 +71,6 @@ def torque_band(model: Model, draws: Draws, motion: Motion) -> tuple[Array, Arra
 
     It is the band of the prediction; a measured torque has its own noise beside it.
 
-    Parameters
-    ----------
-    model : Model
-    draws : Draws
-    motion : Motion
-
     Returns
     -------
     low, high : array, shape (samples, 3), N m

@@ -54,10 +54,6 @@ def time_blocks(training: TorqueSource, block_duration: float | None, most: int 
         short flight has fewer blocks than asked for, and a long one longer blocks.
     most : int, optional
         Blocks at most, where there is memory for fewer than 200.
-
-    Returns
-    -------
-    TimeBlocks
     """
     time = sample_times(training)
     samples = len(time)

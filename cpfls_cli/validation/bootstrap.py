@@ -99,10 +99,6 @@ def bootstrap(
     settings : ValidationSettings
     rng : numpy.random.Generator
 
-    Returns
-    -------
-    Draws
-
     References
     ----------
     Cameron, Gelbach and Miller, Review of Economics and Statistics 90 (2008), 414 (wild bootstrap by cluster);

@@ -21,10 +21,6 @@ def candidates(own: StructureSettings) -> tuple[StructureSettings, ...]:
     The choices are the number of membership functions, the input map, and the consequents: the triangle wave, or
     harmonics up to the first, second or third order.
 
-    Parameters
-    ----------
-    own : StructureSettings
-
     Returns
     -------
     tuple of StructureSettings
@@ -39,10 +35,6 @@ def candidates(own: StructureSettings) -> tuple[StructureSettings, ...]:
 
 def structure_name(settings: StructureSettings) -> str:
     """Name a structure in a line.
-
-    Parameters
-    ----------
-    settings : StructureSettings
 
     Returns
     -------

@@ -76,10 +76,6 @@ def curves(model: Model, draws: Draws, best_rigid_body: Array, training: TorqueS
     draws : Draws
     best_rigid_body : array, shape (6,), kg m^2
     training : TorqueSource
-
-    Returns
-    -------
-    Curves
     """
     visited = _visited_angles(training)
     attitude = np.stack([_along(visited, angle) for angle in (ROLL, PITCH)])

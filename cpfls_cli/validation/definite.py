@@ -24,11 +24,6 @@ def definite_share(model: Model, draws: Draws) -> float | None:
     Cells within 17 degrees of a vertical pitch are left out, as they are from the windows replayed: there the smallest
     eigenvalue of every body falls with the square of cos(pitch), and all noise is larger.
 
-    Parameters
-    ----------
-    model : Model
-    draws : Draws
-
     Returns
     -------
     float or None

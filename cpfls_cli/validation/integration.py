@@ -25,11 +25,6 @@ def free_runs(law: Law, windows: Windows) -> Iterator[State]:
     torque is a straight line. A run is lost where the inertia is not positive definite, or where it turns faster than
     any step can follow.
 
-    Parameters
-    ----------
-    law : callable
-    windows : Windows
-
     Yields
     ------
     State

@@ -44,10 +44,6 @@ def with_constant(torque: Callable[[Motion], Array], constant: Array) -> Callabl
     torque : callable
         Predicts the generalised torque of a motion.
     constant : array, shape (3,), N m, body frame
-
-    Returns
-    -------
-    callable
     """
 
     def predicted(motion: Motion) -> Array:

@@ -32,10 +32,6 @@ def compare_torque(
         One held-out part.
     ours, theirs : callable
         Predict the generalised torque of a motion.
-
-    Returns
-    -------
-    Comparison
     """
     scale = _scale(source)
     chunks = (_errors(data, (ours, theirs)) for data in source.chunks())

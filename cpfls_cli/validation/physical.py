@@ -55,10 +55,6 @@ def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
     rng : numpy.random.Generator
         Draws an attitude rate for every cell.
 
-    Returns
-    -------
-    Physics
-
     References
     ----------
     Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 6.5 (skew symmetry, passivity).

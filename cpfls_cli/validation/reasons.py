@@ -19,16 +19,7 @@ DEFINITE_SHARE = 0.975
 
 
 def reasons(grounds: Grounds) -> Iterator[Reason]:
-    """List what speaks for a model and against it, the most important first.
-
-    Parameters
-    ----------
-    grounds : Grounds
-
-    Yields
-    ------
-    Reason
-    """
+    """List what speaks for a model and against it, the most important first."""
     yield from reasons_of_errors(grounds)
     sense = (_definite, _draws, _elsewhere, _fuzzy_part, _determined)
     for rule in (*sense, _band, _search, _outside, _white):

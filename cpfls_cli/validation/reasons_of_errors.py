@@ -16,16 +16,7 @@ _LARGE_BESIDE_NOISE, _SMALL = 0.25, 0.01
 
 
 def reasons_of_errors(grounds: Grounds) -> Iterator[Reason]:
-    """List what the errors on held-out data speak for, the most important first.
-
-    Parameters
-    ----------
-    grounds : Grounds
-
-    Yields
-    ------
-    Reason
-    """
+    """List what the errors on held-out data speak for, the most important first."""
     for rule in (_held_out, _hardly_excited, _beside_rigid_body, _constant, _steps, _lost):
         yield from rule(grounds)
 

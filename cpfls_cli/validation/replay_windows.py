@@ -93,17 +93,7 @@ def plan_windows(source: TorqueSource, horizon: int, most: int) -> Plan:
 
 
 def read_windows(source: TorqueSource, plan: Plan) -> Iterator[Windows]:
-    """Gather what was measured in the windows, some windows at a time.
-
-    Parameters
-    ----------
-    source : TorqueSource
-    plan : Plan
-
-    Yields
-    ------
-    Windows
-    """
+    """Gather what was measured in the windows, some windows at a time."""
     at_once = max(_SAMPLES_AT_ONCE // (plan.horizon + 1), 1)
     for first in range(0, len(plan.start), at_once):
         wanted = plan.start[first : first + at_once, None] + np.arange(plan.horizon + 1)

@@ -101,10 +101,6 @@ def examine_residuals(
     lags : int
         Largest lag, in samples.
 
-    Returns
-    -------
-    ResidualAnalysis
-
     References
     ----------
     Ljung, System Identification: Theory for the User, section 16.6 (residual analysis).

@@ -66,10 +66,6 @@ def round_trip(
     curves : Curves
     rng : numpy.random.Generator
 
-    Returns
-    -------
-    RoundTrip
-
     Raises
     ------
     ComputationError

@@ -67,10 +67,6 @@ class BlockScores:
         ----------
         penalty : array, shape (parameters,)
         rank_tolerance : float
-
-        Returns
-        -------
-        BlockScores
         """
         half = replace(self, penalty=penalty)._half_inverse(rank_tolerance)
         # The scores add up to P x: taken from there, parameters without a penalty do not move by rounding.

@@ -13,13 +13,7 @@ from cpfls_cli.validation.blocks import TimeBlocks
 
 @dataclass(frozen=True)
 class Missed:
-    """The motion of a source with the torque that a model misses: measured less predicted.
-
-    Attributes
-    ----------
-    source : TorqueSource
-    model : Model
-    """
+    """The motion of a source with the torque that a model misses: measured less predicted."""
 
     source: TorqueSource
     model: Model

@@ -90,11 +90,6 @@ def lagged_pairs(number: IntArray, lag: int) -> tuple[IntArray, IntArray]:
 def leading(source: TorqueSource, most: int) -> TorqueData:
     """Gather the first samples of a source in memory.
 
-    Parameters
-    ----------
-    source : TorqueSource
-    most : int
-
     Returns
     -------
     TorqueData

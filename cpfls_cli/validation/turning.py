@@ -66,10 +66,6 @@ def turning_law(predictor: Predictor) -> Law:
     Parameters
     ----------
     predictor : InertiaModel or array, shape (6,)
-
-    Returns
-    -------
-    callable
     """
     return _rigid(symmetric(predictor)) if isinstance(predictor, np.ndarray) else _identified(predictor)
 

@@ -93,10 +93,6 @@ def validate(
     rng : numpy.random.Generator
     tell : callable, optional
         Told what comes next.
-
-    Returns
-    -------
-    Validation
     """
     asked, model = settings.validation, result.model
     part, source = next(iter(held_out.items()), (TRAINING, training))

@@ -62,14 +62,6 @@ def verdict(grounds: Grounds) -> Verdict:
 
     An unfinished search, wide bands, residuals that are not white and a few windows that were lost are told as
     reasons and do not decide: each of them harms a model only as far as it predicts worse, and that is measured.
-
-    Parameters
-    ----------
-    grounds : Grounds
-
-    Returns
-    -------
-    Verdict
     """
     label, decisive = _decided(grounds)
     told = (decisive, *reasons(grounds))

@@ -13,10 +13,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 def inertia_tensor(vehicle: VehicleSettings) -> Array:
     """Arrange the inertia tensor of a vehicle.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-
     Returns
     -------
     array, shape (3, 3), kg m^2, body frame

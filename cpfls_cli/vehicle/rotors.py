@@ -54,10 +54,6 @@ def allocation_matrix(vehicle: VehicleSettings) -> Array:
 
     A rotor at (x, y, z) gives ``(k, y k, -x k, -spin b)``.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-
     Returns
     -------
     array, shape (4, rotor)
@@ -77,10 +73,6 @@ def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
     ----------
     vehicle : VehicleSettings
     rotor_speed : array, shape (time, rotor), rad/s
-
-    Returns
-    -------
-    BodyWrench
     """
     require_columns("rotor_speed", rotor_speed, len(vehicle.rotors))
     wrench = rotor_speed**2 @ allocation_matrix(vehicle).T

@@ -12,10 +12,6 @@ _SCHEMES = ("tcp", "tls")
 def require_address(address: str) -> None:
     """Require that a text is an address.
 
-    Parameters
-    ----------
-    address : str
-
     Raises
     ------
     InputError

@@ -36,16 +36,7 @@ class Failure:
 
 
 def attempt(work: Callable[[], _Result]) -> _Result | Failure:
-    """Do some work and return its result, or else what went wrong.
-
-    Parameters
-    ----------
-    work : callable
-
-    Returns
-    -------
-    object or Failure
-    """
+    """Do some work and return its result, or else what went wrong."""
     try:
         return work()
     except CpflsError as error:
@@ -60,14 +51,6 @@ def attempt(work: Callable[[], _Result]) -> _Result | Failure:
 
 def result_of(outcome: _Result | Failure) -> _Result:
     """Return what an attempt brought, or raise what it failed with.
-
-    Parameters
-    ----------
-    outcome : object or Failure
-
-    Returns
-    -------
-    object
 
     Raises
     ------

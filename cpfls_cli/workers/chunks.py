@@ -15,10 +15,6 @@ def chunks(rows: int, workers: int) -> list[IntArray]:
     Each chunk takes a fixed share of what is left, so there are few of them, and yet nobody waits long for the
     last one, however uneven the rows are (guided self-scheduling).
 
-    Parameters
-    ----------
-    rows, workers : int
-
     Returns
     -------
     list of array of int

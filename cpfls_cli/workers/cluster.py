@@ -91,10 +91,6 @@ def cluster(evaluate: Evaluate, address: str, *, patience_s: float = 10.0) -> It
     patience_s : float
         How long to wait for the scheduler, and for a worker whenever there is none.
 
-    Yields
-    ------
-    Cluster
-
     Raises
     ------
     WorkerError

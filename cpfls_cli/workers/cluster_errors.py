@@ -46,10 +46,6 @@ def explained(client: Client) -> Iterator[None]:
     client : Client
         Connection to the scheduler.
 
-    Yields
-    ------
-    None
-
     Raises
     ------
     WorkerError

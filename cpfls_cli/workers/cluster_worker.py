@@ -19,10 +19,6 @@ class Shipped(WorkerPlugin):  # type: ignore[misc]
 
     Scattered data would not stay: Dask drops copies while they are idle, and then the only one with its worker.
     Threads of one worker do not share an evaluator, because nothing says that it may be used by two at once.
-
-    Parameters
-    ----------
-    evaluator : bytes
     """
 
     def __init__(self, evaluator: bytes) -> None:
@@ -54,10 +50,6 @@ def evaluate_shipped(genes: IntArray, name: str) -> Evaluation | Failure:
     genes : array of int, shape (individuals, genes)
     name : str
         By which the evaluator was shipped.
-
-    Returns
-    -------
-    Evaluation or Failure
     """
     shipped: Shipped = get_worker().plugins[name]
     return attempt(partial(shipped.evaluate, genes))

@@ -125,10 +125,6 @@ def processes(evaluate: Evaluate, count: int) -> Iterator[Processes]:
     count : int
         Number of processes, >= 1.
 
-    Yields
-    ------
-    Processes
-
     Raises
     ------
     WorkerError

@@ -24,12 +24,7 @@ class Processor:
 
 
 def processor() -> Processor:
-    """Describe the processor of this machine.
-
-    Returns
-    -------
-    Processor
-    """
+    """Describe the processor of this machine."""
     # The compiler behind numba; slow to load, and needed only where workers are elsewhere.
     compiler = import_module("llvmlite.binding")
     usable = (name for name, there in compiler.get_host_cpu_features().items() if there)

@@ -12,12 +12,7 @@ _NOISY = ("distributed", "distributed.client", "tornado", "tornado.application",
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Silence Dask's log; what matters of it comes as an error.
-
-    Yields
-    ------
-    None
-    """
+    """Silence Dask's log; what matters of it comes as an error."""
     loggers = [logging.getLogger(name) for name in _NOISY]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

@@ -11,12 +11,7 @@ from cpfls_cli.workers.workforce import Workforce
 
 
 class Serial(Workforce):
-    """The evaluator itself, row by row, so that it can be stopped between any two.
-
-    Parameters
-    ----------
-    evaluate : callable
-    """
+    """The evaluator itself, row by row, so that it can be stopped between any two."""
 
     def __init__(self, evaluate: Evaluate) -> None:
         self._evaluate = evaluate

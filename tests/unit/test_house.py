@@ -1,6 +1,8 @@
 """The rules of the house that no linter knows: short functions, documented public names, quiet packages."""
 
 import ast
+import itertools
+import re
 from pathlib import Path
 from statistics import median
 
@@ -30,18 +32,63 @@ def test_functions_are_short():
     assert median(lengths.values()) <= 10
 
 
-def test_public_functions_say_what_they_take_and_return():
-    missing = []
+def documented(path):
+    """Public functions, classes and methods at the top of a module, by name."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            yield node.name, node
+            for own in node.body if isinstance(node, ast.ClassDef) else ():
+                if isinstance(own, ast.FunctionDef) and not own.name.startswith("_"):
+                    yield f"{node.name}.{own.name}", own
+
+
+def sections(text):
+    """Entries of the numpydoc sections of a docstring: each a list of lines, by section."""
+    found, name, lines = {}, None, text.splitlines()
+    for line, following in itertools.pairwise([*lines, ""]):
+        if re.fullmatch(r"-{3,}", following) and line.strip():
+            name = line.strip()
+            found[name] = []
+        elif name and line.strip() and not re.fullmatch(r"-{3,}", line):
+            found[name] += [[line]] if not line.startswith(" ") or not found[name] else []
+            found[name][-1] += [line] if line.startswith(" ") else []
+    return found
+
+
+def repeats_signature(entry, section):
+    """Tell whether an entry is a bare type: no word of meaning, no shape, no unit, no range."""
+    kind = entry[0].partition(" : ")[2] if section == "Parameters" else entry[0]
+    return len(entry) == 1 and not re.search(r"[,\[\]()<>]", re.sub(r", optional$", "", kind))
+
+
+def test_first_lines_are_one_sentence():
+    wrong = []
     for path in MODULES:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        for node in tree.body:
-            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
-                text = ast.get_docstring(node) or ""
-                takes = [a.arg for a in node.args.args + node.args.kwonlyargs]
-                if not text or (takes and "Parameters" not in text and "parameters are those" not in text):
-                    missing.append(f"{path.name}:{node.name}")
-    # Commands describe themselves to their users; the command line prints these texts.
-    assert [name for name in missing if not name.startswith("app.py")] == []
+        for name, node in documented(path):
+            first = (ast.get_docstring(node) or "").splitlines()[:1]
+            if not first or not first[0].rstrip().endswith((".", "``")):
+                wrong.append(f"{path.relative_to(PACKAGE)}: {name}")
+    assert wrong == []
+
+
+def test_docstrings_do_not_repeat_signatures():
+    """A section stands where at least one of its entries adds shape, unit, frame, range or meaning."""
+    bare, unknown = [], []
+    for path in MODULES:
+        for name, node in documented(path):
+            found = sections(ast.get_docstring(node) or "")
+            for section in ("Parameters", "Returns", "Yields"):
+                entries = found.get(section, [])
+                if entries and all(repeats_signature(entry, section) for entry in entries):
+                    bare.append(f"{path.relative_to(PACKAGE)}: {name}: {section}")
+            if isinstance(node, ast.FunctionDef):
+                taken = {a.arg for a in (*node.args.args, *node.args.kwonlyargs, node.args.vararg) if a}
+                listed = {
+                    n.strip(" *") for entry in found.get("Parameters", []) for n in entry[0].split(" : ")[0].split(",")
+                }
+                unknown += [f"{path.relative_to(PACKAGE)}: {name}: {n}" for n in sorted(listed - taken)]
+    assert bare == []
+    assert unknown == []
 
 
 @pytest.mark.parametrize("path", [path for path in MODULES if path.name == "__init__.py"], ids=lambda p: p.parent.name)

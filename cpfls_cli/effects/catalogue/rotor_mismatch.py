@@ -17,10 +17,6 @@ _SAME_PLACE = 1e-6
 def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
     """Find the pairs of rotors that face each other across the centre of mass and spin the same way.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-
     Returns
     -------
     tuple of tuple of int
@@ -38,10 +34,6 @@ def gain_modes(vehicle: VehicleSettings) -> Array:
 
     For a quadrotor they are the differences of its two opposite pairs. For other vehicles they grow along x and y.
     What all rotors, or all rotors of one spin, have in common is taken out: it trades with Ixx and Iyy.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
 
     Returns
     -------

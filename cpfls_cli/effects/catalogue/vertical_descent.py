@@ -43,10 +43,6 @@ def induced_velocity(signals: Signals) -> Array:
 def descent_ratio(signals: Signals) -> Array:
     """Compute the speed of descent of each hub over its induced velocity, ``x_i = max(-u_iz / v_h, 0)``.
 
-    Parameters
-    ----------
-    signals : Signals
-
     Returns
     -------
     array, shape (time, rotor)
@@ -63,10 +59,6 @@ def descent_state(ratio: float) -> str:
     ----------
     ratio : float
         Speed of descent over induced velocity.
-
-    Returns
-    -------
-    str
     """
     return next(state for limit, state in _STATES if ratio <= limit)
 

@@ -36,10 +36,6 @@ class System:
     def columns(self, candidate: Candidate) -> Array:
         """Evaluate a candidate; a flight that lacks a signal it needs has zeros.
 
-        Parameters
-        ----------
-        candidate : Candidate
-
         Returns
         -------
         array, shape (window, 6, coefficient)
@@ -81,16 +77,7 @@ class System:
         return np.repeat(np.arange(len(self.flights)), [len(flight) for flight in self.flights])
 
     def can(self, candidate: Candidate) -> bool:
-        """Tell whether any flight has the signals that a candidate needs.
-
-        Parameters
-        ----------
-        candidate : Candidate
-
-        Returns
-        -------
-        bool
-        """
+        """Tell whether any flight has the signals that a candidate needs."""
         return any(not candidate.effect.missing(signals) for signals in self.signals)
 
     def _evaluate(self, candidate: Candidate) -> Array:
@@ -108,30 +95,11 @@ class System:
 
 
 def system(flights: Sequence[WeakFlight], chosen: Sequence[Candidate] = ()) -> System:
-    """Set up the balance of flights under a hypothesis.
-
-    Parameters
-    ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
-
-    Returns
-    -------
-    System
-    """
+    """Set up the balance of flights under a hypothesis."""
     signals = tuple(actuated(flight.signals, chosen) for flight in flights)
     return System(tuple(flights), tuple(chosen), signals)
 
 
 def is_free(candidate: Candidate) -> bool:
-    """Tell whether an effect has columns with free coefficients.
-
-    Parameters
-    ----------
-    candidate : Candidate
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether an effect has columns with free coefficients."""
     return candidate.effect.kind == "wrench" and not candidate.effect.unit_coefficient

@@ -59,10 +59,6 @@ class Folds:
     def solve(self, columns: IntArray) -> tuple[Array, Array]:
         """Fit a subset of columns without each block, and judge it on that block.
 
-        Parameters
-        ----------
-        columns : array of int
-
         Returns
         -------
         coefficients : array, shape (block, column, draw)
@@ -76,10 +72,6 @@ class Folds:
     def fit(self, columns: IntArray) -> tuple[Array, Array]:
         """Fit a subset of columns on all blocks.
 
-        Parameters
-        ----------
-        columns : array of int
-
         Returns
         -------
         coefficients : array, shape (column, draw)
@@ -91,10 +83,6 @@ class Folds:
 
     def errors(self, columns: IntArray) -> Array:
         """Give standard errors of a fit on all blocks as if rows were independent; one draw.
-
-        Parameters
-        ----------
-        columns : array of int
 
         Returns
         -------
@@ -124,10 +112,6 @@ class Folds:
             Columns that the result has.
         weight : array, shape (channel,)
             On the rows.
-
-        Returns
-        -------
-        Folds
         """
         inner = self.grams[:, :, kept, column, None]
         square = self.squares - 2 * self.moments[:, :, column] + self.grams[:, :, column, column, None]
@@ -150,10 +134,6 @@ def folds(columns: Array, right: Array, block: IntArray, prior: Array | None = N
     block : array of int, shape (window,)
     prior : array, shape (column,), or None
         None for nothing known.
-
-    Returns
-    -------
-    Folds
     """
     draws = right.reshape(*right.shape[:2], -1)
     own = [block == b for b in range(int(block.max()) + 1)]

@@ -17,13 +17,7 @@ _SAME_RATE = 1e-3
 
 @dataclass(frozen=True)
 class Recording:
-    """A flight and its name.
-
-    Attributes
-    ----------
-    name : str
-    signals : Signals
-    """
+    """A flight and its name."""
 
     name: str
     signals: Signals
@@ -31,15 +25,6 @@ class Recording:
 
 def common_windows(recordings: Sequence[Recording], settings: GapSettings) -> Windows:
     """Make the windows that all flights share.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    settings : GapSettings
-
-    Returns
-    -------
-    Windows
 
     Raises
     ------

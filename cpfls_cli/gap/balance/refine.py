@@ -28,10 +28,6 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     flights : sequence of WeakFlight
     chosen : sequence of Candidate
     floor : array, shape (6,)
-
-    Returns
-    -------
-    System
     """
     best = list(chosen)
     told = system(flights).rotor_wrench

@@ -14,10 +14,6 @@ _STEP = 1e-3
 def free_shapes(hypothesis: System) -> list[tuple[Candidate, str]]:
     """List the shapes of a hypothesis in the order of its effects.
 
-    Parameters
-    ----------
-    hypothesis : System
-
     Returns
     -------
     list of (Candidate, str)

@@ -26,13 +26,7 @@ CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 
 
 class Candidate(NamedTuple):
-    """An effect with a value for each of its shapes.
-
-    Attributes
-    ----------
-    effect : Effect
-    shape : mapping of str to float
-    """
+    """An effect with a value for each of its shapes."""
 
     effect: Effect
     shape: Mapping[str, float]
@@ -109,22 +103,13 @@ class WeakFlight:
         return rows * self.turns if candidate.effect.kind == "parameter" else rows
 
     def without_force(self) -> WeakFlight:
-        """Leave the force balance out.
-
-        Returns
-        -------
-        WeakFlight
-        """
+        """Leave the force balance out."""
         known = self.known & (np.arange(6) < 3)
         seen = {key: rows * known[:, None] for key, rows in self.seen.items()}
         return replace(self, known=known, seen=seen)
 
     def averaged(self, columns: Columns) -> Array:
         """Average columns, or a residual, over the windows.
-
-        Parameters
-        ----------
-        columns : Columns
 
         Returns
         -------
@@ -156,10 +141,6 @@ def weak_flight(
         Whether to use the force balance where the flight allows it.
     axes : sequence of str
         Body axes of which the torque balance is used.
-
-    Returns
-    -------
-    WeakFlight
     """
     with_force = force and signals.has_force
     rotation = rotation_balance(signals, model)
@@ -207,12 +188,7 @@ def columns_of(candidate: Candidate, signals: Signals) -> Columns:
 
 
 def nuisance() -> Candidate:
-    """Give the parameters of the vehicle that stay free in every fit.
-
-    Returns
-    -------
-    Candidate
-    """
+    """Give the parameters of the vehicle that stay free in every fit."""
     return Candidate(CATALOGUE["parameter_error"], {})
 
 
@@ -224,10 +200,6 @@ def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
     signals : Signals
     chosen : iterable of Candidate
         Those that need a signal which the flight lacks leave it as it is: measured speeds, say, do not lag.
-
-    Returns
-    -------
-    Signals
     """
     for candidate in chosen:
         effect = candidate.effect

@@ -35,16 +35,7 @@ class Windows:
     period: float
 
     def count(self, samples: int) -> int:
-        """Count the windows that fit into a flight.
-
-        Parameters
-        ----------
-        samples : int
-
-        Returns
-        -------
-        int
-        """
+        """Count the windows that fit into a flight."""
         return max(0, (samples - len(self.weight)) // self.hop + 1)
 
     def centres(self, time: Array) -> Array:
@@ -103,10 +94,6 @@ def windows(period: float, window_s: float, overlap: float) -> Windows:
         Length, s.
     overlap : float
         Share that neighbours have in common.
-
-    Returns
-    -------
-    Windows
 
     Raises
     ------

@@ -22,16 +22,6 @@ def unbeaten(own: Scored, ranking: Sequence[Scored], above_floor: float) -> list
     """List the candidates that the chosen one does not beat.
 
     Beaten is what leaves more by more than the scatter over blocks and by more than a few hundredths of the gap.
-
-    Parameters
-    ----------
-    own : Scored
-    ranking : sequence of Scored
-    above_floor : float
-
-    Returns
-    -------
-    list of Scored
     """
     return [
         other
@@ -50,10 +40,6 @@ def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
     ranking : sequence of Scored
         Best first.
     above_floor : float
-
-    Returns
-    -------
-    Scored
     """
     best = ranking[0]
     rivals = [other for other in unbeaten(best, ranking, above_floor) if other.gain > (1 - _CLOSE) * best.gain]
@@ -61,18 +47,7 @@ def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
 
 
 def alternatives(own: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Alternative]:
-    """List what is as good as the chosen effect; an effect that holds it as a special case is none.
-
-    Parameters
-    ----------
-    own : Scored
-    ranking : sequence of Scored
-    above_floor : float
-
-    Returns
-    -------
-    list of Alternative
-    """
+    """List what is as good as the chosen effect; an effect that holds it as a special case is none."""
     effect = own.candidate.effect
     return [
         Alternative(

@@ -53,10 +53,6 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
         Standard deviation of each channel.
     block : array of int, shape (window,)
 
-    Returns
-    -------
-    Estimates
-
     References
     ----------
     Efron and Tibshirani 1993, chapter 11 (delete-a-group jackknife).
@@ -88,10 +84,6 @@ def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Est
     hypothesis : System
     floor : array, shape (6,)
     block : array of int, shape (window,)
-
-    Returns
-    -------
-    Estimates
     """
     left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
     return estimates(hypothesis, np.maximum(floor, np.sqrt(np.mean(left**2, axis=0))), block)
@@ -105,10 +97,6 @@ def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
     effect : Effect
     numbers : sequence of Estimate
         Physical coefficients, then shapes.
-
-    Returns
-    -------
-    bool
     """
     if effect.unit_coefficient and not effect.shapes:
         return True

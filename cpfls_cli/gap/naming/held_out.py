@@ -62,10 +62,6 @@ class HeldOut:
         Parameters
         ----------
         residual : array, shape (window, 6)
-
-        Returns
-        -------
-        GapSize
         """
         count = self.known.sum(axis=0)
         square = (residual**2 * self.known).sum(axis=0)
@@ -115,10 +111,6 @@ def judged_unseen(
     linear : array, shape (column,)
     scatter : float
         Mean square of the relative scatter of the effects.
-
-    Returns
-    -------
-    HeldOut
     """
     plain = system(fitted.flights)
     weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
@@ -170,10 +162,6 @@ def held_out(
         The vehicle's own numbers where nothing else is fitted.
     scatter : float
         Mean square of the relative scatter of the effects, from the training flights.
-
-    Returns
-    -------
-    HeldOut
 
     Raises
     ------

@@ -20,13 +20,7 @@ from cpfls_cli.gap.settings import GapSettings
 
 @dataclass(frozen=True)
 class Judged:
-    """A chosen effect and its rivals.
-
-    Attributes
-    ----------
-    effect : NamedEffect
-    alternatives : tuple of Alternative
-    """
+    """A chosen effect and its rivals."""
 
     effect: NamedEffect
     alternatives: tuple[Alternative, ...]
@@ -56,10 +50,6 @@ def judge_effect(
     effects : sequence of Effect
     settings : GapSettings
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    Judged
     """
     candidate = chosen[place]
     others = [other for other in chosen if other is not candidate]

@@ -71,10 +71,6 @@ def leftover(
     block : array of int, shape (window,)
     settings : GapSettings
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    Leftover
     """
     left = hypothesis.residual - hypothesis.base @ linear
     variance = scatter_variance(hypothesis)

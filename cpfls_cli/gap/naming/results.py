@@ -124,13 +124,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class NotExcited:
-    """An effect that these flights could not show.
-
-    Attributes
-    ----------
-    name : str
-    reason : str
-    """
+    """An effect that these flights could not show."""
 
     name: str
     reason: str

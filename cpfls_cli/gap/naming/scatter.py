@@ -14,10 +14,6 @@ _LEAST_RATIO = 1.5
 def scatter_variance(hypothesis: System) -> Array:
     """Average the variance that chosen effects can scatter, for a unit of scatter.
 
-    Parameters
-    ----------
-    hypothesis : System
-
     Returns
     -------
     array, shape (window, 6)

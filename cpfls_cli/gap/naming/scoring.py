@@ -84,16 +84,7 @@ class Layout:
 
 
 def candidates_of(effects: Sequence[Effect]) -> list[Candidate]:
-    """List effects at all points of their grids.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-
-    Returns
-    -------
-    list of Candidate
-    """
+    """List effects at all points of their grids."""
     return [
         Candidate(effect, dict(zip((shape.name for shape in effect.shapes), values, strict=True)))
         for effect in effects
@@ -112,10 +103,6 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
     hypothesis : System
     candidates : sequence of Candidate
     floor : array, shape (6,)
-
-    Returns
-    -------
-    Layout
     """
     moving = shape_columns(hypothesis, fit(hypothesis, floor))
     parts: list[Array] = [hypothesis.base, moving]
@@ -209,10 +196,6 @@ def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArr
     right : array, shape (window, 6) or (window, 6, draw), N m and N
     floor : array, shape (6,)
     block : array of int, shape (window,)
-
-    Returns
-    -------
-    Folds
     """
     weighted = right / (floor if right.ndim == 2 else floor[:, None])
     return folds(arranged.matrix, weighted, block, arranged.prior)

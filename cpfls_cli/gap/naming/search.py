@@ -63,14 +63,6 @@ class Step:
         """Compute the probability that chance explains as much, over the whole catalogue.
 
         The share of shifts that do; beyond all of them, the tail of the extreme-value law fitted to them.
-
-        Parameters
-        ----------
-        gain : float
-
-        Returns
-        -------
-        float
         """
         if not np.isfinite(gain):
             return 1.0
@@ -103,10 +95,6 @@ def look(
         Of the shifts; None for none.
     also : sequence of Candidate
         Tried beside the grids, with shapes of their own.
-
-    Returns
-    -------
-    Step
     """
     hypothesis = system(flights, chosen)
     floor = best_floor(hypothesis)
@@ -177,17 +165,7 @@ def forward(
 
 
 def acceptable(step: Step, settings: GapSettings) -> bool:
-    """Tell whether the best candidate of a look is more than chance and enough.
-
-    Parameters
-    ----------
-    step : Step
-    settings : GapSettings
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether the best candidate of a look is more than chance and enough."""
     if not step.ranking or step.ranking[0].gain == REFUSED:
         return False
     best = step.ranking[0]
@@ -214,10 +192,6 @@ def quiet_enough(gain: float, step: Step, found: System) -> bool:
         The look that chose it.
     found : System
         With the effect.
-
-    Returns
-    -------
-    bool
     """
     if not found.chosen[-1].effect.rate_derivative:
         return True
@@ -230,19 +204,7 @@ def quiet_enough(gain: float, step: Step, found: System) -> bool:
 def exchanged(
     flights: Sequence[WeakFlight], chosen: Sequence[Candidate], effects: Sequence[Effect], settings: GapSettings
 ) -> tuple[Candidate, ...]:
-    """Drop effects that later ones made needless, and replace those that another serves better beside the rest.
-
-    Parameters
-    ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
-    effects : sequence of Effect
-    settings : GapSettings
-
-    Returns
-    -------
-    tuple of Candidate
-    """
+    """Drop effects that later ones made needless, and replace those that another serves better beside the rest."""
     kept = list(chosen)
     for candidate in list(chosen):
         others = [other for other in kept if other is not candidate]
@@ -267,10 +229,6 @@ def best_floor(hypothesis: System) -> Array:
 
     The fit and the floors depend on each other; starting from equal weights, a second round changes nothing any more.
 
-    Parameters
-    ----------
-    hypothesis : System
-
     Returns
     -------
     array, shape (6,)
@@ -284,11 +242,6 @@ def best_floor(hypothesis: System) -> Array:
 
 def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
     """Give each window the number of its cross-validation block.
-
-    Parameters
-    ----------
-    hypothesis : System
-    settings : GapSettings
 
     Returns
     -------

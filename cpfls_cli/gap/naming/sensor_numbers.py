@@ -9,17 +9,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def sensor_estimates(finding: AuditFinding, vehicle: VehicleSettings) -> tuple[Estimate, ...]:
-    """Give the named numbers of a fault.
-
-    Parameters
-    ----------
-    finding : AuditFinding
-    vehicle : VehicleSettings
-
-    Returns
-    -------
-    tuple of Estimate
-    """
+    """Give the named numbers of a fault."""
     known = _known(finding.name, vehicle)
     return tuple(
         Estimate(*known[number.name][:2], number.value, number.low, number.high, known[number.name][2])

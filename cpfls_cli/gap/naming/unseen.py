@@ -28,10 +28,6 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
     hypothesis : System
     effects : sequence of Effect
     floor : array, shape (6,)
-
-    Returns
-    -------
-    tuple of NotExcited
     """
     # The vehicle's own numbers are free in every fit, so beyond themselves they never show.
     names = {candidate.effect.name for candidate in hypothesis.free} | {c.effect.name for c in hypothesis.chosen}
@@ -41,11 +37,6 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
 
 def look_alikes(hypothesis: System, named: Sequence[NamedEffect]) -> tuple[str, ...]:
     """Say which effects look like a named one and cannot be ruled out, because the flights lack their signals.
-
-    Parameters
-    ----------
-    hypothesis : System
-    named : sequence of NamedEffect
 
     Returns
     -------

@@ -33,10 +33,6 @@ def parameter_error(found: Estimates, effects: Sequence[NamedEffect], share: flo
         Part of the gap of the model as given that refitting its numbers takes off.
     pull : array, shape (parameter,)
         Error of each number that noise in the motion can make: a noisy acceleration asks for less inertia.
-
-    Returns
-    -------
-    NamedEffect or None
     """
     pairs = zip(found.parameters, pull, strict=True)
     wrong = [number for number, drawn in pairs if abs(number.value) > _PULLS * drawn and _told(number, effects)]

@@ -50,10 +50,6 @@ def verdict_of(
     excited : bool
         Whether anything moved enough to show a gap.
     settings : GapSettings
-
-    Returns
-    -------
-    Verdict
     """
     if not effects:
         if unexplained:
@@ -74,10 +70,6 @@ def gap_stays(before: Array, after: Array) -> bool:
     ----------
     before, after : array, shape (6,), floors
         Of the held-out flights, with the vehicle's own numbers refitted.
-
-    Returns
-    -------
-    bool
     """
     return any(_stays(before[kind], after[kind]) for kind in (slice(0, 3), slice(3, 6)))
 
@@ -96,10 +88,6 @@ def matters(left: Unexplained, before: Array) -> bool:
     left : Unexplained
     before : array, shape (6,), floors
         The gap of each channel without effects.
-
-    Returns
-    -------
-    bool
     """
     follows = left.signal is not None or left.frequency_hz is not None
     kind = slice(0, 3) if left.axis.startswith("torque") else slice(3, 6)

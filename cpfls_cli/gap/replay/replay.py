@@ -51,10 +51,6 @@ def start_samples(signals: Signals, every: int, horizon: int) -> IntArray:
     horizon : int
         Samples.
 
-    Returns
-    -------
-    array of int
-
     Raises
     ------
     InputError
@@ -80,10 +76,6 @@ def replay(signals: Signals, starts: IntArray, horizon: int, model: ReplayModel)
     horizon : int
         Samples.
     model : ReplayModel
-
-    Returns
-    -------
-    ReplayError
     """
     return _compared(signals, starts, free_runs(model, signals, starts, start_rate(signals)[starts], horizon))
 
@@ -97,10 +89,6 @@ def held(signals: Signals, starts: IntArray, horizon: int) -> ReplayError:
     starts : array of int
     horizon : int
         Samples.
-
-    Returns
-    -------
-    ReplayError
     """
     rate = start_rate(signals)[starts]
     turned = [None] * horizon if signals.attitude is None else _held_rotation(signals, starts, rate, horizon)
@@ -109,14 +97,6 @@ def held(signals: Signals, starts: IntArray, horizon: int) -> ReplayError:
 
 def rigid_body(signals: Signals) -> ReplayModel:
     """Give the rigid body of the vehicle under the torque of its rotors alone.
-
-    Parameters
-    ----------
-    signals : Signals
-
-    Returns
-    -------
-    ReplayModel
 
     Raises
     ------
@@ -134,10 +114,6 @@ def start_rate(signals: Signals) -> Array:
     The noise of a single sample would be an error of the start that stays over the whole horizon and hides the model's.
     The average is symmetric, so it does not lag; it looks three samples ahead, equally for all models, and says nothing
     of the torque.
-
-    Parameters
-    ----------
-    signals : Signals
 
     Returns
     -------

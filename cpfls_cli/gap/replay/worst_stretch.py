@@ -62,10 +62,6 @@ def worst_stretch(
     run_s : float
         Of each free run, s.
 
-    Returns
-    -------
-    WorstStretch
-
     Raises
     ------
     InputError

@@ -43,10 +43,6 @@ def heat_map(residual: Array, first: Array, second: Array, bins: int = 12) -> He
         Windows where one is not a number are left out.
     bins : int
         Cells along each signal.
-
-    Returns
-    -------
-    HeatMap
     """
     known = np.isfinite(residual) & np.isfinite(first) & np.isfinite(second)
     signals = [first[known], second[known]]

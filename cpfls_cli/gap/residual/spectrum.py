@@ -46,10 +46,6 @@ def grid(lengths: Sequence[int], period: float) -> Grid:
     lengths : sequence of int
     period : float
         From one row to the next, s.
-
-    Returns
-    -------
-    Grid
     """
     samples = next_fast_len(_FINER * max(lengths), real=True)
     return Grid(samples, rfftfreq(samples, period))

@@ -50,10 +50,6 @@ def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: in
     lags : int
         Largest lag; fewer where flights are short.
 
-    Returns
-    -------
-    Whiteness
-
     References
     ----------
     Ljung and Box 1978, equation 1.4.

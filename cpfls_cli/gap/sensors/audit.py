@@ -70,14 +70,6 @@ class Audit:
 
         Coefficients that are not named count as 0. The length stays: the end of a flight that is shifted holds its
         last value.
-
-        Parameters
-        ----------
-        signals : Signals
-
-        Returns
-        -------
-        Signals
         """
         if not self.named:
             return signals
@@ -108,10 +100,6 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
     flights : sequence of Signals
         At least one, with the sampling period of the windows.
     windows : Windows
-
-    Returns
-    -------
-    Audit
 
     References
     ----------

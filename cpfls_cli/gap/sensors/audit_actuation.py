@@ -44,10 +44,6 @@ class ActuationDelay:
 def actuation_delay(flights: Sequence[Signals]) -> ActuationDelay | None:
     """Estimate how late the motion follows the torque, flight by flight.
 
-    Parameters
-    ----------
-    flights : sequence of Signals
-
     Returns
     -------
     ActuationDelay or None

@@ -22,16 +22,7 @@ _ANGLES = ("roll", "pitch", "yaw")
 
 
 def channel_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:
-    """Name channels that never change, and a gyroscope that is clipped or coarsely rounded.
-
-    Parameters
-    ----------
-    flights : sequence of Signals
-
-    Returns
-    -------
-    tuple of str
-    """
+    """Name channels that never change, and a gyroscope that is clipped or coarsely rounded."""
     return (*_constant(flights), *_gyro(np.concatenate([signals.body_rate for signals in flights])))
 
 

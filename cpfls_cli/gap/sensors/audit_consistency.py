@@ -67,18 +67,7 @@ _PAIRS = (
 
 
 def consistency(flights: Sequence[Signals], windows: Windows) -> tuple[tuple[ChannelMatch, ...], tuple[str, ...]]:
-    """Compare channels with the derivatives of others, in weak form.
-
-    Parameters
-    ----------
-    flights : sequence of Signals
-    windows : Windows
-
-    Returns
-    -------
-    matches : tuple of ChannelMatch
-    warnings : tuple of str
-    """
+    """Compare channels with the derivatives of others, in weak form."""
     matches: list[ChannelMatch] = []
     warnings: list[str] = []
     for pair in _PAIRS:
@@ -125,10 +114,6 @@ def frame_warnings(name: str, first: Array, second: Array, floor: float) -> list
         What should be the same.
     floor : float
         Standard deviation above which something moves.
-
-    Returns
-    -------
-    list of str
     """
     moving = (first.std(axis=0) > floor) & (second.std(axis=0) > 0)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -77,10 +77,6 @@ class AuditFinding:
         ----------
         names : sequence of str
             Names of coefficients.
-
-        Returns
-        -------
-        array
         """
         found = {each.name: each.value for each in self.coefficients if each.named}
         return np.array([found.get(name, 0.0) for name in names])
@@ -153,10 +149,6 @@ def findings(fit: GyroFit, tested: Sequence[FaultName], period: float) -> tuple[
         Names of faults.
     period : float
         Sampling period, s.
-
-    Returns
-    -------
-    tuple of AuditFinding
 
     References
     ----------

@@ -82,16 +82,7 @@ class GyroFit:
 
 
 def scan(flights: Sequence[Kinematics]) -> Scan:
-    """Scan the delay between gyroscope and attitude, positive where the gyroscope is late.
-
-    Parameters
-    ----------
-    flights : sequence of Kinematics
-
-    Returns
-    -------
-    Scan
-    """
+    """Scan the delay between gyroscope and attitude, positive where the gyroscope is late."""
     step = max(float(flights[0].time[0, 1] - flights[0].time[0, 0]), _SCAN_STEP_S)
     half = int(LONGEST_DELAY_S / step)
     delays = step * np.arange(-half, half + 1)
@@ -125,11 +116,6 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: Scan) -> GyroFit | None:
     The gyroscope is the cleaner side, hence the reverse regression ``omega(t) = M omega_gyro(t + delay) - c``; its
     noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
     with the derivative of the reading, refined by Gauss-Newton steps.
-
-    Parameters
-    ----------
-    flights : sequence of Kinematics
-    scanned : Scan
 
     Returns
     -------

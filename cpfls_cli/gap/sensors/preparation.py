@@ -34,29 +34,11 @@ class Preparation:
     audit: Audit
 
     def logged(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
-        """Prepare flights as they were logged.
-
-        Parameters
-        ----------
-        recordings : sequence of Recording
-
-        Returns
-        -------
-        list of WeakFlight
-        """
+        """Prepare flights as they were logged."""
         return [self._weak(recording.name, recording.signals) for recording in recordings]
 
     def repaired(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
-        """Prepare flights with the named faults of their sensors repaired.
-
-        Parameters
-        ----------
-        recordings : sequence of Recording
-
-        Returns
-        -------
-        list of WeakFlight
-        """
+        """Prepare flights with the named faults of their sensors repaired."""
         return [self._weak(recording.name, self.audit.repaired(recording.signals)) for recording in recordings]
 
     def _weak(self, name: str, signals: Signals) -> WeakFlight:

@@ -12,16 +12,7 @@ from cpfls_cli.report.table_5 import PRINTED, PrintedColumn
 
 
 def printed_ratio(column: PrintedColumn, reference: PrintedColumn) -> float:
-    """Divide the mean squared errors of two columns of Table 5.
-
-    Parameters
-    ----------
-    column, reference : PrintedColumn
-
-    Returns
-    -------
-    float
-    """
+    """Divide the mean squared errors of two columns of Table 5."""
     return float(column.mse_of_runs[0]) / float(reference.mse_of_runs[0])
 
 
@@ -40,8 +31,6 @@ def as_good(claim: Claim, setting: SweptSetting, reference: SweptSetting, reason
 
     Parameters
     ----------
-    claim : Claim
-    setting, reference : SweptSetting
     reason : str
         Of a failure.
 
@@ -69,16 +58,7 @@ def as_good(claim: Claim, setting: SweptSetting, reference: SweptSetting, reason
 
 
 def times(ratio: float) -> str:
-    """Write a ratio of errors.
-
-    Parameters
-    ----------
-    ratio : float
-
-    Returns
-    -------
-    str
-    """
+    """Write a ratio of errors."""
     return f"{number(ratio, 3)} times the MSE"
 
 

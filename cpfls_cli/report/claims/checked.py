@@ -15,10 +15,6 @@ from cpfls_cli.report.swept import joined_sweeps
 def claims_of(sources: Sources) -> list[Claim]:
     """Check the claims of the paper against what a report is about.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     list of Claim

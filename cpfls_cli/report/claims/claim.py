@@ -31,8 +31,6 @@ class Claim:
         What is measured, and what counts as a pass; stated without the outcome.
     paper : str
         The paper's number.
-    ours : str
-    verdict : Verdict
     why : str
         One or two sentences.
     """
@@ -47,41 +45,13 @@ class Claim:
     why: str = ""
 
     def decided(self, passed: bool, ours: str, why: str) -> Claim:
-        """Add a number and what it says.
-
-        Parameters
-        ----------
-        passed : bool
-        ours, why : str
-
-        Returns
-        -------
-        Claim
-        """
+        """Add a number and what it says."""
         return replace(self, verdict=Verdict.PASS if passed else Verdict.FAIL, ours=ours, why=why)
 
     def undecided(self, ours: str, why: str) -> Claim:
-        """Add a number that does not settle the claim.
-
-        Parameters
-        ----------
-        ours, why : str
-
-        Returns
-        -------
-        Claim
-        """
+        """Add a number that does not settle the claim."""
         return replace(self, verdict=Verdict.UNDECIDED, ours=ours, why=why)
 
     def lacks(self, what: str, command: str) -> Claim:
-        """Say what is missing to measure it, and the command that makes it.
-
-        Parameters
-        ----------
-        what, command : str
-
-        Returns
-        -------
-        Claim
-        """
+        """Say what is missing to measure it, and the command that makes it."""
         return replace(self, why=f"Missing: {what}. Made by: {command}")

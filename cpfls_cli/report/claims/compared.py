@@ -22,7 +22,6 @@ class ComparedFigure:
         What the paper's text says of it in numbers, and the same of ours.
     agreement : {"agrees", "differs", "read as printed", "cannot be compared", "not shown"}
         Read as printed: the paper's own numbers, decoded as here, agree with each other. It says nothing of any model.
-    why : str
     """
 
     title: str
@@ -35,10 +34,6 @@ class ComparedFigure:
 def agreement(agrees: bool) -> Agreement:
     """Say whether two numbers agree.
 
-    Parameters
-    ----------
-    agrees : bool
-
     Returns
     -------
     {"agrees", "differs"}
@@ -48,10 +43,6 @@ def agreement(agrees: bool) -> Agreement:
 
 def reading(agrees: bool) -> Agreement:
     """Say whether printed numbers agree with each other as they are decoded here, whatever was identified.
-
-    Parameters
-    ----------
-    agrees : bool
 
     Returns
     -------
@@ -65,12 +56,7 @@ def not_shown(title: str, printed: str, why: str) -> ComparedFigure:
 
     Parameters
     ----------
-    title, printed : str
     why : str
         What is missing.
-
-    Returns
-    -------
-    ComparedFigure
     """
     return ComparedFigure(title, printed, UNKNOWN, "not shown", why)

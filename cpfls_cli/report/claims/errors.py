@@ -25,16 +25,7 @@ _CLAIM = Claim(
 
 
 def error_claim(sources: Sources) -> Claim:
-    """Hold the relative errors of all models against the paper's bound.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    Claim
-    """
+    """Hold the relative errors of all models against the paper's bound."""
     errors = np.concatenate([np.zeros(0), *_errors(sources)])
     if not len(errors):
         return _CLAIM.lacks("a model or a sweep", "cpfls identify CONFIG flight.h5 -o model.h5")

@@ -16,10 +16,6 @@ from cpfls_cli.report.source import Sources
 def compared_figures(sources: Sources) -> list[ComparedFigure]:
     """Hold the figures of a report against what the paper's text says of its own.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     list of ComparedFigure

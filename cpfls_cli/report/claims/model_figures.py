@@ -18,16 +18,7 @@ _PRECISION = 1e-5
 
 
 def reduction_compared(sources: Sources) -> ComparedFigure:
-    """Compare Figure 5: the condition number while samples are chosen.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    ComparedFigure
-    """
+    """Compare Figure 5: the condition number while samples are chosen."""
     title = f"5: condition number, {_DRAWN.samples} samples"
     printed = f"{_DRAWN.condition_number}, {change(_DRAWN.change)} against all samples"
     fitting = [s for s in sources.selections if len(s.artifact.array("indices")) == _DRAWN.samples]
@@ -46,12 +37,7 @@ def reduction_compared(sources: Sources) -> ComparedFigure:
 
 
 def partitions_compared() -> ComparedFigure:
-    """Compare Figure 6: the printed partitions with the printed weights, as they are decoded here.
-
-    Returns
-    -------
-    ComparedFigure
-    """
+    """Compare Figure 6: the printed partitions with the printed weights, as they are decoded here."""
     weights = np.array(PRINTED_WEIGHTS, dtype=float).reshape(-1, _GENES)
     decoded = np.concatenate([breakpoints(row)[1:-1] for row in weights])
     off = float(np.max(np.abs(decoded - PRINTED_BREAKPOINTS)))
@@ -66,16 +52,7 @@ def partitions_compared() -> ComparedFigure:
 
 
 def error_compared(sources: Sources) -> ComparedFigure:
-    """Compare Figure 7: the torque error.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    ComparedFigure
-    """
+    """Compare Figure 7: the torque error."""
     title, printed = "7: torque error", "below 10 % of the torque along the training path"
     shown = [
         model

@@ -15,12 +15,7 @@ from cpfls_cli.report.table_5 import SMALLEST_MAX_ERROR
 
 
 def seesaw_compared() -> ComparedFigure:
-    """Compare Figure 1: the seesaw.
-
-    Returns
-    -------
-    ComparedFigure
-    """
+    """Compare Figure 1: the seesaw."""
     angles, printed = np.pi * np.array(list(PRINTED_SEESAW)), np.array(list(PRINTED_SEESAW.values()))
     off = float(np.max(np.abs(seesaw(angles)[0] - printed)))
     agrees = off < 1e-12
@@ -33,16 +28,7 @@ def seesaw_compared() -> ComparedFigure:
 
 
 def derivatives_compared(sources: Sources) -> ComparedFigure:
-    """Compare Figure 2: the derivatives of the base move.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    ComparedFigure
-    """
+    """Compare Figure 2: the derivatives of the base move."""
     claim = move_claim(sources.trajectories)
     printed = "peaks 2π, 2, 1, 1, 2, 8, 64; 16 s; integral of |jerk| 8 m/s²"
     title = "2: pop to displacement"
@@ -58,16 +44,7 @@ def derivatives_compared(sources: Sources) -> ComparedFigure:
 
 
 def attitude_compared(sources: Sources) -> ComparedFigure:
-    """Compare Figure 3: roll and pitch.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    ComparedFigure
-    """
+    """Compare Figure 3: roll and pitch."""
     title, printed = "3: roll and pitch", "about 55 s; no angle in the text"
     drawn = [s for s in sources.trajectories if "position" in s.artifact.data]
     if not drawn:
@@ -84,16 +61,7 @@ def attitude_compared(sources: Sources) -> ComparedFigure:
 
 
 def torque_compared(sources: Sources) -> ComparedFigure:
-    """Compare Figure 4: the torques.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    ComparedFigure
-    """
+    """Compare Figure 4: the torques."""
     least = SMALLEST_MAX_ERROR / PRINTED_RELATIVE_ERROR
     title = "4: torques"
     printed = f"more than {number(least, 2)} N m (an error of {SMALLEST_MAX_ERROR} N m is below 10 %)"

@@ -46,14 +46,6 @@ def paired_ratio(setting: SweptSetting, reference: SweptSetting) -> PairedRatio:
 
     With ``d_i = log(mse_i / mse_i')`` over n seeds the ratio is ``exp(mean d)`` and its interval
     ``exp(mean d +- t_{n-1, 0.975} s_d / sqrt n)``.
-
-    Parameters
-    ----------
-    setting, reference : SweptSetting
-
-    Returns
-    -------
-    PairedRatio
     """
     both, places, others = np.intersect1d(setting.seeds, reference.seeds, return_indices=True)
     ours, theirs = setting.mse[places, 0], reference.mse[others, 0]

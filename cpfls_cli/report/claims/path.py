@@ -26,16 +26,7 @@ _CLAIM = Claim(
 
 
 def move_claim(trajectories: Sequence[Source]) -> Claim:
-    """Hold the first move of a path against the numbers that the paper prints.
-
-    Parameters
-    ----------
-    trajectories : sequence of Source
-
-    Returns
-    -------
-    Claim
-    """
+    """Hold the first move of a path against the numbers that the paper prints."""
     along = [trajectory for trajectory in trajectories if "position" in trajectory.artifact.data]
     if not along:
         return _CLAIM.lacks("a trajectory", "cpfls trajectory CONFIG -o trajectory.h5")
@@ -48,16 +39,7 @@ def move_claim(trajectories: Sequence[Source]) -> Claim:
 
 
 def move_numbers(trajectory: Source) -> dict[str, float]:
-    """Measure the first move of a path: its peaks by derivative, its time and its integral of absolute jerk.
-
-    Parameters
-    ----------
-    trajectory : Source
-
-    Returns
-    -------
-    dict of str to float
-    """
+    """Measure the first move of a path: its peaks by derivative, its time and its integral of absolute jerk."""
     leg = first_leg(trajectory.artifact)
     peaks = {name: float(np.max(np.abs(leg.curves[name]))) for name in PRINTED_PEAKS}
     taken = float(leg.time[-1] - leg.time[0])

@@ -33,16 +33,7 @@ _COMMAND = "cpfls reduce CONFIG flight.h5 -o selection.h5"
 
 
 def reduction_claims(selections: Sequence[Source]) -> list[Claim]:
-    """Check what the paper says of reduced training sets.
-
-    Parameters
-    ----------
-    selections : sequence of Source
-
-    Returns
-    -------
-    list of Claim
-    """
+    """Check what the paper says of reduced training sets."""
     return [_contribution(selections), _floor(selections)]
 
 

@@ -35,10 +35,6 @@ def search_claims(sweeps: Sequence[Sweep]) -> list[Claim]:
     ----------
     sweeps : sequence of Sweep
         Where several can check a claim, the one with the larger search does.
-
-    Returns
-    -------
-    list of Claim
     """
     largest_first = sorted(sweeps, key=lambda sweep: -max(_chromosomes(setting) for setting in sweep.settings))
     return [

@@ -37,12 +37,7 @@ _EXPONENTIAL = Claim(
 
 @dataclass(frozen=True)
 class Line:
-    """A straight line through points.
-
-    Attributes
-    ----------
-    slope, r2 : float
-    """
+    """A straight line through points."""
 
     slope: float
     r2: float
@@ -55,10 +50,6 @@ def timing_claims(times: Sequence[EvaluationTime]) -> list[Claim]:
     ----------
     times : sequence of EvaluationTime
         Measured elsewhere and given: no artifact holds a time, so that equal content stays an equal file.
-
-    Returns
-    -------
-    list of Claim
     """
     if len({time.samples for time in times}) < _FEWEST:
         return [claim.lacks("report.evaluation_times", _COMMAND) for claim in (_PROPORTIONAL, _EXPONENTIAL)]
@@ -95,10 +86,6 @@ def line_through(x: Array, y: Array) -> Line:
     Parameters
     ----------
     x, y : array, shape (points,)
-
-    Returns
-    -------
-    Line
     """
     slope = float(np.polyfit(x, y, 1)[0])
     return Line(slope, float(np.corrcoef(x, y)[0, 1] ** 2))

@@ -15,13 +15,8 @@ def attitude_figure(name: str, source: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     source : Source
         A trajectory or a flight that holds attitude.
-
-    Returns
-    -------
-    Plot
 
     References
     ----------

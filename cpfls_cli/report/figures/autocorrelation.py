@@ -17,13 +17,8 @@ def autocorrelation_figure(name: str, model: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     model : Source
         With residuals.
-
-    Returns
-    -------
-    Plot
     """
     artifact = model.artifact
     lag, values = artifact.array("residuals/lag"), artifact.array("residuals/autocorrelation")

@@ -30,10 +30,6 @@ def marked(points: int) -> dict[str, Any]:
     ----------
     points : int
         Of the curve.
-
-    Returns
-    -------
-    dict
     """
     every = max(1, points // _MARKS)
     return {**AFTER, "marker": "o", "markersize": 3.6, "markerfacecolor": "white", "markevery": every}
@@ -44,7 +40,6 @@ def keep_in_view(axes: Axes, shown: Sequence[Array], astray: Array) -> bool:
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
     shown : sequence of array
         Curves that must be seen in full.
     astray : array
@@ -64,18 +59,7 @@ def keep_in_view(axes: Axes, shown: Sequence[Array], astray: Array) -> bool:
 
 
 def by_channel(figure: Figure, channels: Sequence[str], share_y: bool = False) -> list[Axes]:
-    """Make a small plot for each channel, torques above forces, named.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    channels : sequence of str
-    share_y : bool
-
-    Returns
-    -------
-    list of matplotlib.axes.Axes
-    """
+    """Make a small plot for each channel, torques above forces, named."""
     rows = -(-len(channels) // _AXES)
     grid = figure.subplots(rows, _AXES, sharex=True, sharey=share_y, squeeze=False)
     for axes in grid.flat[len(channels) :]:
@@ -91,7 +75,6 @@ def legend_over(figure: Figure, axes: Axes) -> None:
 
     Parameters
     ----------
-    figure : matplotlib.figure.Figure
     axes : matplotlib.axes.Axes
         With the curves.
     """

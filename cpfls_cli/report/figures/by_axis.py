@@ -16,8 +16,6 @@ def by_axis(figure: Figure, rows: int = 1, share_y: Literal["row"] | bool = Fals
 
     Parameters
     ----------
-    figure : matplotlib.figure.Figure
-    rows : int
     share_y : bool or "row"
         Whether all plots, or those of a row, have one y axis.
 

@@ -25,18 +25,7 @@ _FLOOR_TICK = "< 10⁻⁷"
 
 
 def compared_errors_figure(name: str, parts: Sequence[JudgedOn], models: Sequence[Source]) -> Plot:
-    """Draw the error of every model and its rigid body on the data that several were judged on.
-
-    Parameters
-    ----------
-    name : str
-    parts : sequence of JudgedOn
-    models : sequence of Source
-
-    Returns
-    -------
-    Plot
-    """
+    """Draw the error of every model and its rigid body on the data that several were judged on."""
     titles = [part.title for part in parts]
     shown = [model for model in models if any(model in part.models for part in parts)]
 

@@ -22,15 +22,10 @@ def compared_curves_figure(name: str, models: Sequence[Source], word: str) -> Pl
 
     Parameters
     ----------
-    name : str
     models : sequence of Source
         With curves of that name.
     word : str
         "over roll" or "over pitch".
-
-    Returns
-    -------
-    Plot
     """
     largest = max(float(np.abs(model.artifact.array("curves/inertia")).max(initial=1e-12)) for model in models)
 

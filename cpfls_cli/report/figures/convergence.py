@@ -12,17 +12,7 @@ from cpfls_cli.report.source import Source
 
 
 def convergence_figure(name: str, model: Source) -> Plot:
-    """Draw the best of each objective found so far, by generation.
-
-    Parameters
-    ----------
-    name : str
-    model : Source
-
-    Returns
-    -------
-    Plot
-    """
+    """Draw the best of each objective found so far, by generation."""
     best = model.artifact.array("history/best")
     generation = np.arange(len(best))
     error, unit = first_objective(model)
@@ -50,10 +40,6 @@ def convergence_figure(name: str, model: Source) -> Plot:
 
 def first_objective(model: Source) -> tuple[str, str]:
     """Name the error that the search minimised, and its unit.
-
-    Parameters
-    ----------
-    model : Source
 
     Returns
     -------

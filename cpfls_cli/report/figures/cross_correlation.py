@@ -21,13 +21,8 @@ def cross_correlation_figure(name: str, model: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     model : Source
         With residuals.
-
-    Returns
-    -------
-    Plot
     """
     artifact = model.artifact
     inputs, lag = artifact.texts("residuals/input"), artifact.array("residuals/input_lag")

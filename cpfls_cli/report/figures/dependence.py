@@ -28,14 +28,8 @@ def dependence_figure(name: str, disagreement: Source, channels: list[str]) -> P
 
     Parameters
     ----------
-    name : str
-    disagreement : Source
     channels : list of str
         At least one.
-
-    Returns
-    -------
-    Plot
     """
     rows = -(-len(channels) // _COLUMNS)
 
@@ -62,13 +56,8 @@ def heat_map_figure(name: str, disagreement: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     disagreement : Source
         With a heat map.
-
-    Returns
-    -------
-    Plot
     """
     artifact = disagreement.artifact
     channel, signals = artifact.text("heat_map/channel"), artifact.texts("heat_map/signal")

@@ -14,15 +14,6 @@ from cpfls_cli.report.source import Source
 def derivatives_figure(name: str, trajectory: Source) -> Plot:
     """Draw pop to displacement over the first leg.
 
-    Parameters
-    ----------
-    name : str
-    trajectory : Source
-
-    Returns
-    -------
-    Plot
-
     References
     ----------
     Figure 2 of the paper.

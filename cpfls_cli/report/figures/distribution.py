@@ -26,13 +26,8 @@ def distribution_figure(name: str, model: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     model : Source
         With residuals.
-
-    Returns
-    -------
-    Plot
     """
     artifact = model.artifact
     edges, counts = (artifact.array(f"residuals/histogram_{key}") for key in ("edge", "count"))

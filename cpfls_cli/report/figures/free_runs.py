@@ -23,15 +23,10 @@ def free_runs_figure(name: str, diagnosis: Source, after: str) -> Plot:
 
     Parameters
     ----------
-    name : str
     diagnosis : Source
         With a stretch of free runs.
     after : str
         What the second model is, for the caption.
-
-    Returns
-    -------
-    Plot
     """
     artifact = diagnosis.artifact
     time, restart = artifact.array("run/time"), artifact.array("run/restart")

@@ -12,17 +12,7 @@ from cpfls_cli.report.source import Source
 
 
 def front_figure(name: str, model: Source) -> Plot:
-    """Draw the members of the Pareto front and mark the chosen one.
-
-    Parameters
-    ----------
-    name : str
-    model : Source
-
-    Returns
-    -------
-    Plot
-    """
+    """Draw the members of the Pareto front and mark the chosen one."""
     objectives = model.artifact.array("front/objectives")
     chosen = int(model.artifact.number("front/chosen"))
     error, unit = first_objective(model)

@@ -16,15 +16,10 @@ def gap_picture_figure(name: str, diagnosis: Source, after: str) -> Plot:
 
     Parameters
     ----------
-    name : str
     diagnosis : Source
         With a picture.
     after : str
         What the second model is, for the caption.
-
-    Returns
-    -------
-    Plot
     """
     artifact = diagnosis.artifact
     channel = artifact.text("picture/channel")

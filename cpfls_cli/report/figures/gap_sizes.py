@@ -31,13 +31,8 @@ def gap_sizes_figure(name: str, source: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     source : Source
         A diagnosis or an extended model.
-
-    Returns
-    -------
-    Plot
     """
     channels = known_channels(source, "gap/before_floors")
     index = [place for place, _ in channels]

@@ -16,15 +16,6 @@ _PANELS = (("D22", "D33"), ("D13", "D23"))
 def inertia_figure(name: str, prediction: Source) -> Plot:
     """Draw the entries of D(q) that depend on attitude.
 
-    Parameters
-    ----------
-    name : str
-    prediction : Source
-
-    Returns
-    -------
-    Plot
-
     References
     ----------
     Equations (14) and (15).

@@ -36,14 +36,8 @@ def inertia_curves_figure(name: str, model: Source, curve: int) -> Plot:
 
     Parameters
     ----------
-    name : str
     model : Source
         With curves.
-    curve : int
-
-    Returns
-    -------
-    Plot
     """
     artifact = model.artifact
     word = artifact.texts("curves/name")[curve]
@@ -73,7 +67,6 @@ def entry_of(values: Array, entry: str) -> Array:
     Parameters
     ----------
     values : array, shape (..., 3, 3)
-    entry : str
 
     Returns
     -------
@@ -87,7 +80,6 @@ def keep_scale(axes: Axes, shown: list[Array], largest: float) -> None:
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
     shown : list of array
         What must be seen in full.
     largest : float

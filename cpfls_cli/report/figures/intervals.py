@@ -21,7 +21,6 @@ def intervals_figure(name: str, source: Source) -> Plot | None:
 
     Parameters
     ----------
-    name : str
     source : Source
         A diagnosis or an extended model.
 

@@ -22,15 +22,6 @@ _CLOSE = 0.05
 def partitions_figure(name: str, model: Source) -> Plot:
     """Draw the membership functions of all partitions, side by side.
 
-    Parameters
-    ----------
-    name : str
-    model : Source
-
-    Returns
-    -------
-    Plot
-
     References
     ----------
     Figure 6 of the paper; equation (8).
@@ -57,16 +48,7 @@ def partitions_figure(name: str, model: Source) -> Plot:
 
 
 def partitions_of(model: Source) -> dict[str, Array]:
-    """Group the breakpoints of a model by partition.
-
-    Parameters
-    ----------
-    model : Source
-
-    Returns
-    -------
-    dict of str to array
-    """
+    """Group the breakpoints of a model by partition."""
     names, peaks = model.artifact.texts("model/partition"), model.artifact.array("model/breakpoints")
     return {name: peaks[[other == name for other in names]] for name in dict.fromkeys(names)}
 

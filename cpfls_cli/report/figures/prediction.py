@@ -21,13 +21,8 @@ def error_figure(name: str, prediction: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     prediction : Source
         With measured torque.
-
-    Returns
-    -------
-    Plot
 
     References
     ----------
@@ -50,17 +45,7 @@ def error_figure(name: str, prediction: Source) -> Plot:
 
 
 def torques_figure(name: str, prediction: Source) -> Plot:
-    """Draw the torque of the model over the torque of the flight.
-
-    Parameters
-    ----------
-    name : str
-    prediction : Source
-
-    Returns
-    -------
-    Plot
-    """
+    """Draw the torque of the model over the torque of the flight."""
     artifact = prediction.artifact
     time, model = artifact.array("time"), artifact.array("torque")
     banded = {"torque_low", "torque_high"} <= set(artifact.data)
@@ -92,7 +77,6 @@ def shade_outside(axes: Axes, time: Array, outside: Array) -> None:
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
     time, outside : array, shape (samples,)
     """
     half = 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.5

@@ -19,13 +19,8 @@ def reduction_figure(name: str, selections: Sequence[Source]) -> Plot:
 
     Parameters
     ----------
-    name : str
     selections : sequence of Source
         Selections from one flight.
-
-    Returns
-    -------
-    Plot
 
     References
     ----------

@@ -25,16 +25,7 @@ _LABELS = {
 
 
 def has_replay(source: Source) -> bool:
-    """Tell whether rotor speeds were replayed.
-
-    Parameters
-    ----------
-    source : Source
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether rotor speeds were replayed."""
     data = source.artifact.data
     if "replay/rate_held" not in data or len(source.artifact.array("replay/horizon_s")) < 2:
         return False
@@ -47,15 +38,10 @@ def replay_figure(name: str, source: Source, where: str) -> Plot:
 
     Parameters
     ----------
-    name : str
     source : Source
         A disagreement, a diagnosis or an extended model.
     where : str
         On which flights, for the caption.
-
-    Returns
-    -------
-    Plot
     """
     artifact = source.artifact
     horizon = artifact.array("replay/horizon_s")

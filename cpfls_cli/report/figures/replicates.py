@@ -26,11 +26,6 @@ def replicates_figure(name: str, label: str, settings: Sequence[SweptSetting]) -
     ----------
     name, label : str
         Of the figure, and of the sweep.
-    settings : sequence of SweptSetting
-
-    Returns
-    -------
-    Plot
     """
 
     def draw(figure: Figure) -> None:

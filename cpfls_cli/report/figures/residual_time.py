@@ -18,17 +18,7 @@ _LABEL = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 
 
 def residual_time_figure(name: str, disagreement: Source) -> Plot:
-    """Draw the gap of each channel over all flights, one after another.
-
-    Parameters
-    ----------
-    name : str
-    disagreement : Source
-
-    Returns
-    -------
-    Plot
-    """
+    """Draw the gap of each channel over all flights, one after another."""
     artifact = disagreement.artifact
     flight, clock = artifact.array("residual/flight"), artifact.array("residual/time")
     offset = flight_offsets(flight, clock)

@@ -18,15 +18,6 @@ _DECADE = 10.0
 def ridge_figure(name: str, model: Source) -> Plot:
     """Draw the cross-validated error with its standard error; the last point has no fuzzy part at all.
 
-    Parameters
-    ----------
-    name : str
-    model : Source
-
-    Returns
-    -------
-    Plot
-
     References
     ----------
     method.md section 8.

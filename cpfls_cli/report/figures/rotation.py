@@ -17,17 +17,7 @@ _TURN = 360.0
 
 
 def rotation_figure(name: str, trajectory: Source) -> Plot:
-    """Draw attitude and Euler rates of a path of full rotations.
-
-    Parameters
-    ----------
-    name : str
-    trajectory : Source
-
-    Returns
-    -------
-    Plot
-    """
+    """Draw attitude and Euler rates of a path of full rotations."""
     time, degrees = trajectory.artifact.array("time"), np.degrees(trajectory.artifact.array("attitude"))
     rate = trajectory.artifact.array("attitude_rate")
 

@@ -14,14 +14,6 @@ from cpfls_cli.report.printed import PRINTED_SEESAW
 def seesaw_figure(name: str) -> Plot:
     """Draw the piecewise linear seesaw over two turns, with the values that the paper prints.
 
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    Plot
-
     References
     ----------
     Figure 1 and equation (11) of the paper.

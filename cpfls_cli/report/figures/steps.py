@@ -29,13 +29,8 @@ def steps_figure(name: str, model: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     model : Source
         With predictions by horizon.
-
-    Returns
-    -------
-    Plot
     """
     artifact = model.artifact
     horizon, predictors = artifact.array("steps/horizon"), artifact.texts("steps/model")

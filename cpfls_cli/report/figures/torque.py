@@ -14,15 +14,6 @@ AXES = ("roll", "pitch", "yaw")
 def torque_figure(name: str, flight: Source) -> Plot:
     """Draw the generalised torque of a flight, one panel per axis.
 
-    Parameters
-    ----------
-    name : str
-    flight : Source
-
-    Returns
-    -------
-    Plot
-
     References
     ----------
     Figure 4 of the paper.

@@ -29,13 +29,8 @@ def tracking_figure(name: str, flight: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     flight : Source
         With a comparison of controllers.
-
-    Returns
-    -------
-    Plot
     """
     artifact = flight.artifact
     time, error = artifact.array("tracking/time"), np.degrees(artifact.array("tracking/error"))

@@ -19,13 +19,8 @@ def whiteness_figure(name: str, diagnosis: Source) -> Plot:
 
     Parameters
     ----------
-    name : str
     diagnosis : Source
         With whiteness.
-
-    Returns
-    -------
-    Plot
     """
     artifact = diagnosis.artifact
     lag = artifact.array("whiteness/lag")

@@ -47,26 +47,13 @@ def compared_tables(index: int, part: JudgedOn) -> Iterator[Table]:
         Number of the part, from 1.
     part : JudgedOn
         By two models or more.
-
-    Yields
-    ------
-    Table
     """
     yield _overall(f"comparison-{index}", part)
     yield _by_axis(f"comparison-axes-{index}", part)
 
 
 def hashes_words(flights: Sequence[str]) -> str:
-    """Name flights by the first digits of their hashes.
-
-    Parameters
-    ----------
-    flights : sequence of str
-
-    Returns
-    -------
-    str
-    """
+    """Name flights by the first digits of their hashes."""
     return "sha256 " + joined(sha256[:12] for sha256 in flights)
 
 

@@ -20,10 +20,6 @@ _MOST_KEYS = 30
 def comparison_section(sources: Sources) -> Section | None:
     """Compare the models with each other.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -21,10 +21,6 @@ from cpfls_cli.report.source import Source, Sources
 def diagnosis_section(sources: Sources) -> Section | None:
     """Show the diagnoses; their verdicts stand in the summary.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None
@@ -43,16 +39,7 @@ def _diagnosis(diagnosis: Source, index: int) -> Iterator[Block]:
 
 
 def after_words(source: Source) -> str:
-    """Say what the second model of a diagnosis is.
-
-    Parameters
-    ----------
-    source : Source
-
-    Returns
-    -------
-    str
-    """
+    """Say what the second model of a diagnosis is."""
     titles = titles_of(source)
     if titles:
         return f"with {joined(titles)}"

@@ -19,10 +19,6 @@ _ABOVE_NOISE = 1.0
 def disagreement_section(sources: Sources) -> Section | None:
     """Show where models and flights disagree.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

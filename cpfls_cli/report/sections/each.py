@@ -17,8 +17,6 @@ def section_of_each(
     ----------
     name : str
         Identifier of the section.
-    title : str
-    sources : sequence of Source
     blocks : callable
         What is shown of one source; takes it and its number, from 1.
 

@@ -19,10 +19,6 @@ from cpfls_cli.report.source import Source, Sources
 def extension_section(sources: Sources) -> Section | None:
     """Show the extended models; what stands in their diagnosis is not shown again.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -19,10 +19,6 @@ from cpfls_cli.report.source import Source, Sources
 def flight_section(sources: Sources) -> Section | None:
     """Show the flights.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

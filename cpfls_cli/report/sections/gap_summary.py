@@ -17,16 +17,7 @@ _SIGNIFICANT = 0.05
 
 
 def gap_blocks(sources: Sources) -> Iterator[Block]:
-    """Say what is missing, or where the gap is if nobody asked yet.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Yields
-    ------
-    Block
-    """
+    """Say what is missing, or where the gap is if nobody asked yet."""
     several = len(sources.diagnoses) > 1
     for index, diagnosis in enumerate(sources.diagnoses, start=1):
         yield from [Heading(diagnosis.label)] if several else []

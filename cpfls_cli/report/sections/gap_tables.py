@@ -34,14 +34,8 @@ def gap_table(name: str, source: Source, caption: str) -> Table:
 
     Parameters
     ----------
-    name : str
     source : Source
         A diagnosis or an extended model.
-    caption : str
-
-    Returns
-    -------
-    Table
     """
     artifact = source.artifact
     keys = ("before", "after", "floor", "before_floors", "after_floors")
@@ -57,17 +51,7 @@ def gap_table(name: str, source: Source, caption: str) -> Table:
 
 
 def effects_table(name: str, source: Source) -> Table:
-    """Show how sure each effect is.
-
-    Parameters
-    ----------
-    name : str
-    source : Source
-
-    Returns
-    -------
-    Table
-    """
+    """Show how sure each effect is."""
     artifact = source.artifact
     words = [artifact.texts(f"effect/{key}") for key in ("name", "sentence")]
     keys = ("named", "share", "p_value", "selection_frequency")
@@ -93,17 +77,7 @@ def effects_table(name: str, source: Source) -> Table:
 
 
 def coefficients_table(name: str, source: Source) -> Table:
-    """Show the coefficients of the effects with their intervals and ranges.
-
-    Parameters
-    ----------
-    name : str
-    source : Source
-
-    Returns
-    -------
-    Table
-    """
+    """Show the coefficients of the effects with their intervals and ranges."""
     artifact = source.artifact
     words = (artifact.texts(f"coefficient/{key}") for key in ("effect", "name", "unit"))
     keys = ("value", "low", "high", "plausible_low", "plausible_high")
@@ -120,17 +94,7 @@ def coefficients_table(name: str, source: Source) -> Table:
 
 
 def parameters_table(name: str, source: Source) -> Table:
-    """Show the vehicle's own numbers, refitted with the effects.
-
-    Parameters
-    ----------
-    name : str
-    source : Source
-
-    Returns
-    -------
-    Table
-    """
+    """Show the vehicle's own numbers, refitted with the effects."""
     artifact = source.artifact
     words = (artifact.texts(f"parameter/{key}") for key in ("name", "unit"))
     numbers = (artifact.array(f"parameter/{key}") for key in ("value", "low", "high"))
@@ -145,10 +109,6 @@ def parameters_table(name: str, source: Source) -> Table:
 def measured(value: float, low: float, high: float) -> list[str]:
     """Write a value and its interval with the digits that the width of the interval leaves.
 
-    Parameters
-    ----------
-    value, low, high : float
-
     Returns
     -------
     list of str
@@ -160,11 +120,6 @@ def measured(value: float, low: float, high: float) -> list[str]:
 
 def interval(low: float, high: float, digits: int = 4) -> str:
     """Write an interval.
-
-    Parameters
-    ----------
-    low, high : float
-    digits : int
 
     Returns
     -------

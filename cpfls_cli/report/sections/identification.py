@@ -39,10 +39,6 @@ _MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
 def identification_section(sources: Sources) -> Section | None:
     """Show the models beside each other, the paper's, and their baselines.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -16,10 +16,6 @@ from cpfls_cli.report.verdict import fuzzy_part_off
 def partitions_section(sources: Sources) -> Section | None:
     """Show the partitions of the models and their parameters.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

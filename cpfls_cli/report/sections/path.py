@@ -22,10 +22,6 @@ _LEGS_SHOWN = 20
 def path_section(sources: Sources) -> Section | None:
     """Show the planned paths.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

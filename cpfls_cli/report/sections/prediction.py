@@ -18,10 +18,6 @@ from cpfls_cli.report.source import Source, Sources
 def prediction_section(sources: Sources) -> Section | None:
     """Show the predictions.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -14,16 +14,7 @@ _REPEAT = (
 
 
 def provenance_section(sources: Sources) -> Section:
-    """List the artifacts with their hashes, inputs and configs.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    Section
-    """
+    """List the artifacts with their hashes, inputs and configs."""
     blocks: list[Block] = [
         Table(
             "artifacts",

@@ -28,10 +28,6 @@ _Row = list[str | Cell]
 def reduction_section(sources: Sources) -> Section | None:
     """Show the reduced training sets, beside the paper's where that is asked for.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -26,10 +26,6 @@ _Row = tuple[str, Callable[[SweptSetting], str], Callable[[PrintedColumn], str] 
 def replicates_section(sources: Sources) -> Section | None:
     """Show the settings of sweeps beside each other and beside the paper's.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

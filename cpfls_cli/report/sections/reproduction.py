@@ -23,10 +23,6 @@ _TONES: dict[Verdict, Tone] = {
 def reproduction_section(sources: Sources) -> Section | None:
     """Check the claims of the paper and compare its figures, where that is asked for.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -24,10 +24,6 @@ _SIGNIFICANT = 0.01
 def residuals_section(sources: Sources) -> Section | None:
     """Show the residuals of the models that hold them.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

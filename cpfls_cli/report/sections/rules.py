@@ -16,10 +16,6 @@ from cpfls_cli.report.verdict import fuzzy_part_off
 def rules_section(sources: Sources) -> Section | None:
     """Show what of the models the data determine.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -15,10 +15,6 @@ from cpfls_cli.report.verdict import fuzzy_part_off
 def search_section(sources: Sources) -> Section | None:
     """Show how the models were found.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

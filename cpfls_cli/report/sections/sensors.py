@@ -13,10 +13,6 @@ from cpfls_cli.report.source import Source, Sources
 def sensors_section(sources: Sources) -> Section | None:
     """Show the audit of the sensors, each once.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

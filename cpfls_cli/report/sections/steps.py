@@ -21,10 +21,6 @@ _TIE = 1.0 + 1e-6
 def steps_section(sources: Sources) -> Section | None:
     """Show how well the models predict motion, where that was tried.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -17,16 +17,7 @@ _SHOWN = {MODEL: "model", RIGID_BODY: "rigid body", "uniform-partitions": "no se
 
 
 def summary_section(sources: Sources) -> Section:
-    """Say in plain words what ran on what and how it ended.
-
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    Section
-    """
+    """Say in plain words what ran on what and how it ended."""
     blocks: list[Block] = [_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
@@ -43,10 +34,6 @@ def summary_section(sources: Sources) -> Section:
 
 def models_section(sources: Sources) -> Section | None:
     """Summarise each model; one alone stands in the summary itself.
-
-    Parameters
-    ----------
-    sources : Sources
 
     Returns
     -------
@@ -121,16 +108,7 @@ def _search(model: Source) -> str:
 
 
 def structure(model: Source) -> str:
-    """Describe the structure of a model in words.
-
-    Parameters
-    ----------
-    model : Source
-
-    Returns
-    -------
-    str
-    """
+    """Describe the structure of a model in words."""
     settings = model.config["identification"]
     kind = {"cpfls": "continuous periodic fuzzy system", "fls": "classic TSK fuzzy system"}[settings["structure"]]
     functions = settings["membership_functions"]
@@ -145,16 +123,7 @@ def structure(model: Source) -> str:
 
 
 def parameters(model: Source) -> str:
-    """Count the parameters of a model in words.
-
-    Parameters
-    ----------
-    model : Source
-
-    Returns
-    -------
-    str
-    """
+    """Count the parameters of a model in words."""
     artifact = model.artifact
     fuzzy = count(len(artifact.array("model/coefficients")))
     if artifact.text("model/base") != "rigid-body":

@@ -30,10 +30,6 @@ _HEADER = (
 def tracking_section(sources: Sources) -> Section | None:
     """Show how closely controllers followed a plan.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -20,10 +20,6 @@ from cpfls_cli.validation.bands import band
 def uncertainty_section(sources: Sources) -> Section | None:
     """Show the bands of the models that hold them.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -12,10 +12,6 @@ from cpfls_cli.report.source import Source, Sources
 def unseen_section(sources: Sources) -> Section | None:
     """List the effects that could be there unseen, with the reason or the flight that would show them.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None

@@ -24,10 +24,6 @@ _SCORES = ("RMSE, N\N{NO-BREAK SPACE}m", "NRMSE", "R²", "VAF", "Largest, N\N{NO
 def validation_section(sources: Sources) -> Section | None:
     """Show the verdicts on the models and what they rest on.
 
-    Parameters
-    ----------
-    sources : Sources
-
     Returns
     -------
     Section or None
@@ -149,10 +145,6 @@ def ridge_words(model: Source) -> str:
     ----------
     model : Source
         With a ridge curve.
-
-    Returns
-    -------
-    str
     """
     weight, error, deviation = (model.artifact.array(f"ridge/{key}") for key in ("weight", "error", "standard_error"))
     off, best = error[np.isinf(weight)], int(np.argmin(error))

@@ -19,14 +19,6 @@ _PAPER_DURATION = "55"
 def vehicle_section(sources: Sources) -> Section:
     """Show the vehicle of the study, beside the paper's where that is asked for.
 
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    Section
-
     References
     ----------
     Table 3 of the paper.
