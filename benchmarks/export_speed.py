@@ -21,7 +21,7 @@ pin_threads()
 
 import numpy as np
 
-from cpfls_cli.artifacts.records import Header
+from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.export import Evidence, Provenance, Sheet, c_source, reference_points
 from cpfls_cli.fuzzy import InputRange
 from cpfls_cli.identification.excitation import CELLS

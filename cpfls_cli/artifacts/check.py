@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
-from cpfls_cli.artifacts.records import Artifact
-from cpfls_cli.artifacts.spec import DatasetSpec
+from cpfls_cli.artifacts.spec import ArtifactSpec, DatasetSpec
 
 _FIXED = {"axis": 3}
 
 
-def check_artifact(artifact: Artifact) -> list[str]:
+class Checkable(Protocol):
+    """An artifact as its format and its datasets by path."""
+
+    @property
+    def spec(self) -> ArtifactSpec:
+        """Its format."""
+        ...
+
+    @property
+    def data(self) -> Mapping[str, Any]:
+        """Its datasets by path."""
+        ...
+
+
+def check_artifact(artifact: Checkable) -> list[str]:
     """Find everything in an artifact that its format does not allow.
 
     Returns
@@ -23,7 +37,7 @@ def check_artifact(artifact: Artifact) -> list[str]:
     return [finding for rule in _RULES for finding in rule(artifact)]
 
 
-def _dimensions(artifact: Artifact) -> Iterator[str]:
+def _dimensions(artifact: Checkable) -> Iterator[str]:
     lengths: dict[str, tuple[int, str]] = {}
     for spec, values in _present(artifact):
         if values.ndim != len(spec.dimensions):
@@ -36,14 +50,14 @@ def _dimensions(artifact: Artifact) -> Iterator[str]:
                 yield f"{spec.path}: {length} along '{label}', but {known} by {where}"
 
 
-def _kinds(artifact: Artifact) -> Iterator[str]:
+def _kinds(artifact: Checkable) -> Iterator[str]:
     for spec, values in _present(artifact):
         wanted = "text" if spec.units == "text" else "numbers"
         if (values.dtype.kind == "U") != (wanted == "text") or values.dtype.kind not in "Uiuf":
             yield f"{spec.path}: holds {values.dtype}, expected {wanted}"
 
 
-def _finite(artifact: Artifact) -> Iterator[str]:
+def _finite(artifact: Checkable) -> Iterator[str]:
     for spec, values in _present(artifact):
         if values.dtype.kind == "f" and not spec.gaps:
             bad = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
@@ -51,16 +65,16 @@ def _finite(artifact: Artifact) -> Iterator[str]:
                 yield f"{spec.path}: {bad.size} samples are not finite, the first at index {bad[0]}"
 
 
-def _time_ascends(artifact: Artifact) -> Iterator[str]:
+def _time_ascends(artifact: Checkable) -> Iterator[str]:
     time = np.asarray(artifact.data.get("time", ()))
     if time.ndim == 1 and time.dtype.kind in "iuf" and np.any(np.diff(time) <= 0):
         yield f"time: does not ascend at index {int(np.argmax(np.diff(time) <= 0)) + 1}"
 
 
-def _present(artifact: Artifact) -> Iterator[tuple[DatasetSpec, np.ndarray]]:
+def _present(artifact: Checkable) -> Iterator[tuple[DatasetSpec, np.ndarray]]:
     for spec in artifact.spec.datasets:
         if spec.path in artifact.data:
             yield spec, np.asarray(artifact.data[spec.path])
 
 
-_RULES: tuple[Callable[[Artifact], Iterator[str]], ...] = (_dimensions, _kinds, _finite, _time_ascends)
+_RULES: tuple[Callable[[Checkable], Iterator[str]], ...] = (_dimensions, _kinds, _finite, _time_ascends)

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.reading import format_name
 from cpfls_cli.artifacts.spec import ArtifactSpec
+from cpfls_cli.artifacts.store import format_name
 from cpfls_cli.errors import InputError
 
 

@@ -1,8 +1,19 @@
-"""What an artifact is made of: the words that describe a dataset and a format."""
+"""What an artifact is made of: its format, and the records whose fields are its datasets.
+
+A format is a class: ``@record class SelectionRecord(Record)``, with one field for each dataset (`dataset`) or group of
+datasets (`group`). A path is written once, at its field; specification, writing, reading, the check and the tables of
+docs/format.md follow from the fields.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
+from functools import cache
+from types import NoneType
+from typing import Any, ClassVar, NamedTuple, Self, TypeVar, dataclass_transform, get_args, get_type_hints
+
+import numpy as np
 
 SCHEMA_VERSION = 1
 """Raised when a dataset is renamed, removed or changes its meaning; new optional datasets do not raise it."""
@@ -18,6 +29,9 @@ BODY = "body (FLU)"
 WORLD = "world (z up)"
 NO_FRAME = "none"
 
+_TEXT = "text"
+_PATH, _GROUP = "dataset", "group"
+
 
 @dataclass(frozen=True)
 class DatasetSpec:
@@ -31,6 +45,10 @@ class DatasetSpec:
         Labels of the axes; time or samples first. Digits fix the length, ``axis`` is 3.
     units : str
         SI units; ``1`` for a pure number, ``text`` for text.
+    frame : str
+        Frame of reference of its components.
+    description : str
+        What it holds.
     required : bool
         Whether every artifact of the format holds it.
     gaps : bool
@@ -46,16 +64,29 @@ class DatasetSpec:
     gaps: bool = False
 
 
+class Format(NamedTuple):
+    """Name of an artifact format, what it holds, the commands that write it, and the roles of their inputs."""
+
+    name: str
+    description: str
+    made_by: str
+    inputs: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True)
 class ArtifactSpec:
-    """One artifact format.
+    """One artifact format as the list of its datasets.
 
     Attributes
     ----------
     format : str
         Value of the root attribute ``format``.
+    description : str
+        What it holds.
     made_by : str
-        The command that writes it.
+        The commands that write it.
+    datasets : tuple of DatasetSpec
+        In the order in which they are written, which shows in the bytes of a file.
     inputs : tuple of str
         Roles of the files it was made from.
     """
@@ -64,7 +95,7 @@ class ArtifactSpec:
     description: str
     made_by: str
     datasets: tuple[DatasetSpec, ...]
-    inputs: tuple[str, ...] = field(default=())
+    inputs: tuple[str, ...] = ()
 
     @property
     def makers(self) -> str:
@@ -74,3 +105,242 @@ class ArtifactSpec:
     def dataset(self, path: str) -> DatasetSpec | None:
         """Look up a dataset by its path."""
         return next((spec for spec in self.datasets if spec.path == path), None)
+
+
+def dataset(
+    path: str,
+    description: str,
+    *dimensions: str,
+    units: str = "1",
+    frame: str = NO_FRAME,
+    gaps: bool = False,
+    default: Any = MISSING,
+) -> Any:
+    """Make a field of a record a dataset; with ``default=None`` an artifact may lack it.
+
+    Parameters
+    ----------
+    path : str
+        Below the group of the record.
+    description : str
+        What it holds.
+    *dimensions : str
+        Labels of the axes; none for a scalar.
+    units : str
+        SI units; text is told by the type of the field.
+    frame : str
+        Frame of reference of its components.
+    gaps : bool
+        Whether values may be not finite, and mean "not known" there.
+    """
+    spec = DatasetSpec(path, dimensions, units, frame, description, default is MISSING, gaps)
+    return field(default=default, metadata={_PATH: spec})
+
+
+def group(path: str, *, default: Any = MISSING) -> Any:
+    """Make a field of a record a group of datasets, itself a record; with ``default=None`` an artifact may lack all.
+
+    Parameters
+    ----------
+    path : str
+        Below the group of the outer record; empty where the inner paths are whole.
+    """
+    return field(default=default, metadata={_GROUP: path})
+
+
+_Class = TypeVar("_Class")
+
+
+@dataclass_transform(
+    eq_default=False, kw_only_default=True, frozen_default=True, field_specifiers=(dataset, group, field)
+)
+def record(cls: type[_Class]) -> type[_Class]:
+    """Turn a class into an immutable record whose fields are datasets and groups."""
+    return dataclass(frozen=True, kw_only=True, eq=False)(cls)
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file that an artifact was made from.
+
+    Attributes
+    ----------
+    name : str
+        File name without its folder.
+    sha256 : str
+        Hexadecimal.
+    format : str
+        Artifact format, or the suffix of another file.
+    """
+
+    name: str
+    sha256: str
+    format: str
+
+
+@dataclass(frozen=True)
+class Header:
+    """Where an artifact comes from.
+
+    Attributes
+    ----------
+    version : str
+        Version of the program.
+    seed : int
+        Of the study.
+    config : str
+        The resolved study as YAML.
+    inputs : mapping of str to InputFile
+        By role.
+    """
+
+    version: str
+    seed: int
+    config: str
+    inputs: Mapping[str, InputFile] = field(default_factory=dict)
+
+
+@record
+class Record:
+    """One artifact in memory: where it comes from, and a field for each of its datasets or groups of them."""
+
+    FORMAT: ClassVar[Format]
+    header: Header | None = field(default=None)
+
+    @classmethod
+    def spec(cls) -> ArtifactSpec:
+        """List the datasets of the format."""
+        spec: ArtifactSpec = _artifact_spec(cls)  # type: ignore[arg-type]  # classes are hashable
+        return spec
+
+    @classmethod
+    def of_data(cls, header: Header, data: Mapping[str, Any]) -> Self:
+        """Build a record from its datasets by path.
+
+        Raises
+        ------
+        LookupError
+            If one that is required is missing; its argument is the path.
+        """
+        return cls(header=header, **_values(cls, "", data))
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Its datasets by path, in the order of the format."""
+        return dict(_data(self, ""))
+
+    @property
+    def origin(self) -> Header:
+        """Where it comes from; only a record that was written or read has it."""
+        assert self.header is not None, "the record was neither written nor read"
+        return self.header
+
+    @classmethod
+    def path(cls, name: str) -> str:
+        """Give the path of the dataset that a field at the top of the record holds."""
+        return str(cls.__dataclass_fields__[name].metadata[_PATH].path)
+
+    def made_from(self, role: str) -> str | None:
+        """Hash of an input by its role; None where it had none."""
+        source = self.origin.inputs.get(role)
+        return source.sha256 if source else None
+
+    def input_name(self, role: str) -> str:
+        """File name of an input by its role; empty where it had none."""
+        source = self.origin.inputs.get(role)
+        return source.name if source else ""
+
+    def with_header(self, header: Header) -> Self:
+        """Add where it comes from."""
+        return replace(self, header=header)
+
+
+class _Entry(NamedTuple):
+    """A field that is a dataset or a group, with its type without None."""
+
+    field: Field[Any]
+    kind: Any
+    optional: bool
+
+
+@cache
+def _entries(cls: Any) -> tuple[_Entry, ...]:
+    hints = get_type_hints(cls)
+    return tuple(
+        _Entry(own, _without_none(hints[own.name]), own.default is not MISSING)
+        for own in fields(cls)
+        if _PATH in own.metadata or _GROUP in own.metadata
+    )
+
+
+def _without_none(hint: Any) -> Any:
+    return next((part for part in get_args(hint) if part is not NoneType), hint) if NoneType in get_args(hint) else hint
+
+
+def _joined(prefix: str, path: str) -> str:
+    return f"{prefix}/{path}" if prefix and path else prefix or path
+
+
+def _specs(cls: Any, prefix: str, optional: bool) -> Iterator[DatasetSpec]:
+    for entry in _entries(cls):
+        if _GROUP in entry.field.metadata:
+            inner = _joined(prefix, entry.field.metadata[_GROUP])
+            yield from _specs(entry.kind, inner, optional or entry.optional)
+        else:
+            spec: DatasetSpec = entry.field.metadata[_PATH]
+            units = _TEXT if entry.kind in (str, tuple[str, ...]) else spec.units
+            required = spec.required and not optional
+            yield replace(spec, path=_joined(prefix, spec.path), units=units, required=required)
+
+
+@cache
+def _artifact_spec(cls: Any) -> ArtifactSpec:
+    own = cls.FORMAT
+    return ArtifactSpec(own.name, own.description, own.made_by, tuple(_specs(cls, "", False)), own.inputs)
+
+
+def _data(owner: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    for entry in _entries(type(owner)):  # type: ignore[arg-type]  # classes are hashable
+        value = getattr(owner, entry.field.name)
+        if value is None:
+            continue
+        if _GROUP in entry.field.metadata:
+            yield from _data(value, _joined(prefix, entry.field.metadata[_GROUP]))
+        else:
+            yield _joined(prefix, entry.field.metadata[_PATH].path), _stored(value)
+
+
+def _stored(value: Any) -> Any:
+    """Text as an array of text, also where there is none; truth as 0 and 1."""
+    array = np.asarray(value)
+    if isinstance(value, tuple | list) and not len(value):
+        return array.astype("U1")
+    return array.astype(np.uint8) if array.dtype == bool else array
+
+
+def _values(cls: Any, prefix: str, data: Mapping[str, Any]) -> dict[str, Any]:
+    values = {}
+    for entry in _entries(cls):
+        if _GROUP in entry.field.metadata:
+            inner = _joined(prefix, entry.field.metadata[_GROUP])
+            # An optional group is there where any of its datasets is.
+            if not entry.optional or any(spec.path in data for spec in _specs(entry.kind, inner, True)):
+                values[entry.field.name] = entry.kind(**_values(entry.kind, inner, data))
+            continue
+        path = _joined(prefix, entry.field.metadata[_PATH].path)
+        if path in data:
+            values[entry.field.name] = _read(entry.kind, data[path])
+        elif not entry.optional:
+            raise LookupError(path)
+    return values
+
+
+def _read(kind: Any, value: Any) -> Any:
+    """Give a stored value the type of its field; a field of type Any keeps what is stored, bit by bit."""
+    if kind is Any:
+        return value
+    if kind in (str, int, float, bool):
+        return kind(value.item() if hasattr(value, "item") else value)
+    if kind == tuple[str, ...]:
+        return tuple(str(text) for text in value)
+    return np.asarray(value, dtype=get_args(get_args(kind)[1])[0])

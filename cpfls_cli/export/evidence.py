@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.export.sheet import Evidence, Verdict
 
 _MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")

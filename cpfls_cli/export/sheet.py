@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cpfls_cli.artifacts.records import Header
+from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.identification.model import Model
 
 

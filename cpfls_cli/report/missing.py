@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION, SELECTION, TRAJECTORY
-from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
+from cpfls_cli.artifacts.formats import (
+    DIAGNOSIS,
+    DISAGREEMENT,
+    EXTENDED,
+    FLIGHT,
+    MODEL,
+    PREDICTION,
+    SELECTION,
+    SWEEP,
+    TRAJECTORY,
+)
 from cpfls_cli.artifacts.spec import ArtifactSpec
-from cpfls_cli.artifacts.sweep_formats import SWEEP
 from cpfls_cli.report.gap_words import titles_of
 from cpfls_cli.report.source import Sources
 

@@ -7,10 +7,18 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION, SELECTION, TRAJECTORY
-from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
-from cpfls_cli.artifacts.records import InputFile
-from cpfls_cli.artifacts.sweep_formats import SWEEP
+from cpfls_cli.artifacts.formats import (
+    DIAGNOSIS,
+    DISAGREEMENT,
+    EXTENDED,
+    FLIGHT,
+    MODEL,
+    PREDICTION,
+    SELECTION,
+    SWEEP,
+    TRAJECTORY,
+)
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.report.evidence import complete
 from cpfls_cli.report.source import HASH_SHOWN, Source, Sources
 

@@ -8,11 +8,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION, SELECTION, TRAJECTORY
-from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.formats import (
+    DIAGNOSIS,
+    DISAGREEMENT,
+    EXTENDED,
+    FLIGHT,
+    MODEL,
+    PREDICTION,
+    SELECTION,
+    SWEEP,
+    TRAJECTORY,
+)
 from cpfls_cli.artifacts.spec import ArtifactSpec
-from cpfls_cli.artifacts.sweep_formats import SWEEP
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.report.settings import ReportSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 

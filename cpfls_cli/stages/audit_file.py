@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.gap.sensors.audit import Audit
 from cpfls_cli.gap.sensors.audit_findings import AuditFinding, Coefficient
 from cpfls_cli.stages.tables import rows_of, table, texts

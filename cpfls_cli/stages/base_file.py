@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.formats import MODEL
-from cpfls_cli.artifacts.records import Artifact, Header
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.identification.model import Model
 from cpfls_cli.stages.model_file import read_model

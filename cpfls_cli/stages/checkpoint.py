@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from cpfls_cli.artifacts.formats import CHECKPOINT, MODEL
-from cpfls_cli.artifacts.records import Artifact, Header
-from cpfls_cli.artifacts.writing import write_artifact
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.store import Artifact, write_artifact
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.state import EvolutionState

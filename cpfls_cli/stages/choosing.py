@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from cpfls_cli.artifacts.records import InputFile
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.errors import InputError
 from cpfls_cli.identification.data import TorqueSource, joined
 from cpfls_cli.stages.flight_source import flight_source

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
-from cpfls_cli.artifacts.gap_formats import DISAGREEMENT, EXTENDED
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.formats import DISAGREEMENT, EXTENDED
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.diagnose import Diagnosed, diagnose

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.effects.registry import CATALOGUE, effect
 from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.balance.weak_flight import Candidate

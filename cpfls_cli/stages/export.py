@@ -11,7 +11,7 @@ import numpy as np
 import cpfls_cli
 from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.artifacts.output import check_output, write_text
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.c_form import c_source

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, EXTENDED
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.formats import DIAGNOSIS, EXTENDED
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.recording import Recording

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cpfls_cli.artifacts.gap_formats import EXTENDED
-from cpfls_cli.artifacts.reading import format_name
+from cpfls_cli.artifacts.formats import EXTENDED
+from cpfls_cli.artifacts.store import format_name
 from cpfls_cli.config.study import Study
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.stages.base_file import base_artifact, base_model

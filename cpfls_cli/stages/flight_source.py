@@ -10,8 +10,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT
-from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.rows import check_rows, count_rows, read_rows
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.errors import InputError
 from cpfls_cli.identification.data import CHUNK, TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion

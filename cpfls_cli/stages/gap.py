@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cpfls_cli.artifacts.gap_formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
+from cpfls_cli.artifacts.formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.artifacts.records import Artifact, InputFile
-from cpfls_cli.artifacts.spec import ArtifactSpec
+from cpfls_cli.artifacts.spec import ArtifactSpec, InputFile
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.compare import Disagreement
 from cpfls_cli.gap.extended import plain as without_effects

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.formats import MODEL
-from cpfls_cli.artifacts.records import InputFile
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.identification.choice import require_flights

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.reading import read_artifact
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact, read_artifact
 from cpfls_cli.stages.job import Outcome
 
 _SHORT = 8

@@ -9,12 +9,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import cpfls_cli
-from cpfls_cli.artifacts.hashing import file_sha256
 from cpfls_cli.artifacts.output import check_output
-from cpfls_cli.artifacts.reading import format_name
-from cpfls_cli.artifacts.records import Artifact, Header, InputFile
-from cpfls_cli.artifacts.spec import ArtifactSpec
-from cpfls_cli.artifacts.writing import write_artifact
+from cpfls_cli.artifacts.spec import ArtifactSpec, Header, InputFile
+from cpfls_cli.artifacts.store import Artifact, file_sha256, format_name, write_artifact
 from cpfls_cli.config.resolved import resolved_yaml
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError

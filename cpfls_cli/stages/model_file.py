@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.fuzzy.inputs import InputRange

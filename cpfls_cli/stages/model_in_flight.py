@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cpfls_cli.artifacts.gap_formats import EXTENDED
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.formats import EXTENDED
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.simulation import FlownModel, flown_model

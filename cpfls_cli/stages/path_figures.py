@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cpfls_cli.artifacts.output import check_output, write_text
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.resolved import resolved
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.figures.attitude import attitude_figure

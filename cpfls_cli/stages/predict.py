@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import score
 from cpfls_cli.identification.model import Model

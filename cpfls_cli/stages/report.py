@@ -8,7 +8,7 @@ from pathlib import Path
 
 import cpfls_cli
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.artifacts.reading import read_artifact
+from cpfls_cli.artifacts.store import read_artifact
 from cpfls_cli.config.load import validate
 from cpfls_cli.config.resolved import resolved
 from cpfls_cli.config.yaml_text import parse_yaml

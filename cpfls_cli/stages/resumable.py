@@ -10,8 +10,8 @@ from pathlib import Path
 
 from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.artifacts.output import check_output
-from cpfls_cli.artifacts.reading import format_name, read_artifact
-from cpfls_cli.artifacts.records import Header
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.store import format_name, read_artifact
 from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.identification.search_run import SearchRun, SearchStep, Stop, StopReason, is_end

@@ -8,11 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from cpfls_cli.artifacts.formats import MODEL
-from cpfls_cli.artifacts.reading import format_name, read_artifact
-from cpfls_cli.artifacts.records import Header
-from cpfls_cli.artifacts.spec import ArtifactSpec
-from cpfls_cli.artifacts.sweep_formats import SWEEP
+from cpfls_cli.artifacts.formats import MODEL, SWEEP
+from cpfls_cli.artifacts.spec import ArtifactSpec, Header
+from cpfls_cli.artifacts.store import format_name, read_artifact
 from cpfls_cli.errors import InputError
 
 _LONGEST = 120

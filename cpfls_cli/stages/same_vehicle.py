@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
-from cpfls_cli.artifacts.reading import read_header
-from cpfls_cli.artifacts.records import Artifact, Header
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.store import Artifact, read_header
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ConfigError, InputError

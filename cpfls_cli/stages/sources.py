@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.reading import read_artifact
-from cpfls_cli.artifacts.records import Artifact
 from cpfls_cli.artifacts.spec import ArtifactSpec
+from cpfls_cli.artifacts.store import Artifact, read_artifact
 from cpfls_cli.errors import InputError
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.records import InputFile
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.recording import Recording, common_windows

@@ -12,7 +12,7 @@ import numpy as np
 
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.artifacts.formats import CHECKPOINT
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.evolution.archive import Archive, Evaluation
 from cpfls_cli.evolution.history import History
 from cpfls_cli.evolution.state import EvolutionState

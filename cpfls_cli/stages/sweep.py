@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from cpfls_cli.artifacts.formats import SWEEP
 from cpfls_cli.artifacts.output import check_output
-from cpfls_cli.artifacts.records import InputFile
-from cpfls_cli.artifacts.sweep_formats import SWEEP
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.errors import InputError
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.results import Identification

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.reading import format_name, read_artifact
-from cpfls_cli.artifacts.records import Artifact, Header
-from cpfls_cli.artifacts.sweep_formats import SWEEP
-from cpfls_cli.artifacts.writing import write_artifact
+from cpfls_cli.artifacts.formats import SWEEP
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.store import Artifact, format_name, read_artifact, write_artifact
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.stages.resuming import differences, nothing_to_resume, require_same

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cpfls_cli.artifacts.formats import SELECTION
-from cpfls_cli.artifacts.records import InputFile
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.variants import Variant, variants
 from cpfls_cli.errors import ComputationError, ConfigError, InputError

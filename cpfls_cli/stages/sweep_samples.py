@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.records import InputFile
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.variants import Variant
 from cpfls_cli.identification.data import gathered

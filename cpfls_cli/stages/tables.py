@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 
 
 def texts(values: Iterable[str]) -> Any:

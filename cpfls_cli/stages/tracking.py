@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.artifacts.formats import FLIGHT, TRAJECTORY
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.control import Plan, flown_signals, plan_of, scores, start_of, track
 from cpfls_cli.errors import ComputationError, InputError

@@ -10,8 +10,8 @@ import numpy as np
 
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.artifacts.formats import SELECTION
-from cpfls_cli.artifacts.hashing import file_sha256
-from cpfls_cli.artifacts.records import Artifact, InputFile
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import Artifact, file_sha256
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.identification.data import Split, TorqueSource, gathered, joined, sample_times, split_flight

@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.artifacts.formats import TRAJECTORY
-from cpfls_cli.artifacts.records import Artifact
-from cpfls_cli.artifacts.writing import write_artifact
+from cpfls_cli.artifacts.store import Artifact, write_artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.excitation import Excitation, optimised_rotation

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from cpfls_cli.artifacts.records import Artifact
+from cpfls_cli.artifacts.store import Artifact
 
 
 def trust_notes(model: Artifact, path: Path) -> Iterator[str]:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.records import Artifact
-from cpfls_cli.artifacts.validation_formats import VALIDATION
+from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.validate import Validation
 
-_DATASETS = frozenset(spec.path for spec in VALIDATION)
+_DATASETS = frozenset(spec.path for spec in MODEL.datasets)
 # Results by the field of the evidence that holds them, where the group of datasets has another name.
 _GROUPS = {"draws": "uncertainty"}
 

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.hashing import file_sha256
+from cpfls_cli.artifacts.store import file_sha256
 from cpfls_cli.stages import flight_source, job, training
 
 

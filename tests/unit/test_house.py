@@ -82,7 +82,17 @@ def test_docstrings_do_not_repeat_signatures():
                 if entries and all(repeats_signature(entry, section) for entry in entries):
                     bare.append(f"{path.relative_to(PACKAGE)}: {name}: {section}")
             if isinstance(node, ast.FunctionDef):
-                taken = {a.arg for a in (*node.args.args, *node.args.kwonlyargs, node.args.vararg) if a}
+                taken = {
+                    a.arg
+                    for a in (
+                        *node.args.posonlyargs,
+                        *node.args.args,
+                        *node.args.kwonlyargs,
+                        node.args.vararg,
+                        node.args.kwarg,
+                    )
+                    if a
+                }
                 listed = {
                     n.strip(" *") for entry in found.get("Parameters", []) for n in entry[0].split(" : ")[0].split(",")
                 }

@@ -8,9 +8,11 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.validation_formats import VALIDATION
+from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.validation import validate
 
+EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "period", "verdict")
+VALIDATION = [spec for spec in MODEL.datasets if spec.path.split("/")[0] in EVIDENCE]
 LABELS = {"good-for-control", "good-inside-region", "not-better-than-rigid-body", "do-not-use"}
 
 

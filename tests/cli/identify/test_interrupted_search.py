@@ -7,7 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts import check_artifact, read_artifact
+from cpfls_cli.artifacts.check import check_artifact
+from cpfls_cli.artifacts.store import read_artifact
 from cpfls_cli.stages.resumable import Watch
 
 NOTE = "cpfls: note: "

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import norm
 
-from cpfls_cli.artifacts import read_artifact, write_artifact
+from cpfls_cli.artifacts.store import read_artifact, write_artifact
 
 LAGS, INPUTS, POINTS, DRAWS, STEPS = 40, 7, 91, 60, 50
 REASONS = ("R2 of body torque is 0.97 or more on held-out data", "errors follow roll", "the search was short")

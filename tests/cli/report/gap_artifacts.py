@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from cpfls_cli.artifacts import DIAGNOSIS, DISAGREEMENT, EXTENDED, Artifact, Header, InputFile
+from cpfls_cli.artifacts.formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
+from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.store import Artifact
 
 CHANNELS = np.array([f"{kind} {axis}" for kind in ("torque", "force") for axis in "xyz"])
 WINDOWS, HORIZON, LAGS = 60, 50, 10

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts import InputFile, read_artifact, write_artifact
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.report.differences import differences
 from tests.cli.report.evidence_artifacts import curves, steps, verdict
 

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts import check_artifact, read_artifact, write_artifact
+from cpfls_cli.artifacts.check import check_artifact
+from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from tests.cli.report.evidence_artifacts import REASONS, with_evidence
 
 EVIDENCE = ["validation", "residuals", "uncertainty", "steps"]

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cpfls_cli.artifacts import check_artifact, file_sha256, write_artifact
+from cpfls_cli.artifacts.check import check_artifact
+from cpfls_cli.artifacts.store import file_sha256, write_artifact
 from cpfls_cli.cli.app import app
 from tests.cli.report import gap_artifacts as made
 

@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from cpfls_cli.artifacts import file_sha256
+from cpfls_cli.artifacts.store import file_sha256
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from html import unescape
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts import read_artifact, write_artifact
+from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.report.numbers import number
 
 CONFIG = """\

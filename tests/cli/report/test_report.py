@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from cpfls_cli.artifacts import read_artifact, write_artifact
+from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.cli.app import app
 
 CONFIG = """

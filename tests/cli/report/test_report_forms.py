@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from cpfls_cli.artifacts import read_artifact
+from cpfls_cli.artifacts.store import read_artifact
 from cpfls_cli.report.content import Listing, Section
 from cpfls_cli.report.markdown import markdown_page
 from cpfls_cli.report.settings import ReportSettings

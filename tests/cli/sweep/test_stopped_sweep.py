@@ -1,5 +1,6 @@
 """A sweep that is stopped anywhere keeps what is finished, and goes on to the same bytes."""
 
+import os
 import random
 import signal
 import subprocess
@@ -10,7 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts import check_artifact, read_artifact
+from cpfls_cli.artifacts.check import check_artifact
+from cpfls_cli.artifacts.store import read_artifact
 
 PARTIAL, CHECKPOINT = "sweep.h5.partial", "sweep.h5.checkpoint"
 
@@ -65,9 +67,8 @@ class Killed(BaseException):
 @pytest.mark.parametrize("call", range(1, 9))
 def test_stopped_dead_at_any_file_it_writes_it_ends_the_same(cpfls, words, whole, tmp_path, monkeypatch, call, moment):
     """The first writes: no run yet, three generations, the first run, the next run's generations."""
-    from cpfls_cli.artifacts import writing
 
-    output, calls, replace = tmp_path / "sweep.h5", [], writing.os.replace
+    output, calls, replace = tmp_path / "sweep.h5", [], os.replace
 
     def stopping(*paths):
         calls.append(paths)
@@ -77,7 +78,7 @@ def test_stopped_dead_at_any_file_it_writes_it_ends_the_same(cpfls, words, whole
         if len(calls) == call:
             raise Killed
 
-    monkeypatch.setattr(writing.os, "replace", stopping)
+    monkeypatch.setattr("os.replace", stopping)
     with pytest.raises(Killed):
         cpfls(*words, "-o", output)
     monkeypatch.undo()

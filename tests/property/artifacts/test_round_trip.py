@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.formats import FORMATS
-from cpfls_cli.artifacts.hashing import file_sha256
-from cpfls_cli.artifacts.reading import read_artifact
-from cpfls_cli.artifacts.records import Artifact, Header, InputFile
-from cpfls_cli.artifacts.writing import write_artifact
+from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.store import Artifact, file_sha256, read_artifact, write_artifact
 
 FIXED = {"axis": 3}
 # HDF5 pads text of fixed length with zero bytes, so text cannot end in one; files hold no other control characters.

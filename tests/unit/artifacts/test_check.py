@@ -5,7 +5,8 @@ import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.formats import FLIGHT, MODEL
-from cpfls_cli.artifacts.records import Artifact, Header
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.store import Artifact
 
 
 def findings(spec=FLIGHT, **data):

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cpfls_cli.artifacts.describe import format_tables
-from cpfls_cli.artifacts.formats import FORMATS, format_of
+from cpfls_cli.artifacts.formats import FORMATS, format_tables, record_of_format
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
 
 PAGE = (Path(__file__).parents[3] / "docs" / "format.md").read_text()
@@ -13,7 +12,7 @@ PAGE = (Path(__file__).parents[3] / "docs" / "format.md").read_text()
 
 def test_tables_on_the_page_are_those_of_the_code():
     start = PAGE.index("### `")
-    assert PAGE[start:] == format_tables(), "run python -m cpfls_cli.artifacts.describe and put its output on the page"
+    assert PAGE[start:] == format_tables(), "run python -m cpfls_cli.artifacts.formats and put its output on the page"
 
 
 def test_page_names_the_schema_version_and_every_root_attribute():
@@ -23,7 +22,7 @@ def test_page_names_the_schema_version_and_every_root_attribute():
 
 @pytest.mark.parametrize("spec", FORMATS, ids=lambda spec: spec.format)
 def test_every_dataset_is_described(spec):
-    assert format_of(spec.format) is spec
+    assert record_of_format(spec.format).spec() is spec
     assert len({dataset.path for dataset in spec.datasets}) == len(spec.datasets)
     assert {"config", "inputs"}.isdisjoint(dataset.path.split("/")[0] for dataset in spec.datasets)
     for dataset in spec.datasets:
@@ -34,4 +33,4 @@ def test_every_dataset_is_described(spec):
 
 
 def test_unknown_format():
-    assert format_of("cpfls/other") is None
+    assert record_of_format("cpfls/other") is None

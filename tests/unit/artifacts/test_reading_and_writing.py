@@ -8,9 +8,8 @@ import pytest
 
 from cpfls_cli.artifacts.formats import PREDICTION, SELECTION, TRAJECTORY
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.artifacts.reading import format_name, read_artifact
-from cpfls_cli.artifacts.records import Artifact, Header, InputFile
-from cpfls_cli.artifacts.writing import write_artifact
+from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.store import Artifact, format_name, read_artifact, write_artifact
 from cpfls_cli.errors import InputError
 
 HEADER = Header("1.2.3", 4, "seed: 4\n", {"flight": InputFile("f.h5", "ab" * 32, "cpfls/flight")})

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from cpfls_cli.artifacts.records import Header, InputFile
+from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.export import Evidence, Provenance, Sheet, Verdict, expected
 from cpfls_cli.fuzzy import InputRange, breakpoints
 from cpfls_cli.identification.excitation import CELLS

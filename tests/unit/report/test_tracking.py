@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.formats import FLIGHT
-from cpfls_cli.artifacts.records import Artifact, Header, InputFile
+from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.report.content import Cell, Plot, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.report.sections.tracking import tracking_section

@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts import CHECKPOINT, InputFile, check_artifact, read_artifact
-from cpfls_cli.artifacts.writing import write_artifact
+from cpfls_cli.artifacts.check import check_artifact
+from cpfls_cli.artifacts.formats import CHECKPOINT
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution import Evaluation, start, step

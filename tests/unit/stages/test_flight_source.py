@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts import FLIGHT, Artifact, Header, write_artifact
+from cpfls_cli.artifacts.formats import FLIGHT
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.store import Artifact, write_artifact
 from cpfls_cli.config.resolved import resolved_yaml
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
