@@ -20,6 +20,8 @@ pin_threads()
 import numpy as np
 
 from cpfls_cli.config.load import load_study
+from cpfls_cli.config.resolved import generator
+from cpfls_cli.flights.training import read_training
 from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
@@ -27,8 +29,6 @@ from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import search
-from cpfls_cli.stages.study import generator
-from cpfls_cli.stages.training import read_training
 
 
 def main(config: Path, flight: Path, selection: Path) -> None:

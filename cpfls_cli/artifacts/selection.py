@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar, Self
+
+import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+from cpfls_cli.reduction.selection import Selection
 
 
 @record
@@ -47,3 +50,61 @@ class SelectionRecord(Record):
     random_condition_number: Array = dataset(
         "random/condition_number", "of random selections of equal size", "draw", gaps=True
     )
+
+    @classmethod
+    def of(cls, selection: Selection, indices: IntArray, candidates: int, random: Array) -> Self:
+        """Arrange a selection.
+
+        Parameters
+        ----------
+        indices : array of int, shape (selected,)
+            Into all samples of the flights, in order of selection.
+        candidates : int
+            Samples that could be selected.
+        random : array, shape (draw,)
+            Condition numbers of random selections of equal size.
+        """
+        return cls(
+            indices=indices,
+            trace=TraceGroup(
+                condition_number=selection.condition_number_trace,
+                singular_value_min=selection.singular_value_min_trace,
+                singular_value_max=selection.singular_value_max_trace,
+            ),
+            rank=selection.rank,
+            rank_full=selection.rank_full,
+            condition_number=selection.condition_number,
+            condition_number_full=selection.condition_number_full,
+            candidates=candidates,
+            criterion=selection.criterion,
+            exchanges=selection.exchanges,
+            stop_reason=selection.stop_reason,
+            random_condition_number=random,
+        )
+
+    @property
+    def deficient(self) -> bool:
+        """Whether it determines less than all samples do, so that it must not be trained on."""
+        return self.rank < self.rank_full
+
+    @property
+    def random_median(self) -> float:
+        """Condition number of random selections of equal size, the median; NaN where none was drawn."""
+        return float(np.median(self.random_condition_number)) if len(self.random_condition_number) else float("nan")
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The selection for machines."""
+        return {
+            "samples": self.candidates,
+            "selected": len(self.indices),
+            "criterion": self.criterion,
+            "rank": self.rank,
+            "rank_full": self.rank_full,
+            "condition_number": self.condition_number,
+            "condition_number_full": self.condition_number_full,
+            "condition_number_random": self.random_median,
+            "exchanges": self.exchanges,
+            "stop_reason": self.stop_reason,
+            "stalled": self.deficient,
+        }

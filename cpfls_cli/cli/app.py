@@ -20,7 +20,8 @@ from cpfls_cli.report.forms import Form
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cpfls_cli.stages.job import Job, Outcome
+    from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.artifacts.job import Job
 
 app = typer.Typer(
     name="cpfls",
@@ -158,7 +159,7 @@ def trajectory(
         common = replace(common, overrides=[*(common.overrides or []), "trajectory.path=waypoints"])
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import trajectory as stage
+        from cpfls_cli.commands import trajectory as stage
 
         return stage.run(job, waypoints, plot)
 
@@ -204,12 +205,12 @@ def simulate(
 ) -> None:
     """Fly a trajectory: exactly, in closed loop with effects that a model lacks, or with a model that controls it."""
     with messages_for_errors():
-        from cpfls_cli.stages.effect_options import simulation_overrides
+        from cpfls_cli.commands.effect_options import simulation_overrides
 
         common = replace(common, overrides=[*(common.overrides or []), *simulation_overrides(mode, effect or [])])
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import simulate as stage
+        from cpfls_cli.commands import simulate as stage
 
         return stage.run(job, trajectory, model, mode)
 
@@ -222,7 +223,7 @@ def import_(config: ConfigArgument, log: LogArgument, output: OutputOption, *, c
     """Turn a flight log into a flight."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import import_log as stage
+        from cpfls_cli.commands import import_log as stage
 
         return stage.run(job, log)
 
@@ -235,7 +236,7 @@ def reduce(config: ConfigArgument, flights: TrainingArgument, output: OutputOpti
     """Pick the samples of flights that are worth learning from."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import reduce as stage
+        from cpfls_cli.commands import reduce as stage
 
         return stage.run(job, flights)
 
@@ -266,8 +267,8 @@ def identify(
     """Identify a model from one or more flights and judge it beside its baselines."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import identify as stage
-        from cpfls_cli.stages.resumable import SearchOptions
+        from cpfls_cli.commands import identify as stage
+        from cpfls_cli.search.resumable import SearchOptions
 
         options = SearchOptions(resume, time_limit, workers, scheduler)
         return stage.run(job, flights, selection, validate or [], options, choose_on or [])
@@ -293,8 +294,8 @@ def sweep(
     """Identify with several settings, and with several seeds each."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import sweep as stage
-        from cpfls_cli.stages.resumable import SearchOptions
+        from cpfls_cli.commands import sweep as stage
+        from cpfls_cli.search.resumable import SearchOptions
 
         options = SearchOptions(resume, time_limit, workers, scheduler)
         return stage.run(job, flights, validate or [], options, choose_on or [])
@@ -310,7 +311,7 @@ def predict(
     """Predict torque, inertia and Coriolis matrices of a model along a flight."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import predict as stage
+        from cpfls_cli.commands import predict as stage
 
         return stage.run(job, model, flight)
 
@@ -333,7 +334,7 @@ def report(
     """Write one self-contained page about artifacts (html, md or json); models that are given together are compared."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import report as stage
+        from cpfls_cli.commands import report as stage
 
         return stage.run(job, artifacts, form)
 
@@ -348,7 +349,7 @@ def compare(
     """Find where a model and flights disagree."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import compare as stage
+        from cpfls_cli.commands import compare as stage
 
         return stage.run(job, flights, model)
 
@@ -368,7 +369,7 @@ def diagnose(
     """Name the physical effect that a model misses."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import diagnose as stage
+        from cpfls_cli.commands import diagnose as stage
 
         return stage.run(job, disagreement, held_out or [])
 
@@ -388,7 +389,7 @@ def extend(
     """Put the named effects into the model, and show that the gap shrinks."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import extend as stage
+        from cpfls_cli.commands import extend as stage
 
         return stage.run(job, diagnosis, model)
 
@@ -409,7 +410,7 @@ def gap(
     """Compare, diagnose and extend in one go, with a report."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.stages import gap as stage
+        from cpfls_cli.commands import gap as stage
 
         return stage.run(job, flights, held_out or [], model)
 
@@ -442,9 +443,9 @@ def export(
 ) -> None:
     """Write a model as JSON, C or Python that computes torque, D(q) and C(q, qd) without this program."""
     with messages_for_errors():
+        from cpfls_cli.artifacts.job import Job
+        from cpfls_cli.commands import export as stage
         from cpfls_cli.config.load import validate
-        from cpfls_cli.stages import export as stage
-        from cpfls_cli.stages.job import Job
 
         narration = Narration("export", common.verbose and not common.quiet)
         with progress_bar("export", common) as progress:
@@ -460,7 +461,7 @@ def export(
 def info(file: FileArgument, *, common: Common) -> None:
     """Show what an artifact holds and where it comes from."""
     with messages_for_errors():
-        from cpfls_cli.stages.inspect import info as describe
+        from cpfls_cli.commands.inspect import info as describe
 
         tell(describe(file), common)
 
@@ -470,7 +471,7 @@ def info(file: FileArgument, *, common: Common) -> None:
 def check(file: FileArgument, *, common: Common) -> None:
     """Check an artifact against its format; exit code 1 where it does not keep to it."""
     with messages_for_errors():
-        from cpfls_cli.stages.inspect import check as examine
+        from cpfls_cli.commands.inspect import check as examine
 
         outcome, good = examine(file)
         tell(outcome, common)
@@ -490,7 +491,7 @@ def config_(
 ) -> None:
     """Print the resolved config; without CONFIG, a commented default."""
     with messages_for_errors():
-        from cpfls_cli.stages.config import show
+        from cpfls_cli.commands.config import show
 
         tell(show(config, section or [], common.overrides or [], common.seed), common)
 
@@ -506,7 +507,7 @@ def effects(
 ) -> None:
     """Show the effects that a model can miss, and the flights that tell them apart."""
     with messages_for_errors():
-        from cpfls_cli.stages.effects import show
+        from cpfls_cli.commands.effects import show
 
         tell(show(name), common)
 
@@ -514,7 +515,7 @@ def effects(
 def _run(title: str, config: Path, output: Path, common: Common, call: Callable[[Job], Outcome]) -> None:
     """Load the study, run one stage with a progress bar, and print what it says."""
     with messages_for_errors():
-        from cpfls_cli.stages.job import Job
+        from cpfls_cli.artifacts.job import Job
 
         narration = Narration(title, common.verbose and not common.quiet)
         study = common.study(config, sweep=title == "sweep")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -13,11 +14,11 @@ from typing import TYPE_CHECKING
 import typer
 
 from cpfls_cli.cli.options import Common
+from cpfls_cli.commands.plain_json import plain
 from cpfls_cli.errors import CpflsError, InputError
-from cpfls_cli.stages.plain_json import plain
 
 if TYPE_CHECKING:
-    from cpfls_cli.stages.job import Outcome
+    from cpfls_cli.report.outcome import Outcome
 
 _BAR_WIDTH = 20
 # 128 plus the number of SIGPIPE: what a shell reports of the tools that this signal ends.
@@ -53,10 +54,20 @@ def tell(outcome: Outcome, common: Common) -> None:
     if common.as_json:
         print(json.dumps(plain(outcome.summary), allow_nan=False), flush=True)
     elif not common.quiet:
-        print("\n".join(outcome.lines), flush=True)
+        print("\n".join(_lines(outcome)), flush=True)
     if not common.quiet:
-        for warning in outcome.warnings:
+        from cpfls_cli.report.terminal import warnings_of
+
+        for warning in (*warnings_of(outcome.blocks), *outcome.warnings):
             _complain(warning, "note")
+
+
+def _lines(outcome: Outcome) -> Iterator[str]:
+    from cpfls_cli.report.terminal import terminal_lines
+
+    if not sys.stdout.isatty():
+        return terminal_lines(outcome.blocks)
+    return terminal_lines(outcome.blocks, shutil.get_terminal_size().columns, colour="NO_COLOR" not in os.environ)
 
 
 @contextmanager

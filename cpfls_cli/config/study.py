@@ -7,12 +7,12 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 from typing_extensions import Doc
 
+from cpfls_cli.config.report_settings import ReportSettings
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.sweep_settings import SweepSettings
 from cpfls_cli.reduction.settings import ReductionSettings
-from cpfls_cli.report.settings import ReportSettings
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.settings import VehicleSettings

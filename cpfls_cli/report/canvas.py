@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.report.collect import panels_of
-from cpfls_cli.report.collect_artists import SPREAD
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.decimation import evenly_spread, kept_samples
 from cpfls_cli.report.numbers import plain
-from cpfls_cli.report.svg import inline_svg
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+# Matplotlib is loaded where something is drawn: the sentences of a page are also those of the terminal.
 WIDTH = 7.6
 # Both ends of a band are drawn at the samples that either of them keeps.
 _BAND_POINTS = 400
@@ -76,6 +74,12 @@ def plot(name: str, caption: str, description: str, height: float, draw: Callabl
     draw : callable
         Fills an empty figure.
     """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from cpfls_cli.report.collect import panels_of
+    from cpfls_cli.report.svg import inline_svg
+
     style: Any = {**_STYLE, "svg.hashsalt": name}
     with matplotlib.rc_context():
         # A reader's own matplotlib settings must not change the page.
@@ -95,6 +99,8 @@ def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
     **style
         As `Axes.plot` takes it.
     """
+    from cpfls_cli.report.collect_artists import SPREAD
+
     kept, shown = kept_samples(y), evenly_spread(len(y))
     for curve in axes.plot(x[kept], y[kept], **style):
         # A table of the curve shows samples of the whole one: extremes alone would make it look rough.
@@ -133,6 +139,8 @@ def plain_ticks(axis: Axis) -> None:
     axis : matplotlib.axis.Axis
         With a linear scale.
     """
+    from matplotlib.ticker import FuncFormatter
+
     axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, smallest=1e-4)))
 
 

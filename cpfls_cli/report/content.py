@@ -6,7 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.store import text_sha256
 from cpfls_cli.report.drawn import Panel
+
+HASH_SHOWN = 12
 
 Tone = Literal["plain", "note", "good", "warning"]
 
@@ -183,3 +187,57 @@ class Section:
         """Names of its tables, also of those folded away, in order."""
         shown = [block.tables if isinstance(block, Folded) else [block] for block in self.blocks]
         return [table.name for tables in shown for table in tables if isinstance(table, Table)]
+
+
+@dataclass(frozen=True)
+class Origin:
+    """An artifact that a document is about.
+
+    Attributes
+    ----------
+    label : str
+        Its name, unique in the document.
+    sha256 : str
+        Hash of the file.
+    format : str
+        Its format.
+    header : Header
+        Where it comes from.
+    """
+
+    label: str
+    sha256: str
+    format: str
+    header: Header
+
+    @property
+    def short_hash(self) -> str:
+        """First digits of the hash."""
+        return self.sha256[:HASH_SHOWN]
+
+    @property
+    def config_sha256(self) -> str:
+        """Hash of the config that made it."""
+        return text_sha256(self.header.config)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A report in any form: sections, and the artifacts that it is about.
+
+    Attributes
+    ----------
+    title : str
+        Heading of the page.
+    version : str
+        Version of the program.
+    sections : sequence of Section
+        In the order in which they are read.
+    origins : sequence of Origin
+        The artifacts.
+    """
+
+    title: str
+    version: str
+    sections: Sequence[Section]
+    origins: Sequence[Origin]

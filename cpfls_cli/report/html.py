@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from cpfls_cli.report.content import Section
+from cpfls_cli.report.content import Document
 from cpfls_cli.report.figure_tables import figure_tables
-from cpfls_cli.report.source import Sources
 
 
-def html_page(sections: Sequence[Section], sources: Sources, version: str) -> str:
+def html_page(document: Document) -> str:
     """Write sections as HTML.
 
     Parameters
@@ -31,4 +28,4 @@ def html_page(sections: Sequence[Section], sources: Sources, version: str) -> st
     environment.filters["figure"] = Markup
     environment.filters["figure_tables"] = figure_tables
     template = environment.get_template("page.html")
-    return template.render(title=sources.title, sections=sections, version=version, sources=sources.all)
+    return template.render(document=document)

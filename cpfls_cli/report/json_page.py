@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.report.content import Block, Facts, Folded, Plot, Section, Table
+from cpfls_cli.report.content import Block, Document, Facts, Folded, Origin, Plot, Table
 from cpfls_cli.report.drawn import Panel, Series
-from cpfls_cli.report.source import Source, Sources
 
 _DIGITS = 6
 
 
-def json_page(sections: Sequence[Section], sources: Sources, version: str) -> str:
+def json_page(document: Document) -> str:
     """Write sections as one JSON object.
 
     Parameters
@@ -31,13 +30,13 @@ def json_page(sections: Sequence[Section], sources: Sources, version: str) -> st
         Numbers of figures have six digits; null where one is not known or goes to the edge of its panel.
     """
     page = {
-        "title": sources.title,
-        "cpfls_version": version,
+        "title": document.title,
+        "cpfls_version": document.version,
         "sections": [
             {"name": section.name, "title": section.title, "blocks": [_block(block) for block in section.blocks]}
-            for section in sections
+            for section in document.sections
         ],
-        "artifacts": [_artifact(source) for source in sources.all],
+        "artifacts": [_origin(origin) for origin in document.origins],
     }
     return json.dumps(page, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
 
@@ -100,15 +99,15 @@ def _rounded(value: float) -> float | None:
     return float(f"{value:.{_DIGITS}g}") + 0.0 if np.isfinite(value) else None
 
 
-def _artifact(source: Source) -> dict[str, Any]:
-    header = source.artifact.header
+def _origin(origin: Origin) -> dict[str, Any]:
+    header = origin.header
     return {
-        "file": source.label,
-        "format": source.artifact.spec.format,
+        "file": origin.label,
+        "format": origin.format,
         "cpfls_version": header.version,
         "seed": header.seed,
-        "sha256": source.sha256,
-        "config_sha256": source.config_sha256,
+        "sha256": origin.sha256,
+        "config_sha256": origin.config_sha256,
         "inputs": {role: asdict(file) for role, file in header.inputs.items()},
         "config": header.config,
     }

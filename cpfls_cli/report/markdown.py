@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
-from cpfls_cli.report.content import Block, Box, Facts, Folded, Heading, Listing, Plot, Section, Table, Text, Tone
-from cpfls_cli.report.source import Sources
+from cpfls_cli.report.content import Block, Box, Document, Facts, Folded, Heading, Listing, Plot, Table, Text, Tone
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~#$])")
 _BEGINS = re.compile(r"^(\d+)([.)])(?=\s|$)|^([-+=])")
 _TONES: dict[Tone, str] = {"note": "Note", "good": "Good", "warning": "Warning"}
 
 
-def markdown_page(sections: Sequence[Section], sources: Sources, version: str) -> str:
+def markdown_page(document: Document) -> str:
     """Write sections as GitHub-flavoured Markdown.
 
     Parameters
@@ -26,10 +25,10 @@ def markdown_page(sections: Sequence[Section], sources: Sources, version: str) -
     str
         Without anything that a reader of Markdown would take for markup of its own.
     """
-    files = ", ".join(f"{_plain(source.label)} `{source.short_hash}`" for source in sources.all)
-    contents = "\n".join(f"- [{_plain(section.title)}](#{section.name})" for section in sections)
-    parts = [f"# {_plain(sources.title)}", f"Made by cpfls {_plain(version)} from {files}.", contents]
-    for section in sections:
+    files = ", ".join(f"{_plain(source.label)} `{source.short_hash}`" for source in document.origins)
+    contents = "\n".join(f"- [{_plain(section.title)}](#{section.name})" for section in document.sections)
+    parts = [f"# {_plain(document.title)}", f"Made by cpfls {_plain(document.version)} from {files}.", contents]
+    for section in document.sections:
         parts.append(f'<a id="{section.name}"></a>\n\n## {_plain(section.title)}')
         parts += [part for block in section.blocks for part in _block(block)]
     return "\n\n".join(parts) + "\n"

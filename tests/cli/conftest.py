@@ -119,7 +119,7 @@ def at_evaluation(monkeypatch):
 
             return employ(evaluate_and_count, **options)
 
-        monkeypatch.setattr("cpfls_cli.stages.resumable.employ", counting)
+        monkeypatch.setattr("cpfls_cli.search.resumable.employ", counting)
 
     return arrange
 

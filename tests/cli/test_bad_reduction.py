@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from cpfls_cli.report.numbers import number
+
 
 @pytest.mark.parametrize("dry", [(), ("--dry-run",)], ids=["run", "dry-run"])
 @pytest.mark.parametrize(
@@ -36,5 +38,5 @@ def test_a_condition_number_that_is_not_reached_is_said(cpfls, pipeline, study, 
     faster = ("--set", "reduction.criterion=D", "--set", "identification.training_share=0.2")
     result = cpfls("reduce", study, pipeline.flight, "-o", tmp_path / "out.h5", *options, *faster)
     reached = json.loads(result.stdout)["condition_number"]
-    note = f"the target reduction.condition_number = 2 is not reached, the selection has {reached:.5g}: {words}"
+    note = f"the target reduction.condition_number = 2 is not reached, the selection has {number(reached, 5)}: {words}"
     assert result.stderr == (f"cpfls: note: {note}\n" if words else "")

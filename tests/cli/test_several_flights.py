@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.store import file_sha256
-from cpfls_cli.stages import flight_source, job, training
+from cpfls_cli.commands import job
+from cpfls_cli.flights import flight_source, training
 
 
 @pytest.fixture(scope="module")

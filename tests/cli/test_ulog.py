@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.config.load import load_study
+from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.rotations import rotation_matrix
-from cpfls_cli.stages.recordings import read_flights
 
 EXAMPLE = Path(__file__).parents[2] / "configs" / "px4.yaml"
 

@@ -9,7 +9,7 @@ import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.store import read_artifact
-from cpfls_cli.stages.resumable import Watch
+from cpfls_cli.search.resumable import Watch
 
 NOTE = "cpfls: note: "
 
@@ -122,7 +122,7 @@ def test_handlers_are_as_they_were(cpfls, words, tmp_path, interrupt_at):
 def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_path, at_evaluation, monkeypatch):
     output = tmp_path / "model.h5"
     clock = [100.0]
-    monkeypatch.setattr("cpfls_cli.stages.resumable.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("cpfls_cli.search.resumable.time.monotonic", lambda: clock[0])
     at_evaluation(40, lambda: clock.__setitem__(0, 700.0))
     result = cpfls(*words, "-o", output, "--time-limit", "10m")
     assert result.exit_code == 0
@@ -147,7 +147,7 @@ def test_time_limit_in_several_units(cpfls, words, tmp_path, monkeypatch, text, 
             seen.append(time_limit_s)
             super().__init__(job, time_limit_s)
 
-    monkeypatch.setattr("cpfls_cli.stages.identify.Watch", Seeing)
+    monkeypatch.setattr("cpfls_cli.commands.identify.Watch", Seeing)
     settings = ("--set", "identification.membership_functions=1", "--time-limit", text)
     assert cpfls(*words, "-o", tmp_path / "model.h5", *settings).exit_code == 0
     assert seen == [limit]

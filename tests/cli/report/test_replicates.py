@@ -117,7 +117,7 @@ def test_held_out_part_has_its_table(cpfls, study):
 
 
 def test_unfinished_sweep_says_so(cpfls, study, monkeypatch):
-    from cpfls_cli.stages.resumable import Watch
+    from cpfls_cli.search.resumable import Watch
 
     stops = iter([None] * 9 + ["time-limit"] * 9)
     monkeypatch.setattr(Watch, "should_stop", lambda _: next(stops))

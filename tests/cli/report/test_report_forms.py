@@ -6,10 +6,10 @@ import re
 import pytest
 
 from cpfls_cli.artifacts.store import read_artifact
+from cpfls_cli.config.report_settings import ReportSettings
+from cpfls_cli.pages.source import Sources
 from cpfls_cli.report.content import Listing, Section
 from cpfls_cli.report.markdown import markdown_page
-from cpfls_cli.report.settings import ReportSettings
-from cpfls_cli.report.source import Sources
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"

@@ -130,7 +130,7 @@ def test_what_is_finished_or_evaluated_is_not_searched_again(
 
 def test_time_limit_is_for_all_runs_together(cpfls, words, whole, tmp_path, at_evaluation, monkeypatch):
     output, clock = tmp_path / "sweep.h5", [100.0]
-    monkeypatch.setattr("cpfls_cli.stages.resumable.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("cpfls_cli.search.resumable.time.monotonic", lambda: clock[0])
     at_evaluation(40, lambda: clock.__setitem__(0, 200.0))
     assert cpfls(*words, "-o", output, "--time-limit", "90s").exit_code == 0
     assert read_artifact(output).number("complete") == 0

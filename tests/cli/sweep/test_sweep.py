@@ -113,8 +113,8 @@ def test_workers_find_the_same(cpfls, words, tmp_path):
 
 
 def test_run_that_finds_nothing_is_told_and_counts_for_no_mean(cpfls, words, tmp_path, monkeypatch):
+    from cpfls_cli.commands import sweep as stage
     from cpfls_cli.identification.search import NothingFoundError
-    from cpfls_cli.stages import sweep as stage
 
     calls, identify = [], stage.identify
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from cpfls_cli.commands.plain_json import plain
 from cpfls_cli.config.load import load_study
+from cpfls_cli.config.resolved import generator
 from cpfls_cli.errors import CpflsError
+from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.gap.diagnose import diagnose
-from cpfls_cli.stages.plain_json import plain
-from cpfls_cli.stages.recordings import read_flights
-from cpfls_cli.stages.study import generator
 from tests.gap.study.baselines import baselines
 
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cpfls_cli.report.claims.as_good import AS_GOOD
-from cpfls_cli.report.claims.claim import Verdict
-from cpfls_cli.report.claims.model_figures import partitions_compared
-from cpfls_cli.report.claims.motion_figures import seesaw_compared
-from cpfls_cli.report.claims.paired import paired_ratio
-from cpfls_cli.report.claims.reduction import reduction_claims
-from cpfls_cli.report.claims.searches import search_claims
-from cpfls_cli.report.claims.timing import timing_claims
-from cpfls_cli.report.settings import EvaluationTime
-from cpfls_cli.report.swept_setting import SweptSetting
+from cpfls_cli.config.report_settings import EvaluationTime
+from cpfls_cli.pages.claims.as_good import AS_GOOD
+from cpfls_cli.pages.claims.claim import Verdict
+from cpfls_cli.pages.claims.model_figures import partitions_compared
+from cpfls_cli.pages.claims.motion_figures import seesaw_compared
+from cpfls_cli.pages.claims.paired import paired_ratio
+from cpfls_cli.pages.claims.reduction import reduction_claims
+from cpfls_cli.pages.claims.searches import search_claims
+from cpfls_cli.pages.claims.timing import timing_claims
+from cpfls_cli.pages.swept_setting import SweptSetting
 
 NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
 """What a seed does to all settings alike."""

@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.report.figures.before_after import BEFORE, HELD, MEASURED, keep_in_view, marked
-from cpfls_cli.report.figures.residual_time import flight_offsets
-from cpfls_cli.report.gap_words import effect_title, joined, probability, sentence, signal_words, whole_percent
+from cpfls_cli.pages.figures.before_after import BEFORE, HELD, MEASURED, keep_in_view, marked
+from cpfls_cli.pages.figures.residual_time import flight_offsets
+from cpfls_cli.pages.gap_words import effect_title, joined, probability, sentence, signal_words, whole_percent
 
 
 def test_curves_are_told_apart_without_colour():

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.report.gap_verdict import levels, verdict_box
-from cpfls_cli.report.sections.diagnosis import after_words
-from cpfls_cli.report.source import Source
+from cpfls_cli.pages.gap_verdict import levels, verdict_box
+from cpfls_cli.pages.sections.diagnosis import after_words
+from cpfls_cli.pages.source import Source
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.cli.report import gap_artifacts as made
 

@@ -4,8 +4,8 @@ import pytest
 from cpfls_cli.artifacts.formats import TRAJECTORY
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import Artifact
-from cpfls_cli.report.leg import first_leg, peaks
-from cpfls_cli.stages.trajectory_file import trajectory_data
+from cpfls_cli.artifacts.trajectory_file import trajectory_data
+from cpfls_cli.pages.leg import first_leg, peaks
 from cpfls_cli.trajectory.path import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cpfls_cli.report.swept import printed_beside
-from cpfls_cli.report.swept_setting import SweptSetting
-from cpfls_cli.report.table_5 import PRINTED
+from cpfls_cli.pages.swept import printed_beside
+from cpfls_cli.pages.swept_setting import SweptSetting
+from cpfls_cli.pages.table_5 import PRINTED
 
 
 def setting(structure="cpfls", samples=685, population=500, generations=200, mse=(1.0,)):

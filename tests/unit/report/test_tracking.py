@@ -6,11 +6,11 @@ import pytest
 from cpfls_cli.artifacts.formats import FLIGHT
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import Artifact
+from cpfls_cli.config.report_settings import ReportSettings
+from cpfls_cli.pages.sections.tracking import tracking_section
+from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import Cell, Plot, Table, Text
 from cpfls_cli.report.numbers import number
-from cpfls_cli.report.sections.tracking import tracking_section
-from cpfls_cli.report.settings import ReportSettings
-from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 SETTINGS = {"plant": "vehicle", "natural_frequency_hz": [1.2, 1.2, 0.5], "damping": 1.0, "torque_max_n_m": None}

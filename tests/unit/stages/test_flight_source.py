@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.store import Artifact, write_artifact
 from cpfls_cli.config.resolved import resolved_yaml
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
-from cpfls_cli.stages import flight_source as sources
+from cpfls_cli.flights import flight_source as sources
 
 SAMPLES = 30
 

@@ -6,15 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cpfls_cli.commands.extend import require_named
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extend import worse_axes
 from cpfls_cli.gap.naming.results import Alternative, Diagnosis, Estimate, GapSize, NamedEffect, Unexplained, Verdict
 from cpfls_cli.gap.replayed import Replayed
-from cpfls_cli.stages.diagnosis_words import diagnosis_lines, effect_line, headline
-from cpfls_cli.stages.disagreement_words import replay_lines
-from cpfls_cli.stages.extend import require_named
+from cpfls_cli.pages.diagnosis_words import diagnosis_lines, effect_line, headline
+from cpfls_cli.pages.disagreement_words import replay_lines
 
 OFFSET = NamedEffect(
     "com_offset",

@@ -1,0 +1,129 @@
+"""One run of a command: its study, its inputs, its output, and how it shows its progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import cpfls_cli
+from cpfls_cli.artifacts.output import check_output
+from cpfls_cli.artifacts.spec import ArtifactSpec, Header, InputFile, Record
+from cpfls_cli.artifacts.store import Artifact, file_sha256, format_name, write_artifact, write_record
+from cpfls_cli.config.resolved import resolved_yaml
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import InputError
+
+R = TypeVar("R", bound=Record)
+
+
+class Progress(Protocol):
+    """Shows how far long work has come."""
+
+    def __call__(self, done: float, total: int, note: str = "") -> None:
+        """Take note that `done` of `total` steps are done."""
+        ...
+
+
+Interrupted = Callable[[], int | None]
+"""Gives the number of the signal that asks to stop, or None."""
+
+
+def _uninterrupted() -> AbstractContextManager[Interrupted]:
+    return nullcontext(lambda: None)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run of a stage.
+
+    Attributes
+    ----------
+    force : bool
+        Replace an existing output.
+    dry_run : bool
+        Check everything, compute and write nothing.
+    reads : callable
+        Takes note of every input file.
+    deferred_interrupts : callable
+        Gives a context in which an interrupt does not end the program, but is told to whoever asks.
+    """
+
+    study: Study
+    output: Path
+    force: bool
+    dry_run: bool
+    progress: Progress
+    reads: Callable[[Path], None]
+    deferred_interrupts: Callable[[], AbstractContextManager[Interrupted]] = _uninterrupted
+
+
+def begin(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
+    """Check inputs and output of a job before anything is computed, and take note of the inputs by role.
+
+    Raises
+    ------
+    InputError
+        If an input is missing or is the output, or the output cannot or must not be written.
+    """
+    files = take_inputs(job, inputs)
+    check_output(job.output, job.force)
+    return files
+
+
+def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
+    """Check inputs, and take note of what they hold.
+
+    Parameters
+    ----------
+    inputs : mapping of str to Path
+        By role.
+
+    Raises
+    ------
+    InputError
+        If one is missing, no file, or the output.
+    """
+    for path in inputs.values():
+        _check_input(path, job.output)
+        job.reads(path)
+    return {role: input_file(path) for role, path in inputs.items()}
+
+
+def _check_input(path: Path, output: Path) -> None:
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if not path.is_file():
+        raise InputError(f"{path}: is a {'folder' if path.is_dir() else 'device or a pipe'}, not a file")
+    if output.exists() and path.samefile(output):
+        raise InputError(f"{output}: is an input of this command; -o must name another file")
+
+
+def finish(job: Job, record: R, inputs: Mapping[str, InputFile]) -> R:
+    """Write the record of a job, and give it back with the header that says where it comes from."""
+    whole = record.with_header(header_of(job.study, inputs))
+    write_record(job.output, whole)
+    return whole
+
+
+def finish_data(job: Job, spec: ArtifactSpec, data: Mapping[str, Any], inputs: Mapping[str, InputFile]) -> None:
+    """Write the datasets of a job that are not a record yet."""
+    write_artifact(job.output, Artifact(spec, header_of(job.study, inputs), data))
+
+
+def header_of(study: Study, inputs: Mapping[str, InputFile]) -> Header:
+    """Tell where an artifact comes from.
+
+    Parameters
+    ----------
+    inputs : mapping of str to InputFile
+        By role.
+    """
+    return Header(cpfls_cli.__version__, study.seed, resolved_yaml(study), inputs)
+
+
+def input_file(path: Path) -> InputFile:
+    """Describe an input file by name, hash and format."""
+    return InputFile(path.name, file_sha256(path), format_name(path) or path.suffix.lstrip("."))

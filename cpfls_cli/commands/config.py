@@ -1,0 +1,35 @@
+"""Stage `config`: show a study with every default filled in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cpfls_cli.config.commented import commented_default
+from cpfls_cli.config.load import load_study, validate
+from cpfls_cli.config.resolved import resolved, resolved_yaml
+from cpfls_cli.errors import ConfigError
+from cpfls_cli.report.outcome import Outcome
+
+
+def show(path: Path | None, sections: Sequence[str], overrides: Sequence[str], seed: int | None) -> Outcome:
+    """Show a resolved config, or a commented default.
+
+    Parameters
+    ----------
+    path : Path or None
+        None shows the commented default.
+    sections : sequence of str
+        Only these, and the seed.
+
+    Raises
+    ------
+    ConfigError
+        If the default is asked for together with overrides, sections or a seed.
+    """
+    if path is None:
+        if sections or overrides or seed is not None:
+            raise ConfigError("--section, --set and --seed need a CONFIG; without one the commented default is printed")
+        return Outcome(resolved(validate({}, "default")), (commented_default().rstrip("\n"),))
+    study = load_study(path, overrides, seed, sweep=True)
+    return Outcome(resolved(study, sections), (resolved_yaml(study, sections).rstrip("\n"),))

@@ -1,0 +1,49 @@
+"""Command `reduce`: pick the samples of flights that are worth learning from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.selection import SelectionRecord
+from cpfls_cli.config.resolved import generator, settings_of
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.flights.training import flight_roles, split_training, uniform_regressor
+from cpfls_cli.pages.selection import answer
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.reduction.baseline import random_streamed
+from cpfls_cli.reduction.streamed import check_streamed, reduce_streamed
+from cpfls_cli.reduction.survey import survey
+from cpfls_cli.report.outcome import Outcome, nothing_written
+
+RANDOM_DRAWS = 20
+
+
+def run(job: Job, flights: Sequence[Path]) -> Outcome:
+    """Select samples of flights and write their indices."""
+    inputs = begin(job, flight_roles(flights))
+    split = split_training(flights, job.study, inputs, torque=False)
+    settings, rng = job.study.reduction, generator(job.study, "reduce")
+    with _naming(flights), settings_of("reduction", job.study):
+        surveyed = survey(uniform_regressor(split.training, job.study), settings.rank_tolerance)
+        if job.dry_run:
+            check_streamed(surveyed, settings, rng)
+            return nothing_written(job)
+        selection = reduce_streamed(surveyed, settings, rng, job.progress)
+        draws = random_streamed(surveyed, len(selection.indices), RANDOM_DRAWS, rng)
+    random = np.array([draw.condition_number for draw in draws])
+    indices = split.training_indices[selection.indices]
+    record = finish(job, SelectionRecord.of(selection, indices, surveyed.samples, random), inputs)
+    return Outcome(record.summary, tuple(answer(source_of(job, record))))
+
+
+@contextmanager
+def _naming(flights: Sequence[Path]) -> Iterator[None]:
+    try:
+        yield
+    except ComputationError as error:
+        raise ComputationError(f"{' '.join(str(path) for path in flights)}: {error}") from None

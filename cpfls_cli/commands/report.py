@@ -1,0 +1,78 @@
+"""Stage `report`: one self-contained page about artifacts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import cpfls_cli
+from cpfls_cli.artifacts.job import Job, begin
+from cpfls_cli.artifacts.output import write_text
+from cpfls_cli.artifacts.store import read_any
+from cpfls_cli.config.load import validate
+from cpfls_cli.config.resolved import resolved
+from cpfls_cli.config.yaml_text import parse_yaml
+from cpfls_cli.pages.page import Page, report_page
+from cpfls_cli.pages.source import Source, Sources, unique_labels
+from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.report.forms import Form, form_of
+from cpfls_cli.report.outcome import Outcome, nothing_written
+
+
+def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcome:
+    """Write a report about artifacts.
+
+    Parameters
+    ----------
+    artifacts : sequence of Path
+        Of any format and from any flights; a file given twice counts once.
+    form : Form or None
+        None to choose it by the suffix of the output.
+    """
+    inputs = begin(job, {str(path): path for path in artifacts})
+    files = {path: inputs[str(path)].sha256 for path in artifacts}
+    distinct = {sha256: path for path, sha256 in reversed(files.items())}
+    kept = [path for path, sha256 in files.items() if distinct[sha256] == path]
+    sources = _sources(kept, [files[path] for path in kept])
+    if job.dry_run:
+        return nothing_written(job)
+    given = Sources(sources, job.study.vehicle, job.study.report)
+    page = report_page(given, cpfls_cli.__version__, form or form_of(job.output))
+    write_text(job.output, page.text)
+    again = [f"{path}: given {times} times; shown once" for path, times in Counter(artifacts).items() if times > 1]
+    equal = [f"{path}: holds the same as {distinct[files[path]]}; shown once" for path in files if path not in kept]
+    return _outcome(job.output, page, [*again, *equal])
+
+
+def _sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
+    labels = unique_labels([_printable(path.name) for path in paths], hashes)
+    return [_source(path, label, sha256) for path, label, sha256 in zip(paths, labels, hashes, strict=True)]
+
+
+def _source(path: Path, label: str, sha256: str) -> Source:
+    record = read_any(path)
+    study = validate(parse_yaml(record.origin.config, f"{path}: /config"), f"{path}: /config")
+    parameters = model_structure(study.identification).parameters
+    return Source.of(label, sha256, record, resolved(study), study.vehicle, parameters)
+
+
+def _printable(name: str) -> str:
+    """Replace what a page cannot show: control characters, and bytes that are not text."""
+    return "".join(character if character.isprintable() else "\N{REPLACEMENT CHARACTER}" for character in name)
+
+
+def _outcome(output: Path, page: Page, repeated: Sequence[str]) -> Outcome:
+    size = len(page.text.encode())
+    summary = {
+        "output": str(output),
+        "figures": list(page.figures),
+        "tables": list(page.tables),
+        "sections": list(page.sections),
+        "missing": list(page.missing),
+        "bytes": size,
+    }
+    lines = [f"{len(page.sections)} sections, {len(page.figures)} figures, {len(page.tables)} tables, {size} bytes"]
+    if page.missing:
+        lines.append(f"not given: {', '.join(page.missing)}")
+    return Outcome(summary, tuple(lines), tuple(repeated))

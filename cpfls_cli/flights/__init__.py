@@ -1,0 +1,1 @@
+"""Flights from artifacts and logs: opened, split, of the same vehicle."""

@@ -1,0 +1,110 @@
+"""The page: all sections in one file that needs nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cpfls_cli.pages.missing import missing
+from cpfls_cli.pages.sections.comparison import comparison_section
+from cpfls_cli.pages.sections.diagnosis import diagnosis_section
+from cpfls_cli.pages.sections.disagreement import disagreement_section
+from cpfls_cli.pages.sections.extension import extension_section
+from cpfls_cli.pages.sections.flight import flight_section
+from cpfls_cli.pages.sections.identification import identification_section
+from cpfls_cli.pages.sections.partitions import partitions_section
+from cpfls_cli.pages.sections.path import path_section
+from cpfls_cli.pages.sections.prediction import prediction_section
+from cpfls_cli.pages.sections.provenance import provenance_section
+from cpfls_cli.pages.sections.replicates import replicates_section
+from cpfls_cli.pages.sections.reproduction import reproduction_section
+from cpfls_cli.pages.sections.residuals import residuals_section
+from cpfls_cli.pages.sections.rules import rules_section
+from cpfls_cli.pages.sections.search import search_section
+from cpfls_cli.pages.sections.sensors import sensors_section
+from cpfls_cli.pages.sections.steps import steps_section
+from cpfls_cli.pages.sections.summary import models_section, summary_section
+from cpfls_cli.pages.sections.tracking import tracking_section
+from cpfls_cli.pages.sections.uncertainty import uncertainty_section
+from cpfls_cli.pages.sections.unseen import unseen_section
+from cpfls_cli.pages.sections.validation import validation_section
+from cpfls_cli.pages.sections.vehicle import vehicle_section
+from cpfls_cli.pages.selection import reduction_section
+from cpfls_cli.pages.source import Sources
+from cpfls_cli.report.content import Document
+from cpfls_cli.report.forms import Form
+from cpfls_cli.report.html import html_page
+from cpfls_cli.report.json_page import json_page
+from cpfls_cli.report.markdown import markdown_page
+
+_SECTIONS = (
+    summary_section,
+    comparison_section,
+    models_section,
+    reproduction_section,
+    diagnosis_section,
+    extension_section,
+    disagreement_section,
+    sensors_section,
+    unseen_section,
+    vehicle_section,
+    path_section,
+    flight_section,
+    reduction_section,
+    identification_section,
+    validation_section,
+    residuals_section,
+    uncertainty_section,
+    steps_section,
+    replicates_section,
+    search_section,
+    partitions_section,
+    prediction_section,
+    tracking_section,
+    rules_section,
+    provenance_section,
+)
+
+
+_WRITE = {Form.HTML: html_page, Form.MARKDOWN: markdown_page, Form.JSON: json_page}
+
+
+@dataclass(frozen=True)
+class Page:
+    """A finished report.
+
+    Attributes
+    ----------
+    sections, figures, tables : tuple of str
+        Names of what it shows, in order.
+    missing : tuple of str
+        Formats of which no artifact was given.
+    """
+
+    text: str
+    sections: tuple[str, ...]
+    figures: tuple[str, ...]
+    tables: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
+    """Write a report about artifacts.
+
+    Parameters
+    ----------
+    version : str
+        Of the program.
+
+    Returns
+    -------
+    Page
+        Equal text for equal artifacts and settings.
+    """
+    sections = [section for make in _SECTIONS if (section := make(sources)) is not None]
+    return Page(
+        text=_WRITE[form](Document(sources.title, version, sections, sources.all)),
+        sections=tuple(section.name for section in sections),
+        figures=tuple(name for section in sections for name in section.plots),
+        tables=tuple(name for section in sections for name in section.tables),
+        missing=tuple(missing(sources)),
+    )

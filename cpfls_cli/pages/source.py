@@ -1,0 +1,185 @@
+"""The artifacts that a report is about."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, Self
+
+from typing_extensions import TypeVar
+
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.job import Job
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.selection import SelectionRecord
+from cpfls_cli.artifacts.spec import Record
+from cpfls_cli.artifacts.store import Artifact
+from cpfls_cli.artifacts.sweep import SweepRecord
+from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.config.report_settings import ReportSettings
+from cpfls_cli.config.resolved import resolved
+from cpfls_cli.report.content import HASH_SHOWN, Origin
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+R = TypeVar("R", bound=Record, default=Any)
+
+GAP_TITLE = "Where simulation and flight disagree"
+"""Heading of a page about nothing else, unless the config gives one."""
+
+
+@dataclass(frozen=True)
+class Source(Origin, Generic[R]):
+    """One artifact and the study that made it.
+
+    Attributes
+    ----------
+    record : Record
+        The artifact.
+    config : mapping
+        The resolved study that made it, by section and key.
+    vehicle : VehicleSettings
+        Of that study.
+    parameters : int
+        Linear parameters of the fuzzy part that that study asks for.
+    """
+
+    record: R
+    config: Mapping[str, Any]
+    vehicle: VehicleSettings
+    parameters: int
+
+    @classmethod
+    def of(
+        cls, label: str, sha256: str, record: R, config: Mapping[str, Any], vehicle: VehicleSettings, parameters: int
+    ) -> Self:
+        """Name an artifact for a document."""
+        return cls(label, sha256, record.FORMAT.name, record.origin, record, config, vehicle, parameters)
+
+    @cached_property
+    def artifact(self) -> Artifact:
+        """The artifact as datasets by path."""
+        return Artifact(self.record.spec(), self.header, self.record.data)
+
+    @property
+    def searched(self) -> bool:
+        """Whether a model has partitions to search for; without, one chromosome was evaluated."""
+        return bool(self.artifact.array("model/weights").size)
+
+    def made_from(self, role: str) -> str | None:
+        """Hash of an input by its role; None where it had none."""
+        return self.record.made_from(role)
+
+    def input_name(self, role: str) -> str:
+        """File name of an input by its role; empty where it had none."""
+        return self.record.input_name(role)
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Everything that a report is about.
+
+    Attributes
+    ----------
+    all : sequence of Source
+        In the order given.
+    vehicle : VehicleSettings
+        Of the study that the report is made with.
+    """
+
+    all: Sequence[Source[Any]]
+    vehicle: VehicleSettings
+    settings: ReportSettings
+
+    @property
+    def trajectories(self) -> list[Source[TrajectoryRecord]]:
+        """Planned paths."""
+        return self._of(TrajectoryRecord)
+
+    @property
+    def flights(self) -> list[Source[FlightRecord]]:
+        """Flights, simulated or imported."""
+        return self._of(FlightRecord)
+
+    @property
+    def selections(self) -> list[Source[SelectionRecord]]:
+        """Reduced training sets."""
+        return self._of(SelectionRecord)
+
+    @property
+    def models(self) -> list[Source[ModelRecord]]:
+        """Identified models."""
+        return self._of(ModelRecord)
+
+    @property
+    def sweeps(self) -> list[Source[SweepRecord]]:
+        """Replicates of searches."""
+        return self._of(SweepRecord)
+
+    @property
+    def predictions(self) -> list[Source[PredictionRecord]]:
+        """Predictions of models along flights."""
+        return self._of(PredictionRecord)
+
+    @property
+    def disagreements(self) -> list[Source[DisagreementRecord]]:
+        """Where models and flights disagree."""
+        return self._of(DisagreementRecord)
+
+    @property
+    def diagnoses(self) -> list[Source[DiagnosisRecord]]:
+        """What models miss."""
+        return self._of(DiagnosisRecord)
+
+    @property
+    def extensions(self) -> list[Source[ExtendedRecord]]:
+        """Models with the effects that they missed."""
+        return self._of(ExtendedRecord)
+
+    @property
+    def gap(self) -> list[Source[Any]]:
+        """Everything that the gap workflow wrote, answers before their grounds."""
+        return [*self.diagnoses, *self.extensions, *self.disagreements]
+
+    @property
+    def only_gap(self) -> bool:
+        """Whether nothing else was given than what the gap workflow writes."""
+        return len(self.gap) == len(self.all)
+
+    @property
+    def title(self) -> str:
+        """Heading of the page."""
+        usual = self.settings.title == ReportSettings().title
+        return GAP_TITLE if usual and self.only_gap else self.settings.title
+
+    def by_hash(self, sha256: str | None) -> Source[Any] | None:
+        """Look up an artifact by its hash."""
+        return next((source for source in self.all if source.sha256 == sha256), None)
+
+    def _of(self, kind: type[R]) -> list[Source[R]]:
+        return [source for source in self.all if isinstance(source.record, kind)]
+
+
+def unique_labels(names: Sequence[str], hashes: Sequence[str]) -> list[str]:
+    """Name files apart: a name that stands more than once gets the first digits of its hash.
+
+    Parameters
+    ----------
+    names : sequence of str
+        File names without folders.
+    """
+    count = Counter(names)
+    return [
+        name if count[name] == 1 else f"{name} ({sha256[:HASH_SHOWN]})"
+        for name, sha256 in zip(names, hashes, strict=True)
+    ]
+
+
+def source_of(job: Job, record: R) -> Source[R]:
+    """Name the artifact that a job has just written, so that its page can speak of it."""
+    return Source.of(job.output.name, "", record, resolved(job.study), job.study.vehicle, 0)

@@ -1,0 +1,38 @@
+"""What a command has to say, for people as blocks and for machines as a summary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from cpfls_cli.artifacts.job import Job
+from cpfls_cli.report.content import Block, Text
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command has to say.
+
+    Attributes
+    ----------
+    summary : mapping
+        For machines (``--json``).
+    blocks : tuple of Block or str
+        For people, on standard output; texts of tone ``warning`` go to standard error.
+    warnings : tuple of str
+        What to distrust, on standard error.
+    exit_code : int
+        Of the program; not 0 where the work was stopped.
+    """
+
+    summary: Mapping[str, Any]
+    blocks: tuple[Block | str, ...] = ()
+    warnings: tuple[str, ...] = field(default=())
+    exit_code: int = 0
+
+
+def nothing_written(job: Job) -> Outcome:
+    """Say that all is good, where that is all that is asked for (``--dry-run``)."""
+    line = Text(f"{job.output}: would be written; the config and all inputs are good")
+    return Outcome({"dry_run": True, "output": str(job.output)}, (line,))

@@ -1,0 +1,84 @@
+"""Blocks as lines of a terminal: sentences and tables; figures and what is folded away stay on the page."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Iterator, Sequence
+
+from rich.console import Console
+from rich.table import Table as RichTable
+from rich.text import Text as RichText
+
+from cpfls_cli.report.content import Block, Box, Facts, Folded, Heading, Listing, Plot, Table, Text, Tone
+
+_STYLES: dict[Tone, str] = {"plain": "", "note": "", "good": "green", "warning": "bold red"}
+# Where nothing is a terminal no line is cut or folded, so that other programs can read it.
+_UNLIMITED = 100_000
+
+
+def terminal_lines(blocks: Iterable[Block | str], width: int | None = None, *, colour: bool = False) -> Iterator[str]:
+    """Write blocks as lines; texts that warn are left to `warnings_of`.
+
+    Parameters
+    ----------
+    blocks : iterable of Block or str
+        A string is a line of its own.
+    width : int or None
+        Columns of the terminal; None where there is none and lines are as long as they are.
+    colour : bool
+        Whether tones show as colours too.
+    """
+    for block in blocks:
+        match block:
+            case str():
+                yield block
+            case Text() if block.tone == "warning":
+                pass
+            case Text() | Heading():
+                yield block.text
+            case Box():
+                yield f"{block.label}: {block.title}"
+                yield from (f"  {sentence}" for sentence in block.sentences)
+            case Facts():
+                yield from _facts(block)
+            case Table():
+                yield from _table(block, width, colour)
+            case Listing():
+                yield from block.text.rstrip().splitlines()
+            case Plot() | Folded():
+                pass
+
+
+def warnings_of(blocks: Iterable[Block | str]) -> tuple[str, ...]:
+    """List the texts that warn."""
+    return tuple(block.text for block in blocks if isinstance(block, Text) and block.tone == "warning")
+
+
+def _facts(facts: Facts) -> Iterator[str]:
+    for term, value in facts.rows:
+        yield f"{term}: {value}"
+
+
+def _table(table: Table, width: int | None, colour: bool) -> Iterator[str]:
+    drawn = RichTable(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold" if colour else "")
+    for column, title in enumerate(table.header):
+        left = column in table.words or column in table.sentences
+        drawn.add_column(RichText(title), justify="left" if left else "right", no_wrap=width is None)
+    for row in table.cells:
+        drawn.add_row(*(RichText(cell.text, _STYLES[cell.tone] if colour else "") for cell in row))
+    yield from _printed(drawn, width, colour)
+
+
+def _printed(drawn: RichTable, width: int | None, colour: bool) -> Sequence[str]:
+    stream = io.StringIO()
+    console = Console(
+        file=stream,
+        width=width or _UNLIMITED,
+        force_terminal=colour,
+        color_system="standard" if colour else None,
+        markup=False,
+        emoji=False,
+        highlight=False,
+    )
+    console.print(drawn)
+    return [line.rstrip() for line in stream.getvalue().splitlines()]

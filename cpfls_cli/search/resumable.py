@@ -1,0 +1,220 @@
+"""A search that leaves checkpoints, goes on from them, and stops when asked to."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.artifacts.job import Interrupted, Job, header_of, take_inputs
+from cpfls_cli.artifacts.output import check_output
+from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.state_file import StoppedSearch
+from cpfls_cli.artifacts.store import format_name, read_artifact
+from cpfls_cli.errors import ComputationError, InputError, OutputError
+from cpfls_cli.evolution.archive import Evaluate
+from cpfls_cli.identification.search_run import SearchRun, SearchStep, Stop, StopReason, is_end
+from cpfls_cli.search.checkpoint import Checkpoint
+from cpfls_cli.workers.employ import employ
+from cpfls_cli.workers.worker_error import WorkerError
+from cpfls_cli.workers.workforce import Workforce
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How a command runs its search; nothing of it changes what a search that comes to its end finds.
+
+    Attributes
+    ----------
+    resume : bool
+        Go on from the checkpoint.
+    time_limit_s : float or None
+        Stop the search after so much time, and keep what it has.
+    workers : int
+        Processes that evaluate.
+    scheduler : str or None
+        Address of a Dask scheduler whose workers evaluate.
+    """
+
+    resume: bool = False
+    time_limit_s: float | None = None
+    workers: int = 1
+    scheduler: str | None = None
+
+    @property
+    def place(self) -> str:
+        """The option that says who evaluates."""
+        return f"--workers {self.workers}" if self.scheduler is None else f"--scheduler {self.scheduler}"
+
+    def employed(self, evaluate: Evaluate) -> AbstractContextManager[Workforce]:
+        """Employ who evaluates."""
+        return employ(evaluate, count=self.workers, scheduler=self.scheduler)
+
+    def require_one_place(self) -> None:
+        """Refuse processes of this machine together with the workers of a scheduler.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.scheduler is not None and self.workers > 1:
+            raise InputError("--scheduler: knows its own workers; leave --workers out")
+
+
+class Watch:
+    """Knows when a search has to stop: at an interrupt, or when its time is over.
+
+    Parameters
+    ----------
+    time_limit_s : float or None
+        From now on.
+    """
+
+    def __init__(self, job: Job, time_limit_s: float | None) -> None:
+        self._job = job
+        self._end = None if time_limit_s is None else time.monotonic() + time_limit_s
+        self._interrupted: Interrupted = lambda: None
+
+    @property
+    def signal(self) -> int | None:
+        """Number of the signal that asked to stop, or None."""
+        return self._interrupted()
+
+    @contextmanager
+    def deferring(self) -> Iterator[None]:
+        """Take an interrupt for a wish to stop, as long as the work inside looks at this watch."""
+        with self._job.deferred_interrupts() as self._interrupted:
+            yield
+
+    def should_stop(self) -> Stop | None:
+        """Tell why to stop, or None."""
+        if self.signal is not None:
+            return "interrupted"
+        return "time-limit" if self._end is not None and time.monotonic() >= self._end else None
+
+
+@dataclass(frozen=True)
+class Resumable:
+    """One search and its checkpoint.
+
+    Attributes
+    ----------
+    stopped : StoppedSearch or None
+        Where to go on, or None to start.
+    """
+
+    checkpoint: Checkpoint
+    stopped: StoppedSearch | None
+
+    def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
+        """Say how the search is run; from here on a checkpoint that is not resumed is given up.
+
+        Returns
+        -------
+        SearchRun
+            Interrupts are deferred as long as its workers are employed, which is as long as it searches.
+        """
+        self.checkpoint.tidy()
+        if self.stopped is None:
+            self.checkpoint.remove()
+
+        @contextmanager
+        def workers(evaluate: Evaluate) -> Iterator[Workforce]:
+            try:
+                with watch.deferring(), options.employed(evaluate) as workforce:
+                    yield workforce
+            except WorkerError as error:
+                raise WorkerError(f"{options.place}: {error}") from None
+
+        return SearchRun(
+            resumed=self.stopped.state if self.stopped else None,
+            unfinished=self.stopped.unfinished if self.stopped else None,
+            workers=workers,
+            progress=progress,
+            on_generation=self.checkpoint.write,
+            on_stop=self.checkpoint.add,
+            should_stop=watch.should_stop,
+        )
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Say of whatever fails inside that the search can go on nevertheless."""
+        try:
+            yield
+        except (ComputationError, OutputError) as error:
+            if self.checkpoint.path.exists():
+                error.add_note(f"{self.checkpoint.path}: is intact; the same command with --resume goes on")
+            raise
+
+    def end(self, reason: StopReason) -> None:
+        """Remove the checkpoint of a search that came to its end, after what it found is written.
+
+        Parameters
+        ----------
+        reason : str
+            Why the search ended.
+        """
+        if is_end(reason):
+            self.checkpoint.remove()
+
+
+def begin_search(
+    job: Job, inputs: Mapping[str, Path], options: SearchOptions
+) -> tuple[dict[str, InputFile], Resumable]:
+    """Check inputs, checkpoint and output of a search before anything is computed.
+
+    Parameters
+    ----------
+    inputs : mapping of str to Path
+        By role.
+
+    Raises
+    ------
+    InputError
+        As `begin`; also if there is a checkpoint that nothing is said of, or none that can be resumed.
+    """
+    options.require_one_place()
+    files = take_inputs(job, inputs)
+    header = header_of(job.study, files)
+    search = resumable(job.output, header, resume=options.resume, force=job.force)
+    check_output(job.output, job.force or (options.resume and _may_be_replaced(job.output, header)))
+    return files, search
+
+
+def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Resumable:
+    """Find the checkpoint of a search, and read it where the search is to go on.
+
+    Parameters
+    ----------
+    output : Path
+        What the search is for; the checkpoint lies beside it.
+    header : Header
+        Config, seed and inputs of the search.
+    force : bool
+        Allow a checkpoint to be given up.
+
+    Raises
+    ------
+    InputError
+        If there is a checkpoint and neither is said, or none that can be resumed.
+    """
+    checkpoint = Checkpoint.beside(output, header)
+    if resume:
+        return Resumable(checkpoint, checkpoint.read())
+    if checkpoint.path.exists() and not force:
+        raise InputError(
+            f"{checkpoint.path}: a search for {output} was stopped here; --resume continues it, --force starts again"
+        )
+    return Resumable(checkpoint, None)
+
+
+def _may_be_replaced(output: Path, header: Header) -> bool:
+    """Tell whether an output is what a stopped search left: incomplete, or complete with its checkpoint still there."""
+    if not output.is_file() or format_name(output) != MODEL.format:
+        return False
+    model = read_artifact(output, MODEL)
+    complete = "search/complete" not in model.data or bool(model.data["search/complete"])
+    return not complete or model.header == header
