@@ -30,10 +30,8 @@ from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
 from cpfls_cli.excitation import condition_number, optimised_rotation
 from cpfls_cli.excitation.variables import path_of, variables_of
 from cpfls_cli.regressor import StructureSettings, model_structure
-from cpfls_cli.trajectory.rotation import full_rotation
-from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_path import RotationMotion, RotationPath
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.rotation import RotationLimits, RotationMotion, RotationPath, full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.vehicle import VehicleSettings
 
 STRUCTURES = {

@@ -34,7 +34,7 @@ from benchmarks.shared.full_circle import (
     uniform_model,
 )
 from cpfls_cli.config.load import load_study
-from cpfls_cli.config.variants import variants
+from cpfls_cli.config.overrides import variants
 from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.data import TorqueData, joined
 from cpfls_cli.identification.settings import IdentificationSettings

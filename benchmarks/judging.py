@@ -20,7 +20,7 @@ pin_threads()
 import numpy as np
 
 from cpfls_cli.config.load import load_study
-from cpfls_cli.config.resolved import generator
+from cpfls_cli.config.study import generator
 from cpfls_cli.flights.training import read_training
 from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.evaluator import Evaluator

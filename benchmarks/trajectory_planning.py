@@ -26,8 +26,8 @@ from benchmarks.shared.brute_force import shortest_duration
 from benchmarks.shared.exact_move import integrated
 from cpfls_cli.report.canvas import legend_above, plot, style_of
 from cpfls_cli.trajectory import Limits, Moves, plan_move, plan_moves
+from cpfls_cli.trajectory.legs import synchronised
 from cpfls_cli.trajectory.limits import LIMIT_NAMES
-from cpfls_cli.trajectory.synchronised import synchronised
 
 PLOT = Path(__file__).resolve().parents[1] / "docs" / "planner-cost.svg"
 BATCH = 100_000

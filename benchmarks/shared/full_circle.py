@@ -21,9 +21,8 @@ from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.search import search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion, StructureSettings
-from cpfls_cli.trajectory.rotation import full_rotation
-from cpfls_cli.trajectory.rotation_path import RotationPath
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.vehicle import VehicleSettings, newton_euler_torque
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "full-circle.yaml"

@@ -52,7 +52,7 @@ def seconds(work: Callable[[], object]) -> float:
 
 def pin_threads() -> None:
     """Limit linear algebra to one thread; call it before anything numerical is imported."""
-    from cpfls_cli.cli.threads import use_one_thread
+    from cpfls_cli.cli.main import use_one_thread
 
     use_one_thread()
 

@@ -12,8 +12,7 @@ import cpfls_cli
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.spec import ArtifactSpec, Header, InputFile, Record
 from cpfls_cli.artifacts.store import Artifact, file_sha256, format_name, write_artifact, write_record
-from cpfls_cli.config.resolved import resolved_yaml
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 
 R = TypeVar("R", bound=Record)

@@ -15,7 +15,7 @@ from cpfls_cli.excitation.optimise import Excitation
 from cpfls_cli.report.outcome import Outcome
 from cpfls_cli.simulation.flyable import Flyability
 from cpfls_cli.trajectory.legs import Leg
-from cpfls_cli.trajectory.planned import PlannedRotation, Trajectory
+from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 
 _UNITS = ("m", "m/s", "m/s^2", "m/s^3", "m/s^4", "m/s^5", "m/s^6")
 _LEGS_SHOWN = 12

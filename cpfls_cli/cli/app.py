@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cpfls_cli import __version__
-from cpfls_cli.cli.durations import seconds
 from cpfls_cli.cli.interrupts import deferred_interrupts
-from cpfls_cli.cli.narration import Narration
-from cpfls_cli.cli.options import Common, ConfigArgument, OutputOption, with_common
-from cpfls_cli.cli.terminal import messages_for_errors, progress_bar, tell
+from cpfls_cli.cli.options import Common, ConfigArgument, OutputOption, seconds, with_common
+from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.report.forms import Form
 
 if TYPE_CHECKING:

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+import os
+
 from cpfls_cli.cli.interrupts import interruptible, leave_on_interrupt
-from cpfls_cli.cli.threads import use_one_thread
+
+_LIMITS = (
+    "OPENBLAS_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
 
 
 def run() -> None:
@@ -14,3 +23,8 @@ def run() -> None:
 
     with interruptible():
         app(prog_name="cpfls")
+
+
+def use_one_thread() -> None:
+    """Limit linear algebra to one thread; its libraries read the limit when they load, so call this before."""
+    os.environ.update(dict.fromkeys(_LIMITS, "1"))

@@ -1,9 +1,10 @@
-"""Options that every command takes, declared once."""
+"""Options that every command takes, declared once, and durations as values of options."""
 
 from __future__ import annotations
 
 import functools
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -18,6 +19,7 @@ ConfigArgument = Annotated[Path, typer.Argument(metavar="CONFIG", help="Study co
 OutputOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE", help="File to write.", show_default=False)
 ]
+_UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
 @dataclass(frozen=True)
@@ -78,3 +80,25 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return wrapped
+
+
+def seconds(text: str) -> float:
+    """Read a duration, such as ``90``, ``90s``, ``10m`` or ``2h``.
+
+    Returns
+    -------
+    float, s
+
+    Raises
+    ------
+    typer.BadParameter
+        If it is none, or not more than zero.
+    """
+    unit = _UNITS.get(text[-1:])
+    try:
+        value = float(text if unit is None else text[:-1]) * (unit or 1.0)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise typer.BadParameter(f"{text!r} is no duration; write 90, 90s, 10m or 2h")
+    return value

@@ -1,4 +1,4 @@
-"""What the program says: results on standard output, progress and messages on standard error."""
+"""Output of the program: results on standard output; progress, messages and narration on standard error."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -127,3 +129,40 @@ def _mute_output() -> None:
 def _complain(text: str, kind: str = "error") -> None:
     for line in text.splitlines() or [""]:
         print(f"cpfls: {kind}: {line}", file=sys.stderr)
+
+
+@dataclass(frozen=True)
+class Narration:
+    """Tell on standard error which files a command works on, where it is asked to.
+
+    Attributes
+    ----------
+    title : str
+        The command.
+    wanted : bool
+        Whether to say anything at all.
+    started : float, s
+        When the command started, by a clock that only goes forward.
+    """
+
+    title: str
+    wanted: bool
+    started: float = field(default_factory=time.perf_counter)
+
+    def reads(self, path: Path) -> None:
+        """Say that a file is read."""
+        self._say(f"reads {path}{_size(path)}")
+
+    def wrote(self, path: Path) -> None:
+        """Say that a file was written, and how long it took since the command started."""
+        self._say(f"wrote {path}{_size(path)} in {time.perf_counter() - self.started:.2f} s")
+
+    def _say(self, text: str) -> None:
+        if self.wanted:
+            print(f"{self.title}: {text}", file=sys.stderr)
+
+
+def _size(path: Path) -> str:
+    from rich.filesize import decimal
+
+    return f" ({decimal(path.stat().st_size)})" if path.is_file() else ""

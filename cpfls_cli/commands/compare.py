@@ -13,8 +13,7 @@ from cpfls_cli.artifacts.flights_file import flights_data
 from cpfls_cli.artifacts.formats import DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish_data
 from cpfls_cli.artifacts.store import Artifact
-from cpfls_cli.config.resolved import generator
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.recordings import Flights, read_flights

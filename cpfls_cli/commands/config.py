@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from cpfls_cli.config.commented import commented_default
+from cpfls_cli.config.keys import commented_default
 from cpfls_cli.config.load import load_study, validate
-from cpfls_cli.config.resolved import resolved, resolved_yaml
+from cpfls_cli.config.study import resolved, resolved_yaml
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.report.outcome import Outcome
 

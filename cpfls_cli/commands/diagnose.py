@@ -14,8 +14,7 @@ from cpfls_cli.artifacts.formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.job import Job, begin, finish_data
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.commands.compare import check_ignored, flight_roles, progress_of
-from cpfls_cli.config.resolved import generator
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.flights.same_vehicle import require_vehicle_of

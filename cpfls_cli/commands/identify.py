@@ -17,8 +17,7 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.validation_file import validation_data
 from cpfls_cli.commands.stopped import stopped, without_model
 from cpfls_cli.commands.validating import gather_evidence, verdict_lines, verdict_summary, without_evidence
-from cpfls_cli.config.resolved import generator, settings_of
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.flights.choosing import choosing_roles, choosing_source
 from cpfls_cli.flights.flight_source import flight_source

@@ -13,8 +13,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import FLIGHT
 from cpfls_cli.artifacts.job import Job, begin, finish_data
-from cpfls_cli.config.resolved import settings_of
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.errors import CpflsError
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import ImportedFlight

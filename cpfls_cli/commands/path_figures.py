@@ -7,7 +7,7 @@ from pathlib import Path
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.output import check_output, write_text
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.config.resolved import resolved
+from cpfls_cli.config.study import resolved
 from cpfls_cli.pages.figures.attitude import attitude_figure
 from cpfls_cli.pages.figures.derivatives import derivatives_figure
 from cpfls_cli.pages.figures.rotation import rotation_figure

@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.selection import SelectionRecord
-from cpfls_cli.config.resolved import generator, settings_of
+from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.training import flight_roles, split_training, uniform_regressor
 from cpfls_cli.pages.selection import answer

@@ -11,7 +11,7 @@ from cpfls_cli.artifacts.job import Job, begin
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.store import read_any
 from cpfls_cli.config.load import validate
-from cpfls_cli.config.resolved import resolved
+from cpfls_cli.config.study import resolved
 from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.pages.page import Page, report_page
 from cpfls_cli.pages.source import Source, Sources, unique_labels

@@ -12,8 +12,7 @@ from cpfls_cli.artifacts.job import Job, begin, finish_data
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands import tracking
 from cpfls_cli.commands.model_in_flight import model_in_flight
-from cpfls_cli.config.resolved import generator, settings_of
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.sources import read_with
 from cpfls_cli.pages.flown import closed_loop_outcome, effect_record, exact_outcome, noise_record, violation_sentence

@@ -14,8 +14,7 @@ from cpfls_cli.artifacts.model_file import read_model
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.tracking_file import logged_signals, tracking_data
 from cpfls_cli.commands.tracking_setup import controllers_of, loop_of, planned_torque
-from cpfls_cli.config.resolved import generator, settings_of
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.control import Plan, flown_signals, plan_of, scores, start_of, track
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.sources import read_with

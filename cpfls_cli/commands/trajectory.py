@@ -11,8 +11,7 @@ from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.artifacts.trajectory_file import trajectory_data, trajectory_outcome, with_excitation
 from cpfls_cli.commands.flyable_check import PlanAt, checked_plan, remedy
 from cpfls_cli.commands.path_figures import check_figures, write_figures
-from cpfls_cli.config.resolved import generator, settings_of
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.excitation import Excitation, optimised_rotation
 from cpfls_cli.report.outcome import Outcome, nothing_written

@@ -9,7 +9,7 @@ from typing import Any
 
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.commands.stopped import FROM_SIGNAL
-from cpfls_cli.config.resolved import generator, settings_of
+from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.flights.training import TrainingData
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.results import Identification

@@ -1,21 +1,32 @@
-"""The keys of a config, read off the settings classes: names, defaults and one line on each."""
+"""The keys of a config, read off the settings classes, and the commented default that is its reference."""
 
 from __future__ import annotations
 
+import textwrap
 import types
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, get_type_hints
 
 from typing_extensions import Doc
 
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, resolved
+from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
 
 Choice = str | int | None
-
 _ENTRIES = {tuple, list, dict, Mapping}
 _UNIONS = {Union, types.UnionType}
+_WIDTH = 110
+_EXAMPLES: Final = MappingProxyType(
+    {
+        "signals": (
+            "attitude: {columns: [roll, pitch, yaw], unit: deg}",
+            "body_torque: {columns: [mx, my, mz], unit: N mm, sign: [1, -1, -1]}",
+        )
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -136,3 +147,45 @@ def _entries(hint: Any) -> tuple[Choice, ...]:
     if get_origin(hint) is Annotated:
         return _entries(get_args(hint)[0])
     return _choices(get_args(hint)[0]) or () if get_origin(hint) in {dict, Mapping, tuple} else ()
+
+
+def commented_default() -> str:
+    """Write the default study as YAML with comments on every key: what it is, and what values it may have."""
+    return "\n".join(_commented(Study, resolved(Study()), 0)) + "\n"
+
+
+def _commented(settings: type, data: dict[str, Any], depth: int) -> Iterator[str]:
+    indent = "  " * depth
+    for key in keys_of(settings):
+        value = data[key.name]
+        if key.section is not None and isinstance(value, dict) and set(value) == {k.name for k in keys_of(key.section)}:
+            yield f"{indent}{key.name}:  # {key.doc}" if key.doc else f"{indent}{key.name}:"
+            yield from _commented(key.section, value, depth + 1)
+            continue
+        yield from (f"{indent}# {line}" for line in _comment(key))
+        yield from (indent + line for line in to_yaml({key.name: value}).rstrip("\n").split("\n"))
+
+
+def _comment(key: Key) -> Iterator[str]:
+    if key.doc:
+        yield key.doc
+    yield from _listed("one of", key.choices)
+    yield from _listed("names:", key.entries)
+    for below in keys_of(key.section) if key.section is not None else ():
+        yield f"  {below.name}: {below.doc}"
+        yield from (f"    {line}" for line in _listed("one of", below.choices))
+    if key.name in _EXAMPLES:
+        yield "example, to stand below the key instead of {}:"
+        yield from (f"  {line}" for line in _EXAMPLES[key.name])
+
+
+def _listed(words: str, values: Sequence[Choice]) -> list[str]:
+    listed = ", ".join(map(_written, values))
+    return textwrap.wrap(f"{words} {listed}", _WIDTH, break_on_hyphens=False) if values else []
+
+
+def _written(value: Choice) -> str:
+    """Write a value as it must stand in a config: text that reads as a number needs quotes."""
+    if value is None:
+        return "null"
+    return str(value) if parse_yaml(str(value), "choices") == value else f"'{value}'"

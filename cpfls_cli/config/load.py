@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from cpfls_cli.config.checked import checked
-from cpfls_cli.config.overrides import apply_override
+from cpfls_cli.config.check import checked
+from cpfls_cli.config.overrides import apply_override, setting_errors
 from cpfls_cli.config.study import Study
-from cpfls_cli.config.variants import setting_errors
 from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.errors import ConfigError
 

@@ -1,16 +1,23 @@
-"""Overrides from the command line: ``section.key=value``, the value read as YAML."""
+"""Overrides of a config: from the command line, and those of the settings of a sweep."""
 
 from __future__ import annotations
 
 import copy
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from cpfls_cli.config.resolved import resolved
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.check import checked
+from cpfls_cli.config.study import Study, resolved
 from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.errors import ConfigError, SettingError
 
 _MALFORMED = "write section.key=value"
+AS_CONFIGURED = "as configured"
+_SWEEP = "sweep"
+_ALLOWED = ("reduction", "identification")
+_PRESET = "identification.preset"
 
 
 def apply_override(data: dict[str, Any], override: str) -> None:
@@ -83,3 +90,113 @@ def _index(place: list[Any], name: str, key: str) -> int:
     if not name.isdecimal() or int(name) >= len(place):
         raise SettingError(key, f"'{name}' is not an index of a list of {len(place)}, which count from 0")
     return int(name)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One setting of a sweep.
+
+    Attributes
+    ----------
+    overrides : tuple of str
+        ``section.key=value`` each; as options of ``--set`` they make the same study of the same config.
+    study : Study
+        Without a sweep of its own.
+    reduced : bool
+        Whether it learns from a reduced set, not from all samples that train.
+    """
+
+    name: str
+    overrides: tuple[str, ...]
+    study: Study
+    reduced: bool
+
+
+def variants(study: Study) -> tuple[Variant, ...]:
+    """Make the studies of a sweep.
+
+    Returns
+    -------
+    tuple of Variant
+        In the order of the config; the study itself where it names no settings.
+
+    Raises
+    ------
+    ConfigError
+        If a setting is wrong; never for a study that was validated with its sweep.
+    """
+    data, common = resolved(study), study.sweep.set
+    if not study.sweep.settings:
+        return (_variant(data, AS_CONFIGURED, common),)
+    return tuple(_variant(data, setting.name, common | setting.set) for setting in study.sweep.settings)
+
+
+def setting_errors(data: Mapping[str, Any], source: str, known: Sequence[str]) -> list[str]:
+    """Find what is wrong with the settings of a sweep, each in the place where it overrides the config.
+
+    Parameters
+    ----------
+    data : mapping
+        Plain data of a config.
+    source : str
+        Name of the file, for messages.
+    known : sequence of str
+        What is wrong without them; said once.
+
+    Returns
+    -------
+    list of str
+        One line for each wrong key of each setting.
+    """
+    sweep = data.get(_SWEEP)
+    common = _mapping(_mapping(sweep).get("set"))
+    settings = _mapping(sweep).get("settings")
+    everywhere = _wrong(data, source, common)
+    found = {} if settings else {f"{_SWEEP}.set: {line}": None for line in everywhere}
+    for number, setting in enumerate(settings if isinstance(settings, list) else ()):
+        for line in _wrong(data, source, common | _mapping(_mapping(setting).get("set"))):
+            found[f"{_SWEEP}.{'' if line in everywhere else f'settings.{number}.'}set: {line}"] = None
+    said = {line.removeprefix(f"{source}: ") for line in known}
+    return [f"{source}: {line}" for line in found if line.split(": ", 1)[1] not in said]
+
+
+def _mapping(data: Any) -> dict[str, Any]:
+    """Pass over what is no mapping; that is complained of elsewhere."""
+    return data if isinstance(data, dict) else {}
+
+
+def _wrong(data: Mapping[str, Any], source: str, overrides: Mapping[str, Any]) -> list[str]:
+    """Say what is wrong with a config whose keys are overridden."""
+    try:
+        return [line.removeprefix(f"{source}: ") for line in checked(_overridden(data, overrides)[0], source)[1]]
+    except SettingError as error:
+        return [f"{error.key} = {json.dumps(overrides[error.key])}: {error}"]
+
+
+def _variant(data: Mapping[str, Any], name: str, overrides: Mapping[str, Any]) -> Variant:
+    overridden, reduced = _overridden(data, overrides)
+    study, errors = checked(overridden, name)
+    if study is None:
+        raise ConfigError("\n".join(errors))
+    return Variant(name, tuple(f"{key}={json.dumps(value)}" for key, value in overrides.items()), study, reduced)
+
+
+def _overridden(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> tuple[dict[str, Any], bool]:
+    """Override keys of a config, and tell whether it is still reduced."""
+    result = copy.deepcopy({key: value for key, value in data.items() if key != _SWEEP})
+    for key, value in overrides.items():
+        if key.split(".")[0] not in _ALLOWED:
+            raise SettingError(key, f"a setting of a sweep overrides keys of {' and '.join(_ALLOWED)} only")
+        if key in _ALLOWED:
+            raise SettingError(key, f"is a section; name its keys one by one, with a dot: {key}.KEY")
+        if key == _PRESET:
+            raise SettingError(key, "speaks for keys that the config leaves out; name the keys that differ")
+        override_key(result, key, value)
+    reduction = result.get("reduction")
+    if not isinstance(reduction, dict) or reduction.get("size", 0) is not None or reduction.get("condition_number"):
+        return result, True
+    # A reduction that nothing stops is none; its size is not used.
+    if "reduction.size" in overrides or "reduction.condition_number" in overrides:
+        del reduction["size"]
+        return result, False
+    return result, True

@@ -1,13 +1,20 @@
-"""One study: the settings of every section, composed and validated together."""
+"""One study: the settings of every section, validated together, written out again, and named in messages."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from typing_extensions import Doc
 
 from cpfls_cli.config.report_settings import ReportSettings
+from cpfls_cli.config.yaml_text import to_yaml
+from cpfls_cli.errors import ConfigError, SettingError
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.identification.settings import IdentificationSettings
@@ -16,6 +23,9 @@ from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.settings import VehicleSettings
+
+SECTIONS = ("vehicle", "trajectory", "simulation", "import", "reduction", "identification", "sweep", "gap", "report")
+"""The sections of a config, in the order of the pipeline."""
 
 
 class Study(BaseModel):
@@ -41,5 +51,76 @@ class Study(BaseModel):
     report: Annotated[ReportSettings, Doc("what `cpfls report` shows")] = ReportSettings()
 
 
-SECTIONS = ("vehicle", "trajectory", "simulation", "import", "reduction", "identification", "sweep", "gap", "report")
-"""The sections of a config, in the order of the pipeline."""
+def resolved(study: Study, sections: Sequence[str] = ()) -> dict[str, Any]:
+    """Write a study as plain data with every default filled in.
+
+    Parameters
+    ----------
+    sections : sequence of str
+        Only these sections or single keys (``section.key``), and the seed; all if empty.
+
+    Raises
+    ------
+    ConfigError
+        If a section or key does not exist.
+    """
+    data: dict[str, Any] = study.model_dump(mode="json", by_alias=True)
+    if not sections:
+        return data
+    kept: dict[str, Any] = {"seed": data["seed"]}
+    for section in sections:
+        _copy(section.split("."), data, kept, section)
+    return kept
+
+
+def _copy(keys: list[str], source: Any, target: dict[str, Any], asked: str) -> None:
+    first, *rest = keys
+    if not isinstance(source, dict) or first not in source:
+        raise ConfigError(f"--section {asked}: no such section or key; the sections are {', '.join(SECTIONS)}")
+    if rest:
+        _copy(rest, source[first], target.setdefault(first, {}), asked)
+    else:
+        target[first] = source[first]
+
+
+def resolved_yaml(study: Study, sections: Sequence[str] = ()) -> str:
+    """Write a study as YAML with every default filled in.
+
+    Parameters
+    ----------
+    study, sections
+        See `resolved`.
+    """
+    return to_yaml(resolved(study, sections))
+
+
+@contextmanager
+def settings_of(section: str, study: Study) -> Iterator[None]:
+    """Name the config key and its value where the numerics refuse a setting that does not suit the data.
+
+    Parameters
+    ----------
+    section : str
+        Section of the config whose settings are in use.
+
+    Raises
+    ------
+    ConfigError
+    """
+    try:
+        yield
+    except SettingError as error:
+        key = f"{section}.{error.key}"
+        raise ConfigError(f"{key} = {json.dumps(_value(study, key))}: {error}") from None
+
+
+def _value(study: Study, key: str) -> Any:
+    value: Any = resolved(study, [key])
+    for part in key.split("."):
+        value = value[part]
+    return value
+
+
+def generator(study: Study, stage: str) -> np.random.Generator:
+    """Make the random generator of a stage, so that stages draw independently of each other."""
+    return np.random.default_rng([study.seed, zlib.crc32(stage.encode())])

@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.regressor import ModelStructure, Motion, Regressor, data_ranges, uniform_breakpoints
-from cpfls_cli.trajectory.rotation_path import RotationPath
+from cpfls_cli.trajectory.rotation import RotationPath
 
 # Share of the largest eigenvalue below which an eigenvalue of a Gram matrix is rounding error.
 _ROUNDING = 1e-15

@@ -10,8 +10,7 @@ from cpfls_cli.excitation.motion_gradient import motion_gradient
 from cpfls_cli.excitation.regressor_gradient import regressor_gradient
 from cpfls_cli.excitation.variables import design
 from cpfls_cli.regressor import ModelStructure
-from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_path import RotationMotion, RotationPath
+from cpfls_cli.trajectory.rotation import RotationLimits, RotationMotion, RotationPath
 
 # In the course of the descent: from all eigenvalues to the extremes, and from limits that give way to hard ones.
 _EXPONENTS, _COSTS = (1.0, 16.0), (100.0, 3000.0)

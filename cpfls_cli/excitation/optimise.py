@@ -13,10 +13,8 @@ from cpfls_cli.excitation.conditioning import condition_number
 from cpfls_cli.excitation.objective import Objective
 from cpfls_cli.excitation.variables import path_of, variables_of
 from cpfls_cli.regressor import ModelStructure, StructureSettings, model_structure
-from cpfls_cli.trajectory.rotation import full_rotation
-from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_path import RotationPath
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 Progress = Callable[[int, int, str], None]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.trajectory.rotation_path import RotationPath
+from cpfls_cli.trajectory.rotation import RotationPath
 
 
 @dataclass(frozen=True)

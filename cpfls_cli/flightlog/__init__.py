@@ -1,13 +1,9 @@
 """Flight logs of others: columns become signals on one clock, aligned, filtered and differentiated."""
 
-from cpfls_cli.flightlog.alignment import align_commands
-from cpfls_cli.flightlog.delay import estimate_delay
-from cpfls_cli.flightlog.deriving import derive_flight
-from cpfls_cli.flightlog.importing import import_log
-from cpfls_cli.flightlog.reading import read_signals
+from cpfls_cli.flightlog.alignment import align_commands, estimate_delay
+from cpfls_cli.flightlog.importing import derive_flight, import_log, read_signals
 from cpfls_cli.flightlog.results import DelayEstimate, ImportedFlight, ImportReport, LogSignals
-from cpfls_cli.flightlog.settings import ImportSettings
-from cpfls_cli.flightlog.signal_map import SignalMap, SignalName
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap, SignalName
 
 __all__ = [
     "DelayEstimate",

@@ -3,16 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
+from math import pi
+from typing import Any
 
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.alignment import align_commands
-from cpfls_cli.flightlog.deriving import derive_flight
-from cpfls_cli.flightlog.following import followed
-from cpfls_cli.flightlog.reading import read_signals
-from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
+from cpfls_cli.errors import ComputationError, InputError, SettingError
+from cpfls_cli.flightlog.alignment import align_commands, followed
+from cpfls_cli.flightlog.clock import longest_stretch
+from cpfls_cli.flightlog.columns import of_present_signals, select_columns
+from cpfls_cli.flightlog.frames import to_program_frames
+from cpfls_cli.flightlog.quality import (
+    count_values,
+    refuse_steep_pitch,
+    warn_of_angles,
+    warn_of_disagreement,
+    warn_of_values,
+)
+from cpfls_cli.flightlog.repair import Table, fill, find_table_spikes, in_order_and_cropped, made_continuous, without
+from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
+
+_STEEPEST_PITCH = pi / 2 - pi / 180
+_LARGEST_REFINEMENT = 10
+_FEWEST_SAMPLES = 10
 
 
 def import_log(
@@ -51,3 +70,178 @@ def import_log(
             raise InputError(f"import.torque_source = {settings.torque_source} needs a vehicle")
         signals = replace(signals, body_torque=rotor_torque(signals))
     return derive_flight(align_commands(signals, settings, delay_share), settings)
+
+
+def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogSignals:
+    """Read the mapped columns of a log, drop and repair what is bad, and put all on one uniform clock.
+
+    Parameters
+    ----------
+    columns : mapping from str to array, shape (sample,)
+        The log.
+    settings : ImportSettings
+        The section `import`.
+
+    Returns
+    -------
+    LogSignals
+        At the log's median rate, time from 0; neither shifted nor filtered. A torque that the rotors are to
+        give is still None.
+
+    Raises
+    ------
+    SettingError
+        If the crop leaves fewer than two rows.
+    InputError
+        If columns are missing, too few signals are left, a gap is too long, the clock goes backward and stays
+        behind, or the pitch is larger than any pitch.
+    """
+    settings = of_present_signals(columns, settings)
+    read = Table(*select_columns(columns, settings))
+    table, dropped = in_order_and_cropped(read, settings)
+    table = made_continuous(table)
+    spikes = find_table_spikes(table, settings)
+    repaired = table if settings.spike_deviations is None else without(table, spikes)
+    stretch = longest_stretch(table.time, np.isfinite(repaired.columns()), settings)
+    dropped |= {"incomplete_ends": stretch.incomplete_ends, "gap": stretch.beyond_gap}
+    table, repaired = table.rows(stretch.rows), repaired.rows(stretch.rows)
+    counts = count_values(table, {name: marked[stretch.rows] for name, marked in spikes.items()}, settings)
+    clock, rate_hz = _uniform_clock(table.time)
+    on_clock = {name: fill(table.time, values, clock) for name, values in repaired.signals.items()}
+    refuse_steep_pitch(on_clock)
+    gaps, longest_gap_s = _gaps(table.time)
+    report = ImportReport(
+        samples_read=len(read.time),
+        samples=len(clock),
+        dropped=dropped,
+        missing=counts.missing,
+        spikes=counts.spikes,
+        suspected_spikes=counts.suspected_spikes,
+        saturated=counts.saturated,
+        gaps=gaps,
+        longest_gap_s=longest_gap_s,
+        span_s=(float(clock[0]), float(clock[-1])),
+        log_rate_hz=rate_hz,
+        rate_hz=rate_hz,
+        warnings=(*warn_of_values(counts), *_warn_of_gap(stretch.beyond_gap), *warn_of_angles(read.signals)),
+    )
+    return LogSignals(time=clock - clock[0], report=report, **to_program_frames(on_clock, settings))
+
+
+def _uniform_clock(time: Array) -> tuple[Array, float]:
+    period = float(np.median(np.diff(time)))
+    # A whole number of periods that rounding made a little short must not lose its last sample.
+    samples = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1
+    return time[0] + period * np.arange(samples), 1 / period
+
+
+def _gaps(time: Array) -> tuple[int, float]:
+    steps = np.diff(time)
+    return int((steps > 1.5 * np.median(steps)).sum()), float(steps.max())
+
+
+def _warn_of_gap(rows: int) -> list[str]:
+    return [f"{rows} rows beyond a gap are not used"] if rows else []
+
+
+def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:
+    """Filter all signals alike and derive rates, accelerations and torques.
+
+    One filter for every signal keeps the torque equation: its linear part holds between filtered signals as it did
+    between the raw ones. The result is interpolated to `rate_hz` last.
+
+    Parameters
+    ----------
+    signals : LogSignals
+        With the body torque, aligned.
+    settings : ImportSettings
+        `lowpass_hz`, `lowpass_order` and `rate_hz`.
+
+    Raises
+    ------
+    SettingError
+        If the cut-off is not below half of the log's rate, or `rate_hz` leaves next to no samples or is more than ten
+        times the log's.
+    ComputationError
+        If the pitch comes within a degree of +-90 degrees, where Euler rates are not defined.
+
+    References
+    ----------
+    Section 1 of the method's description.
+    """
+    smooth = _filtered(signals, settings)
+    arrays = _arrays(smooth) | _derived(smooth)
+    time = smooth.time
+    report = replace(signals.report, lowpass_hz=settings.lowpass_hz, warnings=_warnings(signals))
+    if settings.rate_hz is not None:
+        time = _clock(time, settings.rate_hz, report.log_rate_hz)
+        arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
+        report = replace(
+            report,
+            rate_hz=settings.rate_hz,
+            samples=len(time),
+            warnings=report.warnings + _warn_of_aliasing(settings, report.log_rate_hz),
+        )
+    return ImportedFlight(time=time, report=report, **arrays)
+
+
+def _warnings(signals: LogSignals) -> tuple[str, ...]:
+    if signals.attitude is None or signals.body_rate is None:
+        return signals.report.warnings
+    return signals.report.warnings + warn_of_disagreement(signals.time, signals.attitude, signals.body_rate)
+
+
+def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
+    samples = int(time[-1] * rate_hz + 1e-6) + 1
+    if rate_hz > _LARGEST_REFINEMENT * log_rate_hz or samples < _FEWEST_SAMPLES:
+        raise SettingError(
+            "rate_hz",
+            f"does not suit {time[-1]:.4g} s of flight at {log_rate_hz:.4g} Hz; at most {_LARGEST_REFINEMENT} times the"
+            f" log's rate, and {_FEWEST_SAMPLES} samples at least",
+        )
+    return np.arange(samples) / rate_hz
+
+
+def _arrays(signals: LogSignals) -> dict[str, Array]:
+    names = {entry.name for entry in fields(signals)} - {"time", "report"}
+    return {name: getattr(signals, name) for name in sorted(names) if getattr(signals, name) is not None}
+
+
+def _filtered(signals: LogSignals, settings: ImportSettings) -> LogSignals:
+    rate_hz = signals.report.log_rate_hz
+    smooth: dict[str, Any] = {
+        name: low_pass(values, rate_hz, settings.lowpass_hz, settings.lowpass_order)
+        for name, values in _arrays(signals).items()
+    }
+    return replace(signals, **smooth)
+
+
+def _derived(signals: LogSignals) -> dict[str, Array]:
+    derived: dict[str, Array] = {}
+    body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
+    if body_rate is not None:
+        derived["body_rate"] = body_rate
+    if signals.attitude is None or body_rate is None:
+        return derived
+    _require_regular(signals.time, signals.attitude)
+    attitude_rate = rotations.attitude_rate(signals.attitude, body_rate)
+    derived |= {"attitude_rate": attitude_rate, "attitude_acceleration": derivative(signals.time, attitude_rate)}
+    if signals.body_torque is not None:
+        derived["torque"] = rotations.generalised_torque(signals.attitude, signals.body_torque)
+    return derived
+
+
+def _require_regular(time: Array, attitude: Array) -> None:
+    steep = np.flatnonzero(np.abs(attitude[:, 1]) > _STEEPEST_PITCH)
+    if len(steep):
+        raise ComputationError(
+            f"the pitch comes within a degree of +-90 degrees at {time[steep[0]]:.3f} s of the flight, where"
+            " Euler rates are not defined: cut that part off with import.crop_s"
+        )
+
+
+def _warn_of_aliasing(settings: ImportSettings, log_rate_hz: float) -> tuple[str, ...]:
+    rate, cutoff = settings.rate_hz, settings.lowpass_hz
+    if rate is None or rate >= log_rate_hz * 0.99 or (cutoff is not None and cutoff < rate / 2):
+        return ()
+    return ("the log is thinned without import.lowpass_hz below half of the new rate: noise is folded into the flight",)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
 
@@ -64,3 +65,22 @@ def derivative(time: Array, values: Array) -> Array:
     """
     slopes: Array = CubicSpline(time, values).derivative()(time)
     return slopes
+
+
+def body_rate_of(time: Array, attitude: Array | None, measured: Array | None) -> Array | None:
+    """Take the measured body rates, or derive them from the attitude, ``omega = W(q) dq/dt``.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+    attitude : array, shape (time, 3), rad, or None
+    measured : array, shape (time, 3), rad/s, body frame, or None
+
+    Returns
+    -------
+    array, shape (time, 3), rad/s, body frame, or None
+        None where there is neither.
+    """
+    if measured is not None or attitude is None:
+        return measured
+    return rotations.body_rate(attitude, derivative(time, attitude))

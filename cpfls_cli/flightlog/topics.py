@@ -8,22 +8,21 @@ from math import pi
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.clock import increasing_rows
 from cpfls_cli.flightlog.repair import same_sign, without_jumps
-from cpfls_cli.flightlog.resampling import held, interpolated
-from cpfls_cli.flightlog.settings import ImportSettings
-from cpfls_cli.flightlog.signal_map import SignalMap
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.units import known_unit
 
 Topics = Mapping[str, Mapping[str, Array]]
-
 STAMP = "timestamp"
 """The field of a topic that says when."""
-
 _SETPOINTS = ("torque", "body_torque", "thrust", "rotor_command")
 _ANGLES_THAT_JUMP = (0, 2)
 _THINNED = 1.5
+# Stamps are rounded, so a pause of exactly the allowed length must pass.
+_ROUNDING = 1 + 1e-9
 
 
 def topic_and_field(column: str) -> tuple[str, str]:
@@ -117,3 +116,61 @@ def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]
 
 def _step(time: Array) -> float:
     return float(np.median(np.diff(time))) if len(time) > 1 else float("inf")
+
+
+def interpolated(time: Array, values: Array, target: Array, longest_s: float) -> Array:
+    """Interpolate linearly.
+
+    Parameters
+    ----------
+    time, values : array, shape (sample,)
+        Stamps, s, and values; those that are not finite are absent.
+    target : array, shape (row,), s
+        When values are wanted.
+    longest_s : float
+        Longest step between samples that is bridged, s.
+
+    Returns
+    -------
+    array, shape (row,)
+        NaN before the first sample, after the last and in longer steps.
+    """
+    time, values = _present(time, values)
+    if not len(time):
+        return np.full(len(target), np.nan)
+    return np.where(_bridged(time, target, longest_s), np.interp(target, time, values), np.nan)
+
+
+def held(time: Array, values: Array, target: Array, longest_s: float) -> Array:
+    """Keep the previous value.
+
+    Parameters
+    ----------
+    time, values, target, longest_s
+        See `interpolated`.
+
+    Returns
+    -------
+    array, shape (row,)
+        NaN before the first sample, after the last and in longer steps.
+    """
+    time, values = _present(time, values)
+    if not len(time):
+        return np.full(len(target), np.nan)
+    previous = np.maximum(np.searchsorted(time, target, side="right") - 1, 0)
+    return np.where(_bridged(time, target, longest_s), values[previous], np.nan)
+
+
+def _present(time: Array, values: Array) -> tuple[Array, Array]:
+    finite = np.isfinite(values)
+    rows, _ = increasing_rows(time[finite])
+    return time[finite][rows], values[finite][rows]
+
+
+def _bridged(time: Array, target: Array, longest_s: float) -> BoolArray:
+    """Mark the targets at a sample, or between two that are near enough."""
+    after = np.searchsorted(time, target, side="left")
+    nearest = np.minimum(after, len(time) - 1)
+    between = (after > 0) & (after < len(time))
+    near = np.diff(time, prepend=time[0])[nearest] <= longest_s * _ROUNDING
+    return np.asarray((time[nearest] == target) | (between & near), dtype=bool)

@@ -17,7 +17,7 @@ from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.motion import body_rate_of
+from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flights.log_quality import found_and_done
 from cpfls_cli.flights.rotor_torque import commanded_speed
 from cpfls_cli.flights.same_vehicle import require_same_vehicle

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.report.outcome import Outcome
 from cpfls_cli.simulation import FlownEffects, MeasuredFlight, SimulatedFlight
-from cpfls_cli.vehicle.violations import RotorViolation
+from cpfls_cli.vehicle.rotors import RotorViolation
 
 
 def exact_outcome(flight: SimulatedFlight, time: Array, problems: tuple[str, ...]) -> Outcome:

@@ -11,9 +11,8 @@ import numpy as np
 
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.config.resolved import generator, settings_of
-from cpfls_cli.config.study import Study
-from cpfls_cli.config.variants import Variant
+from cpfls_cli.config.overrides import Variant
+from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.flights.training import SplitFlights, TrainingData, split_training, uniform_regressor
 from cpfls_cli.identification.data import gathered
 from cpfls_cli.reduction.streamed import check_streamed, reduce_streamed

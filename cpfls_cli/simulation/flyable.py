@@ -10,9 +10,8 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.simulation.collective import collective_thrust
 from cpfls_cli.vehicle.rigid_body import body_torque, inertia_tensor
-from cpfls_cli.vehicle.rotors import rotor_demand
+from cpfls_cli.vehicle.rotors import RotorViolation, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.vehicle.violations import RotorViolation
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from cpfls_cli.simulation.flown_model import FlownModel
 from cpfls_cli.simulation.plant import ATTITUDE, POSITION
 from cpfls_cli.simulation.sensors import logged
 from cpfls_cli.simulation.settings import SimulationSettings
+from cpfls_cli.vehicle.rotors import RotorViolation, violations
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.vehicle.violations import RotorViolation, violations
 
 
 @dataclass(frozen=True)

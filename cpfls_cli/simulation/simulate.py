@@ -14,9 +14,8 @@ from cpfls_cli.simulation.collective import collective_thrust
 from cpfls_cli.simulation.noise import noisy
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.vehicle.rigid_body import body_torque, inertia_tensor, torque
-from cpfls_cli.vehicle.rotors import rotor_demand
+from cpfls_cli.vehicle.rotors import RotorViolation, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.vehicle.violations import RotorViolation
 
 
 @dataclass(frozen=True)

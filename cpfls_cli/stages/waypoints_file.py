@@ -10,7 +10,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.stages.table import read_csv, row_lines
-from cpfls_cli.trajectory.waypoint_settings import WaypointSettings, check_waypoints
+from cpfls_cli.trajectory.consistency import check_waypoints
+from cpfls_cli.trajectory.settings import WaypointSettings
 
 _POSITION = ("x_m", "y_m", "z_m")
 _OPTIONAL = ("yaw_rad", "pause_s")

@@ -1,15 +1,11 @@
 """Smooth paths in space, the attitude they ask of a multirotor, and attitude paths of full rotations."""
 
-from cpfls_cli.trajectory.held import held_rotation
 from cpfls_cli.trajectory.limits import Limits
 from cpfls_cli.trajectory.moves import Move, Moves
-from cpfls_cli.trajectory.path import plan
-from cpfls_cli.trajectory.planned import PlannedRotation, Trajectory
+from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rotation, plan
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, Peaks, covering
-from cpfls_cli.trajectory.rotation import full_rotation
-from cpfls_cli.trajectory.rotation_path import RotationPath
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
-from cpfls_cli.trajectory.settings import TrajectorySettings
+from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings, TrajectorySettings
 from cpfls_cli.trajectory.time_optimal import plan_move, plan_moves
 
 __all__ = [

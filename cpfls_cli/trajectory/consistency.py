@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.trajectory.clock import check_duration, check_samples
 from cpfls_cli.trajectory.profile import BaseProfile
-from cpfls_cli.trajectory.waypoint_settings import check_waypoints
 
 if TYPE_CHECKING:
-    from cpfls_cli.trajectory.settings import TrajectorySettings
+    from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
 
 _LARGEST_PEAK = 1e100
 _MAY_JUMP = ("crackle", "pop")
+_LARGEST_SIZE = 10_000_000
 
 
 def check_consistency(settings: TrajectorySettings) -> None:
@@ -127,3 +128,72 @@ def check_peaks(profile: BaseProfile, key: str) -> None:
     if not value < _LARGEST_PEAK:
         message = f"a move with period_s = {profile.period:g} has {name} up to {value:.3g} in m and s: too large to"
         raise SettingError(key, f"{message} compute with; lower it, or raise period_s")
+
+
+def check_samples(duration: float, sample_time: float) -> None:
+    """Refuse a sample time that does not suit a duration.
+
+    Parameters
+    ----------
+    duration : float, s
+    sample_time : float, s
+
+    Raises
+    ------
+    SettingError
+        If there would be one sample, or more than memory holds.
+    """
+    if duration > _LARGEST_SIZE * sample_time:
+        raise SettingError("sample_time_s", f"makes more than {_LARGEST_SIZE} samples of {duration:g} s; raise it")
+    if sample_time > duration:
+        raise SettingError("sample_time_s", f"is longer than the whole path, which takes {duration:g} s")
+
+
+def check_duration(moves: int, needed: float, duration: float) -> None:
+    """Refuse a duration that the moves do not fit into.
+
+    Parameters
+    ----------
+    moves : int
+    needed : float, s
+        By all of them.
+    duration : float, s
+
+    Raises
+    ------
+    SettingError
+    """
+    if needed > duration * (1 + 1e-12):
+        words = f"{moves} moves take" if moves > 1 else "the move takes"
+        raise SettingError("duration_s", f"{words} {needed:g} s; raise it, or set it to null for as long as they take")
+
+
+def check_waypoints(waypoints: Sequence[WaypointSettings], paused: bool) -> None:
+    """Refuse points that make no path.
+
+    Parameters
+    ----------
+    waypoints : sequence of WaypointSettings
+    paused : bool
+        Whether the points may have pauses of their own.
+
+    Raises
+    ------
+    SettingError
+        If there are fewer than two, one repeats the one before, only some have a yaw, or one has a pause that it
+        must not have; it names the entry, counted from 0 as in all messages on a config.
+    """
+    if len(waypoints) < 2:
+        raise SettingError("waypoints", f"holds {len(waypoints)}; a path needs two or more, here or in a CSV file")
+    for number, (before, point) in enumerate(pairwise(waypoints), start=1):
+        if before.position_m == point.position_m:
+            message = "repeats the point before; take one out: a rest is pause_s, and no turn on the spot is planned"
+            raise SettingError(f"waypoints.{number}.position_m", message)
+    headings = [point.yaw_rad is None for point in waypoints]
+    if len(set(headings)) > 1:
+        message = "is missing while other points have a yaw; give it at all of them, or at none"
+        raise SettingError(f"waypoints.{headings.index(True)}.yaw_rad", message)
+    for number, point in enumerate(waypoints):
+        if point.pause_s and not paused:
+            message = "contradicts duration_s, which leaves what rest there is; set duration_s to null"
+            raise SettingError(f"waypoints.{number}.pause_s", message)

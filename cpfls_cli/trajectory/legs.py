@@ -1,14 +1,22 @@
-"""The rest-to-rest moves of a path, one after the other."""
+"""Legs of a path in space: the shape of a rest-to-rest move, axes that begin and end together, and legs in turn."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Literal
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.trajectory.profile import BaseProfile
+from cpfls_cli.errors import SettingError
+from cpfls_cli.trajectory.limits import Limits, LimitSettings
+from cpfls_cli.trajectory.moves import Move, Moves, Outcome, moves_of
+from cpfls_cli.trajectory.profile import BaseProfile, Holds, covering
+from cpfls_cli.trajectory.time_optimal import plan_move, plan_moves
+
+Measure = Literal["along-path", "per-axis"]
+Synchronisation = Literal["straight-line", "each-axis"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,3 +106,160 @@ def in_turn(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, slice]]:
     for leg, first, after in zip(legs, firsts[:-1], firsts[1:], strict=True):
         if first < after:
             yield leg, slice(int(first), int(after))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """How long a move takes: as its period and holds say, or as short as its limits allow.
+
+    Attributes
+    ----------
+    limits : LimitSettings
+    coordination : {"straight-line", "each-axis"}
+    period : float or None, s
+        None where the limits choose it.
+    holds : Holds
+        Where there are no limits.
+    measure : {"along-path", "per-axis"}
+        How long a displacement is, and what a limit that is one number for all axes holds for.
+    """
+
+    limits: LimitSettings
+    coordination: Synchronisation
+    period: float | None
+    holds: Holds
+    measure: Measure
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """Profiles of one move in space.
+
+    Attributes
+    ----------
+    profiles : tuple of BaseProfile
+    directions : array, shape (profiles, 3)
+        World vector that one metre of each profile moves along.
+    limited_by : tuple of str
+        Derivatives that reach their limit on any axis, or ``period`` where none does; empty where the move was not
+        planned under limits.
+    """
+
+    profiles: tuple[BaseProfile, ...]
+    directions: Array
+    limited_by: tuple[str, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Time from rest to rest, s."""
+        return max(profile.duration for profile in self.profiles)
+
+
+def unit_of(vector: Array, measure: Measure) -> tuple[float, Array]:
+    """Split a vector into its length, in a measure, and the vector of length 1.
+
+    Parameters
+    ----------
+    vector : array, shape (3,)
+        Not zero.
+    measure : {"along-path", "per-axis"}
+
+    Returns
+    -------
+    length : float
+    direction : array, shape (3,)
+    """
+    # Divided by the largest component first, so that no square overflows.
+    largest = float(np.abs(vector).max())
+    unit = vector / largest
+    length = 1.0 if measure == "per-axis" else float(np.sqrt(unit @ unit))
+    return largest * length, unit / length
+
+
+def shape_of(vector: Array, timing: Timing) -> Shape:
+    """Find the shape of the move over a displacement.
+
+    Parameters
+    ----------
+    vector : array, shape (3,), m, world frame
+        Not zero.
+    timing : Timing
+
+    Raises
+    ------
+    SettingError
+        If there is no smooth move under the limits; it names the key of the section `trajectory`.
+    """
+    length, direction = unit_of(vector, timing.measure)
+    if not timing.limits.given:
+        period = 1.0 if timing.period is None else timing.period
+        return Shape(profiles=(covering(length, period, timing.holds),), directions=direction[None])
+    if timing.coordination == "straight-line":
+        move = plan_move(length, timing.limits.along(direction), timing.period)
+        return _smooth((move,), direction[None])
+    axes = np.flatnonzero(vector)
+    moves = synchronised(vector[axes], timing.limits.of_axes(axes), timing.period, "each-axis")
+    return _smooth(moves, np.eye(3)[axes])
+
+
+def _smooth(moves: tuple[Move, ...], directions: Array) -> Shape:
+    """Refuse what has no attitude: its acceleration follows from the snap."""
+    for move in moves:
+        if not move.outcome.solved:
+            raise SettingError("limits", move.outcome.words)
+        if not np.isfinite(move.peaks.snap):
+            message = "leave the snap without limit, and with it the acceleration of the attitude; give a limit on"
+            raise SettingError("limits", f"{message} snap_m_s4, crackle_m_s5 or pop_m_s6, or a period_s")
+    # Where no limit is reached, the period that was given decides.
+    reached = dict.fromkeys(name for move in moves for name in move.active) or {"period": None}
+    profiles = tuple(move.profile for move in moves)
+    return Shape(profiles=profiles, directions=directions, limited_by=tuple(reached))
+
+
+def synchronised(
+    displacements: Array, limits: Limits, period: float | None = None, method: Synchronisation = "straight-line"
+) -> tuple[Move, ...]:
+    """Plan one move for each axis, all of the same duration.
+
+    Parameters
+    ----------
+    displacements : array, shape (axes,), m
+        Of any sign; an axis may stay where it is.
+    limits : Limits
+        One of each for all axes, or one for each axis.
+    period : float, s, optional
+        P, of the straight line, or of the slowest axis.
+    method : {"straight-line", "each-axis"}
+        One profile for all axes, which is the shortest that keeps the limits of each; or the shortest of every axis,
+        stretched in time to the slowest. Both take as long as the slowest axis alone, or longer; on a straight line
+        the slowest derivative of any axis may set the pace.
+
+    Raises
+    ------
+    SettingError
+        If a displacement is not finite, or a limit or the period is not greater than zero; it names the key.
+    """
+    covered = np.asarray(displacements, dtype=np.float64)
+    together = _straight_line if method == "straight-line" else _each_axis
+    moves = together(covered, limits, period)
+    return tuple(moves[axis] for axis in range(len(covered)))
+
+
+def _straight_line(displacements: Array, limits: Limits, period: float | None) -> Moves:
+    """Plan the fraction of the way, under the strictest limit of all axes."""
+    bounds = limits.broadcast(len(displacements))
+    largest = max(np.abs(displacements).max(initial=0.0), np.finfo(float).tiny)
+    shares = np.abs(displacements) / largest
+    with np.errstate(divide="ignore", over="ignore"):
+        strictest = (bounds / shares).min(axis=1, initial=np.inf)
+    names = (field.name for field in fields(Limits))
+    line = plan_moves(np.array([largest]), Limits(**dict(zip(names, strictest.tolist(), strict=True))), period)
+    outcome = np.where(displacements == 0, Outcome.ZERO_DISPLACEMENT, line.outcome)
+    return moves_of(displacements, line.spans, bounds, outcome)
+
+
+def _each_axis(displacements: Array, limits: Limits, period: float | None) -> Moves:
+    moves = plan_moves(displacements, limits, period)
+    taken = np.where(moves.outcome == Outcome.SOLVED, moves.duration, 0.0)
+    stretched = moves.spans * np.divide(taken.max(initial=0.0), taken, out=np.ones_like(taken), where=taken > 0)
+    return moves_of(displacements, stretched, limits.broadcast(len(displacements)), moves.outcome)

@@ -8,8 +8,8 @@ from enum import IntEnum
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.trajectory.closed_form import holds_of, peaks_of, spans_of
 from cpfls_cli.trajectory.limits import LIMIT_NAMES
-from cpfls_cli.trajectory.nesting import holds_of, peaks_of, spans_of
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, Peaks, covering
 
 # A peak this near to its limit, in parts of it, has reached it.

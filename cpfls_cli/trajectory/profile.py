@@ -8,8 +8,7 @@ from dataclasses import asdict, astuple, dataclass, fields
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.trajectory.nesting import peaks_of, spans_of
-from cpfls_cli.trajectory.sampling import sample
+from cpfls_cli.trajectory.closed_form import peaks_of, sample, spans_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
+from cpfls_cli.trajectory.closed_form import peaks_of
 from cpfls_cli.trajectory.limits import Limits, require_positive, spread
 from cpfls_cli.trajectory.moves import Move, Moves, Outcome, moves_of
-from cpfls_cli.trajectory.nesting import peaks_of
-from cpfls_cli.trajectory.ramps import shortest_spans
 
 # By how much a peak may lie above its limit, in parts of it.
 _ROUNDING = 1e-12
+# Spans of a rise without holds, in periods.
+_DOUBLING = np.array([1.0, 1.0, 2.0, 4.0, 8.0])[:, np.newaxis]
+# The start is within 7 % of the root, and every step squares the error.
+_NEWTON_STEPS = 5
 
 
 def plan_moves(displacement: Array, limits: Limits, period: float | Array | None = None) -> Moves:
@@ -96,3 +101,90 @@ def _kept(displacement: Array, bounds: Array, spans: Array) -> BoolArray:
     peaks = peaks_of(displacement, spans)
     kept: BoolArray = np.isfinite(duration) & (duration > 0)
     return kept & (peaks[1:] <= bounds * (1 + _ROUNDING)).all(axis=0)
+
+
+def shortest_spans(displacement: Array, limits: Array, period: Array | None) -> Array:
+    """Find the spans of the shortest move of the family.
+
+    Let ``S_k(x)`` be the shortest time in which derivative k (1 snap, 2 jerk, 3 acceleration, 4 velocity,
+    5 displacement) rises to x. It grows no faster than x, so that what is below is best raised as far as its
+    limit allows: if ``x >= L_m K (2 K)^n 2^(n (n - 1) / 2)``, with ``K = S_m(L_m)``, ``n = k - m - 1`` and the
+    highest such m, derivative m is held at its limit, nothing above is held, and
+    ``x = L_m t (K + t)^n 2^(n (n - 1) / 2)`` with the spans ``t, K + t, 2 (K + t), 4 (K + t)`` above m. If there
+    is no such m, nothing is held at all.
+
+    Parameters
+    ----------
+    displacement : array, shape (moves,), m
+        Greater than zero.
+    limits : array, shape (6, moves)
+        On velocity, acceleration, jerk, snap, crackle, pop; infinite where there is none.
+    period : array, shape (moves,), s, or None
+        P, where it is not to be chosen.
+
+    Returns
+    -------
+    array, shape (5, moves), s
+        T1 to T5; zero where nothing limits the derivative below.
+
+    References
+    ----------
+    Section 7 of the paper; the derivation is in docs/trajectory.md.
+    """
+    velocity, acceleration, jerk, snap, crackle, pop = limits
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore", under="ignore"):
+        if period is not None:
+            snap = np.minimum(snap, period * np.minimum(crackle / 2, pop * period / (2 * np.pi)))
+        targets = [snap, jerk, acceleration, velocity, displacement]
+        rises: list[Array] = []
+        for target in targets:
+            free = _without_holds(target, len(rises) + 1, crackle, pop, period)
+            rises.append(_with_holds(free, target, targets, rises))
+    return rises[-1]
+
+
+def _without_holds(target: Array, level: int, crackle: Array, pop: Array, period: Array | None) -> Array:
+    """Spans of a rise that holds nothing, limited by crackle and pop only, shape (level, moves)."""
+    if period is None:
+        scaled = target / 2.0 ** ((level - 1) * (level - 2) // 2)
+        by_crackle = (2 * scaled / crackle) ** (1 / level)
+        by_pop = (2 * np.pi * scaled / pop) ** (1 / (level + 1))
+        period = np.maximum(by_crackle, by_pop)
+    spans: Array = _DOUBLING[:level] * period
+    return spans
+
+
+def _with_holds(spans: Array, target: Array, limits: Sequence[Array], rises: Sequence[Array]) -> Array:
+    """Replace the spans where a derivative below is held at its limit, the highest such first."""
+    undecided = np.isfinite(target)
+    for below in reversed(range(len(rises))):
+        above = len(rises) - below - 1
+        here = undecided & _held(target, limits[below], rises[below], above)
+        if here.any():
+            spans[:, here] = _holding(target[here], limits[below][here], rises[below][:, here], above)
+            undecided &= ~here
+    return spans
+
+
+def _held(target: Array, limit: Array, rise: Array, above: int) -> BoolArray:
+    reach = rise.sum(axis=0)
+    least = limit * reach * (2 * reach) ** above * 2.0 ** (above * (above - 1) // 2)
+    held: BoolArray = np.isfinite(limit) & (target >= least)
+    return held
+
+
+def _holding(target: Array, limit: Array, rise: Array, above: int) -> Array:
+    """Spans of a rise that holds the derivative `above` + 1 below its target at the limit."""
+    reach = rise.sum(axis=0)
+    unit = (target / limit / 2.0 ** (above * (above - 1) // 2)) ** (1 / (above + 1))
+    held = unit * _root(reach / unit, above)
+    return np.concatenate([rise, held[np.newaxis], (reach + held) * 2.0 ** np.arange(above)[:, np.newaxis]])
+
+
+def _root(offset: Array, power: int) -> Array:
+    """Solve ``z (c + z)^n = 1`` for z >= c >= 0 by Newton's method, from a lower bound of the root."""
+    root = 1 - power / (power + 1) * offset
+    for _ in range(_NEWTON_STEPS if power else 0):
+        total = offset + root
+        root = root - (root * total - total ** (1 - power)) / (offset + (power + 1) * root)
+    return root

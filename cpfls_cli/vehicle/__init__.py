@@ -9,9 +9,15 @@ from cpfls_cli.vehicle.rigid_body import (
     rigid_body_regressor,
     torque,
 )
-from cpfls_cli.vehicle.rotors import BodyWrench, RotorDemand, allocation_matrix, body_wrench, rotor_demand
+from cpfls_cli.vehicle.rotors import (
+    BodyWrench,
+    RotorDemand,
+    RotorViolation,
+    allocation_matrix,
+    body_wrench,
+    rotor_demand,
+)
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
-from cpfls_cli.vehicle.violations import RotorViolation
 
 __all__ = [
     "BodyWrench",

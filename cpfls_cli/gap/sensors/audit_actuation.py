@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.flightlog.delay import estimate_delay
+from cpfls_cli.flightlog.alignment import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
 
 # Above the motion of a multirotor and below most of the noise of its derivative.

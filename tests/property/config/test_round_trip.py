@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cpfls_cli.config.load import parse_config, validate
-from cpfls_cli.config.resolved import resolved_yaml
+from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
 
 printable = st.text(st.characters(exclude_categories=["Cs", "Cc", "Cn", "Co"]))

@@ -3,9 +3,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli import rotations
-from cpfls_cli.trajectory.rotation import full_rotation
-from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.rotation import RotationLimits, full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.vehicle.rigid_body import newton_euler_torque
 
 INERTIA = (0.6, 0.7, 1.2, 0.02, -0.01, 0.03)

@@ -9,7 +9,7 @@ from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, StructureSettings
 from cpfls_cli.trajectory import TrajectorySettings, full_rotation, plan
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.vehicle import VehicleSettings, newton_euler_torque
 
 INERTIA = [0.6, 0.8, 1.2]

@@ -13,7 +13,7 @@ from cpfls_cli.identification import Model, TorqueData
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.trajectory import full_rotation
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.steps import replay_steps
 from cpfls_cli.vehicle import newton_euler_torque
 

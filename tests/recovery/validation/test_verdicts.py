@@ -11,7 +11,7 @@ from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion
 from cpfls_cli.trajectory import full_rotation
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.grounds import Grounds
 from cpfls_cli.validation.paired import Comparison
 from cpfls_cli.validation.paired_torque import compare_torque

@@ -2,8 +2,7 @@
 
 from typing import get_args
 
-from cpfls_cli.config.commented import commented_default
-from cpfls_cli.config.keys import keys_of, known_keys
+from cpfls_cli.config.keys import commented_default, keys_of, known_keys
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import SECTIONS, Study
 from cpfls_cli.flightlog import SignalName

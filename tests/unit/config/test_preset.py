@@ -5,7 +5,7 @@ from dataclasses import asdict, fields
 import pytest
 
 from cpfls_cli.config.load import validate
-from cpfls_cli.config.resolved import resolved
+from cpfls_cli.config.study import resolved
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.evolution import EvolutionSettings
 from cpfls_cli.identification.presets import PRESETS

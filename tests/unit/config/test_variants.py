@@ -3,8 +3,8 @@
 import pytest
 
 from cpfls_cli.config.load import load_study, validate
-from cpfls_cli.config.resolved import resolved
-from cpfls_cli.config.variants import variants
+from cpfls_cli.config.overrides import variants
+from cpfls_cli.config.study import resolved
 from cpfls_cli.errors import ConfigError
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from cpfls_cli.excitation.conditioning import condition_number, conditioning
 from cpfls_cli.regressor import StructureSettings, model_structure
-from cpfls_cli.trajectory.rotation_path import RotationPath
+from cpfls_cli.trajectory.rotation import RotationPath
 
 
 def gram(seed=0):

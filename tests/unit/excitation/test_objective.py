@@ -6,9 +6,8 @@ from cpfls_cli.excitation.conditioning import conditioning, regressor_of
 from cpfls_cli.excitation.objective import conditioning_gradient, penalty_gradient
 from cpfls_cli.excitation.variables import design, path_of, variables_of
 from cpfls_cli.regressor import StructureSettings, model_structure
-from cpfls_cli.trajectory.rotation import full_rotation
-from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.rotation import RotationLimits, full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 
 # A low order of the harmonics keeps the curvature over the step in attitude small.
 STRUCTURE = model_structure(StructureSettings(harmonic_order=1))

@@ -4,9 +4,8 @@ import pytest
 from cpfls_cli.errors import SettingError
 from cpfls_cli.excitation import condition_number, optimised_rotation
 from cpfls_cli.regressor import StructureSettings, model_structure
-from cpfls_cli.trajectory.rotation import full_rotation
-from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.rotation import RotationLimits, full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.vehicle import VehicleSettings
 
 DURATION, STRUCTURE, VEHICLE = 20.0, StructureSettings(), VehicleSettings()

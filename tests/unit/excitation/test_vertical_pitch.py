@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.excitation.conditioning import regressor_of
 from cpfls_cli.regressor import StructureSettings, model_structure
-from cpfls_cli.trajectory.rotation_path import RotationPath
+from cpfls_cli.trajectory.rotation import RotationPath
 from cpfls_cli.vehicle import inertia_matrix, torque
 from cpfls_cli.vehicle.rigid_body import newton_euler_torque
 

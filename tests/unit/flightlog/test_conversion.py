@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog import ImportSettings, SignalMap
-from cpfls_cli.flightlog.conversion import to_program_frames
+from cpfls_cli.flightlog.frames import to_program_frames
 
 ROTORS = SignalMap(columns=("m1", "m2", "m3", "m4"), unit="1")
 SHARES = np.array([[0.0, 0.25, 0.64, 1.0], [-0.1, 0.04, 0.5, 0.81]])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.flightlog.following import followed
+from cpfls_cli.flightlog.alignment import followed
 from cpfls_cli.flightlog.results import LogSignals
 
 TAU, PERIOD = 0.07, 0.004

@@ -5,8 +5,7 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog import ImportSettings, SignalMap
-from cpfls_cli.flightlog.resampling import held, interpolated
-from cpfls_cli.flightlog.topics import on_one_clock, topic_and_field
+from cpfls_cli.flightlog.topics import held, interpolated, on_one_clock, topic_and_field
 
 GYRO = 0.004 * np.arange(500)
 SLOW = 0.001 + 0.02 * np.arange(100)

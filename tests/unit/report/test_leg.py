@@ -6,7 +6,7 @@ from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.trajectory_file import trajectory_data
 from cpfls_cli.pages.leg import first_leg, peaks
-from cpfls_cli.trajectory.path import plan
+from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
 
 

@@ -9,8 +9,7 @@ import pytest
 from cpfls_cli.artifacts.formats import FLIGHT
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import Artifact, write_artifact
-from cpfls_cli.config.resolved import resolved_yaml
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights import flight_source as sources
 

@@ -2,10 +2,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.trajectory.rotation import full_rotation
-from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_path import RotationPath
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.vehicle import VehicleSettings
 
 DURATION = 20.0

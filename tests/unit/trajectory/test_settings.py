@@ -2,8 +2,8 @@ import pytest
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory import TrajectorySettings
-from cpfls_cli.trajectory.limit_settings import LimitSettings
-from cpfls_cli.trajectory.waypoint_settings import WaypointSettings
+from cpfls_cli.trajectory.limits import LimitSettings
+from cpfls_cli.trajectory.settings import WaypointSettings
 
 
 def point(x, **more):

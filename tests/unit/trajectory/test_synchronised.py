@@ -3,9 +3,9 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
+from cpfls_cli.trajectory.legs import synchronised
 from cpfls_cli.trajectory.limits import Limits
 from cpfls_cli.trajectory.moves import Outcome
-from cpfls_cli.trajectory.synchronised import synchronised
 from cpfls_cli.trajectory.time_optimal import plan_moves
 
 DISPLACEMENTS = np.array([10.0, -4.0, 0.0, 0.5])

@@ -10,7 +10,7 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import generalised_torque
 from cpfls_cli.trajectory import full_rotation
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.steps import NOTHING_MOVES, replay_steps
 from cpfls_cli.vehicle import newton_euler_torque
 

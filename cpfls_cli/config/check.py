@@ -1,4 +1,4 @@
-"""What is wrong with a config, in one line for each key."""
+"""Check the plain data of a config: a study, or every error at once, one line for each key."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ import json
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from cpfls_cli.config.keys import known_keys
+from cpfls_cli.config.study import SECTIONS, Study
 from cpfls_cli.errors import SettingError
+from cpfls_cli.identification.presets import PRESETS
 
+_SECTION = "identification"
 _UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
 _LENGTH = {"too_short", "too_long"}
 _LONGEST_VALUE = 60
@@ -26,8 +30,60 @@ _PLAIN_WORDS = {
     "must be a valid number": "must be a number",
     "Field required": "is missing",
 }
-
 Location = tuple[str, ...]
+
+
+def checked(data: dict[str, Any], source: str) -> tuple[Study | None, list[str]]:
+    """Check plain data as a study.
+
+    Parameters
+    ----------
+    source : str
+        Name of the file, for messages.
+
+    Returns
+    -------
+    study : Study or None
+        None where there are errors.
+    errors : list of str
+        One line for each wrong key.
+    """
+    # A section that is named but left empty means its defaults.
+    filled = with_preset({key: {} if value is None and key in SECTIONS else value for key, value in data.items()})
+    try:
+        return Study.model_validate_json(json.dumps(filled)), []
+    except ValidationError as error:
+        errors = [*error.errors(), *_hidden_errors(filled, error.errors())]
+        return None, describe_errors(errors, filled, source)
+
+
+def _hidden_errors(data: dict[str, Any], found: list[ErrorDetails]) -> list[ErrorDetails]:
+    """Find what an unknown key hides: rules between the keys of a section run only where all its keys are known."""
+    try:
+        Study.model_validate_json(json.dumps(without_unknown_keys(data, found)))
+    except ValidationError as error:
+        return error.errors()
+    return []
+
+
+def with_preset(data: dict[str, Any]) -> dict[str, Any]:
+    """Put the values of the preset that a config names under its own keys.
+
+    Parameters
+    ----------
+    data : dict
+        Plain data of a config.
+
+    Returns
+    -------
+    dict
+        The same where no preset is named, or none that exists.
+    """
+    section = data.get(_SECTION)
+    if not isinstance(section, dict):
+        return data
+    values = next((values for name, values in PRESETS.items() if name == section.get("preset")), {})
+    return data | {_SECTION: {**values, **section}}
 
 
 def describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], source: str) -> list[str]:

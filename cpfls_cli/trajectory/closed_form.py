@@ -1,4 +1,14 @@
-"""Closed forms of the pieces of a move: single waves of the pop, and holds between them."""
+"""The base move in closed form: its spans, holds and peaks, and samples of all its derivatives.
+
+Every derivative is the ramp of the one below. With ``T1 = P``, ``T2 = T1 + Ts``, ``T3 = T1 + T2 + Tj``,
+``T4 = T1 + T2 + T3 + Ta`` and ``T5 = T1 + T2 + T3 + T4 + Tv`` the peaks are ``s = A T1``, ``j = s T2``, ``a = j T3``,
+``v = a T4``, ``D = v T5``, and the whole move lasts ``T1 + T2 + T3 + T4 + T5``. These are called spans here.
+
+A move is sampled piece by piece, each half from its own end. A piece is a wave of the pop or a hold. Inside it every
+derivative is a polynomial of the fraction tau of the piece, and in a wave a sine or a cosine besides. The second half
+is the mirror image of the first, so that rounding errors are small against the peak of every derivative, and the end
+is exact.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +17,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.trajectory.nesting import holds_of
 
+# A hold shorter than this part of its span is what rounding left of none.
+_NO_HOLD = 8 * float(np.finfo(float).eps)
+# Samples of a block: what is computed on the way stays in the cache.
+_BLOCK = 4096
+# A move is odd about its middle: the derivatives of the second half, from those of the first.
+_MIRROR = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 # The Thue-Morse sequence: the ramp up of every derivative is followed by its mirror image.
 _SIGNS = np.array([1, -1, -1, 1, -1, 1, 1, -1, -1, 1, 1, -1, 1, -1, -1, 1], dtype=float)
 _TURN = 2 * np.pi
@@ -23,6 +38,125 @@ _WAVE = np.array(
         [0, 1, 0, 0, 0, 0, -1 / _TURN, 0],
     ]
 )
+
+
+def spans_of(period: float | Array, holds: Array) -> Array:
+    """Add up the spans.
+
+    Parameters
+    ----------
+    period : float or array, shape (moves,), s
+        P.
+    holds : array, shape (4,) or (4, moves), s
+        Holds of snap, jerk, acceleration and velocity.
+
+    Returns
+    -------
+    array, shape (5,) or (5, moves), s
+        T1 to T5.
+    """
+    spans = np.empty((5, *holds.shape[1:]))
+    spans[0] = period
+    # A sum too large for numbers is infinite, and told by whoever asked for it.
+    with np.errstate(over="ignore"):
+        for level in range(1, 5):
+            spans[level] = spans[:level].sum(axis=0) + holds[level - 1]
+    return spans
+
+
+def holds_of(spans: Array) -> Array:
+    """Find what of each span is hold, the inverse of `spans_of`.
+
+    Parameters
+    ----------
+    spans : array, shape (5, moves), s
+
+    Returns
+    -------
+    array, shape (4, moves), s
+    """
+    holds = spans[1:] - np.cumsum(spans, axis=0)[:-1]
+    holds[holds <= _NO_HOLD * spans[1:]] = 0.0
+    return holds
+
+
+def peaks_of(displacement: float | Array, spans: Array) -> Array:
+    """Find the peak of every derivative.
+
+    Parameters
+    ----------
+    displacement : float or array, shape (moves,), m
+        Of any sign.
+    spans : array, shape (5,) or (5, moves), s
+        The first of them may be zero; what rises in no time has a derivative without bound.
+
+    Returns
+    -------
+    array, shape (7,) or (7, moves), m and s
+        Largest absolute displacement, velocity, acceleration, jerk, snap, crackle and pop.
+
+    References
+    ----------
+    Section 7 of the paper; method.md section 3.
+    """
+    peaks = np.zeros((7, *spans.shape[1:]))
+    peaks[0] = np.abs(displacement)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for order, span in enumerate(spans[::-1], start=1):
+            peaks[order] = peaks[order - 1] / span
+        peaks[6] = 2 * np.pi * peaks[5] / spans[0]
+        peaks[5] *= 2
+    return np.where(peaks[0] > 0, peaks, 0.0)
+
+
+def sample(displacement: float, spans: Array, time: Array) -> Array:
+    """Evaluate a move and its derivatives.
+
+    Parameters
+    ----------
+    displacement : float, m
+    spans : array, shape (5,), s
+        T1 to T5.
+    time : array, shape (time,), s
+        Any order.
+
+    Returns
+    -------
+    array, shape (time, 7), m and s
+        Displacement, velocity, acceleration, jerk, snap, crackle, pop.
+    """
+    if np.all(time[1:] >= time[:-1]):
+        return _ascending(displacement, spans, time).T
+    order = np.argsort(time, kind="stable")
+    motion = np.empty((len(time), 7))
+    motion[order] = _ascending(displacement, spans, time[order]).T
+    return motion
+
+
+def _ascending(displacement: float, spans: Array, time: Array) -> Array:
+    """Evaluate at ascending times, shape (7, time)."""
+    motion = np.zeros((7, len(time)))
+    half = pieces(np.copysign(peaks_of(displacement, spans), displacement), spans)
+    duration = spans.sum()
+    starts = np.array([piece.start for piece in half])
+    breaks = np.concatenate([starts, [duration / 2], duration - starts[::-1]])
+    bounds = np.searchsorted(time, np.maximum.accumulate(breaks))
+    for piece, first, last in zip(half, bounds[: len(half)], bounds[1:], strict=False):
+        _fill(motion[:, first:last], piece, time[first:last], piece.start, 1.0)
+    for piece, first, last in zip(half[::-1], bounds[len(half) : -1], bounds[len(half) + 1 :], strict=True):
+        backwards = piece.mirrored(_MIRROR, displacement)
+        _fill(motion[:, first:last], backwards, time[first:last], duration - piece.start, -1.0)
+    motion[0, bounds[-1] :] = displacement
+    return motion
+
+
+def _fill(motion: Array, piece: Piece, time: Array, origin: float, direction: float) -> None:
+    """Evaluate one piece, whose time runs from the origin in the direction."""
+    for first in range(0, len(time), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        elapsed = direction * (time[block] - origin)
+        # Rounding of a large time may lie outside a short piece.
+        piece.evaluate(np.clip(elapsed / piece.length, 0.0, 1.0), motion[:, block])
 
 
 @dataclass(frozen=True)
