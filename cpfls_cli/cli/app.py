@@ -13,6 +13,7 @@ from cpfls_cli import __version__
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.options import Common, ConfigArgument, OutputOption, seconds, with_common
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
+from cpfls_cli.logs.formats import formats_in_words, suffixes_in_words
 from cpfls_cli.report.forms import Form
 
 if TYPE_CHECKING:
@@ -35,13 +36,13 @@ FlightArgument = Annotated[Path, typer.Argument(metavar="FLIGHT", help="Made by 
 TrainingArgument = Annotated[
     list[Path], typer.Argument(metavar="FLIGHT...", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
 ]
-LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help="Flight log: .csv, .csv.gz, .parquet or .ulg.")]
+LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help=f"Flight log: {suffixes_in_words()}.")]
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`.")]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
 FlightsArgument = Annotated[
     list[Path],
-    typer.Argument(metavar="FLIGHT...", help="Flights, or logs (CSV, Parquet, ULog) that the config describes."),
+    typer.Argument(metavar="FLIGHT...", help=f"Flights, or logs ({formats_in_words()}) that the config describes."),
 ]
 DisagreementArgument = Annotated[Path, typer.Argument(metavar="DISAGREEMENT", help="Made by `cpfls compare`.")]
 DiagnosisArgument = Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="Made by `cpfls diagnose`.")]

@@ -19,8 +19,8 @@ from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flights.log_quality import found_and_done, missing_signals
 from cpfls_cli.flights.rotor_torque import rotor_torque, rotor_torque_words
+from cpfls_cli.logs.formats import read_log
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.stages.log_file import read_log
 
 
 def run(job: Job, log: Path) -> Outcome:
@@ -29,7 +29,7 @@ def run(job: Job, log: Path) -> Outcome:
     Parameters
     ----------
     log : Path
-        CSV, plain or gzip-compressed, Parquet or ULog.
+        In one of the formats of `cpfls_cli.logs`.
 
     Raises
     ------

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 
+import numpy as np
+
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import Job, begin, header_of
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
@@ -12,10 +16,10 @@ from cpfls_cli.artifacts.trajectory_file import trajectory_data, trajectory_outc
 from cpfls_cli.commands.flyable_check import PlanAt, checked_plan, remedy
 from cpfls_cli.commands.path_figures import check_figures, write_figures
 from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.errors import ComputationError, ConfigError
+from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation import Excitation, optimised_rotation
+from cpfls_cli.logs.csv_log import read_csv, row_lines
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.stages.waypoints_file import read_waypoints
 from cpfls_cli.trajectory import (
     RotationPath,
     TrajectorySettings,
@@ -23,6 +27,11 @@ from cpfls_cli.trajectory import (
     held_rotation,
     plan,
 )
+from cpfls_cli.trajectory.consistency import check_waypoints
+from cpfls_cli.trajectory.settings import WaypointSettings
+
+_POSITION_COLUMNS = ("x_m", "y_m", "z_m")
+_OPTIONAL_COLUMNS = ("yaw_rad", "pause_s")
 
 
 def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
@@ -65,7 +74,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
     settings = study.trajectory
     if waypoints is not None:
-        points = read_waypoints(waypoints, settings.duration_s is None)
+        points = _read_waypoints(waypoints, settings.duration_s is None)
         with settings_of("trajectory", study):
             return replace(settings, path="waypoints", waypoints=points)
     if settings.path == "waypoints" and not settings.waypoints:
@@ -93,3 +102,61 @@ def _rotation(job: Job, settings: TrajectorySettings) -> tuple[RotationPath, Exc
     structure = job.study.identification
     found = optimised_rotation(settings.rotation, settings.duration_s, structure, vehicle, rng, job.progress)
     return found.path, found
+
+
+def _read_waypoints(path: Path, paused: bool) -> tuple[WaypointSettings, ...]:
+    """Read the points of a path from a CSV with the columns ``x_m, y_m, z_m`` and, if wanted, ``yaw_rad, pause_s``.
+
+    Errors name the file and the column or the row that is wrong. `paused` tells whether the points may have pauses.
+    """
+    columns = read_csv(path, {*_POSITION_COLUMNS, *_OPTIONAL_COLUMNS})
+    _check_columns(path, columns)
+    lines = row_lines(path)
+    _check_values(path, columns, lines)
+    count = len(columns[_POSITION_COLUMNS[0]])
+    yaw = columns["yaw_rad"].tolist() if "yaw_rad" in columns else [None] * count
+    pause = columns.get("pause_s", np.zeros(count)).tolist()
+    positions = zip(*(columns[name].tolist() for name in _POSITION_COLUMNS), strict=True)
+    points = zip(positions, yaw, pause, strict=True)
+    waypoints = tuple(WaypointSettings(position_m=p, yaw_rad=angle, pause_s=rest) for p, angle, rest in points)
+    try:
+        check_waypoints(waypoints, paused)
+    except SettingError as error:
+        raise InputError(f"{path}{_line_and_column(error.key, lines)}: {error}") from None
+    return waypoints
+
+
+def _check_columns(path: Path, columns: dict[str, Array]) -> None:
+    known = (*_POSITION_COLUMNS, *_OPTIONAL_COLUMNS)
+    missing = [name for name in _POSITION_COLUMNS if name not in columns]
+    unknown = [name for name in columns if name not in known]
+    problems = [
+        f"{path}: column '{name}' is missing; waypoints need {', '.join(_POSITION_COLUMNS)}" for name in missing
+    ]
+    for name in unknown:
+        near = get_close_matches(name, known, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"the columns are {', '.join(known)}"
+        problems.append(f"{path}: column '{name}' is not known; {hint}")
+    if problems:
+        raise InputError("\n".join(problems))
+
+
+def _check_values(path: Path, columns: dict[str, Array], lines: list[int]) -> None:
+    problems = []
+    for name, values in columns.items():
+        wrong = ~np.isfinite(values) | ((values < 0) if name == "pause_s" else False)
+        for row in np.flatnonzero(wrong):
+            expected = "a finite number, 0 or more" if name == "pause_s" else "a finite number"
+            fault = "is empty or not a number" if np.isnan(values[row]) else f"= {values[row]:g}"
+            problems.append(f"{path}:{lines[row]}: column '{name}' {fault}: give {expected}")
+    if problems:
+        raise InputError("\n".join(problems))
+
+
+def _line_and_column(key: str, lines: list[int]) -> str:
+    """Name line and column of an entry such as ``waypoints.3.position_m``."""
+    parts = key.split(".")
+    if len(parts) < 3:
+        return ""
+    column = {"position_m": ", ".join(_POSITION_COLUMNS)}.get(parts[2], parts[2])
+    return f":{lines[int(parts[1])]}: {column}"

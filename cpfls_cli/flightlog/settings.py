@@ -157,6 +157,11 @@ class ImportSettings(Settings):
             _check_torque(self)
             _check_command(self)
 
+    @property
+    def mapped_columns(self) -> tuple[str, ...]:
+        """Columns of the log that are used: the time stamps, then those of every signal."""
+        return (self.time_column, *(column for signal in self.signals.values() for column in signal.columns))
+
 
 def _check_attitude(settings: ImportSettings) -> None:
     names = settings.signals.keys()

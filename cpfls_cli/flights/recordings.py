@@ -23,7 +23,7 @@ from cpfls_cli.flights.rotor_torque import commanded_speed
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.flights.sources import read_good
 from cpfls_cli.gap.balance.recording import Recording
-from cpfls_cli.stages.log_file import is_log
+from cpfls_cli.logs.formats import is_log
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
 _UNIFORM = 0.01

@@ -1,4 +1,4 @@
-"""Read logs in ULog, as PX4 writes them: topics, each with stamps in microseconds."""
+"""Reader of ULog, as PX4 writes it: topics, each with stamps in microseconds."""
 
 from __future__ import annotations
 
@@ -10,40 +10,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyulog
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.topics import STAMP, on_one_clock, topic_and_field
-from cpfls_cli.stages.optional_package import require_package
+from cpfls_cli.logs.formats import ULOG_MAGIC, LogColumns
 from cpfls_cli.units import known_unit
 
-_MAGIC = b"ULog\x01\x12\x35"
 _MICROSECOND = 1e-6
 
 
-def read_ulog(path: Path, settings: ImportSettings) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Read columns of a log, ``topic.field`` or ``topic[instance].field``, on the clock of one topic.
+def read(path: Path, settings: ImportSettings) -> LogColumns:
+    """Read the mapped columns, ``topic.field`` or ``topic[instance].field``, on the clock of one topic.
+
+    Warnings name dropouts of the logger, a broken file and topics that are thinned.
 
     Parameters
     ----------
     settings : ImportSettings
         `time_column` names the stamps that are the clock; stamps are converted to `time_unit`.
 
-    Returns
-    -------
-    columns : dict of str to array, shape (rows,)
-        Wanted columns that exist; others map to empty arrays.
-    warnings : tuple of str
-        Dropouts of the logger, a broken file, topics that are thinned.
-
     Raises
     ------
     InputError
-        If pyulog is not installed, the file is no ULog, or `time_column` names no stamps.
+        If the file is no ULog, or `time_column` names no stamps.
     """
-    reader = require_package("pyulog", "ulog", path)
-    log, topics = _read(reader, path, settings)
+    log, topics = _read(path, settings)
     base, stamp = topic_and_field(settings.time_column)
     if stamp not in topics.get(base, {}):
         raise InputError(
@@ -57,30 +51,29 @@ def read_ulog(path: Path, settings: ImportSettings) -> tuple[dict[str, Array], t
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     columns[settings.time_column] = columns[settings.time_column] / known_unit(settings.time_unit).factor
-    return columns, (*_warn_of_file(log, origin), *warnings)
+    return LogColumns(columns, (*_warn_of_file(log, origin), *warnings))
 
 
-def _read(reader: Any, path: Path, settings: ImportSettings) -> tuple[Any, dict[str, dict[str, Any]]]:
+def _read(path: Path, settings: ImportSettings) -> tuple[Any, dict[str, dict[str, Any]]]:
     """Read the wanted topics only, and all of them where something wanted is not there, for the names."""
-    columns = [settings.time_column, *(column for signal in settings.signals.values() for column in signal.columns)]
-    wanted = [topic_and_field(column) for column in columns]
-    log = _parsed(reader, path, sorted({topic.partition("[")[0] for topic, _ in wanted}))
+    wanted = [topic_and_field(column) for column in settings.mapped_columns]
+    log = _parsed(path, sorted({topic.partition("[")[0] for topic, _ in wanted}))
     if not all(field in _topics(log).get(topic, {}) for topic, field in wanted):
-        log = _parsed(reader, path, None)
+        log = _parsed(path, None)
     return log, _topics(log)
 
 
-def _parsed(reader: Any, path: Path, topics: Sequence[str] | None) -> Any:
+def _parsed(path: Path, topics: Sequence[str] | None) -> Any:
     try:
         # The reader prints what it finds wrong, which is asked for below, and leaves a file that it cannot read open.
         with path.open("rb") as stream, redirect_stdout(io.StringIO()):
-            if stream.read(len(_MAGIC)) != _MAGIC:
+            if stream.read(len(ULOG_MAGIC)) != ULOG_MAGIC:
                 raise InputError(f"{path}: not a ULog file: it does not begin as one")
             stream.seek(0)
-            return reader.ULog(stream, None if topics is None else list(topics))
+            return pyulog.ULog(stream, None if topics is None else list(topics))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
-    except (reader.core.ULogException, struct.error, ValueError, KeyError, IndexError, TypeError) as error:
+    except (pyulog.core.ULogException, struct.error, ValueError, KeyError, IndexError, TypeError) as error:
         raise InputError(f"{path}: a broken ULog file: {error}") from None
 
 
@@ -91,7 +84,8 @@ def _topics(log: Any) -> dict[str, dict[str, Any]]:
 def _in_seconds(topics: dict[str, dict[str, Any]], origin: int) -> dict[str, dict[str, Array]]:
     """Convert stamps to s from the origin; the difference of whole numbers is still exact."""
     return {
-        topic: {field: _field(field, values, origin) for field, values in own.items()} for topic, own in topics.items()
+        topic: {field: _field(field, values, origin) for field, values in fields.items()}
+        for topic, fields in topics.items()
     }
 
 

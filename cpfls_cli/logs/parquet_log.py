@@ -1,59 +1,52 @@
-"""Read logs in Parquet: the wanted columns only, as numbers."""
+"""Reader of Parquet: the mapped columns only, as numbers."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
+import pyarrow
+from pyarrow import parquet
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.stages.optional_package import require_package
+from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.logs.formats import LogColumns
 from cpfls_cli.units import known_unit
 
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
 
-def read_parquet(path: Path, time_column: str, time_unit: str, wanted: set[str]) -> dict[str, Array]:
-    """Read columns of a log.
+def read(path: Path, settings: ImportSettings) -> LogColumns:
+    """Read the columns of a log that a config maps; nulls are NaN.
 
     Parameters
     ----------
-    time_column, time_unit : str
+    settings : ImportSettings
         Stamps whose type states a unit are converted to `time_unit`, from the first one; others are taken as they are.
-    wanted : set of str
-        Columns to read; others are only named.
-
-    Returns
-    -------
-    dict of str to array, shape (rows,)
-        Wanted columns that exist; the others map to empty arrays. Nulls are NaN.
 
     Raises
     ------
     InputError
-        If pyarrow is not installed, the file is no Parquet or broken, has no rows or a name twice, or a wanted column
-        does not hold numbers.
+        If the file is no Parquet or broken, has no rows or a name twice, or a mapped column does not hold numbers.
     """
-    pyarrow = require_package("pyarrow", "parquet", path)
-    require_package("pyarrow.parquet", "parquet", path)
+    wanted = set(settings.mapped_columns)
     try:
-        with pyarrow.parquet.ParquetFile(path) as file:
+        with parquet.ParquetFile(path) as file:
             names = file.schema_arrow.names
             _require_single(path, [name for name in names if name in wanted])
-            read = file.read(columns=[name for name in names if name in wanted])
+            table = file.read(columns=[name for name in names if name in wanted])
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
     if file.metadata.num_rows == 0:
         raise InputError(f"{path}: holds column names but no samples")
     columns: dict[str, Array] = {name: np.empty(0) for name in names}
-    for name in set(read.column_names) & wanted:
-        columns[name] = _numbers(pyarrow, path, name, read.column(name))
-        if name == time_column and _states_unit(pyarrow, read.column(name).type):
-            columns[name] /= known_unit(time_unit).factor
-    return columns
+    for name in set(table.column_names) & wanted:
+        columns[name] = _numbers(path, name, table.column(name))
+        if name == settings.time_column and _states_unit(table.column(name).type):
+            columns[name] /= known_unit(settings.time_unit).factor
+    return LogColumns(columns)
 
 
 def _require_single(path: Path, names: list[str]) -> None:
@@ -62,10 +55,10 @@ def _require_single(path: Path, names: list[str]) -> None:
         raise InputError(f"{path}: column '{repeated[0]}' stands twice")
 
 
-def _numbers(pyarrow: ModuleType, path: Path, name: str, column: Any) -> Array:
+def _numbers(path: Path, name: str, column: Any) -> Array:
     kind = column.type.value_type if pyarrow.types.is_dictionary(column.type) else column.type
-    if _states_unit(pyarrow, kind):
-        return _seconds(pyarrow, column)
+    if _states_unit(kind):
+        return _seconds(column)
     types = pyarrow.types
     numeric = (types.is_integer, types.is_floating, types.is_boolean, types.is_decimal, types.is_null)
     if not any(is_kind(kind) for is_kind in numeric):
@@ -78,11 +71,11 @@ def _numbers(pyarrow: ModuleType, path: Path, name: str, column: Any) -> Array:
     return np.asarray(column.cast(pyarrow.float64(), safe=False).to_numpy(), dtype=float)
 
 
-def _states_unit(pyarrow: ModuleType, kind: Any) -> bool:
+def _states_unit(kind: Any) -> bool:
     return bool(pyarrow.types.is_timestamp(kind) or pyarrow.types.is_duration(kind) or pyarrow.types.is_time(kind))
 
 
-def _seconds(pyarrow: ModuleType, column: Any) -> Array:
+def _seconds(column: Any) -> Array:
     """Convert stamps, whole numbers of their unit, to seconds from the first one; the difference is still exact."""
     per_second = _PER_SECOND[column.type.unit]
     whole = pyarrow.int32() if pyarrow.types.is_time32(column.type) else pyarrow.int64()

@@ -1,4 +1,4 @@
-"""Read logs in CSV: plain or gzip-compressed, comma, semicolon or tab, every field a number."""
+"""Reader of CSV: plain or gzip-compressed, comma, semicolon or tab, every field a number."""
 
 from __future__ import annotations
 
@@ -15,10 +15,17 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.logs.formats import LogColumns
+
+
+def read(path: Path, settings: ImportSettings) -> LogColumns:
+    """Read the columns of a log that a config maps."""
+    return LogColumns(read_csv(path, set(settings.mapped_columns)))
 
 
 def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
-    """Read columns of a log.
+    """Read columns of a CSV.
 
     Parameters
     ----------
@@ -74,7 +81,7 @@ def _columns(path: Path, stream: TextIO, wanted: set[str]) -> dict[str, Array]:
         raise InputError(f"{path}: holds column names but no samples")
     values = np.array(rows, dtype=float).reshape(len(rows), len(kept))
     columns: dict[str, Array] = {name: np.empty(0) for name in names}
-    return columns | {names[index]: values[:, place] for place, index in enumerate(kept)}
+    return columns | {names[index]: values[:, position] for position, index in enumerate(kept)}
 
 
 def row_lines(path: Path) -> list[int]:

@@ -1,0 +1,184 @@
+"""The formats of flight logs: one table, and all that names a format follows from it.
+
+A new format is one reader, a module with a function ``read(path, settings)``, and one row of `LOG_FORMATS`. The
+command line lists the formats in its help, so nothing heavy is imported here: a reader, and the package it needs, is
+loaded when the first file of its format is read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cpfls_cli.errors import InputError
+
+if TYPE_CHECKING:
+    from cpfls_cli.arrays import Array
+    from cpfls_cli.flightlog.settings import ImportSettings
+
+ULOG_MAGIC = b"ULog\x01\x12\x35"
+_LONGEST_LINE = 16384
+
+
+@dataclass(frozen=True)
+class LogColumns:
+    """Columns of a log.
+
+    Attributes
+    ----------
+    columns : dict from str to array, shape (sample,)
+        Those that the config maps; the others by name only, as empty arrays, so that a message can suggest them.
+    warnings : tuple of str
+        Faults of the file as a whole.
+    """
+
+    columns: dict[str, Array]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogFormat:
+    """One format of flight logs.
+
+    Attributes
+    ----------
+    suffix : str
+        End of a file's name, in lower case.
+    name : str
+        Of the format, in help texts.
+    content : str
+        What a file that begins in this way holds, in messages.
+    magic : bytes
+        First bytes of every such file; none for text, which begins with a line of column names.
+    reader : str
+        Module with ``read(path, settings)``, which returns `LogColumns`.
+    packages : tuple of str
+        Modules of the optional package that the reader needs.
+    extra : str
+        Extra of this program that installs the package.
+    """
+
+    suffix: str
+    name: str
+    content: str
+    magic: bytes = b""
+    reader: str
+    packages: tuple[str, ...] = ()
+    extra: str = ""
+
+    def begins(self, line: bytes) -> bool:
+        """Tell whether the first line of a file is that of a log in this format."""
+        return line.startswith(self.magic) if self.magic else _is_header(line)
+
+
+LOG_FORMATS = (
+    LogFormat(suffix=".csv", name="CSV", content="CSV", reader="cpfls_cli.logs.csv_log"),
+    LogFormat(
+        suffix=".csv.gz",
+        name="CSV",
+        content="gzip-compressed data",
+        magic=b"\x1f\x8b",
+        reader="cpfls_cli.logs.csv_log",
+    ),
+    LogFormat(
+        suffix=".parquet",
+        name="Parquet",
+        content="Parquet",
+        magic=b"PAR1",
+        reader="cpfls_cli.logs.parquet_log",
+        packages=("pyarrow", "pyarrow.parquet"),
+        extra="parquet",
+    ),
+    LogFormat(
+        suffix=".ulg",
+        name="ULog",
+        content="ULog",
+        magic=ULOG_MAGIC,
+        reader="cpfls_cli.logs.ulog",
+        packages=("pyulog",),
+        extra="ulog",
+    ),
+)
+"""The formats in the order in which messages list them."""
+
+
+def suffixes_in_words() -> str:
+    """List the suffixes of logs as a sentence does, ``.csv, .csv.gz or .ulg``."""
+    *others, last = (form.suffix for form in LOG_FORMATS)
+    return f"{', '.join(others)} or {last}"
+
+
+def formats_in_words() -> str:
+    """List the names of the formats, each once."""
+    return ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS))
+
+
+def is_log(path: Path) -> bool:
+    """Tell by its name whether a file is a log."""
+    return _format_of(path) is not None
+
+
+def read_log(path: Path, settings: ImportSettings) -> LogColumns:
+    """Read the columns of a log that a config maps.
+
+    Parameters
+    ----------
+    settings : ImportSettings
+        The section `import`.
+
+    Raises
+    ------
+    InputError
+        If the name ends in no suffix of a log or in that of another format, the file cannot be read, or the package
+        that reads it is not installed.
+    """
+    form = _format_of(path)
+    if form is None:
+        suffixes = ", ".join(form.suffix for form in LOG_FORMATS)
+        raise InputError(f"{path}: not a log: its name must end in one of {suffixes}")
+    _refuse_other_content(path, form)
+    _require_packages(path, form)
+    columns: LogColumns = import_module(form.reader).read(path, settings)
+    return columns
+
+
+def _format_of(path: Path) -> LogFormat | None:
+    name = path.name.lower()
+    return next((form for form in LOG_FORMATS if name.endswith(form.suffix)), None)
+
+
+def _refuse_other_content(path: Path, form: LogFormat) -> None:
+    """Refuse a log that begins as one of another format."""
+    try:
+        with path.open("rb") as stream:
+            first = stream.readline(_LONGEST_LINE)
+    except OSError:
+        # The reader says so.
+        return
+    alike = [other for other in LOG_FORMATS if other.begins(first)]
+    if alike and form not in alike:
+        raise InputError(
+            f"{path}: seems to hold {alike[0].content}, not what its name ends in; rename it to end in"
+            f" {alike[0].suffix}"
+        )
+
+
+def _is_header(line: bytes) -> bool:
+    """Tell whether a line is text with a separator of columns in it."""
+    text = line.rstrip(b"\r\n")
+    printable = all(byte >= 0x20 or byte == 0x09 for byte in text)
+    return line.endswith(b"\n") and printable and any(separator in text for separator in b",;\t")
+
+
+def _require_packages(path: Path, form: LogFormat) -> None:
+    """Refuse a log whose reader needs a package that is not installed."""
+    for module in form.packages:
+        try:
+            import_module(module)
+        except ImportError:
+            package = module.partition(".")[0]
+            raise InputError(
+                f'{path}: reading {path.suffix} needs the package {package}; pip install "cpfls[{form.extra}]"'
+            ) from None

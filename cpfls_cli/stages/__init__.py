@@ -1,1 +1,0 @@
-"""One module per command: read artifacts, call the numerics, write an artifact."""

@@ -1,0 +1,93 @@
+"""A new format of logs is one reader and one row of the table: the commands then take, name and tell it."""
+
+import json
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from cpfls_cli.flights.recordings import read_flights
+
+from cpfls_cli.config.load import load_study
+from cpfls_cli.logs import formats
+
+CONFIG = """\
+import:
+  time_column: t
+  signals:
+    attitude: {columns: [roll, pitch, yaw], unit: rad}
+    body_torque: {columns: [mx, my, mz], unit: N m}
+"""
+NAMES = ("t", "roll", "pitch", "yaw", "mx", "my", "mz")
+MAGIC = b"FAKE\x00"
+
+
+def read(path, settings):
+    """Columns one after the other, eight bytes a number."""
+    values = np.frombuffer(path.read_bytes()[len(MAGIC) :]).reshape(len(NAMES), -1)
+    columns = dict(zip(NAMES, values, strict=True))
+    assert set(settings.mapped_columns) == set(columns)
+    return formats.LogColumns(columns, ("the logger was tired",))
+
+
+@pytest.fixture
+def fake_format(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fake_reader", SimpleNamespace(read=read))
+    row = formats.LogFormat(suffix=".fake", name="Fake", content="fakes", magic=MAGIC, reader="fake_reader")
+    monkeypatch.setattr(formats, "LOG_FORMATS", (*formats.LOG_FORMATS, row))
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(CONFIG)
+    return path
+
+
+def write(path):
+    time = 0.02 * np.arange(200)
+    signals = [0.2 * np.sin((2 + place) * time) for place in range(6)]
+    path.write_bytes(MAGIC + np.array([time, *signals]).tobytes())
+    return path
+
+
+@pytest.mark.usefixtures("fake_format")
+def test_import_takes_a_log_of_a_new_format(cpfls, config, tmp_path):
+    log = write(tmp_path / "log.FAKE")
+    result = cpfls("import", config, log, "-o", tmp_path / "flight.h5", "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["samples"] == 200
+    assert "cpfls: note: the logger was tired" in result.stderr.splitlines()
+
+
+@pytest.mark.usefixtures("fake_format")
+def test_the_gap_workflow_takes_it_as_well(config, tmp_path):
+    flights = read_flights([write(tmp_path / "log.fake")], load_study(config))
+    assert [recording.name for recording in flights.recordings] == ["log.fake"]
+
+
+@pytest.mark.usefixtures("fake_format")
+def test_messages_name_a_new_format(refuse, config, tmp_path):
+    csv, other = write(tmp_path / "log.csv"), tmp_path / "log.txt"
+    words = ("-o", tmp_path / "flight.h5")
+    assert refuse("import", config, csv, *words) == [
+        f"{csv}: seems to hold fakes, not what its name ends in; rename it to end in .fake"
+    ]
+    assert refuse("import", config, other, *words) == [f"{other}: no such file"]
+    other.write_text("t\n")
+    assert refuse("import", config, other, *words) == [
+        f"{other}: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg, .fake"
+    ]
+    assert formats.suffixes_in_words() == ".csv, .csv.gz, .parquet, .ulg or .fake"
+    assert formats.formats_in_words() == "CSV, Parquet, ULog, Fake"
+
+
+@pytest.mark.usefixtures("fake_format")
+def test_a_package_of_a_new_format_that_is_missing_is_named(refuse, config, tmp_path, monkeypatch):
+    row = formats.LogFormat(
+        suffix=".fake", name="Fake", content="fakes", reader="fake_reader", packages=("no_such.part",), extra="fake"
+    )
+    monkeypatch.setattr(formats, "LOG_FORMATS", (row,))
+    log = write(tmp_path / "log.fake")
+    (line,) = refuse("import", config, log, "-o", tmp_path / "flight.h5")
+    assert line == f'{log}: reading .fake needs the package no_such; pip install "cpfls[fake]"'
