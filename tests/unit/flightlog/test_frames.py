@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
-from cpfls_cli.flightlog.frames import acceleration_from_specific_force, attitude_to_enu_flu
+from cpfls_cli.flightlog.frames import acceleration_from_specific_force, attitude_to_enu_flu, to_program_frames
 
 NAMES = ("roll", "pitch", "yaw")
 
@@ -71,3 +71,16 @@ def test_positions_in_ned_become_enu():
     mapped = {"position": SignalMap(columns=("n", "e", "d"), unit="m")}
     flight = import_log(log, ImportSettings(signals=mapped, world_frame="NED", torque_source=None))
     np.testing.assert_allclose(flight.position[0], [2, 1, 3])
+
+
+ROTORS = SignalMap(columns=("m1", "m2", "m3", "m4"), unit="1")
+SHARES = np.array([[0.0, 0.25, 0.64, 1.0], [-0.1, 0.04, 0.5, 0.81]])
+
+
+@pytest.mark.parametrize(
+    ("meaning", "kept"),
+    [("speed", SHARES), ("thrust", [[0.0, 0.5, 0.8, 1.0], [0.0, 0.2, np.sqrt(0.5), 0.9]])],
+)
+def test_a_command_is_kept_as_a_share_of_speed(meaning, kept):
+    settings = ImportSettings(signals={"rotor_command": ROTORS}, torque_source=None, rotor_command_is=meaning)
+    assert to_program_frames({"rotor_command": SHARES}, settings)["rotor_command"] == pytest.approx(np.array(kept))
