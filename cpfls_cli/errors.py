@@ -14,7 +14,7 @@ class ComputationError(CpflsError):
 
 
 class OutputError(CpflsError):
-    """A file cannot be written, though it could when the command began: a full disk (exit code 1)."""
+    """A file can no longer be written, for example on a full disk (exit code 1)."""
 
 
 class StoppedError(CpflsError):
@@ -42,7 +42,7 @@ class ConfigError(InputError):
 
 
 class SettingError(ValueError):
-    """Reject a combination of settings, naming the key of the section that is wrong.
+    """A combination of settings is wrong; the error names the key of the section.
 
     Parameters
     ----------

@@ -105,7 +105,7 @@ def to_si(values: Array, unit: str) -> Array:
 
 
 def known_unit(unit: str) -> Unit:
-    """Find a unit by its name.
+    """Look up a unit by its name.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Interrupts: one line and an exit code, never a traceback, whatever the program was doing."""
+"""Interrupts: one line and an exit code, never a traceback."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _Handler = Callable[[int, FrameType | None], None]
 
 
 def leave_on_interrupt() -> None:
-    """Leave at once at an interrupt: for the time of loading, when there is nothing to tidy up."""
+    """Exit at once on an interrupt: while the program loads, when there is nothing to clean up."""
     _install(_leave)
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Turn an interrupt into `KeyboardInterrupt`, and whatever comes of it into an exit code.
+    """Turn an interrupt into `KeyboardInterrupt`, and that or the error it causes into an exit code.
 
     The exit code is 128 plus the number of the signal: 130 after Ctrl-C, 143 after a request to terminate.
     """
@@ -53,7 +53,7 @@ def interruptible() -> Iterator[None]:
 
 
 def _sent_again(received: list[int], otherwise: Callable[[Any], object]) -> Callable[[Any], None]:
-    """Send an interrupt again that came in a destructor or a callback of the interpreter, which swallow it."""
+    """Send an interrupt again that came in a destructor or a callback, where the interpreter swallows it."""
 
     def hook(unraisable: Any) -> None:
         if received and issubclass(unraisable.exc_type, KeyboardInterrupt):
@@ -66,7 +66,7 @@ def _sent_again(received: list[int], otherwise: Callable[[Any], object]) -> Call
 
 @contextmanager
 def deferred_interrupts() -> Iterator[Callable[[], int | None]]:
-    """Take the first interrupt as a wish to stop, which the work inside asks for; the next one acts as it does outside.
+    """Record the first interrupt as a request to stop, which the work inside polls; the next one acts as outside.
 
     Yields
     ------

@@ -6,7 +6,7 @@ import os
 
 from cpfls_cli.cli.interrupts import interruptible, leave_on_interrupt
 
-_LIMITS = (
+_THREAD_LIMITS = (
     "OPENBLAS_NUM_THREADS",
     "OMP_NUM_THREADS",
     "MKL_NUM_THREADS",
@@ -27,4 +27,4 @@ def run() -> None:
 
 def use_one_thread() -> None:
     """Limit linear algebra to one thread; its libraries read the limit when they load, so call this before."""
-    os.environ.update(dict.fromkeys(_LIMITS, "1"))
+    os.environ.update(dict.fromkeys(_THREAD_LIMITS, "1"))

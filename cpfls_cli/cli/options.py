@@ -19,7 +19,7 @@ ConfigArgument = Annotated[Path, typer.Argument(metavar="CONFIG", help="Study co
 OutputOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE", help="File to write.", show_default=False)
 ]
-_UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
+_SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     """
     hints = get_type_hints(command, include_extras=True)
     common_hints = get_type_hints(Common, include_extras=True)
-    own = [
+    command_parameters = [
         parameter.replace(annotation=hints[name])
         for name, parameter in inspect.signature(command).parameters.items()
         if name != "common"
@@ -76,7 +76,8 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
         common = Common(**{f.name: kwargs.pop(f.name) for f in fields(Common)})
         command(*args, common=common, **kwargs)
 
-    parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own] + shared
+    parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in command_parameters]
+    parameters += shared
     wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return wrapped
@@ -94,11 +95,11 @@ def seconds(text: str) -> float:
     typer.BadParameter
         If it is none, or not more than zero.
     """
-    unit = _UNITS.get(text[-1:])
+    unit = _SECONDS.get(text[-1:])
     try:
         value = float(text if unit is None else text[:-1]) * (unit or 1.0)
     except ValueError:
         value = math.nan
     if not 0.0 < value < math.inf:
-        raise typer.BadParameter(f"{text!r} is no duration; write 90, 90s, 10m or 2h")
+        raise typer.BadParameter(f"{text!r} is not a duration; write 90, 90s, 10m or 2h")
     return value

@@ -29,7 +29,7 @@ _CLOSED_PIPE = 141
 
 @contextmanager
 def messages_for_errors() -> Iterator[None]:
-    """End a command with one message and its exit code where a user can cause the error."""
+    """Turn an error that a user can cause into one message and an exit code."""
     try:
         yield
     except CpflsError as error:
@@ -122,7 +122,7 @@ def _log_progress(title: str) -> Callable[..., None]:
 
 
 def _mute_output() -> None:
-    """Send what is still to be printed nowhere, or the interpreter would stumble over it when it ends."""
+    """Discard further output, on which the interpreter would otherwise fail when it ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -133,14 +133,14 @@ def _complain(text: str, kind: str = "error") -> None:
 
 @dataclass(frozen=True)
 class Narration:
-    """Tell on standard error which files a command works on, where it is asked to.
+    """Report on standard error which files a command reads and writes, if asked to.
 
     Attributes
     ----------
     title : str
         The command.
     wanted : bool
-        Whether to say anything at all.
+        Whether to report anything.
     started : float, s
         When the command started, by a clock that only goes forward.
     """
@@ -150,11 +150,11 @@ class Narration:
     started: float = field(default_factory=time.perf_counter)
 
     def reads(self, path: Path) -> None:
-        """Say that a file is read."""
+        """Report that a file is read."""
         self._say(f"reads {path}{_size(path)}")
 
     def wrote(self, path: Path) -> None:
-        """Say that a file was written, and how long it took since the command started."""
+        """Report that a file was written, and the time since the command started."""
         self._say(f"wrote {path}{_size(path)} in {time.perf_counter() - self.started:.2f} s")
 
     def _say(self, text: str) -> None:

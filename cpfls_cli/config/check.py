@@ -16,7 +16,7 @@ from cpfls_cli.config.study import SECTIONS, Study
 from cpfls_cli.errors import SettingError
 from cpfls_cli.identification.presets import PRESETS
 
-_SECTION = "identification"
+_PRESET_SECTION = "identification"
 _UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
 _LENGTH = {"too_short", "too_long"}
 _LONGEST_VALUE = 60
@@ -33,8 +33,8 @@ _PLAIN_WORDS = {
 Location = tuple[str, ...]
 
 
-def checked(data: dict[str, Any], source: str) -> tuple[Study | None, list[str]]:
-    """Check plain data as a study.
+def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[str]]:
+    """Validate plain data as a study, or list every error.
 
     Parameters
     ----------
@@ -49,44 +49,33 @@ def checked(data: dict[str, Any], source: str) -> tuple[Study | None, list[str]]
         One line for each wrong key.
     """
     # A section that is named but left empty means its defaults.
-    filled = with_preset({key: {} if value is None and key in SECTIONS else value for key, value in data.items()})
+    filled = _with_preset({key: {} if value is None and key in SECTIONS else value for key, value in data.items()})
     try:
         return Study.model_validate_json(json.dumps(filled)), []
     except ValidationError as error:
         errors = [*error.errors(), *_hidden_errors(filled, error.errors())]
-        return None, describe_errors(errors, filled, source)
+        return None, _describe_errors(errors, filled, source)
 
 
-def _hidden_errors(data: dict[str, Any], found: list[ErrorDetails]) -> list[ErrorDetails]:
-    """Find what an unknown key hides: rules between the keys of a section run only where all its keys are known."""
+def _hidden_errors(data: dict[str, Any], errors: list[ErrorDetails]) -> list[ErrorDetails]:
+    """Find errors that an unknown key hides: rules between keys run only where all keys of a section are known."""
     try:
-        Study.model_validate_json(json.dumps(without_unknown_keys(data, found)))
+        Study.model_validate_json(json.dumps(_without_unknown_keys(data, errors)))
     except ValidationError as error:
         return error.errors()
     return []
 
 
-def with_preset(data: dict[str, Any]) -> dict[str, Any]:
-    """Put the values of the preset that a config names under its own keys.
-
-    Parameters
-    ----------
-    data : dict
-        Plain data of a config.
-
-    Returns
-    -------
-    dict
-        The same where no preset is named, or none that exists.
-    """
-    section = data.get(_SECTION)
+def _with_preset(data: dict[str, Any]) -> dict[str, Any]:
+    """Fill in the values of the preset that a config names; keys that are given win."""
+    section = data.get(_PRESET_SECTION)
     if not isinstance(section, dict):
         return data
     values = next((values for name, values in PRESETS.items() if name == section.get("preset")), {})
-    return data | {_SECTION: {**values, **section}}
+    return data | {_PRESET_SECTION: {**values, **section}}
 
 
-def describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], source: str) -> list[str]:
+def _describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], source: str) -> list[str]:
     """Describe every wrong key of a config.
 
     Parameters
@@ -103,7 +92,7 @@ def describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], source
     list of str
         One line for each key: ``file: dotted.key = value: what is wrong (did you mean ...?)``.
     """
-    # Where a key allows several types, each of them has its own complaint; a line joins them.
+    # Where a key allows several types, each of them has an error of its own; a line joins them.
     reasons: dict[Location, dict[Sequence[int | str], str]] = {}
     not_of_length: set[Location] = set()
     for detail in errors:
@@ -114,55 +103,49 @@ def describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], source
         if (reason := _reason(detail, location, data)) is not None:
             reasons.setdefault(location, {})[alternative] = reason
             not_of_length |= set() if _lacks_entry(detail) or detail["type"] in _LENGTH else {location}
-    # Where an entry of a list is wrong, only alternatives of another length complain about the list itself.
+    # Where an entry of a list is wrong, only alternatives of another length report an error of the list itself.
     entries = [location for location in reasons if location in not_of_length]
-    told = [
+    reported = [
         location
         for location in reasons
         if location in not_of_length or not any(_is_below(entry, location) for entry in entries)
     ]
-    return [_line(location, reasons[location].values(), data, source) for location in told]
+    return [_line(location, reasons[location].values(), data, source) for location in reported]
 
 
-def _is_below(location: Location, place: Location) -> bool:
-    return len(location) > len(place) and location[: len(place)] == place
+def _is_below(location: Location, parent: Location) -> bool:
+    return len(location) > len(parent) and location[: len(parent)] == parent
 
 
-def without_unknown_keys(data: dict[str, Any], errors: Iterable[ErrorDetails]) -> dict[str, Any]:
-    """Copy the data of a config without the keys that no section has.
-
-    Parameters
-    ----------
-    errors : iterable of ErrorDetails
-        What the validating library says of the data.
-    """
+def _without_unknown_keys(data: dict[str, Any], errors: Iterable[ErrorDetails]) -> dict[str, Any]:
+    """Copy the data of a config without the keys that the errors call unknown."""
     kept = copy.deepcopy(data)
     for detail in errors:
         *parents, last = _location(detail, data) or ("",)
-        known, place = _value(kept, tuple(parents))
-        if detail["type"] in _UNKNOWN and known and isinstance(place, dict):
-            place.pop(last, None)
+        exists, section = _value(kept, tuple(parents))
+        if detail["type"] in _UNKNOWN and exists and isinstance(section, dict):
+            section.pop(last, None)
     return kept
 
 
 def _line(location: Location, reasons: Iterable[str], data: dict[str, Any], source: str) -> str:
-    known, value = _value(data, location)
+    exists, value = _value(data, location)
     text = json.dumps(value)
     if len(text) > _LONGEST_VALUE:
         text = text[:_LONGEST_VALUE] + " ..."
-    shown = f" = {text}" if known and not isinstance(value, dict) else ""
+    shown = f" = {text}" if exists and not isinstance(value, dict) else ""
     return f"{source}: {'.'.join(location)}{shown}: {' or '.join(dict.fromkeys(reasons))}"
 
 
 def _location(detail: ErrorDetails, data: dict[str, Any]) -> Location:
     """Drop the parts of a location that name alternatives of a type, and add the key of a combination rule."""
     location: list[str] = []
-    place: Any = data
+    node: Any = data
     for part in detail["loc"]:
         if isinstance(part, int):
-            place = place[part] if isinstance(place, list) and part < len(place) else None
-        elif isinstance(place, dict) and (part in place or detail["type"] == "missing"):
-            place = place.get(part)
+            node = node[part] if isinstance(node, list) and part < len(node) else None
+        elif isinstance(node, dict) and (part in node or detail["type"] == "missing"):
+            node = node.get(part)
         else:
             continue
         location.append(str(part))
@@ -198,7 +181,7 @@ def _reason(detail: ErrorDetails, location: Location, data: dict[str, Any]) -> s
 
 
 def _length(detail: ErrorDetails, value: Any) -> str | None:
-    """Say what length is wanted; None where entries only count as lacking because they are wrong themselves."""
+    """Describe the length that is needed; None where entries only count as missing because they are wrong."""
     context = detail.get("ctx", {})
     if detail["type"] == "too_long":
         return f"needs {context.get('max_length')} entries at most"

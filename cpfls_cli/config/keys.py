@@ -1,4 +1,4 @@
-"""The keys of a config, read off the settings classes, and the commented default that is its reference."""
+"""The keys of a config, read from the settings classes, and the commented default that lists them all."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _key(name: str, hint: Any) -> Key:
 
 
 def known_keys(location: Sequence[str], deep: bool = False) -> list[str]:
-    """List the valid keys at a place of a config.
+    """List the valid keys of a section of a config.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def known_keys(location: Sequence[str], deep: bool = False) -> list[str]:
     Returns
     -------
     list of str
-        Empty where the place is no section.
+        Empty where the location is no section.
     """
     settings: type | None = Study
     parts = iter(location)
@@ -122,8 +122,8 @@ def _section(hint: Any, many: bool = False) -> tuple[type | None, bool]:
         return hint, many
     origin = get_origin(hint)
     if origin is Annotated or origin in _UNIONS or origin in _ENTRIES:
-        found = (_section(part, many or origin in _ENTRIES) for part in get_args(hint))
-        return next((pair for pair in found if pair[0] is not None), (None, False))
+        pairs = (_section(part, many or origin in _ENTRIES) for part in get_args(hint))
+        return next((pair for pair in pairs if pair[0] is not None), (None, False))
     return None, False
 
 
@@ -150,7 +150,7 @@ def _entries(hint: Any) -> tuple[Choice, ...]:
 
 
 def commented_default() -> str:
-    """Write the default study as YAML with comments on every key: what it is, and what values it may have."""
+    """Write the default study as YAML with a comment on every key: its meaning and the values that it may have."""
     return "\n".join(_commented(Study, resolved(Study()), 0)) + "\n"
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from cpfls_cli.config.check import checked
+from cpfls_cli.config.check import check_data
 from cpfls_cli.config.overrides import apply_override, setting_errors
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.yaml_text import parse_yaml
@@ -93,7 +93,7 @@ def validate(data: dict[str, Any], source: str, *, sweep: bool = False) -> Study
     ConfigError
         Listing every wrong key with its value, what is wrong, and the nearest valid key.
     """
-    study, errors = checked(data, source)
+    study, errors = check_data(data, source)
     if sweep:
         errors += setting_errors(data, source, errors)
     if study is None or errors:

@@ -1,4 +1,4 @@
-"""Overrides of a config: from the command line, and those of the settings of a sweep."""
+"""Overrides of a config: from the command line, and by the settings of a sweep."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cpfls_cli.config.check import checked
+from cpfls_cli.config.check import check_data
 from cpfls_cli.config.study import Study, resolved
 from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.errors import ConfigError, SettingError
 
 _MALFORMED = "write section.key=value"
-AS_CONFIGURED = "as configured"
+_AS_CONFIGURED = "as configured"
 _SWEEP = "sweep"
-_ALLOWED = ("reduction", "identification")
+_OVERRIDABLE = ("reduction", "identification")
 _PRESET = "identification.preset"
 
 
 def apply_override(data: dict[str, Any], override: str) -> None:
-    """Put one override into the data of a config.
+    """Apply one override to the data of a config.
 
     Parameters
     ----------
@@ -39,62 +39,49 @@ def apply_override(data: dict[str, Any], override: str) -> None:
     try:
         if not separator:
             raise SettingError(key, _MALFORMED)
-        override_key(data, key.strip(), parse_yaml(text, f"--set {key}"))
+        _override_key(data, key.strip(), parse_yaml(text, f"--set {key}"))
     except SettingError as error:
         raise ConfigError(f"--set {override}: {error}") from None
 
 
-def override_key(data: dict[str, Any], key: str, value: Any) -> None:
-    """Put the value of one key into the data of a config.
-
-    Parameters
-    ----------
-    data : dict
-        Changed in place. A list that the config leaves out is taken from the default study.
-    key : str
-        With dots; an entry of a list is named by its index, from 0.
-
-    Raises
-    ------
-    SettingError
-        If the key is malformed, or leads below a single value or past the end of a list.
-    """
+def _override_key(data: dict[str, Any], key: str, value: Any) -> None:
+    """Set one key, written with dots, in the data of a config; the data are changed in place."""
     parts = key.split(".")
     if not all(parts):
         raise SettingError(key, _MALFORMED)
     *parents, last = parts
-    place: Any = data
+    node: Any = data
     default: Any = resolved(Study())
     for parent in parents:
         default = default.get(parent) if isinstance(default, dict) else None
-        place = _enter(place, parent, default, key)
-    if isinstance(place, list):
-        place[_index(place, last, key)] = value
-    elif isinstance(place, dict):
-        place[last] = value
+        node = _enter(node, parent, default, key)
+    if isinstance(node, list):
+        node[_index(node, last, key)] = value
+    elif isinstance(node, dict):
+        node[last] = value
     else:
         raise SettingError(key, f"'{'.'.join(parents)}' is a single value and has no keys")
 
 
-def _enter(place: Any, name: str, default: Any, key: str) -> Any:
-    if isinstance(place, list):
-        return place[_index(place, name, key)]
-    if not isinstance(place, dict):
+def _enter(node: Any, name: str, default: Any, key: str) -> Any:
+    if isinstance(node, list):
+        return node[_index(node, name, key)]
+    if not isinstance(node, dict):
         raise SettingError(key, f"'{name}' lies below a single value")
-    if place.get(name) is None:
-        place[name] = copy.deepcopy(default) if isinstance(default, list) else {}
-    return place[name]
+    if node.get(name) is None:
+        node[name] = copy.deepcopy(default) if isinstance(default, list) else {}
+    return node[name]
 
 
-def _index(place: list[Any], name: str, key: str) -> int:
-    if not name.isdecimal() or int(name) >= len(place):
-        raise SettingError(key, f"'{name}' is not an index of a list of {len(place)}, which count from 0")
+def _index(entries: list[Any], name: str, key: str) -> int:
+    if not name.isdecimal() or int(name) >= len(entries):
+        raise SettingError(key, f"'{name}' is not an index of a list of {len(entries)}, which count from 0")
     return int(name)
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One setting of a sweep.
+    """A study that a sweep runs: the config with the overrides of one setting.
 
     Attributes
     ----------
@@ -113,7 +100,7 @@ class Variant:
 
 
 def variants(study: Study) -> tuple[Variant, ...]:
-    """Make the studies of a sweep.
+    """Build the studies of a sweep, one for each setting.
 
     Returns
     -------
@@ -127,12 +114,12 @@ def variants(study: Study) -> tuple[Variant, ...]:
     """
     data, common = resolved(study), study.sweep.set
     if not study.sweep.settings:
-        return (_variant(data, AS_CONFIGURED, common),)
+        return (_variant(data, _AS_CONFIGURED, common),)
     return tuple(_variant(data, setting.name, common | setting.set) for setting in study.sweep.settings)
 
 
 def setting_errors(data: Mapping[str, Any], source: str, known: Sequence[str]) -> list[str]:
-    """Find what is wrong with the settings of a sweep, each in the place where it overrides the config.
+    """List the errors of the settings of a sweep, each at the key where it overrides the config.
 
     Parameters
     ----------
@@ -141,7 +128,7 @@ def setting_errors(data: Mapping[str, Any], source: str, known: Sequence[str]) -
     source : str
         Name of the file, for messages.
     known : sequence of str
-        What is wrong without them; said once.
+        Errors without the settings; they are not repeated.
 
     Returns
     -------
@@ -151,47 +138,47 @@ def setting_errors(data: Mapping[str, Any], source: str, known: Sequence[str]) -
     sweep = data.get(_SWEEP)
     common = _mapping(_mapping(sweep).get("set"))
     settings = _mapping(sweep).get("settings")
-    everywhere = _wrong(data, source, common)
-    found = {} if settings else {f"{_SWEEP}.set: {line}": None for line in everywhere}
+    everywhere = _errors_with(data, source, common)
+    errors = {} if settings else {f"{_SWEEP}.set: {line}": None for line in everywhere}
     for number, setting in enumerate(settings if isinstance(settings, list) else ()):
-        for line in _wrong(data, source, common | _mapping(_mapping(setting).get("set"))):
-            found[f"{_SWEEP}.{'' if line in everywhere else f'settings.{number}.'}set: {line}"] = None
-    said = {line.removeprefix(f"{source}: ") for line in known}
-    return [f"{source}: {line}" for line in found if line.split(": ", 1)[1] not in said]
+        for line in _errors_with(data, source, common | _mapping(_mapping(setting).get("set"))):
+            errors[f"{_SWEEP}.{'' if line in everywhere else f'settings.{number}.'}set: {line}"] = None
+    reported = {line.removeprefix(f"{source}: ") for line in known}
+    return [f"{source}: {line}" for line in errors if line.split(": ", 1)[1] not in reported]
 
 
 def _mapping(data: Any) -> dict[str, Any]:
-    """Pass over what is no mapping; that is complained of elsewhere."""
+    """Return a mapping as it is and anything else as empty; another check reports that."""
     return data if isinstance(data, dict) else {}
 
 
-def _wrong(data: Mapping[str, Any], source: str, overrides: Mapping[str, Any]) -> list[str]:
-    """Say what is wrong with a config whose keys are overridden."""
+def _errors_with(data: Mapping[str, Any], source: str, overrides: Mapping[str, Any]) -> list[str]:
+    """List the errors of a config whose keys are overridden."""
     try:
-        return [line.removeprefix(f"{source}: ") for line in checked(_overridden(data, overrides)[0], source)[1]]
+        return [line.removeprefix(f"{source}: ") for line in check_data(_overridden(data, overrides)[0], source)[1]]
     except SettingError as error:
         return [f"{error.key} = {json.dumps(overrides[error.key])}: {error}"]
 
 
 def _variant(data: Mapping[str, Any], name: str, overrides: Mapping[str, Any]) -> Variant:
     overridden, reduced = _overridden(data, overrides)
-    study, errors = checked(overridden, name)
+    study, errors = check_data(overridden, name)
     if study is None:
         raise ConfigError("\n".join(errors))
     return Variant(name, tuple(f"{key}={json.dumps(value)}" for key, value in overrides.items()), study, reduced)
 
 
 def _overridden(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> tuple[dict[str, Any], bool]:
-    """Override keys of a config, and tell whether it is still reduced."""
+    """Override keys of a config, and tell whether it still has a reduction."""
     result = copy.deepcopy({key: value for key, value in data.items() if key != _SWEEP})
     for key, value in overrides.items():
-        if key.split(".")[0] not in _ALLOWED:
-            raise SettingError(key, f"a setting of a sweep overrides keys of {' and '.join(_ALLOWED)} only")
-        if key in _ALLOWED:
+        if key.split(".")[0] not in _OVERRIDABLE:
+            raise SettingError(key, f"a setting of a sweep overrides keys of {' and '.join(_OVERRIDABLE)} only")
+        if key in _OVERRIDABLE:
             raise SettingError(key, f"is a section; name its keys one by one, with a dot: {key}.KEY")
         if key == _PRESET:
             raise SettingError(key, "speaks for keys that the config leaves out; name the keys that differ")
-        override_key(result, key, value)
+        _override_key(result, key, value)
     reduction = result.get("reduction")
     if not isinstance(reduction, dict) or reduction.get("size", 0) is not None or reduction.get("condition_number"):
         return result, True

@@ -1,4 +1,4 @@
-"""YAML that means what it says: `1e-3` is a number, `on` is a word, and equal keys are refused."""
+"""YAML without surprises: `1e-3` is a number, `on` is a string, and duplicate keys are refused."""
 
 from __future__ import annotations
 

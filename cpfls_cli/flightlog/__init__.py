@@ -1,4 +1,4 @@
-"""Flight logs of others: columns become signals on one clock, aligned, filtered and differentiated."""
+"""Import of flight logs: columns become signals on one clock, aligned, filtered and differentiated."""
 
 from cpfls_cli.flightlog.alignment import align_commands, estimate_delay
 from cpfls_cli.flightlog.importing import derive_flight, import_log, read_signals

@@ -33,7 +33,7 @@ _SMALLEST_WINDOW = 50
 
 
 def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: float = 1.0) -> LogSignals:
-    """Shift torque, thrust and rotor commands by the delay, stated or estimated, and cut the front that they then miss.
+    """Shift torque, thrust and rotor commands by the delay, given or estimated, and drop the samples before it.
 
     Measured rotor speeds are motion and stay where they are, unless the torque is computed from them.
 
@@ -118,7 +118,7 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
 
 @dataclass(frozen=True)
 class _Fit:
-    """The regression that every delay is judged by; only the torque moves."""
+    """Regression of the shifted torque on the columns of a rigid body."""
 
     time: Array
     torque: CubicSpline
@@ -134,9 +134,9 @@ class _Fit:
     def r2(self, delay: float) -> tuple[float, Array]:
         torque = self.scaled_torque(delay)
         fitted = (self.basis @ (self.basis.T @ torque.ravel())).reshape(torque.shape)
-        left, whole = ((torque - fitted) ** 2).sum(axis=0), (torque**2).sum(axis=0)
-        acting = whole > 0
-        unexplained = left[acting] / whole[acting]
+        residual, total = ((torque - fitted) ** 2).sum(axis=0), (torque**2).sum(axis=0)
+        acting = total > 0
+        unexplained = residual[acting] / total[acting]
         r2 = np.ones(3)
         r2[acting] = 1 - unexplained
         return float(1 - np.prod(unexplained) ** (1 / len(unexplained))), r2
@@ -156,7 +156,7 @@ def estimate_delay(
     lowpass_order: int = 4,
     share: float = 1.0,
 ) -> DelayEstimate:
-    """Find the delay at which a rigid body explains most of the torque.
+    """Estimate the delay at which a rigid body explains most of the torque.
 
     Both sides of ``tau(t - delay) = I omegad + omega x I omega + constant`` go through the same low-pass filter.
     For every delay, the six inertia parameters and a constant torque about each axis are regressed on one common
@@ -222,7 +222,7 @@ def _prepare(
 
 
 def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
-    """Leave out the filter's transients, and at the front what the longest delay reaches for."""
+    """Exclude the filter's transients and, at the start, the longest delay."""
     edge = 0.0 if lowpass_hz is None else 0.5 / lowpass_hz
     first, last = np.searchsorted(time, [time[0] + delay_max_s + edge, time[-1] - edge])
     if last - first < _SMALLEST_WINDOW:
@@ -235,29 +235,29 @@ def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
 
 
 def _orthonormal(regressor: Array) -> Array:
-    """Span the regressor's columns, scaled first so that a weakly excited one is not taken for rounding."""
+    """Compute an orthonormal basis of the columns, scaled first so that a weakly excited one is not lost."""
     lengths = np.linalg.norm(regressor, axis=0)
-    left, sizes, _ = np.linalg.svd(regressor / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
-    basis: Array = left[:, sizes > 1e-10 * sizes[0]]
+    directions, sizes, _ = np.linalg.svd(regressor / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
+    basis: Array = directions[:, sizes > 1e-10 * sizes[0]]
     return basis
 
 
 def _refine(fit: _Fit, delays: Array, best: int) -> float:
     low, high = delays[max(best - 1, 0)], delays[min(best + 1, len(delays) - 1)]
-    found = minimize_scalar(lambda delay: -fit.r2(float(delay))[0], bounds=(low, high), method="bounded")
-    refined, on_grid = float(found.x), float(delays[best])
+    minimum = minimize_scalar(lambda delay: -fit.r2(float(delay))[0], bounds=(low, high), method="bounded")
+    refined, on_grid = float(minimum.x), float(delays[best])
     return refined if fit.r2(refined)[0] > fit.r2(on_grid)[0] else on_grid
 
 
-def followed(signals: LogSignals, time_constant: float) -> LogSignals:
-    """Replace the commands to the rotors by what the rotors make of them, ``tau w' + w = u``, u held between samples.
+def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:
+    """Replace rotor commands by their first-order response, ``tau w' + w = u``, with u held between samples.
 
     Parameters
     ----------
     signals : LogSignals
         On a uniform clock.
     time_constant : float
-        tau, s; 0 for rotors that follow at once.
+        tau, s; 0 for rotors without lag.
     """
     command = signals.rotor_command
     if command is None or time_constant == 0:

@@ -11,8 +11,8 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.settings import ImportSettings
 
-_LARGEST_SHARE = 0.05
-_WORTH_KEEPING = 0.1
+_LARGEST_SHARE_BEHIND = 0.05
+_SMALLEST_SHARE_KEPT = 0.1
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def increasing_rows(time: Array) -> tuple[IntArray, dict[str, int]]:
 
 
 def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> Stretch:
-    """Find the rows between which no column lacks values for longer than the longest gap allowed.
+    """Find the longest stretch in which no column lacks values for longer than the longest gap allowed.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -
 
 
 def _slow_log(time: Array, present: BoolArray, settings: ImportSettings) -> str | None:
-    """Say so where the usual step, not a gap in it, is longer than the longest gap allowed."""
+    """Describe a log whose median step, not a gap in it, exceeds the longest gap allowed; None if it does not."""
     step = float(np.median(np.diff(time)))
     if step > settings.gap_s:
         return (
@@ -179,7 +179,7 @@ def refuse_restart(time: Array, rows: IntArray) -> None:
 
 
 def _remedy(time: Array) -> str:
-    kept = {crop: rows for crop in _crops(time) if (rows := _rows_left(time, crop)) > _WORTH_KEEPING * len(time)}
+    kept = {crop: rows for crop in _crops(time) if (rows := _rows_left(time, crop)) > _SMALLEST_SHARE_KEPT * len(time)}
     if not kept:
         return "split the log (import.crop_s cannot tell the parts apart: their time stamps overlap)"
     begin, end = max(kept, key=lambda crop: kept[crop])
@@ -187,7 +187,7 @@ def _remedy(time: Array) -> str:
 
 
 def _crops(time: Array) -> Iterator[tuple[float, float]]:
-    """List the stretches of stamps that may belong to one part: before, beyond and among the stamps behind."""
+    """List the intervals of time that may hold one part of the log: before, beyond and among the stamps behind."""
     behind = _behind(time)
     last = float(time.max())
     lowest, highest = float(time[behind].min()), float(time[behind].max())
@@ -200,12 +200,12 @@ def _crops(time: Array) -> Iterator[tuple[float, float]]:
 
 def _rows_left(time: Array, crop: tuple[float, float]) -> int:
     """Count the rows that a crop leaves; 0 where the clock goes back within it."""
-    left = time[(time >= crop[0]) & (time <= crop[1])]
-    return 0 if _too_many(_runs_behind(left), len(left)) else len(left)
+    inside = time[(time >= crop[0]) & (time <= crop[1])]
+    return 0 if _too_many(_runs_behind(inside), len(inside)) else len(inside)
 
 
 def _too_many(runs: IntArray, rows: int) -> bool:
-    return bool(runs[runs[:, 1] > 1, 1].sum() > _LARGEST_SHARE * rows)
+    return bool(runs[runs[:, 1] > 1, 1].sum() > _LARGEST_SHARE_BEHIND * rows)
 
 
 def _runs_behind(time: Array) -> IntArray:

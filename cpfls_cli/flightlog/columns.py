@@ -13,14 +13,13 @@ from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.units import to_si
 
-_ENOUGH = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
+_SUFFICIENT_SIGNALS = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
 
 
-def of_present_signals(columns: Container[str], settings: ImportSettings) -> ImportSettings:
-    """Leave out the signals that a log may lack and does lack.
+def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> ImportSettings:
+    """Leave out the optional signals whose columns the log does not hold.
 
-    A signal with some of its columns stays, so that the missing ones are named like those of a signal that must be
-    there.
+    A signal with some of its columns stays, so that the missing ones are named like those of a required signal.
 
     Parameters
     ----------
@@ -32,13 +31,12 @@ def of_present_signals(columns: Container[str], settings: ImportSettings) -> Imp
     Returns
     -------
     ImportSettings
-        With the signals that are left.
+        With the remaining signals.
 
     Raises
     ------
     InputError
-        If signals are absent and what is left tells neither of the rotation nor of the rotors, or another key needs
-        one that is absent.
+        If the remaining signals describe neither the rotation nor the rotors, or another key needs an absent one.
     """
     absent = [
         name
@@ -47,13 +45,14 @@ def of_present_signals(columns: Container[str], settings: ImportSettings) -> Imp
     ]
     if not absent:
         return settings
-    left = {name: signal for name, signal in settings.signals.items() if name not in absent}
-    if not any(name in left for name in _ENOUGH):
+    present = {name: signal for name, signal in settings.signals.items() if name not in absent}
+    if not any(name in present for name in _SUFFICIENT_SIGNALS):
         raise InputError(
-            f"import.signals: a flight needs one of {', '.join(_ENOUGH)}; the log has no columns of {', '.join(absent)}"
+            f"import.signals: a flight needs one of {', '.join(_SUFFICIENT_SIGNALS)}; the log has no columns of"
+            f" {', '.join(absent)}"
         )
     try:
-        return replace(settings, signals=left)
+        return replace(settings, signals=present)
     except SettingError as error:
         raise InputError(f"import.{error.key}: {error}; the log has no columns of {', '.join(absent)}") from None
 

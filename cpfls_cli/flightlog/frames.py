@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.flightlog.repair import without_jumps
+from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.rotations import multiply, rotation_matrix
 
@@ -63,7 +63,7 @@ def _is_specific_force(name: str, settings: ImportSettings) -> bool:
 
 
 def _as_body_vectors(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:
-    """Replace what is written in Euler coordinates, while they are still the log's own."""
+    """Convert quaternion, Euler rates and Euler torque to attitude and body vectors, in the log's own frames."""
     in_body = {name: signals[name] for name in ("attitude", *_BODY_SIGNALS) if name in signals}
     if "quaternion" in signals:
         in_body["attitude"] = attitude_from_quaternion(signals["quaternion"], settings.quaternion_order)
@@ -75,7 +75,7 @@ def _as_body_vectors(signals: Mapping[str, Array], settings: ImportSettings) -> 
 
 
 def body_to_flu(vectors: Array, frame: BodyFrame) -> Array:
-    """Turn body vectors into front, left, up.
+    """Convert body vectors to front, left, up (FLU).
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def body_to_flu(vectors: Array, frame: BodyFrame) -> Array:
 
 
 def world_to_enu(vectors: Array, frame: WorldFrame) -> Array:
-    """Turn world vectors into east, north, up.
+    """Convert world vectors to east, north, up (ENU).
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def attitude_from_quaternion(quaternion: Array, order: Literal["wxyz", "xyzw"]) 
 
 
 def euler_angles(rotation: Array) -> Array:
-    """Read roll, pitch, yaw (intrinsic ZYX) off rotation matrices.
+    """Extract roll, pitch, yaw (intrinsic ZYX) from rotation matrices.
 
     Parameters
     ----------
@@ -162,11 +162,11 @@ def euler_angles(rotation: Array) -> Array:
     roll = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
     pitch = -np.arcsin(np.clip(rotation[:, 2, 0], -1.0, 1.0))
     yaw = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    return np.column_stack([without_jumps(roll), pitch, without_jumps(yaw)])
+    return np.column_stack([unwrap_angles(roll), pitch, unwrap_angles(yaw)])
 
 
 def acceleration_from_specific_force(attitude: Array, specific_force: Array) -> Array:
-    """Convert what an accelerometer senses to acceleration, ``a = R f - g e_z``.
+    """Convert specific force to acceleration, ``a = R f - g e_z``.
 
     Parameters
     ----------

@@ -13,9 +13,9 @@ from scipy.interpolate import CubicSpline
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError, InputError, SettingError
-from cpfls_cli.flightlog.alignment import align_commands, followed
+from cpfls_cli.flightlog.alignment import align_commands, apply_rotor_lag
 from cpfls_cli.flightlog.clock import longest_stretch
-from cpfls_cli.flightlog.columns import of_present_signals, select_columns
+from cpfls_cli.flightlog.columns import drop_absent_signals, select_columns
 from cpfls_cli.flightlog.frames import to_program_frames
 from cpfls_cli.flightlog.quality import (
     count_values,
@@ -24,7 +24,14 @@ from cpfls_cli.flightlog.quality import (
     warn_of_disagreement,
     warn_of_values,
 )
-from cpfls_cli.flightlog.repair import Table, fill, find_table_spikes, in_order_and_cropped, made_continuous, without
+from cpfls_cli.flightlog.repair import (
+    SignalTable,
+    crop_and_order,
+    fill,
+    find_signal_spikes,
+    make_continuous,
+    mask_values,
+)
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
@@ -64,7 +71,7 @@ def import_log(
     ComputationError
         If the pitch comes within a degree of +-90 degrees, or the delay cannot be estimated.
     """
-    signals = followed(read_signals(columns, settings), settings.rotor_command_lag_s)
+    signals = apply_rotor_lag(read_signals(columns, settings), settings.rotor_command_lag_s)
     if settings.torque_source in ("rotor-speed", "rotor-command"):
         if rotor_torque is None:
             raise InputError(f"import.torque_source = {settings.torque_source} needs a vehicle")
@@ -73,7 +80,7 @@ def import_log(
 
 
 def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogSignals:
-    """Read the mapped columns of a log, drop and repair what is bad, and put all on one uniform clock.
+    """Read the mapped columns of a log, drop bad rows, repair bad values, and resample to one uniform clock.
 
     Parameters
     ----------
@@ -96,12 +103,12 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         If columns are missing, too few signals are left, a gap is too long, the clock goes backward and stays
         behind, or the pitch is larger than any pitch.
     """
-    settings = of_present_signals(columns, settings)
-    read = Table(*select_columns(columns, settings))
-    table, dropped = in_order_and_cropped(read, settings)
-    table = made_continuous(table)
-    spikes = find_table_spikes(table, settings)
-    repaired = table if settings.spike_deviations is None else without(table, spikes)
+    settings = drop_absent_signals(columns, settings)
+    read = SignalTable(*select_columns(columns, settings))
+    table, dropped = crop_and_order(read, settings)
+    table = make_continuous(table)
+    spikes = find_signal_spikes(table, settings)
+    repaired = table if settings.spike_deviations is None else mask_values(table, spikes)
     stretch = longest_stretch(table.time, np.isfinite(repaired.columns()), settings)
     dropped |= {"incomplete_ends": stretch.incomplete_ends, "gap": stretch.beyond_gap}
     table, repaired = table.rows(stretch.rows), repaired.rows(stretch.rows)

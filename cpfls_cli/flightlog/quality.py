@@ -12,15 +12,15 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.repair import Table, count_saturated
+from cpfls_cli.flightlog.repair import SignalTable, count_saturated
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 
 _NEVER_SATURATED = {"quaternion", "voltage"}
-# What noise and filters add to a nose that points straight up.
+# A quarter turn, and a margin for noise and filters.
 _LARGEST_PITCH = pi / 2 + 0.05
 _FULL_TURN = 7.0
-_USUAL_SHARE = 0.99
+_ANGLE_QUANTILE = 0.99
 _AXES = ("x (roll)", "y (pitch)", "z (yaw)")
 _COMPARED_BELOW_HZ = 5.0
 _FILTER_ORDER = 4
@@ -29,8 +29,8 @@ _MOVING_SHARE = 0.1
 _POOR_CORRELATION = 0.6
 # At a correlation of 0.6 and a true gain of 1, noise in one of the two changes the ratio of their spreads by 1.7.
 _LARGEST_GAIN = 2.0
-_DEGREES = 180 / pi
-_NEAR = 1.3
+_DEGREES_PER_RADIAN = 180 / pi
+_GAIN_TOLERANCE = 1.3
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class ValueCounts:
     saturated: dict[str, int]
 
 
-def count_values(table: Table, spikes: Mapping[str, BoolArray], settings: ImportSettings) -> ValueCounts:
+def count_values(table: SignalTable, spikes: Mapping[str, BoolArray], settings: ImportSettings) -> ValueCounts:
     """Count the bad values of each column of the log.
 
     Parameters
@@ -65,18 +65,18 @@ def count_values(table: Table, spikes: Mapping[str, BoolArray], settings: Import
     settings : ImportSettings
         The names of the columns, `spike_deviations` and `saturation_samples`.
     """
-    found = _by_column(spikes, settings, lambda column: int(column.sum()))
+    counts = _by_column(spikes, settings, lambda column: int(column.sum()))
     repaired = settings.spike_deviations is not None
     return ValueCounts(
         missing=_by_column(table.signals, settings, lambda column: int(np.isnan(column).sum())),
-        spikes=found if repaired else {},
-        suspected_spikes={} if repaired else found,
+        spikes=counts if repaired else {},
+        suspected_spikes={} if repaired else counts,
         saturated=_saturated(table, settings),
     )
 
 
-def _saturated(table: Table, settings: ImportSettings) -> dict[str, int]:
-    """Count saturated values; a hovering quaternion stands at 1, parked rotors at 0, and a voltage is coarse."""
+def _saturated(table: SignalTable, settings: ImportSettings) -> dict[str, int]:
+    """Count saturated values, but not a quaternion at hover (1), parked rotors (0), or a coarse voltage."""
     length = settings.saturation_samples
     rotors = {name: signal for name, signal in table.signals.items() if name.startswith("rotor")}
     others = {name: signal for name, signal in table.signals.items() if name not in _NEVER_SATURATED | rotors.keys()}
@@ -86,7 +86,7 @@ def _saturated(table: Table, settings: ImportSettings) -> dict[str, int]:
 
 
 def warn_of_values(counts: ValueCounts) -> tuple[str, ...]:
-    """Say which columns hold values that look wrong and are used as they are."""
+    """Describe the columns whose suspicious values are used unchanged."""
     saturated = (
         f"{column} stands at its extreme for {count} samples in all: saturated?"
         for column, count in counts.saturated.items()
@@ -112,7 +112,7 @@ def _by_column(
 
 
 def refuse_steep_pitch(signals: Mapping[str, Array]) -> None:
-    """Refuse an attitude whose pitch exceeds a quarter turn, which roll, pitch, yaw never do.
+    """Refuse an attitude whose pitch exceeds a quarter turn, which roll, pitch, yaw angles cannot.
 
     Parameters
     ----------
@@ -128,14 +128,14 @@ def refuse_steep_pitch(signals: Mapping[str, Array]) -> None:
     largest = float(np.abs(signals["attitude"][:, 1]).max())
     if largest > _LARGEST_PITCH:
         raise InputError(
-            f"attitude reaches {largest:.3g} rad of pitch, and a quarter turn of 1.57 is the most there is: is"
+            f"attitude reaches {largest:.3g} rad of pitch, and no pitch is larger than a quarter turn, 1.57 rad: is"
             " import.signals.attitude.unit deg? Otherwise check the order of its columns, and spikes"
             " (import.spike_deviations)"
         )
 
 
 def warn_of_angles(signals: Mapping[str, Array]) -> tuple[str, ...]:
-    """Doubt roll and yaw beyond a full turn, where no gyroscope can tell their unit.
+    """Warn of roll or yaw beyond a full turn where no gyroscope confirms their unit.
 
     Parameters
     ----------
@@ -144,8 +144,8 @@ def warn_of_angles(signals: Mapping[str, Array]) -> tuple[str, ...]:
     """
     if "attitude" not in signals or {"body_rate", "attitude_rate"} & signals.keys():
         return ()
-    # One spike is no unit.
-    roll, _, yaw = np.nanquantile(np.abs(signals["attitude"]), _USUAL_SHARE, axis=0)
+    # A single spike says nothing about the unit.
+    roll, _, yaw = np.nanquantile(np.abs(signals["attitude"]), _ANGLE_QUANTILE, axis=0)
     return tuple(
         f"attitude reaches {angle:.3g} rad of {name}: is import.signals.attitude.unit deg? (good where the angle counts"
         " on over full turns)"
@@ -202,8 +202,11 @@ def _wrong_gains(gain: dict[int, float]) -> Iterator[str]:
 
 
 def _explanation(gain: float) -> str:
-    for factor, name, rate, angle in ((_DEGREES, "180/pi", "deg/s", "rad"), (1 / _DEGREES, "pi/180", "rad/s", "deg")):
-        if abs(log(gain / factor)) < log(_NEAR):
+    for factor, name, rate, angle in (
+        (_DEGREES_PER_RADIAN, "180/pi", "deg/s", "rad"),
+        (1 / _DEGREES_PER_RADIAN, "pi/180", "rad/s", "deg"),
+    ):
+        if abs(log(gain / factor)) < log(_GAIN_TOLERANCE):
             return (
                 f"about {name}; does the log hold rates in {rate} (import.signals.body_rate.unit, attitude_rate.unit),"
                 f" or angles in {angle} (import.signals.attitude.unit)?"
@@ -226,7 +229,7 @@ def _moving(derived: Array, measured: Array) -> BoolArray:
 
 
 def _correlation(derived: Array, measured: Array) -> Array:
-    """Correlate column by column; 0 where one stands still."""
+    """Correlate column by column; 0 for a constant column."""
     spread = derived.std(axis=0) * measured.std(axis=0)
     together = ((derived - derived.mean(axis=0)) * (measured - measured.mean(axis=0))).mean(axis=0)
     return np.asarray(np.divide(together, spread, out=np.zeros(3), where=spread > 0), dtype=float)

@@ -21,7 +21,7 @@ _DEVIATION_OF_MEDIAN = 1.4826
 
 
 @dataclass(frozen=True)
-class Table:
+class SignalTable:
     """Time stamps and the mapped signals at them, in SI, absent values NaN.
 
     Attributes
@@ -33,16 +33,16 @@ class Table:
     time: Array
     signals: dict[str, Array]
 
-    def rows(self, kept: slice | IntArray | BoolArray) -> Table:
-        """Keep some rows."""
-        return Table(self.time[kept], {name: values[kept] for name, values in self.signals.items()})
+    def rows(self, kept: slice | IntArray | BoolArray) -> SignalTable:
+        """Select rows."""
+        return SignalTable(self.time[kept], {name: values[kept] for name, values in self.signals.items()})
 
     def columns(self) -> Array:
         """Join all signals to one array, shape (sample, column)."""
         return np.hstack(list(self.signals.values()))
 
 
-def in_order_and_cropped(table: Table, settings: ImportSettings) -> tuple[Table, dict[str, int]]:
+def crop_and_order(table: SignalTable, settings: ImportSettings) -> tuple[SignalTable, dict[str, int]]:
     """Keep the rows that lie inside the crop, and of these the ones whose time stamps increase.
 
     The crop comes first, so that it can cut off a part whose clock went wrong.
@@ -56,7 +56,7 @@ def in_order_and_cropped(table: Table, settings: ImportSettings) -> tuple[Table,
     Returns
     -------
     table : Table
-        What is left.
+        The rows that remain.
     dropped : dict from str to int
         Rows dropped, by reason.
 
@@ -80,12 +80,12 @@ def in_order_and_cropped(table: Table, settings: ImportSettings) -> tuple[Table,
     kept, dropped = increasing_rows(table.time)
     if len(kept) < 2:
         raise InputError("the log has fewer than two rows of increasing time stamps; see import.time_column")
-    left = table.rows(kept)
-    _require_values(left, settings)
-    return left, dropped | {"crop": int(outside.sum())}
+    ordered = table.rows(kept)
+    _require_values(ordered, settings)
+    return ordered, dropped | {"crop": int(outside.sum())}
 
 
-def _require_values(table: Table, settings: ImportSettings) -> None:
+def _require_values(table: SignalTable, settings: ImportSettings) -> None:
     """Refuse columns that are empty in the part of the log that is read, by their names."""
     problems = [
         f"import.signals.{name}.columns: {column!r} has fewer than two values ({count}) in the"
@@ -99,8 +99,8 @@ def _require_values(table: Table, settings: ImportSettings) -> None:
         raise InputError("\n".join(problems))
 
 
-def made_continuous(table: Table) -> Table:
-    """Remove what is no motion: full turns of roll and yaw, and the change of sign of a quaternion.
+def make_continuous(table: SignalTable) -> SignalTable:
+    """Remove jumps that are not motion: full turns of roll and yaw, sign changes of a quaternion.
 
     Returns
     -------
@@ -110,14 +110,14 @@ def made_continuous(table: Table) -> Table:
     signals = dict(table.signals)
     if "attitude" in signals:
         roll, pitch, yaw = signals["attitude"].T
-        signals["attitude"] = np.column_stack([without_jumps(roll), pitch, without_jumps(yaw)])
+        signals["attitude"] = np.column_stack([unwrap_angles(roll), pitch, unwrap_angles(yaw)])
     if "quaternion" in signals:
-        signals["quaternion"] = same_sign(signals["quaternion"])
-    return Table(table.time, signals)
+        signals["quaternion"] = align_quaternion_signs(signals["quaternion"])
+    return SignalTable(table.time, signals)
 
 
-def find_table_spikes(table: Table, settings: ImportSettings) -> dict[str, BoolArray]:
-    """Find the spikes of all signals; commands of the rotors may jump and have none.
+def find_signal_spikes(table: SignalTable, settings: ImportSettings) -> dict[str, BoolArray]:
+    """Find the spikes of all signals except rotor commands, which may jump.
 
     Parameters
     ----------
@@ -140,8 +140,8 @@ def find_table_spikes(table: Table, settings: ImportSettings) -> dict[str, BoolA
     return spikes
 
 
-def without(table: Table, marked: Mapping[str, BoolArray]) -> Table:
-    """Make the marked values absent.
+def mask_values(table: SignalTable, marked: Mapping[str, BoolArray]) -> SignalTable:
+    """Replace marked values by NaN.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def without(table: Table, marked: Mapping[str, BoolArray]) -> Table:
     marked : mapping from signal name to array of bool, shape (sample, column)
     """
     signals = {name: np.where(marked[name], np.nan, values) for name, values in table.signals.items()}
-    return Table(table.time, signals)
+    return SignalTable(table.time, signals)
 
 
 def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
@@ -216,7 +216,7 @@ def count_saturated(values: Array, samples: int, rest: float | None = None) -> i
 
 
 def fill(time: Array, values: Array, target: Array) -> Array:
-    """Interpolate the values that are present linearly at other times.
+    """Interpolate the present values linearly at other times.
 
     Parameters
     ----------
@@ -233,8 +233,8 @@ def fill(time: Array, values: Array, target: Array) -> Array:
     return np.column_stack([np.interp(target, time[k], v[k]) for k, v in zip(known.T, values.T, strict=True)])
 
 
-def without_jumps(angles: Array, turn: float = 2 * pi) -> Array:
-    """Remove the jumps of full turns from angles, over absent values.
+def unwrap_angles(angles: Array, turn: float = 2 * pi) -> Array:
+    """Unwrap angles, also across absent values.
 
     Parameters
     ----------
@@ -252,8 +252,8 @@ def without_jumps(angles: Array, turn: float = 2 * pi) -> Array:
     return continuous
 
 
-def same_sign(quaternion: Array) -> Array:
-    """Give each quaternion the sign that is nearer to the one before; q and -q are one attitude.
+def align_quaternion_signs(quaternion: Array) -> Array:
+    """Give each quaternion the sign nearer to the previous one; q and -q are the same attitude.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def same_sign(quaternion: Array) -> Array:
 
 
 def _windows(values: Array, window: int) -> Array:
-    """Surround each value by its neighbours; mirrored at the ends, where repeating would hide a spike."""
+    """Collect the neighbours of each value; mirrored at the ends, where repetition would hide a spike."""
     before = window // 2
     padded = np.pad(values, (before, window - 1 - before), mode="reflect")
     return np.asarray(sliding_window_view(padded, window), dtype=float)

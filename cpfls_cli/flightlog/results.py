@@ -41,7 +41,7 @@ class DelayEstimate:
 
 @dataclass(frozen=True, kw_only=True)
 class ImportReport:
-    """What an import read, dropped, repaired and chose.
+    """Report of an import: rows read and dropped, values repaired, filter and delay.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Settings of the section `import`: which columns of a log are which signals, and how they become a flight."""
+"""Settings of the section `import`: how the columns of a log map to signals, and how these become a flight."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _COLUMNS_OF_VECTOR = 3
 
 @dataclass(frozen=True, kw_only=True)
 class SignalMap(Settings):
-    """Where one signal stands in the log: ``signal = sign * (scale * column + offset)`` in `unit`."""
+    """Columns of one signal in the log: ``signal = sign * (scale * column + offset)`` in `unit`."""
 
     columns: Annotated[tuple[str, ...], MinLen(1), Doc("names of the columns, in the order of the axes")]
     unit: Annotated[UnitName, Doc("unit of the columns after scale and offset")]
@@ -72,7 +72,7 @@ class SignalMap(Settings):
             raise SettingError("sign", f"needs {len(self.columns)} numbers, one for each column, each +1 or -1")
 
 
-def check_signal(name: SignalName, signal: SignalMap) -> None:
+def _check_signal(name: SignalName, signal: SignalMap) -> None:
     """Check the number of columns and the unit against the kind of signal.
 
     Raises
@@ -151,7 +151,7 @@ class ImportSettings(Settings):
         if self.crop_s is not None and not 0 <= self.crop_s[0] < self.crop_s[1]:
             raise SettingError("crop_s", "needs 0 <= begin < end")
         for name, signal in self.signals.items():
-            check_signal(name, signal)
+            _check_signal(name, signal)
         if self.signals:
             _check_attitude(self)
             _check_torque(self)

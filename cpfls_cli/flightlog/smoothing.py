@@ -1,4 +1,4 @@
-"""Zero-phase low-pass filter and time derivative of uniformly sampled signals."""
+"""Zero-phase low-pass filter and time derivative of uniformly sampled signals, and body rates from an attitude."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PADDED_PERIODS = 3
 
 
 def low_pass(values: Array, rate_hz: float, cutoff_hz: float | None, order: int) -> Array:
-    """Filter without phase shift: a Butterworth low-pass, forward and backward.
+    """Apply a Butterworth low-pass filter forward and backward, without phase shift.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def derivative(time: Array, values: Array) -> Array:
 
     On a uniform clock this is the compact central difference of fourth order: its relative error is
     ``(2 pi f / rate)^4 / 180``, where the plain central difference has ``(2 pi f / rate)^2 / 6`` and would make
-    every identified inertia too large. It does not smooth; that is the low-pass filter's work.
+    every identified inertia too large. It does not smooth; `low_pass` does.
 
     Parameters
     ----------

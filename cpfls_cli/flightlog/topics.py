@@ -1,4 +1,4 @@
-"""Topics of a log, each with a clock of its own, put on the clock of one of them."""
+"""Topics of a log, each with a clock of its own, resampled to the clock of one of them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.clock import increasing_rows
-from cpfls_cli.flightlog.repair import same_sign, without_jumps
+from cpfls_cli.flightlog.repair import align_quaternion_signs, unwrap_angles
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.units import known_unit
 
 Topics = Mapping[str, Mapping[str, Array]]
 STAMP = "timestamp"
-"""The field of a topic that says when."""
+"""The field of a topic that holds its time stamps."""
 _SETPOINTS = ("torque", "body_torque", "thrust", "rotor_command")
 _ANGLES_THAT_JUMP = (0, 2)
 _THINNED = 1.5
@@ -38,7 +38,7 @@ def topic_and_field(column: str) -> tuple[str, str]:
 
 
 def on_one_clock(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Put the mapped columns of all topics on the clock that `time_column` names.
+    """Resample the mapped columns of all topics to the clock that `time_column` names.
 
     Between two samples a setpoint (torque, thrust, rotor command) keeps the previous value, and what is measured is
     interpolated linearly, quaternions with one sign and roll and yaw without full turns. Inside a pause of a topic
@@ -75,24 +75,26 @@ def on_one_clock(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Ar
             used.add(topic)
             if topic != base:
                 _require_fast(topic, clocks[topic], settings)
-                between = held if name in _SETPOINTS else interpolated
+                between = hold_previous if name in _SETPOINTS else interpolate
                 values = between(clocks[topic], values, target, settings.gap_s)
             columns[column] = values
     return columns, _warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)})
 
 
 def _continuous(name: str, signal: SignalMap, topics: Topics) -> dict[str, Array]:
-    """Take the columns of a signal that exist, without the jumps that are no motion."""
+    """Select the existing columns of a signal, with angles unwrapped and quaternion signs aligned."""
     parts = {column: topic_and_field(column) for column in signal.columns}
-    found = {column: topics[topic][field] for column, (topic, field) in parts.items() if field in topics.get(topic, {})}
-    of_one_topic = len({topic for topic, _ in parts.values()}) == 1 and len(found) == len(parts)
+    existing = {
+        column: topics[topic][field] for column, (topic, field) in parts.items() if field in topics.get(topic, {})
+    }
+    of_one_topic = len({topic for topic, _ in parts.values()}) == 1 and len(existing) == len(parts)
     if name == "quaternion" and of_one_topic:
-        return dict(zip(found, same_sign(np.column_stack(list(found.values()))).T, strict=True))
+        return dict(zip(existing, align_quaternion_signs(np.column_stack(list(existing.values()))).T, strict=True))
     if name == "attitude":
         turn = 2 * pi / abs(signal.scale * known_unit(signal.unit).factor)
-        jumping = {column for place, column in enumerate(signal.columns) if place in _ANGLES_THAT_JUMP}
-        return {column: without_jumps(v, turn) if column in jumping else v for column, v in found.items()}
-    return found
+        jumping = {column for axis, column in enumerate(signal.columns) if axis in _ANGLES_THAT_JUMP}
+        return {column: unwrap_angles(v, turn) if column in jumping else v for column, v in existing.items()}
+    return existing
 
 
 def _require_fast(topic: str, time: Array, settings: ImportSettings) -> None:
@@ -118,8 +120,8 @@ def _step(time: Array) -> float:
     return float(np.median(np.diff(time))) if len(time) > 1 else float("inf")
 
 
-def interpolated(time: Array, values: Array, target: Array, longest_s: float) -> Array:
-    """Interpolate linearly.
+def interpolate(time: Array, values: Array, target: Array, longest_s: float) -> Array:
+    """Interpolate linearly between samples that are near enough.
 
     Parameters
     ----------
@@ -141,13 +143,13 @@ def interpolated(time: Array, values: Array, target: Array, longest_s: float) ->
     return np.where(_bridged(time, target, longest_s), np.interp(target, time, values), np.nan)
 
 
-def held(time: Array, values: Array, target: Array, longest_s: float) -> Array:
-    """Keep the previous value.
+def hold_previous(time: Array, values: Array, target: Array, longest_s: float) -> Array:
+    """Hold the previous value between samples that are near enough.
 
     Parameters
     ----------
     time, values, target, longest_s
-        See `interpolated`.
+        See `interpolate`.
 
     Returns
     -------

@@ -32,7 +32,7 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
     path : Path
         ``.csv`` or ``.csv.gz`` with one line of names.
     wanted : set of str
-        Columns to read as numbers; others are only named, so that a message can suggest them.
+        Columns to read as numbers; others by name only, so that a message can suggest them.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def _columns(path: Path, stream: TextIO, wanted: set[str]) -> dict[str, Array]:
 
 
 def row_lines(path: Path) -> list[int]:
-    """Tell in which line of a CSV each row of values stands; empty lines hold none.
+    """List the line number of each row of values in a CSV; empty lines hold none.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def row_lines(path: Path) -> list[int]:
     Returns
     -------
     list of int
-        From 1; the names stand before the first row.
+        From 1; the line of names comes before the first row.
     """
     with _open(path) as stream:
         lines = [number for number, line in enumerate(stream, start=1) if line.strip()]

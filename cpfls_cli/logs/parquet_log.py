@@ -76,7 +76,7 @@ def _states_unit(kind: Any) -> bool:
 
 
 def _seconds(column: Any) -> Array:
-    """Convert stamps, whole numbers of their unit, to seconds from the first one; the difference is still exact."""
+    """Convert stamps, whole numbers of their unit, to seconds from the first one; their difference is exact."""
     per_second = _PER_SECOND[column.type.unit]
     whole = pyarrow.int32() if pyarrow.types.is_time32(column.type) else pyarrow.int64()
     stamps = column.cast(whole).cast(pyarrow.int64())

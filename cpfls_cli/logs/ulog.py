@@ -55,7 +55,7 @@ def read(path: Path, settings: ImportSettings) -> LogColumns:
 
 
 def _read(path: Path, settings: ImportSettings) -> tuple[Any, dict[str, dict[str, Any]]]:
-    """Read the wanted topics only, and all of them where something wanted is not there, for the names."""
+    """Read the mapped topics, or all topics where a mapped field is missing, so that a message can list them."""
     wanted = [topic_and_field(column) for column in settings.mapped_columns]
     log = _parsed(path, sorted({topic.partition("[")[0] for topic, _ in wanted}))
     if not all(field in _topics(log).get(topic, {}) for topic, field in wanted):
@@ -82,7 +82,7 @@ def _topics(log: Any) -> dict[str, dict[str, Any]]:
 
 
 def _in_seconds(topics: dict[str, dict[str, Any]], origin: int) -> dict[str, dict[str, Array]]:
-    """Convert stamps to s from the origin; the difference of whole numbers is still exact."""
+    """Convert stamps to seconds from the origin; the difference of whole numbers is exact."""
     return {
         topic: {field: _field(field, values, origin) for field, values in fields.items()}
         for topic, fields in topics.items()

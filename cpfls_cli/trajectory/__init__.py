@@ -1,4 +1,4 @@
-"""Smooth paths in space, the attitude they ask of a multirotor, and attitude paths of full rotations."""
+"""Smooth paths in space, the attitude that they require of a multirotor, and attitude paths of full rotations."""
 
 from cpfls_cli.trajectory.limits import Limits
 from cpfls_cli.trajectory.moves import Move, Moves

@@ -1,4 +1,4 @@
-"""Attitude along a path in space: the yaw, and the roll and pitch that the acceleration asks for."""
+"""Attitude along a path in space: the yaw, and the roll and pitch that the acceleration requires."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.trajectory.legs import Leg, in_turn
+from cpfls_cli.trajectory.legs import Leg, samples_of_legs
 from cpfls_cli.trajectory.profile import BaseProfile, covering
 
 # Fraction of gravity below which the direction of the thrust is rounding error.
@@ -67,7 +67,7 @@ def flat_attitude(time: Array, translation: Array, heading: Array, gravity: floa
 
 
 def _in_heading_frame(force: Array, heading: Array) -> tuple[Array, Array, Array]:
-    """Components forward, right and up of the force in the frame that turns with yaw, each (3, time)."""
+    """Resolve the force into forward, right and up in the frame that turns with yaw, each (3, time)."""
     yaw, rate, acceleration = heading
     sine, cosine = np.sin(yaw), np.cos(yaw)
     x, y, up = np.moveaxis(force, 2, 0)
@@ -118,7 +118,7 @@ def _refuse_sideways(time: Array, tilted: Array, gravity: float) -> None:
 
 
 def uniform_heading(time: Array, turn: float, duration: float) -> Array:
-    """Turn at a constant rate.
+    """Compute a yaw that turns at a constant rate.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def uniform_heading(time: Array, turn: float, duration: float) -> Array:
 
 
 def stretched_heading(time: Array, turn: float, profile: BaseProfile, duration: float) -> Array:
-    """Turn from rest to rest as a move does, stretched in time.
+    """Compute a yaw that turns from rest to rest with the shape of a move, stretched in time.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def stretched_heading(time: Array, turn: float, profile: BaseProfile, duration: 
 
 
 def heading_of_legs(time: Array, legs: Sequence[Leg]) -> Array:
-    """Turn from point to point, while the vehicle moves.
+    """Compute a yaw that turns from point to point during the legs.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def heading_of_legs(time: Array, legs: Sequence[Leg]) -> Array:
     """
     heading = np.zeros((3, len(time)))
     heading[0] = _yaw(legs[0])[0]
-    for leg, samples in in_turn(legs, time):
+    for leg, samples in samples_of_legs(legs, time):
         begin, end = _yaw(leg)
         turned = stretched_heading(time[samples] - leg.begin, end - begin, leg.profiles[0], leg.duration)
         heading[:, samples] = turned

@@ -18,7 +18,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 
-# A hold shorter than this part of its span is what rounding left of none.
+# A hold shorter than this fraction of its span is rounding error.
 _NO_HOLD = 8 * float(np.finfo(float).eps)
 # Samples of a block: what is computed on the way stays in the cache.
 _BLOCK = 4096
@@ -41,7 +41,7 @@ _WAVE = np.array(
 
 
 def spans_of(period: float | Array, holds: Array) -> Array:
-    """Add up the spans.
+    """Compute the spans from period and holds.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def spans_of(period: float | Array, holds: Array) -> Array:
     """
     spans = np.empty((5, *holds.shape[1:]))
     spans[0] = period
-    # A sum too large for numbers is infinite, and told by whoever asked for it.
+    # A sum that overflows is infinite, and reported by the caller.
     with np.errstate(over="ignore"):
         for level in range(1, 5):
             spans[level] = spans[:level].sum(axis=0) + holds[level - 1]
@@ -65,7 +65,7 @@ def spans_of(period: float | Array, holds: Array) -> Array:
 
 
 def holds_of(spans: Array) -> Array:
-    """Find what of each span is hold, the inverse of `spans_of`.
+    """Compute the holds from the spans, the inverse of `spans_of`.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def holds_of(spans: Array) -> Array:
 
 
 def peaks_of(displacement: float | Array, spans: Array) -> Array:
-    """Find the peak of every derivative.
+    """Compute the peak of every derivative.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def sample(displacement: float, spans: Array, time: Array) -> Array:
 def _ascending(displacement: float, spans: Array, time: Array) -> Array:
     """Evaluate at ascending times, shape (7, time)."""
     motion = np.zeros((7, len(time)))
-    half = pieces(np.copysign(peaks_of(displacement, spans), displacement), spans)
+    half = _pieces(np.copysign(peaks_of(displacement, spans), displacement), spans)
     duration = spans.sum()
     starts = np.array([piece.start for piece in half])
     breaks = np.concatenate([starts, [duration / 2], duration - starts[::-1]])
@@ -150,7 +150,7 @@ def _ascending(displacement: float, spans: Array, time: Array) -> Array:
     return motion
 
 
-def _fill(motion: Array, piece: Piece, time: Array, origin: float, direction: float) -> None:
+def _fill(motion: Array, piece: _Piece, time: Array, origin: float, direction: float) -> None:
     """Evaluate one piece, whose time runs from the origin in the direction."""
     for first in range(0, len(time), _BLOCK):
         block = slice(first, first + _BLOCK)
@@ -160,7 +160,7 @@ def _fill(motion: Array, piece: Piece, time: Array, origin: float, direction: fl
 
 
 @dataclass(frozen=True)
-class Piece:
+class _Piece:
     """A wave or a hold, as functions of the fraction tau of its length.
 
     Attributes
@@ -189,8 +189,8 @@ class Piece:
         end: Array = self.coefficients[:, :6].sum(axis=1) + self.coefficients[:, 7]
         return end
 
-    def mirrored(self, parity: Array, displacement: float) -> Piece:
-        """Make the piece of the second half of the move that mirrors this one, its time running backwards.
+    def mirrored(self, parity: Array, displacement: float) -> _Piece:
+        """Mirror this piece into the second half of the move, with its time reversed.
 
         Parameters
         ----------
@@ -204,7 +204,7 @@ class Piece:
         return replace(self, coefficients=coefficients, crackle=parity[5] * self.crackle, pop=parity[6] * self.pop)
 
     def evaluate(self, tau: Array, motion: Array) -> None:
-        """Write displacement to pop.
+        """Evaluate displacement to pop in place.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class Piece:
         np.multiply(sine, self.pop, out=motion[6])
 
 
-def pieces(peaks: Array, spans: Array) -> list[Piece]:
+def _pieces(peaks: Array, spans: Array) -> list[_Piece]:
     """Cut the first half of a move into its pieces: eight waves, seven holds between and half the last hold.
 
     Parameters
@@ -249,7 +249,7 @@ def pieces(peaks: Array, spans: Array) -> list[Piece]:
     # What jumps does so inside pieces of no length, which nobody samples.
     bounded = np.where(np.isfinite(peaks), peaks, 0.0)
     known = _known_states(bounded)
-    made: list[Piece] = []
+    made: list[_Piece] = []
     for start, length, sign, exact in zip(starts, lengths, signs, known, strict=True):
         state = made[-1].end if made else np.zeros(5)
         made.append(_piece(start, length, sign * bounded, np.where(np.isnan(exact), state, exact)))
@@ -275,7 +275,7 @@ def _known_states(peaks: Array) -> Array:
     return known
 
 
-def _piece(start: float, length: float, wave: Array, state: Array) -> Piece:
+def _piece(start: float, length: float, wave: Array, state: Array) -> _Piece:
     """Carry a state through a piece; `wave` holds the signed peaks, zeros in a hold."""
     coefficients = np.zeros((5, 8))
     coefficients[:, 0] = state
@@ -283,7 +283,7 @@ def _piece(start: float, length: float, wave: Array, state: Array) -> Piece:
     for order in (3, 2, 1, 0):
         coefficients[order, 1:5] = coefficients[order + 1, :4] * length / np.arange(1, 5)
     coefficients += np.cumprod([wave[4], *[length] * 4])[::-1, np.newaxis] * _WAVE
-    return Piece(start, length, coefficients, wave[5] / 2, wave[6])
+    return _Piece(start, length, coefficients, wave[5] / 2, wave[6])
 
 
 def _polynomial(coefficients: Array, tau: Array, values: Array) -> None:

@@ -19,7 +19,7 @@ _LARGEST_SIZE = 10_000_000
 
 
 def check_consistency(settings: TrajectorySettings) -> None:
-    """Refuse combinations that do not describe a path.
+    """Refuse combinations of settings that do not describe a path.
 
     Raises
     ------
@@ -52,7 +52,9 @@ def _check_clock(settings: TrajectorySettings) -> None:
         return
     check_samples(settings.duration_s, settings.sample_time_s)
     if settings.pause_s:
-        raise SettingError("pause_s", "contradicts duration_s, which leaves what rest there is; set that to null")
+        raise SettingError(
+            "pause_s", "contradicts duration_s, which determines the rest between moves; set that to null"
+        )
 
 
 def _check_held(settings: TrajectorySettings) -> None:
@@ -106,7 +108,7 @@ def _check_moves(settings: TrajectorySettings) -> None:
 
 
 def check_peaks(profile: BaseProfile, key: str) -> None:
-    """Refuse a move that numbers cannot hold.
+    """Refuse a move whose displacement vanishes or whose derivatives overflow.
 
     Parameters
     ----------
@@ -120,7 +122,7 @@ def check_peaks(profile: BaseProfile, key: str) -> None:
     """
     if not profile.displacement:
         raise SettingError(
-            key, f"with period_s = {profile.period:g} makes a move too short for numbers to hold; raise it"
+            key, f"with period_s = {profile.period:g} makes a move too short for floating-point numbers; raise it"
         )
     peaks = {name: value for name, value in asdict(profile.peaks).items() if name not in _MAY_JUMP}
     name, value = max(peaks.items(), key=lambda peak: peak[1])
@@ -169,7 +171,7 @@ def check_duration(moves: int, needed: float, duration: float) -> None:
 
 
 def check_waypoints(waypoints: Sequence[WaypointSettings], paused: bool) -> None:
-    """Refuse points that make no path.
+    """Refuse waypoints that do not describe a path.
 
     Parameters
     ----------
@@ -195,5 +197,5 @@ def check_waypoints(waypoints: Sequence[WaypointSettings], paused: bool) -> None
         raise SettingError(f"waypoints.{headings.index(True)}.yaw_rad", message)
     for number, point in enumerate(waypoints):
         if point.pause_s and not paused:
-            message = "contradicts duration_s, which leaves what rest there is; set duration_s to null"
+            message = "contradicts duration_s, which determines the rest between moves; set duration_s to null"
             raise SettingError(f"waypoints.{number}.pause_s", message)

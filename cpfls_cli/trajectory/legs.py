@@ -1,4 +1,4 @@
-"""Legs of a path in space: the shape of a rest-to-rest move, axes that begin and end together, and legs in turn."""
+"""Legs of a path in space: the profiles of one rest-to-rest move, and the moves one after the other."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Leg:
 
     @property
     def end(self) -> float:
-        """When it is at rest again, s."""
+        """Time at which it is at rest again, s."""
         return self.begin + self.duration
 
     @property
@@ -63,7 +63,7 @@ class Leg:
         return np.asarray(covered @ self.directions)
 
 
-def along(legs: Sequence[Leg], time: Array) -> Array:
+def evaluate_legs(legs: Sequence[Leg], time: Array) -> Array:
     """Evaluate position and its six derivatives along a path.
 
     Parameters
@@ -79,7 +79,7 @@ def along(legs: Sequence[Leg], time: Array) -> Array:
     """
     motion = np.zeros((7, len(time), 3))
     motion[0] = legs[0].start
-    for leg, samples in in_turn(legs, time):
+    for leg, samples in samples_of_legs(legs, time):
         elapsed = time[samples] - leg.begin
         motion[0, samples] = leg.start
         for profile, direction in zip(leg.profiles, leg.directions, strict=True):
@@ -87,8 +87,8 @@ def along(legs: Sequence[Leg], time: Array) -> Array:
     return motion
 
 
-def in_turn(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, slice]]:
-    """Divide samples among legs, so that the work grows with the samples and not with their product.
+def samples_of_legs(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, slice]]:
+    """Assign the samples to the legs, so that the work grows with the samples and not with samples times legs.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def in_turn(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, slice]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """How long a move takes: as its period and holds say, or as short as its limits allow.
+    """Timing of a move: by its period and holds, or the shortest that its limits allow.
 
     Attributes
     ----------
@@ -203,7 +203,7 @@ def shape_of(vector: Array, timing: Timing) -> Shape:
 
 
 def _smooth(moves: tuple[Move, ...], directions: Array) -> Shape:
-    """Refuse what has no attitude: its acceleration follows from the snap."""
+    """Refuse moves of unbounded snap, from which the acceleration of the attitude follows."""
     for move in moves:
         if not move.outcome.solved:
             raise SettingError("limits", move.outcome.words)
@@ -246,7 +246,7 @@ def synchronised(
 
 
 def _straight_line(displacements: Array, limits: Limits, period: float | None) -> Moves:
-    """Plan the fraction of the way, under the strictest limit of all axes."""
+    """Plan the common fraction of the way under the strictest limit of all axes."""
     bounds = limits.broadcast(len(displacements))
     largest = max(np.abs(displacements).max(initial=0.0), np.finfo(float).tiny)
     shares = np.abs(displacements) / largest

@@ -35,7 +35,7 @@ class Limits:
     pop: float | Array = np.inf
 
     def __post_init__(self) -> None:
-        """Refuse limits that no move can keep.
+        """Refuse limits that are not greater than zero.
 
         Raises
         ------
@@ -46,7 +46,7 @@ class Limits:
             require_positive(field.name, getattr(self, field.name), "leave it out for no limit")
 
     def broadcast(self, moves: int) -> Array:
-        """Give every move its limits.
+        """Broadcast the limits to all moves.
 
         Returns
         -------
@@ -58,14 +58,14 @@ class Limits:
         SettingError
             If the length of a limit is neither one nor the number of moves.
         """
-        return np.stack([spread(field.name, getattr(self, field.name), moves) for field in fields(self)])
+        return np.stack([broadcast_to_moves(field.name, getattr(self, field.name), moves) for field in fields(self)])
 
 
 LIMIT_NAMES = tuple(field.name for field in fields(Limits))
 
 
 def require_positive(key: str, value: float | Array, remedy: str) -> None:
-    """Refuse what is not greater than zero.
+    """Refuse values that are not greater than zero.
 
     Parameters
     ----------
@@ -86,8 +86,8 @@ def require_positive(key: str, value: float | Array, remedy: str) -> None:
         raise SettingError(key, f"is {values[wrong][0]:g}; must be greater than 0, or {remedy}")
 
 
-def spread(key: str, value: float | Array, moves: int) -> Array:
-    """Give every move the one value, or its own.
+def broadcast_to_moves(key: str, value: float | Array, moves: int) -> Array:
+    """Broadcast one value to all moves, or check that there is one for each.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Results of planning: moves, which limits they reach, and why there is none."""
+"""Results of planning: moves, the limits that they reach, and the reason where there is no move."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _REACHED = 1e-9
 
 
 class Outcome(IntEnum):
-    """What planning came to; `words` says it to a person."""
+    """Outcome of planning; `words` describes it."""
 
     SOLVED = 0
     ZERO_DISPLACEMENT = 1
@@ -26,12 +26,12 @@ class Outcome(IntEnum):
 
     @property
     def solved(self) -> bool:
-        """Whether there is a move to fly, be it one that stays where it is."""
+        """Whether a move was found, including one of zero displacement."""
         return self in (Outcome.SOLVED, Outcome.ZERO_DISPLACEMENT)
 
     @property
     def words(self) -> str:
-        """What happened, and what to do about it."""
+        """Description of the outcome, with a remedy."""
         return _WORDS[self]
 
 
@@ -40,8 +40,8 @@ _WORDS = {
     Outcome.ZERO_DISPLACEMENT: "the displacement is zero: nothing moves, and it takes no time",
     Outcome.NO_LIMIT: "no solution: nothing limits the move, so none is the shortest; give a limit on "
     f"{', '.join(LIMIT_NAMES[:-1])} or {LIMIT_NAMES[-1]}, or a period",
-    Outcome.OUT_OF_RANGE: "no solution: the move's times are too long or too short for numbers to hold; bring the "
-    "displacement and the limits nearer to 1",
+    Outcome.OUT_OF_RANGE: "no solution: the move's times are too long or too short for floating-point numbers; bring "
+    "the displacement and the limits nearer to 1",
 }
 
 
@@ -133,7 +133,7 @@ class Moves:
 
 
 def moves_of(displacement: Array, spans: Array, bounds: Array, outcome: IntArray) -> Moves:
-    """Describe moves of given durations.
+    """Build moves from their spans.
 
     Parameters
     ----------

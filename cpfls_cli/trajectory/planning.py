@@ -12,14 +12,14 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.trajectory.attitude import flat_attitude, heading_of_legs, stretched_heading, uniform_heading
 from cpfls_cli.trajectory.consistency import check_duration, check_peaks, check_samples, check_waypoints
-from cpfls_cli.trajectory.legs import Leg, Shape, along, shape_of
+from cpfls_cli.trajectory.legs import Leg, Shape, evaluate_legs, shape_of
 from cpfls_cli.trajectory.rotation import RotationPath
 from cpfls_cli.trajectory.settings import TrajectorySettings
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedRotation:
-    """How a vehicle is to turn, sampled; time is the first axis.
+    """Planned rotation of a vehicle, sampled; time is the first axis.
 
     By itself it is the plan of a vehicle that is held at its centre of mass.
 
@@ -86,13 +86,13 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
     SettingError
         If a move cannot be planned, or the moves take longer than the duration; it names the key.
     ComputationError
-        If the path asks for free fall, where the attitude is not defined, or is too large for numbers to hold.
+        If the path asks for free fall, where the attitude is not defined, or its derivatives overflow.
 
     References
     ----------
     Sections 7 and 9 of the paper; method.md section 3.
     """
-    # What overflows is told from what does not at the end, with a remedy.
+    # Overflow is reported at the end, with a remedy.
     with np.errstate(over="ignore", invalid="ignore"):
         planned = _planned(settings, gravity)
     if not all(np.isfinite(values).all() for values in vars(planned).values() if isinstance(values, np.ndarray)):
@@ -103,10 +103,10 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
 
 
 def _planned(settings: TrajectorySettings, gravity: float) -> Trajectory:
-    legs = itinerary(settings)
-    duration = duration_of(settings, legs)
+    legs = _itinerary(settings)
+    duration = _duration_of(settings, legs)
     time = sample_times(duration, settings.sample_time_s)
-    motion = along(legs, time)
+    motion = evaluate_legs(legs, time)
     heading = _heading(settings, legs, time, duration)
     flat = flat_attitude(time, motion[2:5], heading, gravity)
     position, velocity, acceleration, jerk, snap, crackle, pop = motion
@@ -128,12 +128,12 @@ def _planned(settings: TrajectorySettings, gravity: float) -> Trajectory:
         attitude_acceleration=flat.attitude_acceleration,
         body_rate=rotations.body_rate(flat.attitude, flat.attitude_rate),
         legs=legs,
-        maxima=maxima(legs),
+        maxima=_maxima(legs),
     )
 
 
 def _heading(settings: TrajectorySettings, legs: tuple[Leg, ...], time: Array, duration: float) -> Array:
-    """Yaw, its rate and its acceleration, shape (3, time)."""
+    """Compute yaw, its rate and its acceleration, shape (3, time)."""
     if legs[0].yaw is not None:
         return heading_of_legs(time, legs)
     if settings.yaw_profile == "uniform":
@@ -141,19 +141,8 @@ def _heading(settings: TrajectorySettings, legs: tuple[Leg, ...], time: Array, d
     return stretched_heading(time, settings.yaw_turn, legs[0].profiles[0], duration)
 
 
-def itinerary(settings: TrajectorySettings) -> tuple[Leg, ...]:
-    """Plan the legs of a path in space.
-
-    Returns
-    -------
-    tuple of Leg
-        In the order of time.
-
-    Raises
-    ------
-    SettingError
-        If a leg cannot be planned, or the legs take longer than the duration; it names the key.
-    """
+def _itinerary(settings: TrajectorySettings) -> tuple[Leg, ...]:
+    """Plan the legs of a path in space, in the order of time."""
     shapes = _between_waypoints(settings) if settings.path == "waypoints" else _to_and_fro(settings)
     begins = _begins(settings, np.array([shape.duration for shape in shapes]))
     start, yaw = _start(settings)
@@ -165,19 +154,8 @@ def itinerary(settings: TrajectorySettings) -> tuple[Leg, ...]:
     return tuple(legs)
 
 
-def duration_of(settings: TrajectorySettings, legs: tuple[Leg, ...]) -> float:
-    """Tell how long a path takes.
-
-    Returns
-    -------
-    float, s
-        Where the settings leave it to the moves, up to the first sample at which all is at rest.
-
-    Raises
-    ------
-    SettingError
-        If the sample time does not suit it.
-    """
+def _duration_of(settings: TrajectorySettings, legs: tuple[Leg, ...]) -> float:
+    """Compute the duration of a path, s: as set, or up to the first sample at which all is at rest."""
     if settings.duration_s is not None:
         return settings.duration_s
     duration = legs[-1].end + _last_pause(settings)
@@ -202,7 +180,7 @@ def _between_waypoints(settings: TrajectorySettings) -> list[Shape]:
 
 
 def _start(settings: TrajectorySettings) -> tuple[Array, list[float] | None]:
-    """Position at the start, and the yaw at the ends of all legs where the points have one."""
+    """Find the start position, and the yaw at the ends of all legs where the points have one."""
     if settings.path != "waypoints":
         return np.zeros(3), None
     yaw = [waypoint.yaw_rad for waypoint in settings.waypoints if waypoint.yaw_rad is not None]
@@ -210,7 +188,7 @@ def _start(settings: TrajectorySettings) -> tuple[Array, list[float] | None]:
 
 
 def _begins(settings: TrajectorySettings, durations: Array) -> Array:
-    """When each leg begins."""
+    """Compute the time at which each leg begins."""
     if settings.duration_s is None:
         pauses = np.full(len(durations), settings.pause_s)
         pauses[0] = 0.0
@@ -227,20 +205,14 @@ def _last_pause(settings: TrajectorySettings) -> float:
     return settings.waypoints[-1].pause_s if settings.path == "waypoints" else 0.0
 
 
-def maxima(legs: tuple[Leg, ...]) -> dict[str, float]:
-    """Find the largest peak of every derivative over all legs.
-
-    Returns
-    -------
-    dict of str to float
-        By name of the derivative, m and s; infinite for crackle and pop where nothing limits them.
-    """
+def _maxima(legs: tuple[Leg, ...]) -> dict[str, float]:
+    """Find the largest peak of every derivative over all legs; infinite for crackle and pop without a limit."""
     peaks = [asdict(profile.peaks) for leg in legs for profile in leg.profiles]
     return {name: max(abs(peak[name]) for peak in peaks) for name in peaks[0]}
 
 
 def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
-    """Sample an attitude path.
+    """Plan the rotation of a held vehicle along an attitude path.
 
     Parameters
     ----------
@@ -265,7 +237,7 @@ def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
 
 
 def sample_times(duration: float, sample_time: float) -> Array:
-    """Divide a duration into samples.
+    """Compute the sample times of a duration.
 
     Parameters
     ----------

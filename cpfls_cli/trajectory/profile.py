@@ -13,7 +13,7 @@ from cpfls_cli.trajectory.closed_form import peaks_of, sample, spans_of
 
 @dataclass(frozen=True, kw_only=True)
 class Holds:
-    """How long a derivative stays at its peak, s.
+    """Time for which each derivative stays at its peak, s.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class BaseProfile:
     displacement: float = math.nan
 
     def __post_init__(self) -> None:
-        """Find the displacement where it is not given."""
+        """Compute the displacement where it is not given."""
         if math.isnan(self.displacement):
             object.__setattr__(self, "displacement", self.amplitude * _product(self.spans))
 
@@ -156,6 +156,6 @@ def covering(displacement: float, period: float, holds: Holds) -> BaseProfile:
 
 
 def _product(spans: Array) -> float:
-    # What is too large for numbers is infinite, and refused by whoever asks for it.
+    # A product that overflows is infinite, and refused by the caller.
     with np.errstate(over="ignore", under="ignore"):
         return float(np.prod(spans))

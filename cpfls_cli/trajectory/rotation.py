@@ -124,7 +124,7 @@ def full_rotation(
     rng: np.random.Generator,
     inertia: Sequence[float] | None = None,
 ) -> RotationPath:
-    """Draw a path at random that uses up one of its limits.
+    """Draw a random path that uses up one of its limits.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ class RotationLimits:
         self._inertia = six_parameters(inertia or ())
 
     def loads(self, motion: RotationMotion) -> Array:
-        """Divide what a motion asks for by the limits.
+        """Compute rates, accelerations and torques of a motion as shares of their limits.
 
         Returns
         -------
@@ -299,6 +299,6 @@ class RotationLimits:
 
 
 def _turns_at_the_fastest(path: RotationPath) -> int:
-    """Complete turns that the fastest rate of any angle would make over the duration."""
+    """Count the turns that the fastest rate of any angle would make over the duration."""
     rate = path.sample(path.times(8 * path.harmonics)).attitude_rate
     return int(np.ceil(np.abs(rate).max() * path.duration / (2 * np.pi)))

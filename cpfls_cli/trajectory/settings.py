@@ -142,7 +142,7 @@ class TrajectorySettings(Settings):
     ] = "stop"
 
     def __post_init__(self) -> None:
-        """Refuse combinations that do not describe a path.
+        """Refuse combinations of settings that do not describe a path.
 
         Raises
         ------
@@ -180,7 +180,7 @@ class TrajectorySettings(Settings):
 
     @property
     def timing(self) -> Timing:
-        """How long a move takes."""
+        """Timing of a move."""
         return Timing(
             limits=self.limits,
             coordination=self.coordination,

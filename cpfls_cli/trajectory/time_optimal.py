@@ -9,7 +9,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.closed_form import peaks_of
-from cpfls_cli.trajectory.limits import Limits, require_positive, spread
+from cpfls_cli.trajectory.limits import Limits, broadcast_to_moves, require_positive
 from cpfls_cli.trajectory.moves import Move, Moves, Outcome, moves_of
 
 # By how much a peak may lie above its limit, in parts of it.
@@ -21,7 +21,7 @@ _NEWTON_STEPS = 5
 
 
 def plan_moves(displacement: Array, limits: Limits, period: float | Array | None = None) -> Moves:
-    """Plan the shortest moves, all at once.
+    """Plan the shortest moves under limits, all at once.
 
     Minimise ``16 P + 8 Ts + 4 Tj + 2 Ta + Tv`` over A, P and the holds, with the displacement covered and no
     derivative above its limit.
@@ -47,12 +47,12 @@ def plan_moves(displacement: Array, limits: Limits, period: float | Array | None
     """
     covered = _finite(displacement)
     bounds = limits.broadcast(len(covered))
-    spans = shortest_spans(np.abs(covered), bounds, _positive(period, len(covered)))
+    spans = _shortest_spans(np.abs(covered), bounds, _positive(period, len(covered)))
     return moves_of(covered, spans, bounds, _outcome(covered, bounds, spans, period))
 
 
 def plan_move(displacement: float, limits: Limits, period: float | None = None) -> Move:
-    """Plan the shortest move.
+    """Plan the shortest move under limits.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _positive(period: float | Array | None, moves: int) -> Array | None:
     require_positive("period", period, "leave it out to have it chosen")
     if not np.isfinite(period).all():
         raise SettingError("period", "is not finite; give a time in s, or leave it out to have it chosen")
-    return spread("period", period, moves)
+    return broadcast_to_moves("period", period, moves)
 
 
 def _outcome(displacement: Array, bounds: Array, spans: Array, period: float | Array | None) -> IntArray:
@@ -95,7 +95,7 @@ def _outcome(displacement: Array, bounds: Array, spans: Array, period: float | A
 
 
 def _kept(displacement: Array, bounds: Array, spans: Array) -> BoolArray:
-    """Whether the limits are kept, which is always so unless numbers overflowed on the way, or vanished."""
+    """Tell whether the limits are kept, which fails only where numbers overflowed or vanished on the way."""
     with np.errstate(over="ignore", invalid="ignore"):
         duration = spans.sum(axis=0)
     peaks = peaks_of(displacement, spans)
@@ -103,8 +103,8 @@ def _kept(displacement: Array, bounds: Array, spans: Array) -> BoolArray:
     return kept & (peaks[1:] <= bounds * (1 + _ROUNDING)).all(axis=0)
 
 
-def shortest_spans(displacement: Array, limits: Array, period: Array | None) -> Array:
-    """Find the spans of the shortest move of the family.
+def _shortest_spans(displacement: Array, limits: Array, period: Array | None) -> Array:
+    """Compute the spans of the shortest move of the family.
 
     Let ``S_k(x)`` be the shortest time in which derivative k (1 snap, 2 jerk, 3 acceleration, 4 velocity,
     5 displacement) rises to x. It grows no faster than x, so that what is below is best raised as far as its

@@ -1,4 +1,4 @@
-"""Rotors: the wrench that they give, the speeds that a wrench asks of them, and demands that they cannot meet."""
+"""Rotors: the wrench of given speeds, the speeds of a given wrench, and demands that no rotor can meet."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ROUNDING = 1e-12
 
 
 class BodyWrench(NamedTuple):
-    """What the rotors do to the body.
+    """Thrust and torque of the rotors on the body.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class BodyWrench(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class RotorDemand:
-    """What a wrench asks of the rotors; nothing is clipped.
+    """Rotor speeds that a wrench requires; nothing is clipped.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ def allocation_matrix(vehicle: VehicleSettings) -> Array:
 
 
 def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
-    """Compute what the rotors do to the body.
+    """Compute thrust and body torque from rotor speeds.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
 
 
 def rotor_demand(vehicle: VehicleSettings, thrust: Array, body_torque: Array) -> RotorDemand:
-    """Find the rotor speeds that give a wrench, of minimum norm in the squared speeds.
+    """Compute the rotor speeds that give a wrench, of minimum norm in the squared speeds.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def rotor_demand(vehicle: VehicleSettings, thrust: Array, body_torque: Array) ->
         sample = int(np.flatnonzero(~np.isfinite(wrench).all(axis=1))[0])
         raise ComputationError(f"the demanded thrust or torque is not finite at sample {sample}")
     squared_speed = wrench @ _allocation_inverse(allocation_matrix(vehicle)).T
-    possible = feasible(squared_speed, vehicle.rotor_speed_max_rad_s)
+    possible = _feasible(squared_speed, vehicle.rotor_speed_max_rad_s)
     speed = np.sqrt(np.where(possible, np.maximum(squared_speed, 0.0), np.nan))
     return RotorDemand(
         squared_speed=squared_speed,
@@ -135,7 +135,7 @@ def _allocation_inverse(allocation: Array) -> Array:
 
 
 def _refuse(unreachable: Array) -> None:
-    """Name the axes that have a share in the wrenches out of reach."""
+    """Raise an error that names the axes with a share in the wrenches out of reach."""
     missing = [axis for axis, row in zip(_AXES, unreachable, strict=True) if np.abs(row).max() > 1e-6]
     raise ComputationError(
         f"vehicle.rotors: the rotors cannot produce {', '.join(missing)} independently of the rest; check their "
@@ -145,7 +145,7 @@ def _refuse(unreachable: Array) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class RotorViolation:
-    """One rotor that is asked for what it cannot do.
+    """Samples at which a rotor cannot reach the demanded squared speed.
 
     Attributes
     ----------
@@ -169,23 +169,13 @@ class RotorViolation:
     worst: float
 
 
-def feasible(squared_speed: Array, speed_max: float) -> BoolArray:
-    """Tell which squared speeds a rotor can turn at.
-
-    Parameters
-    ----------
-    squared_speed : array, shape (time, rotor), rad^2/s^2
-    speed_max : float, rad/s
-
-    Returns
-    -------
-    array of bool, shape (time, rotor)
-    """
+def _feasible(squared_speed: Array, speed_max: float) -> BoolArray:
+    """Mark the squared speeds that a rotor can reach."""
     return ~(_negative(squared_speed, speed_max) | _above(squared_speed, speed_max))
 
 
 def violations(squared_speed: Array, speed_max: float) -> tuple[RotorViolation, ...]:
-    """Sum up what cannot be met, by rotor and kind.
+    """Summarise the squared speeds that cannot be reached, by rotor and kind.
 
     Parameters
     ----------
@@ -198,13 +188,13 @@ def violations(squared_speed: Array, speed_max: float) -> tuple[RotorViolation, 
         At most two for each rotor, in the order of the rotors.
     """
     negative, above = _negative(squared_speed, speed_max), _above(squared_speed, speed_max)
-    found: list[RotorViolation] = []
+    summaries: list[RotorViolation] = []
     for rotor, demand in enumerate(squared_speed.T):
         if negative[:, rotor].any():
-            found.append(_summary(rotor, "negative squared speed", negative[:, rotor], float(demand.min())))
+            summaries.append(_summary(rotor, "negative squared speed", negative[:, rotor], float(demand.min())))
         if above[:, rotor].any():
-            found.append(_summary(rotor, "above the limit", above[:, rotor], float(demand.max())))
-    return tuple(found)
+            summaries.append(_summary(rotor, "above the limit", above[:, rotor], float(demand.max())))
+    return tuple(summaries)
 
 
 def _negative(squared_speed: Array, speed_max: float) -> BoolArray:

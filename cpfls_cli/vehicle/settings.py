@@ -55,7 +55,7 @@ class VehicleSettings(Settings):
     rotor_speed_max_rad_s: Annotated[float, Gt(0), Doc("largest speed of a rotor, rad/s")] = 1000.0
 
     def __post_init__(self) -> None:
-        """Refuse an inertia that no body has.
+        """Refuse an inertia that is not positive definite.
 
         Raises
         ------

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.flightlog.alignment import followed
+from cpfls_cli.flightlog.alignment import apply_rotor_lag
 from cpfls_cli.flightlog.results import LogSignals
 
 TAU, PERIOD = 0.07, 0.004
@@ -23,13 +23,13 @@ def make_signals():
 
 
 def test_rotors_follow_a_step_as_an_exponential(stepped):
-    speed = followed(stepped, TAU).rotor_command[:, 2]
+    speed = apply_rotor_lag(stepped, TAU).rotor_command[:, 2]
     after = stepped.time - 0.2
     expected = np.where(after < 0, 0.5, 0.8 - 0.3 * np.exp(-np.maximum(after, 0) / TAU))
     assert speed == pytest.approx(expected, abs=1e-12)
 
 
 def test_without_lag_or_command_nothing_changes(stepped, make_signals):
-    assert followed(stepped, 0.0) is stepped
+    assert apply_rotor_lag(stepped, 0.0) is stepped
     without = make_signals(stepped.time, None)
-    assert followed(without, TAU) is without
+    assert apply_rotor_lag(without, TAU) is without

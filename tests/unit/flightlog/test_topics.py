@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog import ImportSettings, SignalMap
-from cpfls_cli.flightlog.topics import held, interpolated, on_one_clock, topic_and_field
+from cpfls_cli.flightlog.topics import hold_previous, interpolate, on_one_clock, topic_and_field
 
 GYRO = 0.004 * np.arange(500)
 SLOW = 0.001 + 0.02 * np.arange(100)
@@ -124,18 +124,18 @@ def test_clock_that_is_too_slow_is_warned_of():
     assert warnings[0].startswith("topic gyro (250 Hz) is thinned to the clock of slow (50 Hz)")
 
 
-@pytest.mark.parametrize("between", [interpolated, held])
+@pytest.mark.parametrize("between", [interpolate, hold_previous])
 def test_pauses_are_absent_and_absent_values_are_passed_over(between):
     time = np.array([0.0, 0.1, 0.2, 0.9, 1.0, 1.1])
     values = np.array([1.0, np.nan, 3.0, 4.0, 5.0, 5.0])
     target = np.array([-0.05, 0.0, 0.1, 0.2, 0.3, 0.9, 0.95, 1.1, 1.2])
     result = between(time, values, target, 0.2)
     np.testing.assert_array_equal(np.isnan(result), [True, False, False, False, True, False, False, False, True])
-    assert result[2] == (2.0 if between is interpolated else 1.0)
-    assert result[6] == pytest.approx(4.5 if between is interpolated else 4.0, abs=1e-9)
+    assert result[2] == (2.0 if between is interpolate else 1.0)
+    assert result[6] == pytest.approx(4.5 if between is interpolate else 4.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("between", [interpolated, held])
+@pytest.mark.parametrize("between", [interpolate, hold_previous])
 def test_stamps_that_go_back_or_repeat_are_passed_over_and_nothing_gives_nothing(between):
     time = np.array([0.0, 0.1, 0.1, 0.05, 0.2])
     values = np.array([0.0, 1.0, 9.0, 9.0, 2.0])
