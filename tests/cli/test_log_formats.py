@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from cpfls_cli.flights.recordings import read_flights
 
 from cpfls_cli.config.load import load_study
+from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.logs import formats
 
 CONFIG = """\
