@@ -6,13 +6,14 @@ import json
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Gt
 from pydantic import BaseModel, ConfigDict, Field
 from typing_extensions import Doc
 
-from cpfls_cli.config.report_settings import ReportSettings
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.errors import ConfigError, SettingError
 from cpfls_cli.flightlog.settings import ImportSettings
@@ -20,12 +21,36 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.sweep_settings import SweepSettings
 from cpfls_cli.reduction.settings import ReductionSettings
+from cpfls_cli.settings import Settings
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 SECTIONS = ("vehicle", "trajectory", "simulation", "import", "reduction", "identification", "sweep", "gap", "report")
 """The sections of a config, in the order of the pipeline."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluationTime(Settings):
+    """Duration of an evaluation on a number of samples."""
+
+    samples: Annotated[int, Gt(0), Doc("samples learned from and judged on")]
+    svd_s: Annotated[float, Gt(0), Doc("singular value decomposition of the regressor, s")]
+    evaluation_s: Annotated[float, Gt(0), Doc("evaluation as the paper does it, s")]
+    compiled_s: Annotated[float, Gt(0), Doc("evaluation by the compiled code, s")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportSettings(Settings):
+    """Settings of the report."""
+
+    title: Annotated[str, Doc("heading of the page")] = "Identification of rotational dynamics"
+    notes: Annotated[tuple[str, ...], Doc("what a reader should know about this study, one sentence each")] = ()
+    paper: Annotated[bool, Doc("show the figures that the paper prints beside ours")] = False
+    evaluation_times: Annotated[
+        tuple[EvaluationTime, ...],
+        Doc("times measured elsewhere, for the paper's claims about time; no artifact holds any"),
+    ] = ()
 
 
 class Study(BaseModel):

@@ -22,8 +22,7 @@ from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.config.report_settings import ReportSettings
-from cpfls_cli.config.study import resolved
+from cpfls_cli.config.study import ReportSettings, resolved
 from cpfls_cli.report.content import HASH_SHOWN, Origin
 from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.config.report_settings import EvaluationTime
+from cpfls_cli.config.study import EvaluationTime
 from cpfls_cli.pages.claims.claim import Claim
 from cpfls_cli.report.numbers import number
 

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from cpfls_cli.artifacts.store import read_artifact
-from cpfls_cli.config.report_settings import ReportSettings
+from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.pages.source import Sources
 from cpfls_cli.report.content import Listing, Section
 from cpfls_cli.report.markdown import markdown_page

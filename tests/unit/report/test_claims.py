@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cpfls_cli.config.report_settings import EvaluationTime
+from cpfls_cli.config.study import EvaluationTime
 from cpfls_cli.pages.claims.as_good import AS_GOOD
 from cpfls_cli.pages.claims.claim import Verdict
 from cpfls_cli.pages.claims.model_figures import partitions_compared

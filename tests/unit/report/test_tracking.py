@@ -6,7 +6,7 @@ import pytest
 from cpfls_cli.artifacts.formats import FLIGHT
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import Artifact
-from cpfls_cli.config.report_settings import ReportSettings
+from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.pages.sections.tracking import tracking_section
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import Cell, Plot, Table, Text
