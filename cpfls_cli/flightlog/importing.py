@@ -15,8 +15,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.flightlog.alignment import align_commands, apply_rotor_lag
 from cpfls_cli.flightlog.clock import longest_stretch
-from cpfls_cli.flightlog.columns import drop_absent_signals, select_columns
-from cpfls_cli.flightlog.frames import to_program_frames
+from cpfls_cli.flightlog.conversion import drop_absent_signals, select_columns, to_program_frames
 from cpfls_cli.flightlog.quality import (
     count_values,
     refuse_steep_pitch,

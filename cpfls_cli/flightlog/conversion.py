@@ -1,8 +1,10 @@
-"""Frames: signals in the axes of a log, converted to body FLU and world ENU."""
+"""Conversion of a log's columns: selected by name, in SI, in body FLU and world ENU."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
+from dataclasses import replace
+from difflib import get_close_matches
 from typing import Literal
 
 import numpy as np
@@ -11,10 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.repair import unwrap_angles
-from cpfls_cli.flightlog.settings import ImportSettings
-from cpfls_cli.rotations import multiply, rotation_matrix
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.units import to_si
 
+_SUFFICIENT_SIGNALS = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
 _WORLD_SIGNALS = ("position", "velocity", "acceleration")
 _BODY_SIGNALS = ("body_rate", "body_torque")
 _ROTOR_SIGNALS = ("rotor_speed", "rotor_command")
@@ -23,6 +27,117 @@ BodyFrame = Literal["FLU", "FRD"]
 WorldFrame = Literal["ENU", "NED"]
 _BODY = {"FLU": np.eye(3), "FRD": np.diag([1.0, -1.0, -1.0])}
 _WORLD = {"ENU": np.eye(3), "NED": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])}
+
+
+def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> ImportSettings:
+    """Leave out the optional signals whose columns the log does not hold.
+
+    A signal with some of its columns stays, so that the missing ones are named like those of a required signal.
+
+    Parameters
+    ----------
+    columns : container of str
+        Names of the log's columns.
+    settings : ImportSettings
+        The section `import`.
+
+    Returns
+    -------
+    ImportSettings
+        With the remaining signals.
+
+    Raises
+    ------
+    InputError
+        If the remaining signals describe neither the rotation nor the rotors, or another key needs an absent one.
+    """
+    absent = [
+        name
+        for name, signal in settings.signals.items()
+        if not signal.required and not any(column in columns for column in signal.columns)
+    ]
+    if not absent:
+        return settings
+    present = {name: signal for name, signal in settings.signals.items() if name not in absent}
+    if not any(name in present for name in _SUFFICIENT_SIGNALS):
+        raise InputError(
+            f"import.signals: a flight needs one of {', '.join(_SUFFICIENT_SIGNALS)}; the log has no columns of"
+            f" {', '.join(absent)}"
+        )
+    try:
+        return replace(settings, signals=present)
+    except SettingError as error:
+        raise InputError(f"import.{error.key}: {error}; the log has no columns of {', '.join(absent)}") from None
+
+
+def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tuple[Array, dict[str, Array]]:
+    """Take the time stamps and the mapped columns of a log, in SI and with their signs.
+
+    Parameters
+    ----------
+    columns : mapping from str to array, shape (sample,)
+        The log.
+    settings : ImportSettings
+        The section `import`.
+
+    Returns
+    -------
+    time : array, shape (sample,), s
+        Time stamps from 0.
+    signals : dict from signal name to array, shape (sample, column), SI
+        Frames and order as in the log.
+
+    Raises
+    ------
+    InputError
+        If columns are missing, empty or of unequal length; the message names all of them, the config key of each
+        and the nearest columns of the log.
+    """
+    _require_present(columns, settings)
+    time: Array = to_si(np.asarray(columns[settings.time_column], dtype=float), settings.time_unit)
+    signals: dict[str, Array] = {name: _in_si(columns, signal) for name, signal in settings.signals.items()}
+    for name, values in signals.items():
+        if len(values) != len(time):
+            raise InputError(f"import.signals.{name}.columns: {len(values)} values for {len(time)} time stamps")
+    finite = time[np.isfinite(time)]
+    if len(finite) < 2:
+        raise InputError(f"import.time_column: {settings.time_column!r} holds fewer than two time stamps")
+    return time - finite[0], signals
+
+
+def _in_si(columns: Mapping[str, Array], signal: SignalMap) -> Array:
+    values = np.column_stack([np.asarray(columns[name], dtype=float) for name in signal.columns])
+    sign = np.ones(len(signal.columns)) if signal.sign is None else np.array(signal.sign)
+    values[~np.isfinite(values)] = np.nan
+    return to_si(sign * (signal.scale * values + signal.offset), signal.unit)
+
+
+def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> None:
+    if not settings.signals:
+        raise InputError("import.signals: no signal is mapped to columns of the log")
+    wanted = [("import.time_column", settings.time_column)]
+    wanted += [
+        (f"import.signals.{name}.columns", column)
+        for name, signal in settings.signals.items()
+        for column in signal.columns
+    ]
+    missing = [
+        f"{key}: the log has no column {name!r}{_hint(name, columns)}" for key, name in wanted if name not in columns
+    ]
+    if missing:
+        raise InputError("\n".join(missing))
+
+
+def _hint(name: str, columns: Mapping[str, Array]) -> str:
+    by_lower = {column.lower(): column for column in columns}
+    nearest = [by_lower[match] for match in get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)]
+    if nearest:
+        return f" (nearest: {', '.join(nearest)})"
+    # A log of topics has hundreds of columns.
+    topics = sorted({column.partition(".")[0] for column in columns})
+    if all("." in column for column in columns):
+        return f" (topics: {', '.join(topics)})"
+    return f" (columns: {', '.join(columns)})"
 
 
 def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:
@@ -124,7 +239,7 @@ def attitude_to_enu_flu(attitude: Array, body: BodyFrame, world: WorldFrame) -> 
     """
     if (body, world) == ("FLU", "ENU"):
         return attitude
-    return euler_angles(_WORLD[world] @ rotation_matrix(attitude) @ _BODY[body].T)
+    return euler_angles(_WORLD[world] @ rotations.rotation_matrix(attitude) @ _BODY[body].T)
 
 
 def attitude_from_quaternion(quaternion: Array, order: Literal["wxyz", "xyzw"]) -> Array:
@@ -178,6 +293,6 @@ def acceleration_from_specific_force(attitude: Array, specific_force: Array) -> 
     -------
     array, shape (time, 3), m/s^2, world frame ENU
     """
-    acceleration: Array = multiply(rotation_matrix(attitude), specific_force)
+    acceleration: Array = rotations.multiply(rotations.rotation_matrix(attitude), specific_force)
     acceleration[:, 2] -= standard_gravity
     return acceleration

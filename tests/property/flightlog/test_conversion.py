@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.flightlog.frames import attitude_from_quaternion, attitude_to_enu_flu, body_to_flu, world_to_enu
+from cpfls_cli.flightlog.conversion import attitude_from_quaternion, attitude_to_enu_flu, body_to_flu, world_to_enu
 from cpfls_cli.rotations import rotation_matrix
 
 ANGLE = st.floats(-3.1, 3.1)
