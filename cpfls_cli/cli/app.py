@@ -19,8 +19,8 @@ from cpfls_cli.report.forms import Form
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from cpfls_cli.artifacts.job import Job
     from cpfls_cli.report.outcome import Outcome
-from cpfls_cli.artifacts.job import Job
 
 app = typer.Typer(
     name="cpfls",

@@ -10,13 +10,7 @@ from cpfls_cli.report.figure_tables import figure_tables
 
 
 def html_page(document: Document) -> str:
-    """Write sections as HTML.
-
-    Parameters
-    ----------
-    version : str
-        Of the program.
-    """
+    """Write sections as HTML."""
     environment = Environment(
         loader=PackageLoader("cpfls_cli.report", "templates"),
         autoescape=True,
