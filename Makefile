@@ -256,12 +256,12 @@ bench: $(INSTALLED_DEV)
 	$(MAKE) data/paper/report.html
 	$(BIN)/python benchmarks/report_cost.py configs/paper.yaml data/paper/*.h5
 
-# Stopped and started again it goes on where it was. SIZE takes more options: `python -m tests.gap.study --help`.
+# Stopped and started again it goes on where it was. SIZE takes more options: `python -m benchmarks.blind_study --help`.
 SEED := 2027
 DRAWS := 6
 NONE := 200
 blind-study: $(INSTALLED_DEV)
-	$(BIN)/python -m tests.gap.study run --out data/blind --seed $(SEED) --draws $(DRAWS) --none $(NONE) $(SIZE)
+	$(BIN)/python -m benchmarks.blind_study run --out data/blind --seed $(SEED) --draws $(DRAWS) --none $(NONE) $(SIZE)
 
 clean:
 	rm -rf data/paper data/quick data/hexarotor data/full-circle data/crazyflie data/gap-example

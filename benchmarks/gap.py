@@ -13,15 +13,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.blind.cases import make
+from benchmarks.blind.generator import COLUMNS, simulate_many
+from benchmarks.blind.measure import disturb
 from benchmarks.shared.measure import table
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
-from tests.gap.blind.cases import make
-from tests.gap.blind.generator import COLUMNS, simulate_many
-from tests.gap.blind.measure import disturb
 
 EFFECTS = ("com_offset", "rotor_drag")
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from benchmarks.blind_study.baselines import baselines
 from cpfls_cli.commands.plain_json import plain
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import generator
 from cpfls_cli.errors import CpflsError
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.gap.diagnose import diagnose
-from tests.gap.study.baselines import baselines
 
 
 def judge(folder, compared=False):

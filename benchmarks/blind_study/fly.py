@@ -7,7 +7,7 @@ from pathlib import Path
 
 import yaml
 
-from tests.gap.blind.generator import DURATION, simulate_many, write, write_key
+from benchmarks.blind.generator import DURATION, simulate_many, write, write_key
 
 _COLUMNS_OF = Path(__file__).parents[3] / "configs" / "gap" / "sixkg.yaml"
 

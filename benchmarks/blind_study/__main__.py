@@ -1,15 +1,15 @@
-"""Judge the gap workflow blindly: ``python -m tests.gap.study run --seed 777 --draws 2 --out data/blind``."""
+"""Judge the gap workflow blindly: ``python -m benchmarks.blind_study run --seed 777 --draws 2 --out data/blind``."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from tests.gap.study.fly import fly
-from tests.gap.study.run import judge_all, run
-from tests.gap.study.score import scored
-from tests.gap.study.sets import GROUPS, LEVELS, Size, sets
-from tests.gap.study.tables import tables
+from benchmarks.blind_study.fly import fly
+from benchmarks.blind_study.run import judge_all, run
+from benchmarks.blind_study.score import scored
+from benchmarks.blind_study.sets import GROUPS, LEVELS, Size, sets
+from benchmarks.blind_study.tables import tables
 
 
 def main():
@@ -30,7 +30,7 @@ def main():
 
 
 def _arguments():
-    parser = argparse.ArgumentParser(prog="tests.gap.study", description=__doc__)
+    parser = argparse.ArgumentParser(prog="benchmarks.blind_study", description=__doc__)
     parser.add_argument("command", choices=("fly", "judge", "score", "run"))
     parser.add_argument("--out", type=Path, default=Path("data/blind"), help="folder of the study")
     parser.add_argument("--seed", type=int, default=777)

@@ -10,13 +10,13 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from tests.gap.blind import generator
-from tests.gap.blind.cases import cases, make
-from tests.gap.blind.missions import mission
-from tests.gap.blind.plant import nominal
-from tests.gap.blind.simulate import DT, Fleet, FlightPlan
-from tests.gap.blind.strengths import CATALOGUE, FORMS, OUTSIDE, strength
-from tests.gap.blind.vehicles import SIXKG, VEHICLES
+from benchmarks.blind import generator
+from benchmarks.blind.cases import cases, make
+from benchmarks.blind.missions import mission
+from benchmarks.blind.plant import nominal
+from benchmarks.blind.simulate import DT, Fleet, FlightPlan
+from benchmarks.blind.strengths import CATALOGUE, FORMS, OUTSIDE, strength
+from benchmarks.blind.vehicles import SIXKG, VEHICLES
 
 EFFECTS = ("com_offset", "euler_axis_torque", "ground_effect", "wind", "payload", "battery_sag", "gyro_bias")
 

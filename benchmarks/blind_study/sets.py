@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.gap.blind.cases import Case, cases, make
-from tests.gap.blind.measure import KINDS
-from tests.gap.blind.vehicles import VEHICLES
+from benchmarks.blind.cases import Case, cases, make
+from benchmarks.blind.measure import KINDS
+from benchmarks.blind.vehicles import VEHICLES
 
 LEVELS = ("low", "mid", "high")
 GROUPS = ("single", "none", "outside", "form", "pair", "triple", "background", "hover", "no_velocity", "no_force")

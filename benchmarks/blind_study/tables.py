@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable
 
-from tests.gap.study import score
-from tests.gap.study.number_tables import coefficient_table, gap_table, number_totals
-from tests.gap.study.score import OUTCOMES, RIGHT
-from tests.gap.study.text import percent, table
+from benchmarks.blind_study import score
+from benchmarks.blind_study.number_tables import coefficient_table, gap_table, number_totals
+from benchmarks.blind_study.score import OUTCOMES, RIGHT
+from benchmarks.blind_study.text import percent, table
 
 _LIMITED = ("hover", "no_velocity", "no_force")
 _OUTSIDE = ("NAMED", "AMBIGUOUS", "PARTIAL", "UNEXPLAINED", "NO_GAP", "NOT_EXCITED", "ERROR")

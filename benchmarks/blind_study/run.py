@@ -10,8 +10,8 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from tests.gap.study.fly import fly
-from tests.gap.study.judge import judge
+from benchmarks.blind_study.fly import fly
+from benchmarks.blind_study.judge import judge
 
 _CASES_AT_ONCE = 24
 

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from tests.gap.study.fly import fly
-from tests.gap.study.judge import judge
-from tests.gap.study.score import (
+from benchmarks.blind_study.fly import fly
+from benchmarks.blind_study.judge import judge
+from benchmarks.blind_study.score import (
     EXTRA,
     MISSED,
     PARTIAL,
@@ -20,7 +20,7 @@ from tests.gap.study.score import (
     numbers,
     outcome,
 )
-from tests.gap.study.sets import Size, sets
+from benchmarks.blind_study.sets import Size, sets
 
 CASES = {
     "single-sixkg-com_offset-0",

@@ -6,8 +6,8 @@ from collections import defaultdict
 
 import numpy as np
 
-from tests.gap.study.score import RIGHT, exact, numbers
-from tests.gap.study.text import percent, table
+from benchmarks.blind_study.score import RIGHT, exact, numbers
+from benchmarks.blind_study.text import percent, table
 
 _CLOSE = 0.05
 _LEVELS = ("low", "mid", "high")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.gap.study.truth import ROUGH, coefficients
+from benchmarks.blind_study.truth import ROUGH, coefficients
 
 VISIBLE = 0.7
 """Hidden torque in floors, on its largest axis, below which nobody can see it."""

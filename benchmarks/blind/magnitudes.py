@@ -1,4 +1,4 @@
-"""Print the unexplained torque of each effect: ``python -m tests.gap.blind.magnitudes [level] [vehicle]``."""
+"""Print the unexplained torque of each effect: ``python -m benchmarks.blind.magnitudes [level] [vehicle]``."""
 
 from __future__ import annotations
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.gap.blind.plant import USUAL_LAG
-from tests.gap.blind.vehicles import VEHICLES
+from benchmarks.blind.plant import USUAL_LAG
+from benchmarks.blind.vehicles import VEHICLES
 
 ROUGH = frozenset({"payload", "vertical_descent", "translational_lift"})
 """Effects whose hidden form is not that of the catalogue, so that no estimate can be exact."""
