@@ -34,6 +34,7 @@ from scipy import signal
 from benchmarks.shared.full_circle import INERTIA, random_flight
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque
 from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueData, axis_scale
@@ -48,8 +49,6 @@ from cpfls_cli.validation.blocks import time_blocks
 from cpfls_cli.validation.bootstrap import bootstrap
 from cpfls_cli.validation.scores import POWER, BlockScores
 from cpfls_cli.validation.simulated import Missed
-from cpfls_cli.vehicle import newton_euler_torque
-from cpfls_cli.vehicle.rigid_body import inertia_matrix
 
 NOISE, TIME_CONSTANT, ATTITUDES = 0.05, 5.0, 100
 BENT = 0.3

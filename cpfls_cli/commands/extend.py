@@ -26,7 +26,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.extend import Extension, extend, worse_axes
 from cpfls_cli.gap.extended import plain
 from cpfls_cli.gap.naming.results import GapSize, NamedEffect, Verdict
-from cpfls_cli.gap.replayed import Replayed, replayed
+from cpfls_cli.gap.replay import Replayed, replayed
 from cpfls_cli.gap.sensors.audit import Audit
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.diagnosis_words import effect_line, effect_summary, gap_lines

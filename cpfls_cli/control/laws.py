@@ -1,43 +1,18 @@
-"""Control laws of the attitude: computed torque with a model, proportional-derivative feedback alone."""
+"""Control laws of the attitude, by a model or by feedback alone, and the actuators that turn commands into torques."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import log, pi, sqrt
-from typing import Protocol
+from math import exp, log, pi, sqrt
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import TorqueModel
 from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.vehicle.rigid_body import newton_euler_torque
 
 _SETTLED = 1e-6
-
-
-class TorqueModel(Protocol):
-    """A model that knows the generalised torque of a motion, ``D(q) qdd + C(q, qd) qd``."""
-
-    def torque(self, motion: Motion) -> Array:
-        """Evaluate the generalised torque, shape (samples, 3), N m."""
-        ...
-
-
-@dataclass(frozen=True)
-class RigidBody:
-    """A rigid body as a model.
-
-    Attributes
-    ----------
-    inertia : array, shape (3, 3), kg m^2, body frame
-    """
-
-    inertia: Array
-
-    def torque(self, motion: Motion) -> Array:
-        """Compute the generalised torque, shape (samples, 3), N m."""
-        return newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, self.inertia)
 
 
 @dataclass(frozen=True)
@@ -89,7 +64,7 @@ def gains(natural_frequency: tuple[float, float, float], damping: float) -> Gain
     return Gains(2 * pi * np.array(natural_frequency), damping)
 
 
-Law = Callable[[Array, Array, Array, Array], Array]
+ControlLaw = Callable[[Array, Array, Array, Array], Array]
 """Takes attitude, Euler rates, feedback and planned Euler acceleration, shape (3,) each; gives generalised torque."""
 
 
@@ -98,10 +73,10 @@ class Controller:
     """A law with a name."""
 
     name: str
-    law: Law
+    law: ControlLaw
 
 
-def computed_torque(model: TorqueModel) -> Law:
+def computed_torque(model: TorqueModel) -> ControlLaw:
     """Command the torque that the model asks for the wanted motion, ``tau = D(q) v + C(q, qd) qd``.
 
     ``v = qdd_planned + Kd e' + Kp e`` in Euler coordinates.
@@ -117,7 +92,7 @@ def computed_torque(model: TorqueModel) -> Law:
     return law
 
 
-def proportional_derivative(inertia: Array) -> Law:
+def proportional_derivative(inertia: Array) -> ControlLaw:
     """Command feedback alone, ``tau_i = D_ii (Kd e'_i + Kp e_i)`` with constant D_ii.
 
     Parameters
@@ -130,3 +105,39 @@ def proportional_derivative(inertia: Array) -> Law:
         return np.asarray(inertia * feedback)
 
     return law
+
+
+@dataclass(frozen=True)
+class TorqueActuators:
+    """How a command becomes a torque.
+
+    Attributes
+    ----------
+    time_constant : float, s
+        Of a first-order lag; 0 for none.
+    torque_max : array, shape (3,), or None, N m, body frame
+        Commands are clipped to it; None for no limit.
+    """
+
+    time_constant: float = 0.0
+    torque_max: Array | None = None
+
+    def clipped(self, command: Array) -> Array:
+        """Clip commands, shape (vehicle, 3), N m, to what the actuators can do."""
+        return command if self.torque_max is None else np.clip(command, -self.torque_max, self.torque_max)
+
+    def torque(self, before: Array, command: Array, after: float) -> Array:
+        """Compute the torque some time after a command, ``c + (before - c) exp(-t / T)``.
+
+        Parameters
+        ----------
+        before, command : array, shape (vehicle, 3), N m
+        after : float, s
+
+        Returns
+        -------
+        array, shape (vehicle, 3), N m
+        """
+        if self.time_constant == 0:
+            return command
+        return np.asarray(command + (before - command) * exp(-after / self.time_constant))

@@ -16,7 +16,7 @@ from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.results import NotExcited
 from cpfls_cli.gap.naming.search import best_floor, block_index
 from cpfls_cli.gap.naming.unseen import not_excited
-from cpfls_cli.gap.replayed import Replayed, replayed
+from cpfls_cli.gap.replay import Replayed, replayed
 from cpfls_cli.gap.residual.dependence import Dependence, rank_dependence
 from cpfls_cli.gap.residual.heat_map import HeatMap, heat_map
 from cpfls_cli.gap.residual.state_signals import joined_states, state_signals

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.balance.recording import Recording, common_windows
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import CHANNELS

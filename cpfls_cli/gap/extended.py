@@ -10,16 +10,17 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics.integration import ReplayModel
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
-from cpfls_cli.gap.balance.inertial import InertiaModel, rotation_balance
+from cpfls_cli.gap.balance.inertial import rotation_balance
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, actuated, columns_of, nuisance
-from cpfls_cli.gap.replay.rate_equation import ReplayModel
 from cpfls_cli.gap.sensors.audit import Audit
 from cpfls_cli.regressor.regressor import InertiaValues
-from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 
 _COUPLING = (3, 4, 5)
 """Places of what a wrong scale of the rotor torque leaves between the rates; no inertia holds it."""

@@ -7,9 +7,9 @@ from math import pi
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.simulation.reference import Reference
 from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.vehicle.rigid_body import inertia_tensor
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 

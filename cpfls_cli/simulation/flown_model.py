@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.errors import SettingError
 from cpfls_cli.simulation.flown_effects import FlownEffect, FlownEffects, flown_effects, refuse_conflict
-from cpfls_cli.simulation.turning import InertiaModel
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _OWN_NUMBERS = "parameter_error"

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor
 from cpfls_cli.simulation.collective import collective_thrust
-from cpfls_cli.vehicle.rigid_body import body_torque, inertia_tensor
 from cpfls_cli.vehicle.rotors import RotorViolation, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -8,6 +8,8 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import identified_turning, rigid_turning
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.simulation.actuators import Actuators, Rotors
 from cpfls_cli.simulation.autopilot import Autopilot
@@ -18,8 +20,6 @@ from cpfls_cli.simulation.mixer import Mixer, mixer
 from cpfls_cli.simulation.payload import payload
 from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY, Plant, instant
 from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.simulation.turning import identified_turning, rigid_turning
-from cpfls_cli.vehicle.rigid_body import inertia_tensor
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 

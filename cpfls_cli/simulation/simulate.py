@@ -9,11 +9,11 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor, torque
 from cpfls_cli.errors import SettingError
 from cpfls_cli.simulation.collective import collective_thrust
 from cpfls_cli.simulation.noise import noisy
 from cpfls_cli.simulation.settings import SimulationSettings
-from cpfls_cli.vehicle.rigid_body import body_torque, inertia_tensor, torque
 from cpfls_cli.vehicle.rotors import RotorViolation, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 

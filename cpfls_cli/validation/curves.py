@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.fuzzy.inputs import wrap
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.model import Model
@@ -14,7 +15,6 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import PITCH, ROLL
 from cpfls_cli.validation.bands import inertia_band
 from cpfls_cli.validation.bootstrap import Draws
-from cpfls_cli.vehicle.rigid_body import inertia_matrix
 
 POINTS = 181
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import INERTIA_PLACES, symmetric
 from cpfls_cli.regressor.motion import Motion
@@ -12,7 +13,6 @@ from cpfls_cli.regressor.regressor import Regressor
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.physical import cell_centres
 from cpfls_cli.validation.replay_windows import CLEAR
-from cpfls_cli.vehicle.rigid_body import inertia_matrix
 
 # Cells times draws at a time: 50 MB for the six entries.
 _AT_ONCE = 1_000_000

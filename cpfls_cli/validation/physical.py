@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
 from cpfls_cli.identification.excitation import CELLS
-from cpfls_cli.identification.model import Model, coriolis_matrix
-from cpfls_cli.identification.physics import not_positive_definite, vertical
+from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor.regressor import InertiaValues
 
 

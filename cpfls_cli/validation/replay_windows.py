@@ -9,9 +9,9 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.dynamics.equations_of_motion import RotationState
 from cpfls_cli.identification.data import TorqueSource, gathered, sample_times
 from cpfls_cli.validation.stretches import sample_period, stretch_numbers
-from cpfls_cli.validation.turning import State
 
 # 40 MB of rotations, rates and torques at a time.
 _SAMPLES_AT_ONCE = 200_000
@@ -41,9 +41,11 @@ class Windows:
     beyond: BoolArray
 
     @property
-    def start(self) -> State:
+    def start(self) -> RotationState:
         """What was measured at the start of the windows."""
-        return State(self.rotation[:, 0], self.body_rate[:, 0], self.beyond, np.ones(len(self.time), dtype=bool))
+        return RotationState(
+            self.rotation[:, 0], self.body_rate[:, 0], self.beyond, np.ones(len(self.time), dtype=bool)
+        )
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.dynamics.equations_of_motion import Predictor, RotationState, acceleration_law
+from cpfls_cli.dynamics.integration import free_runs
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.validation.integration import free_runs
 from cpfls_cli.validation.replay_windows import Windows, plan_windows, read_windows
-from cpfls_cli.validation.turning import Predictor, State, turning_law
 
 NOTHING_MOVES = "nothing-moves"
 """The predictor by which attitude and body rate stay what they were at the start of a window."""
@@ -99,7 +99,7 @@ def replay_steps(
     sums = [_Sums(plan.horizon) for _ in names]
     for measured in read_windows(source, plan):
         runs = [
-            free_runs(turning_law(predictor), replace(measured, torque=measured.torque - missing.get(name, 0.0)))
+            _run(predictor, replace(measured, torque=measured.torque - missing.get(name, 0.0)))
             for name, predictor in predictors.items()
         ]
         for own, run in zip(sums, [*runs, _still(measured)], strict=True):
@@ -127,7 +127,7 @@ class _Sums:
         self.windows = 0
         self.window_error: list[Array] = []
 
-    def add(self, measured: Windows, run: Iterator[State]) -> None:
+    def add(self, measured: Windows, run: Iterator[RotationState]) -> None:
         by_window = np.zeros((len(measured.time), 3))
         for step, state in enumerate(run):
             turned, rate = _errors(measured, step + 1, state)
@@ -143,10 +143,15 @@ class _Sums:
         return np.where(whole[:, None], np.sqrt(squares / max(self.windows, 1)), np.nan)
 
 
-def _errors(measured: Windows, sample: int, state: State) -> tuple[Array, Array]:
+def _errors(measured: Windows, sample: int, state: RotationState) -> tuple[Array, Array]:
     away = measured.rotation[:, sample].swapaxes(1, 2) @ state.rotation
     return Rotation.from_matrix(away).as_rotvec(), state.body_rate - measured.body_rate[:, sample]
 
 
-def _still(measured: Windows) -> Iterator[State]:
+def _still(measured: Windows) -> Iterator[RotationState]:
     return iter([measured.start] * (measured.time.shape[1] - 1))
+
+
+def _run(predictor: Predictor, windows: Windows) -> Iterator[RotationState]:
+    fastest = float(np.max(np.linalg.norm(windows.body_rate, axis=2), initial=0.0))
+    return free_runs(acceleration_law(predictor), windows.start, windows.time, windows.torque, fastest)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import Predictor
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, model_evaluator
 from cpfls_cli.identification.results import Identification
@@ -25,7 +26,6 @@ from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
 from cpfls_cli.validation.round_trip import RoundTrip, round_trip
 from cpfls_cli.validation.steps import StepErrors, replay_steps
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
-from cpfls_cli.validation.turning import Predictor
 from cpfls_cli.validation.verdict import Verdict, verdict
 
 Tell = Callable[[str], None]

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 
 from cpfls_cli.arrays import BoolArray
+from cpfls_cli.dynamics.rigid_body import why_unphysical
 from cpfls_cli.identification.findings import AXES
-from cpfls_cli.identification.physics import why_unphysical
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.reason import AGAINST, FOR, NEITHER, Reason, numbers
 from cpfls_cli.validation.reasons import DEFINITE_SHARE, reasons

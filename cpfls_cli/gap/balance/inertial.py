@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.regressor.regressor import InertiaValues
-from cpfls_cli.vehicle.rigid_body import inertia_tensor
 
 
 @dataclass(frozen=True)
@@ -26,14 +24,6 @@ class Balance:
 
     momentum: Array
     direct: Array
-
-
-class InertiaModel(Protocol):
-    """A model that knows the generalised inertia matrix and its gradient."""
-
-    def inertia(self, attitude: Array) -> InertiaValues:
-        """Evaluate J(q) and its gradient."""
-        ...
 
 
 def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Balance:
@@ -68,14 +58,7 @@ def _euler_balance(signals: Signals, model: InertiaModel) -> Balance:
     attitude = signals.attitude
     if attitude is None:
         raise InputError("the model needs the attitude, which the flight lacks")
-    rate = rotations.attitude_rate(attitude, signals.body_rate)
-    inertia = model.inertia(attitude)
-    generalised = rotations.multiply(inertia.value, rate)
-    momentum = rotations.body_torque(attitude, generalised)
-    # W^-T h' = d/dt (W^-T h) + W^-T W'^T (W^-T h), since the derivative of W^-T is -W^-T W'^T W^-T.
-    turning = rotations.multiply(rotations.euler_rate_matrix_derivative(attitude, rate).swapaxes(1, 2), momentum)
-    potential = 0.5 * np.einsum("nkij,ni,nj->nk", inertia.gradient, rate, rate)
-    return Balance(momentum, rotations.body_torque(attitude, turning - potential))
+    return Balance(*momentum_form(attitude, signals.body_rate, model.inertia(attitude)))
 
 
 def translation_balance(signals: Signals) -> Balance:

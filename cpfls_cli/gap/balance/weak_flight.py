@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.inertial import Balance, InertiaModel, rotation_balance, translation_balance
+from cpfls_cli.gap.balance.inertial import Balance, rotation_balance, translation_balance
 from cpfls_cli.gap.balance.noise_floor import noise_floor
 from cpfls_cli.gap.balance.windows import Windows
 

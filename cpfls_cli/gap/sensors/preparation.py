@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
 from cpfls_cli.gap.balance.windows import Windows

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data
 from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.chromosome import uniform_chromosome
@@ -17,7 +18,6 @@ from cpfls_cli.validation.bootstrap import bootstrap
 from cpfls_cli.validation.curves import curves
 from cpfls_cli.validation.round_trip import round_trip
 from cpfls_cli.validation.simulated import Missed, Simulated
-from cpfls_cli.vehicle import newton_euler_torque
 
 SAMPLES = 800
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification import Model
-from cpfls_cli.identification.model import coriolis_matrix
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.validation.physical import energy_share, physical_sense
-from cpfls_cli.vehicle.rigid_body import inertia_matrix
 
 RANGE = InputRange(-1.0, 1.0)
 BODY = np.array([0.6, 0.8, 1.2, 0.05, 0.0, -0.03])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification.data import TorqueData, joined
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion
@@ -12,7 +13,6 @@ from cpfls_cli.rotations import generalised_torque
 from cpfls_cli.trajectory import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.steps import NOTHING_MOVES, replay_steps
-from cpfls_cli.vehicle import newton_euler_torque
 
 INERTIA = np.array([0.6, 0.8, 1.2, 0.0, 0.0, 0.0])
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.cross_validation import contiguous_blocks
 from cpfls_cli.identification.data import axis_scale
@@ -15,7 +16,6 @@ from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.validation.candidates import candidates
 from cpfls_cli.validation.structures import RIGID_BODY, compare_structures
-from cpfls_cli.vehicle import newton_euler_torque
 
 SAMPLES = 300
 VALIDATION = ValidationSettings(folds=4)

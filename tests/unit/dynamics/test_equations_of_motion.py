@@ -6,13 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cpfls_cli import rotations
-from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.errors import SettingError
+from cpfls_cli.dynamics.equations_of_motion import identified_turning, rigid_turning
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.regressor.regressor import InertiaValues
-from cpfls_cli.simulation import FlownModel, flown_effects, flown_model
-from cpfls_cli.simulation.turning import identified_turning, rigid_turning
-from cpfls_cli.vehicle import VehicleSettings
-from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient
 
 INERTIA = np.array([[0.6, 0.02, -0.01], [0.02, 0.7, 0.03], [-0.01, 0.03, 1.2]])
 angles = st.lists(st.floats(-1.2, 1.2), min_size=3, max_size=3).map(np.array)
@@ -53,22 +49,3 @@ def test_kinetic_energy_grows_by_the_work_of_the_torque(attitude, body_rate):
         return 0.5 * qd @ Warped().inertia(q).value[0] @ qd
 
     assert (energy(1e-5) - energy(-1e-5)) / 2e-5 == pytest.approx(0.0, abs=1e-5)
-
-
-def test_errors_of_the_numbers_add_up_and_other_effects_are_flown_once():
-    vehicle = VehicleSettings()
-    model = flown_model(None, {"parameter_error": {"inertia_x": 0.1}, "torque_bias": {"M_z": 0.1}}, vehicle)
-    more = model.with_effects(flown_effects({"parameter_error": {"inertia_x": 0.05, "thrust_scale": -0.1}}, vehicle))
-    values = more.effects.values("parameter_error")
-    assert values["inertia_x"] == pytest.approx(0.15)
-    assert values["thrust_scale"] == -0.1
-    with pytest.raises(SettingError, match=r"has it already: M_x = 0, M_y = 0, M_z = 0\.1"):
-        model.with_effects(flown_effects({"torque_bias": {"M_z": 0.1}}, vehicle))
-
-
-def test_effects_that_hide_the_speeds_are_refused_beside_a_shift_of_them():
-    vehicle = VehicleSettings()
-    shifted = flown_model(None, {"channel_delay": {CATALOGUE["channel_delay"].shapes[0].name: 0.01}}, vehicle)
-    with pytest.raises(SettingError, match="shifts measured rotor speeds"):
-        shifted.with_effects(flown_effects({"motor_lag": [0.05]}, vehicle))
-    assert FlownModel().with_effects(shifted.effects) == shifted

@@ -1,6 +1,6 @@
 import numpy as np
 
-from cpfls_cli.vehicle import inertia_matrix, torque
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, torque
 
 MOMENTS = 0.6, 0.7, 1.2
 

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.vehicle import (
+from cpfls_cli.dynamics.rigid_body import (
     inertia_matrix,
     inertia_matrix_gradient,
     newton_euler_torque,
