@@ -45,10 +45,8 @@ from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import INERTIA_PLACES, symmetric
 from cpfls_cli.regressor import Motion
 from cpfls_cli.validation.bands import band, inertia_band
-from cpfls_cli.validation.blocks import time_blocks
-from cpfls_cli.validation.bootstrap import bootstrap
-from cpfls_cli.validation.scores import POWER, BlockScores
-from cpfls_cli.validation.simulated import Missed
+from cpfls_cli.validation.bootstrap import POWER, BlockScores, MissedTorque, bootstrap
+from cpfls_cli.validation.timeline import time_blocks
 
 NOISE, TIME_CONSTANT, ATTITUDES = 0.05, 5.0, 100
 BENT = 0.3
@@ -224,7 +222,7 @@ def block_scores(evaluator, training: TorqueData, model: Model) -> BlockScores:
     """Sum by block, without a ridge and without a rigid body."""
     learned = evaluator.solver.learned
     label = time_blocks(training, None).labels(learned.ready.source)
-    ready = Ready(Missed(learned.ready.source, model), rigid=False)
+    ready = Ready(MissedTorque(learned.ready.source, model), rigid=False)
     products = replace(learned, ready=ready, label=label, labels=int(label[-1]) + 1).products(model.partitions)
     return BlockScores(products.gram, products.moment, np.zeros(len(model.coefficients)), model.coefficients)
 

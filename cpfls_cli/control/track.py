@@ -1,4 +1,4 @@
-"""Let several controllers follow one plan, each with its own vehicle."""
+"""Several controllers that follow one plan, each with its own vehicle: their motion, its signals and its scores."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.control.laws import Controller, Gains, TorqueActuators
-from cpfls_cli.control.plan import Plan
+from cpfls_cli.control.controllers import Controller, Gains, Plan, TorqueActuators
 from cpfls_cli.dynamics.equations_of_motion import RotationalPlant
 from cpfls_cli.dynamics.integration import advance
 from cpfls_cli.errors import SettingError
@@ -113,20 +112,20 @@ def track(
     steps = _steps(plan.period, loop.integration_rate, loop.actuators.time_constant)
     record = np.full((instants, vehicles, 12), np.nan)
     clipped = np.zeros((instants, vehicles), dtype=bool)
-    # A vehicle that is lost may reach infinity before the next instant, where it is told.
+    # A vehicle that is lost may reach infinity before the next instant, where it is noticed.
     with np.errstate(all="ignore"):
         for instant in range(instants):
             state[_lost(state, plan.attitude[instant])] = np.nan
             flown = np.flatnonzero(~np.isnan(state[:, 0]))
             if not flown.size:
                 break
-            own, before = state[flown], torque[flown]
-            asked = _commands(plan, instant, [controllers[index].law for index in flown.tolist()], loop, own)
+            alive, before = state[flown], torque[flown]
+            asked = _commands(plan, instant, [controllers[index].law for index in flown.tolist()], loop, alive)
             command = loop.actuators.clipped(asked)
             clipped[instant, flown] = (command != asked).any(axis=1)
             acting = partial(loop.actuators.torque, before, command)
-            record[instant, flown] = np.concatenate([own, acting(0.0), before], axis=1)
-            state[flown] = advance(loop.plant, own, acting, plan.period, steps)
+            record[instant, flown] = np.concatenate([alive, acting(0.0), before], axis=1)
+            state[flown] = advance(loop.plant, alive, acting, plan.period, steps)
             torque[flown] = acting(plan.period)
             if instant % _STEPS_BETWEEN_REPORTS == 0:
                 progress(instant, instants)
@@ -135,7 +134,7 @@ def track(
 
 
 def start_of(plan: Plan, initial_error: Array) -> Array:
-    """Find the state in which a flight begins, with the Euler rates of the plan.
+    """Compute the state in which a flight begins, with the Euler rates of the plan.
 
     Parameters
     ----------
@@ -184,7 +183,7 @@ def _lost(state: Array, planned: Array) -> BoolArray:
 def _commands(
     plan: Plan, instant: int, laws: Sequence[Callable[..., Array]], loop: AttitudeLoop, state: Array
 ) -> Array:
-    """Body torques that the controllers command for what they measure, shape (vehicle, 3)."""
+    """Compute the body torques that the controllers command for what they measure, shape (vehicle, 3)."""
     attitude, body_rate = state[:, :3], state[:, 3:]
     if loop.sensing is not None:
         attitude = attitude + loop.sensing.attitude[instant]
@@ -197,7 +196,7 @@ def _commands(
 
 
 def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: RotationalPlant) -> dict[str, Array]:
-    """Take the motion of one vehicle at the samples of the plan, up to where it was lost.
+    """Extract the signals of one vehicle at the samples of the plan, up to where it was lost.
 
     Torques are the mean of what acts before and after each command, and accelerations what they do to the vehicle: on
     straight lines between samples they push as the torques do that are held from command to command.
@@ -268,7 +267,7 @@ class Scores:
 
 
 def scores(plan: Plan, tracked: Tracked, settling_time: float) -> Scores:
-    """Score what controllers did.
+    """Compute the tracking errors and the effort of controllers.
 
     Parameters
     ----------

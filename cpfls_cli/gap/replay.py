@@ -25,7 +25,7 @@ _EVERY = 5
 
 @dataclass(frozen=True)
 class ReplayError:
-    """Error of a simulation after a horizon.
+    """Error of the simulation of one flight by horizon.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ def replay(signals: Signals, starts: IntArray, horizon: int, model: ReplayModel)
 
 
 def held(signals: Signals, starts: IntArray, horizon: int) -> ReplayError:
-    """Predict that the body rate stays what it was: what a model has to beat.
+    """Predict that the body rate stays constant, as the reference that a model has to beat.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def held(signals: Signals, starts: IntArray, horizon: int) -> ReplayError:
 
 
 def rigid_body(signals: Signals) -> ReplayModel:
-    """Give the rigid body of the vehicle under the torque of its rotors alone.
+    """Make a replay model of the rigid body of the vehicle under the torque of its rotors alone.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def _held_rotation(signals: Signals, starts: IntArray, rate: Array, horizon: int
 def _compared(signals: Signals, starts: IntArray, runs: Iterable[tuple[Array, Array | None]]) -> ReplayError:
     rates: list[Array] = []
     attitudes: list[Array] = []
-    # A wrong model can run away within a horizon; what overflows then is large, and that is all there is to say.
+    # A wrong model can diverge within a horizon; that its error is large is then all that counts.
     with np.errstate(over="ignore", invalid="ignore"):
         for step, (rate, rotation) in enumerate(runs, start=1):
             at = starts + step
@@ -156,7 +156,7 @@ def _compared(signals: Signals, starts: IntArray, runs: Iterable[tuple[Array, Ar
 
 
 def _turned(away: Array) -> Array:
-    """Give the turn of each rotation; half a turn, the most there is, where a simulation ran away."""
+    """Compute the rotation vectors; half a turn, the most there is, where a simulation diverged."""
     usable = np.isfinite(away).all(axis=(1, 2)) & (np.abs(np.linalg.det(np.nan_to_num(away)) - 1) < _ROTATION)
     turn = np.full((len(away), 3), np.pi / np.sqrt(3))
     if usable.any():
@@ -170,7 +170,7 @@ def _rms(error: Array) -> Array:
 
 @dataclass(frozen=True)
 class Replayed:
-    """Root mean square errors by horizon.
+    """Root mean square errors over several flights by horizon.
 
     Attributes
     ----------
@@ -298,7 +298,7 @@ def worst_stretch(
 
 def _simulated(signals: Signals, model: ReplayModel, starts: IntArray, samples: int) -> Array:
     """Simulate every run, its start included, shape (run, sample, 3)."""
-    # A wrong model can run away; beyond any rate that a picture shows it is all the same how far.
+    # A wrong model can diverge; beyond any rate that a figure shows its size does not matter.
     with np.errstate(over="ignore", invalid="ignore"):
         steps = [rate for rate, _ in _free_runs(signals, starts, model, samples - 1)]
     run = np.nan_to_num(np.stack([start_rate(signals)[starts], *steps], axis=1), nan=_ENDLESS_RATE)

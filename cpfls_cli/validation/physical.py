@@ -1,17 +1,23 @@
-"""Whether an identified model could be a body wherever training was: positive definite, no energy of its own."""
+"""Whether a model makes sense beside the data: a body wherever training was, and the same one period away."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
+from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.excitation import CELLS
+from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.model import Model
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues
+
+_AWAY = 2 * np.pi * np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
 @dataclass(frozen=True)
@@ -118,3 +124,49 @@ def cell_centres(visited: BoolArray) -> Array:
     centres = (np.stack([roll, pitch, np.zeros_like(roll)], axis=1) + 0.5) * (2 * np.pi / CELLS) - np.pi
     attitude = centres * [1.0, 1.0, 0.0]
     return np.asarray(attitude[~vertical(attitude)])
+
+
+@dataclass(frozen=True)
+class PeriodErrors:
+    """Torque errors one period away, by part and Euler axis.
+
+    Attributes
+    ----------
+    parts : tuple of str
+    mse : array, shape (part, 3), (N m)^2
+        Mean squared error; the worse of one turn in roll and one turn back in pitch.
+    max_error : array, shape (part, 3), N m
+        Largest absolute error; likewise.
+    """
+
+    parts: tuple[str, ...]
+    mse: Array
+    max_error: Array
+
+
+def one_period_away(model: Model, parts: Mapping[str, TorqueSource]) -> PeriodErrors | None:
+    """Judge a model with roll one turn on, and with pitch one turn back, against the same torque.
+
+    Parameters
+    ----------
+    model : Model
+    parts : mapping of str to TorqueSource
+        By name.
+
+    Returns
+    -------
+    PeriodErrors or None
+        None where the inputs of the model are not those of the full circle.
+    """
+    if model.structure.settings.input_map != "full-circle":
+        return None
+    scores = [[score_of(data, _moved(model, shift)) for shift in _AWAY] for data in parts.values()]
+    return PeriodErrors(
+        parts=tuple(parts),
+        mse=np.max([[score.mse for score in both] for both in scores], axis=1),
+        max_error=np.max([[score.max_error for score in both] for both in scores], axis=1),
+    )
+
+
+def _moved(model: Model, shift: Array) -> Callable[[Motion], Array]:
+    return lambda motion: model.torque(replace(motion, attitude=motion.attitude + shift))

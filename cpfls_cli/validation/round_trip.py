@@ -2,22 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.validation.blocks import time_blocks
-from cpfls_cli.validation.curves import Curves
-from cpfls_cli.validation.simulated import Simulated
+from cpfls_cli.validation.bands import Curves
+from cpfls_cli.validation.timeline import TimeBlocks, time_blocks
 
 # Share of the largest inertia that rounding may take a curve out of a band of no width.
 _ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class SimulatedTorque:
+    """The motion of a source with the torque of a model, and what it missed as noise, turned over by block.
+
+    Attributes
+    ----------
+    source : TorqueSource
+    model : Model
+    blocks : TimeBlocks
+    factor : array, shape (blocks,)
+        What the errors of each block are multiplied with.
+    """
+
+    source: TorqueSource
+    model: Model
+    blocks: TimeBlocks
+    factor: Array
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        return len(self.source)
+
+    def chunks(self) -> Iterator[TorqueData]:
+        """Yield the samples, chunk by chunk."""
+        for data in self.source.chunks():
+            predicted = self.model.torque(data.motion)
+            noise = self.factor[self.blocks.number(data.time), None] * (data.torque - predicted)
+            yield replace(data, torque=predicted + noise)
 
 
 @dataclass(frozen=True)
@@ -87,8 +117,8 @@ def _simulated(
     rows, parameters = 3 * len(learned), len(model.coefficients)
     strength = np.sqrt(rows / max(rows - parameters, 1))
     factor = strength * rng.choice([-1.0, 1.0], len(blocks.starts) + 1)
-    whole = Simulated(training, model, blocks, factor)
-    return whole, whole if learned is training else Simulated(learned, model, blocks, factor)
+    whole = SimulatedTorque(training, model, blocks, factor)
+    return whole, whole if learned is training else SimulatedTorque(learned, model, blocks, factor)
 
 
 def _identified_again(

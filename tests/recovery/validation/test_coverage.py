@@ -13,8 +13,7 @@ from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.validation.bands import band, inertia_band
-from cpfls_cli.validation.bootstrap import bootstrap
-from cpfls_cli.validation.scores import BlockScores
+from cpfls_cli.validation.bootstrap import BlockScores, bootstrap
 
 RUNS, SAMPLES, BLOCKS, DRAWS = 200, 2000, 40, 200
 INERTIA = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])

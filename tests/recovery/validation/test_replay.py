@@ -15,7 +15,7 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.trajectory import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.validation.steps import replay_steps
+from cpfls_cli.validation.replay import replay_steps
 
 INERTIA = np.array([0.6, 0.8, 1.2, 0.03, -0.02, 0.04])
 RANGE = InputRange(-1.0, 1.0)

@@ -14,11 +14,10 @@ from cpfls_cli.regressor import Motion
 from cpfls_cli.trajectory import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.grounds import Grounds
-from cpfls_cli.validation.paired import Comparison
-from cpfls_cli.validation.paired_torque import compare_torque
+from cpfls_cli.validation.paired import Comparison, compare_torque
 from cpfls_cli.validation.physical import physical_sense
+from cpfls_cli.validation.replay import replay_steps
 from cpfls_cli.validation.residuals import examine_residuals
-from cpfls_cli.validation.steps import replay_steps
 from cpfls_cli.validation.verdict import good_axes, verdict
 
 INERTIA = symmetric([0.6, 0.8, 1.2])

@@ -12,7 +12,7 @@ from cpfls_cli.identification.settings import LocalSearchSettings, ValidationSet
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import generalised_torque
-from cpfls_cli.validation.paired_torque import compare_torque
+from cpfls_cli.validation.paired import compare_torque
 from cpfls_cli.validation.validate import validate
 
 INERTIA = symmetric([0.6, 0.8, 1.2])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from cpfls_cli.validation.scores import BlockScores
+from cpfls_cli.validation.bootstrap import BlockScores
 
 BLOCKS, ROWS, PARAMETERS = 6, 9, 5
 TOLERANCE = 1e-10
@@ -57,14 +57,14 @@ def test_another_penalty_is_that_of_all_rows_solved_again(case):
 def test_left_is_what_samples_do_not_tell_of_values_that_are_true(case):
     values = (case.penalty > 0) * np.random.default_rng(3).standard_normal((4, PARAMETERS))
     expected = [value - solved(case.A, case.A @ value, case.penalty) for value in values]
-    np.testing.assert_allclose(case.scores.left(values, TOLERANCE), expected, atol=1e-12)
+    np.testing.assert_allclose(case.scores.undetermined(values, TOLERANCE), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("penalty", [0.0, 1e-30, 1e-3], ids=["none", "rounding", "some"])
 def test_all_is_left_of_a_direction_that_no_sample_sees(penalty):
     gram = np.diag([4.0, 1.0, 0.0])[None]
     scores = BlockScores(gram, np.zeros((1, 3)), np.full(3, penalty), np.ones(3))
-    left = scores.left(np.array([[3.0, -2.0, 5.0]]), TOLERANCE)
+    left = scores.undetermined(np.array([[3.0, -2.0, 5.0]]), TOLERANCE)
     np.testing.assert_allclose(left, [[3.0 * penalty / (4 + penalty), -2.0 * penalty / (1 + penalty), 5.0]], atol=1e-15)
 
 

@@ -12,7 +12,7 @@ from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import generalised_torque
 from cpfls_cli.trajectory import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.validation.steps import NOTHING_MOVES, replay_steps
+from cpfls_cli.validation.replay import NOTHING_MOVES, replay_steps
 
 INERTIA = np.array([0.6, 0.8, 1.2, 0.0, 0.0, 0.0])
 
@@ -90,7 +90,7 @@ def test_a_body_far_too_light_is_lost_and_nothing_overflows():
 def test_windows_are_the_same_read_at_once_or_one_by_one(monkeypatch):
     data = flight()
     at_once = replay_steps("x", data, {"body": 1.1 * INERTIA}, 12, 30)
-    monkeypatch.setattr("cpfls_cli.validation.replay_windows._SAMPLES_AT_ONCE", 13)
+    monkeypatch.setattr("cpfls_cli.validation.replay._SAMPLES_AT_ONCE", 13)
     by_one = replay_steps("x", data, {"body": 1.1 * INERTIA}, 12, 30)
     # Slower windows among themselves take fewer steps of integration.
     np.testing.assert_allclose(by_one.attitude, at_once.attitude, rtol=1e-3)

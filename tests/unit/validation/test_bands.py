@@ -1,18 +1,22 @@
-"""Curves over roll and pitch: where they run, and what stands on them."""
+"""Curves over roll and pitch, where they run and what stands on them, and the share of draws that are a body."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
-from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.identification import IdentificationSettings, Model, TorqueData
 from cpfls_cli.identification.excitation import visited_cells
-from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor import Motion, data_ranges, model_structure, uniform_breakpoints
-from cpfls_cli.validation.bands import inertia_band
+from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.validation.bands import curves, definite_share, inertia_band
 from cpfls_cli.validation.bootstrap import Draws
-from cpfls_cli.validation.curves import curves
+from cpfls_cli.validation.physical import cell_centres
 
+RANGE = InputRange(-1.0, 1.0)
+BODY = np.array([0.6, 0.8, 1.2, 0.05, 0.0, -0.03])
 BEST = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
 STRUCTURE = model_structure(IdentificationSettings(harmonic_order=1))
 
@@ -61,3 +65,47 @@ def test_close_up_where_it_did_not(pitch, ends):
     assert over_roll[[0, -1], 0] == pytest.approx((-180, 180))
     assert over_pitch[[0, -1], 1] == pytest.approx(ends)
     np.testing.assert_allclose(over_pitch[:, 0], 0.0, atol=1e-9)
+
+
+def model(visited):
+    structure = model_structure(StructureSettings())
+    parts = uniform_breakpoints(structure)
+    return Model(structure, (RANGE, RANGE), parts, np.zeros(structure.parameters), BODY, visited)
+
+
+def random_draws(own, size, count=60, seed=91):
+    rng = np.random.default_rng(seed)
+    rigid = BODY + 0.1 * rng.standard_normal((count, 6))
+    return Draws(size * rng.standard_normal((count, len(own.coefficients))), rigid, rigid, 40, 1.0)
+
+
+@pytest.mark.parametrize("at_once", [1_000_000, 100])
+def test_share_of_draws_is_that_of_their_models(monkeypatch, at_once):
+    monkeypatch.setattr("cpfls_cli.validation.bands._AT_ONCE", at_once)
+    visited = np.zeros((72, 72), dtype=bool)
+    visited[30:40, 30:40] = True
+    own = model(visited)
+    drawn = random_draws(own, 0.2)
+    each = [
+        np.linalg.eigvalsh(
+            replace(own, coefficients=fuzzy, rigid_body=rigid).inertia(cell_centres(visited)).value
+        ).min()
+        > 0
+        for fuzzy, rigid in zip(drawn.coefficients, drawn.rigid_body, strict=True)
+    ]
+    assert 0.1 < np.mean(each) < 0.9
+    assert definite_share(own, drawn) == pytest.approx(np.mean(each))
+
+
+def test_near_a_vertical_pitch_noise_says_nothing_of_a_body():
+    """One row of cells there, at a pitch of 77.5 degrees, changes nothing; alone it leaves no share."""
+    visited, near = np.zeros((2, 72, 72), dtype=bool)
+    visited[30:40, 30:40] = near[:, 51] = True
+    drawn = random_draws(model(visited), 0.2)
+    assert definite_share(model(visited | near), drawn) == definite_share(model(visited), drawn) < 1
+    assert definite_share(model(near), drawn) is None
+
+
+def test_no_cell_was_visited():
+    own = model(np.zeros((72, 72), dtype=bool))
+    assert definite_share(own, random_draws(own, 0.05)) is None

@@ -1,11 +1,18 @@
-"""Blocks of time: how many, where, and what they hold of a selection."""
+"""Samples in the order of time: blocks, how many, where, and what they hold of a selection; stretches and lags."""
 
 import numpy as np
 import pytest
 
 from cpfls_cli.identification.data import Flights, TorqueData
 from cpfls_cli.regressor import Motion
-from cpfls_cli.validation.blocks import time_blocks
+from cpfls_cli.validation.timeline import (
+    lagged_pairs,
+    leading_samples,
+    sample_numbers,
+    sample_period,
+    stretch_numbers,
+    time_blocks,
+)
 
 
 def flight(samples, step=0.01):
@@ -52,3 +59,25 @@ def test_the_pause_between_flights_counts_for_nothing():
     blocks = time_blocks(both, None)
     assert blocks.duration == pytest.approx(1.0)
     np.testing.assert_array_equal(blocks.labels(both), np.arange(4000) // 100)
+
+
+def test_a_pause_starts_a_stretch_and_jitter_does_not():
+    time = np.arange(20) * 0.01 + np.random.default_rng(53).uniform(-0.002, 0.002, 20)
+    time[12:] += 0.01
+    np.testing.assert_array_equal(stretch_numbers(time), np.repeat([0, 1], [12, 8]))
+    np.testing.assert_array_equal(stretch_numbers(time[:1]), [0])
+    assert np.isnan(sample_period(time[:1]))
+
+
+def test_a_long_source_is_cut():
+    data = flight(30)
+    assert len(leading_samples(data, 12)) == 12
+    assert len(leading_samples(data, 100)) == 30
+
+
+def test_a_slow_flight_and_a_fast_one_are_two_stretches():
+    slow, fast = 0.01 * np.arange(300), 0.002 * np.arange(2000)
+    for time in (np.r_[slow, 1e4 + fast], np.r_[fast, 1e4 + slow]):
+        assert stretch_numbers(time)[-1] == 1
+        assert sample_numbers(time, 8)[-1] == 2298 + 8
+    np.testing.assert_array_equal(lagged_pairs(sample_numbers(slow[[0, 1, 3, 4]], 8), 2), [[1], [2]])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.validation.region import region_in_words
+from cpfls_cli.validation.verdict import region_in_words
 
 
 def visited(roll, pitch):
