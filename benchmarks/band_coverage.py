@@ -42,7 +42,7 @@ from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.samples import Ready
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.inertia import INERTIA_PLACES, symmetric
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor import Motion
 from cpfls_cli.validation.bands import band, inertia_band
 from cpfls_cli.validation.bootstrap import POWER, BlockScores, MissedTorque, bootstrap
@@ -52,7 +52,7 @@ NOISE, TIME_CONSTANT, ATTITUDES = 0.05, 5.0, 100
 BENT = 0.3
 NOWHERE = np.zeros((72, 72), dtype=bool)
 POWERS = {"no correction": 0.0, "CR2": 0.5, "ours": POWER, "CR3, jackknife": 1.0}
-ROWS = tuple("".join(str(place + 1) for place in places) for places in INERTIA_PLACES)
+ROWS = tuple("".join(str(place + 1) for place in places) for places in INERTIA_ENTRIES)
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,9 @@ def coverage(case: Case, coloured: bool, runs: int, seed: int) -> tuple:
         held.append((low <= best_truth) & (best_truth <= high))
         weights.append(fit.ridge_weight)
     by_entry = np.mean(inside, axis=(0, 1))
-    entries = np.array([by_entry[place] for place in INERTIA_PLACES if np.any(truth[:, *place] != 0) or not free(case)])
+    entries = np.array(
+        [by_entry[place] for place in INERTIA_ENTRIES if np.any(truth[:, *place] != 0) or not free(case)]
+    )
     return entries, np.mean(held, axis=0), np.min(np.mean(inside, axis=0)), np.median(weights)
 
 
@@ -198,7 +200,7 @@ def compared(case: Case, coloured: bool, runs: int, seed: int) -> dict[str, Arra
     """Count for other ways to draw blocks: coverage by attitude of all D_ij(q), without a ridge."""
     rng, truth = np.random.default_rng(seed), case.inertia()
     strength, counts = NOISE * axis_scale(case.flight), {name: [] for name in ("pairs, percentiles", *POWERS)}
-    some = [place for place in INERTIA_PLACES if np.any(truth[:, *place] != 0)]
+    some = [place for place in INERTIA_ENTRIES if np.any(truth[:, *place] != 0)]
     linear = unit_inertias(case.fitted(case.flight.torque)[2], case.attitude)
     for _ in range(runs):
         torque = case.flight.torque + strength * noise(rng, len(case.flight), coloured)

@@ -13,14 +13,14 @@ from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, model_evaluator
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.validation.bands import Curves, curves, definite_share
+from cpfls_cli.validation.bands import definite_share
 from cpfls_cli.validation.bootstrap import Draws, bootstrap
+from cpfls_cli.validation.curves import Curves, RoundTrip, curves, round_trip
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
 from cpfls_cli.validation.paired import Comparison, compare_torque, mean_missing_torque, with_constant
 from cpfls_cli.validation.physical import PeriodErrors, Physics, one_period_away, physical_sense
 from cpfls_cli.validation.replay import StepErrors, replay_steps
 from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
-from cpfls_cli.validation.round_trip import RoundTrip, round_trip
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
 from cpfls_cli.validation.verdict import Verdict, verdict
 

@@ -13,9 +13,8 @@ from cpfls_cli.identification.excitation import visited_cells
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import Motion, uniform_breakpoints
-from cpfls_cli.validation.bands import curves
 from cpfls_cli.validation.bootstrap import MissedTorque, bootstrap
-from cpfls_cli.validation.round_trip import SimulatedTorque, round_trip
+from cpfls_cli.validation.curves import SimulatedTorque, curves, round_trip
 from cpfls_cli.validation.timeline import time_blocks
 
 SAMPLES = 800
