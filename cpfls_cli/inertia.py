@@ -16,7 +16,7 @@ INERTIA_ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def symmetric(parameters: Sequence[float] | Array) -> Array:
-    """Arrange six parameters as a symmetric matrix.
+    """Build a symmetric matrix from its six parameters.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def symmetric(parameters: Sequence[float] | Array) -> Array:
 
 
 def six_parameters(inertia: Sequence[float] | Array) -> Array:
-    """Fill three moments of inertia up to six parameters.
+    """Extend three moments of inertia to six parameters.
 
     Parameters
     ----------

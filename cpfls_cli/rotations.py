@@ -30,7 +30,7 @@ def rotation_matrix(attitude: Array) -> Array:
 
 
 def euler_angles(rotation: Array) -> Array:
-    """Read roll, pitch and yaw off rotation matrices.
+    """Extract roll, pitch and yaw from rotation matrices.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def euler_angles(rotation: Array) -> Array:
 
 
 def euler_rate_matrix(attitude: Array) -> Array:
-    """Map Euler rates to body rates, ``omega = W(q) qd``.
+    """Build the matrix that maps Euler rates to body rates, ``omega = W(q) qd``.
 
     Parameters
     ----------

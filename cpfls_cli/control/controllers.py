@@ -25,7 +25,7 @@ _SETTLED = 1e-6
 
 @dataclass(frozen=True)
 class Plan:
-    """What controllers follow.
+    """Planned attitude at the instants of control.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Plan:
 
 
 def plan_of(time: Array, planned: Mapping[str, Array], control_rate: float) -> Plan:
-    """Bring a planned attitude to the instants of control.
+    """Interpolate a planned attitude to the instants of control.
 
     Between samples it is the polynomial of fifth order that has their angles, rates and accelerations.
 
@@ -105,7 +105,7 @@ def _refuse_vertical(time: Array, pitch: Array) -> None:
 
 @dataclass(frozen=True)
 class Gains:
-    """Feedback that makes the error of a perfect model a damped oscillation, ``e'' + Kd e' + Kp e = 0``.
+    """Feedback gains that make the error of a perfect model a damped oscillation, ``e'' + Kd e' + Kp e = 0``.
 
     Attributes
     ----------
@@ -158,14 +158,14 @@ ControlLaw = Callable[[Array, Array, Array, Array], Array]
 
 @dataclass(frozen=True)
 class Controller:
-    """A law with a name."""
+    """A control law with a name."""
 
     name: str
     law: ControlLaw
 
 
 def computed_torque(model: TorqueModel) -> ControlLaw:
-    """Command the torque that the model asks for the wanted motion, ``tau = D(q) v + C(q, qd) qd``.
+    """Make the law that commands a model's torque for the wanted motion, ``tau = D(q) v + C(q, qd) qd``.
 
     ``v = qdd_planned + Kd e' + Kp e`` in Euler coordinates.
 
@@ -181,7 +181,7 @@ def computed_torque(model: TorqueModel) -> ControlLaw:
 
 
 def proportional_derivative(inertia: Array) -> ControlLaw:
-    """Command feedback alone, ``tau_i = D_ii (Kd e'_i + Kp e_i)`` with constant D_ii.
+    """Make the law of feedback alone, ``tau_i = D_ii (Kd e'_i + Kp e_i)`` with constant D_ii.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def proportional_derivative(inertia: Array) -> ControlLaw:
 
 @dataclass(frozen=True)
 class TorqueActuators:
-    """How a command becomes a torque.
+    """Limit and first-order lag between a commanded torque and the torque that acts.
 
     Attributes
     ----------

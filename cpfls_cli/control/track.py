@@ -37,7 +37,7 @@ class Sensing:
 
 @dataclass(frozen=True)
 class Tracked:
-    """What the vehicles did, at the instants of control; NaN where one was lost.
+    """Motion and torques of the vehicles at the instants of control; NaN where one was lost.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Tracked:
 
 @dataclass(frozen=True)
 class AttitudeLoop:
-    """What closes the loop between controllers and vehicles.
+    """Plant, gains, actuators and sensors of the control loop.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ def track(
     initial_torque: Array,
     progress: Callable[[float, int], None] = lambda _done, _total: None,
 ) -> Tracked:
-    """Fly all controllers along a plan.
+    """Simulate all controllers along a plan.
 
     A vehicle is lost where an angle is off by more than 90 degrees, its pitch reaches the vertical, or its state is not
     finite; the others go on.

@@ -44,7 +44,7 @@ class TorqueModel(Protocol):
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A rigid body as a model.
+    """A rigid body as a torque model.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ TurningLaw = Callable[[Array, Array], Turning]
 
 
 def rigid_turning(inertia: Array) -> TurningLaw:
-    """Turn as a rigid body does, ``I omega' + omega x I omega``.
+    """Make the turning law of a rigid body, ``I omega' + omega x I omega``.
 
     Parameters
     ----------
@@ -134,9 +134,9 @@ def rigid_turning(inertia: Array) -> TurningLaw:
 
 
 def identified_turning(model: InertiaModel) -> TurningLaw:
-    """Turn as a model in Euler coordinates does, ``J qdd + (dJ/dt) qd - 1/2 grad (qd^T J qd)``.
+    """Make the turning law of a model in Euler coordinates, ``J qdd + (dJ/dt) qd - 1/2 grad (qd^T J qd)``.
 
-    With ``omega = W qd`` its inertia in body axes is ``W^-T J W^-1``, and what is left is ``W^-T ((dJ/dt) qd -
+    With ``omega = W qd`` its inertia in body axes is ``W^-T J W^-1``, and the rest is ``W^-T ((dJ/dt) qd -
     1/2 grad (qd^T J qd) - J W^-1 (dW/dt) qd)``.
     """
 
@@ -158,7 +158,7 @@ RotationalPlant = Callable[[Array, Array, Array], Array]
 
 
 def rigid_plant(inertia: Array) -> RotationalPlant:
-    """Turn as a rigid body does, ``I omega' = M - omega x I omega``.
+    """Make the plant of a rigid body, ``I omega' = M - omega x I omega``.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def rigid_plant(inertia: Array) -> RotationalPlant:
 
 
 def model_plant(model: TorqueModel) -> RotationalPlant:
-    """Turn as a model in Euler coordinates does, ``D(q) qdd = W^T M - C(q, qd) qd``.
+    """Make the plant of a model in Euler coordinates, ``D(q) qdd = W^T M - C(q, qd) qd``.
 
     Returns
     -------
@@ -248,12 +248,12 @@ Predictor = InertiaModel | Array
 
 
 def acceleration_law(predictor: Predictor) -> AccelerationLaw:
-    """Give the equation of motion of a predictor, for many bodies at once."""
+    """Make the equation of motion of a predictor, for many bodies at once."""
     return _rigid(symmetric(predictor)) if isinstance(predictor, np.ndarray) else _identified(predictor)
 
 
 def _rigid(inertia: Array) -> AccelerationLaw:
-    """Turn as ``I omega' = M - omega x I omega``."""
+    """Make the law ``I omega' = M - omega x I omega``."""
 
     def law(state: RotationState, torque: Array) -> Acceleration:
         matrices = np.broadcast_to(inertia, (len(torque), 3, 3))
@@ -263,7 +263,7 @@ def _rigid(inertia: Array) -> AccelerationLaw:
 
 
 def _identified(model: InertiaModel) -> AccelerationLaw:
-    """Turn as ``J qdd = W^T M - (dJ/dt) qd + 1/2 grad (qd^T J qd)``, and then ``omega' = W qdd + (dW/dt) qd``."""
+    """Make the law ``J qdd = W^T M - (dJ/dt) qd + 1/2 grad (qd^T J qd)``, ``omega' = W qdd + (dW/dt) qd``."""
 
     def law(state: RotationState, torque: Array) -> Acceleration:
         q = _attitude(state)
@@ -280,7 +280,7 @@ def _identified(model: InertiaModel) -> AccelerationLaw:
 
 
 def _attitude(state: RotationState) -> Array:
-    """Give the Euler angles on the side of the vertical that the pitch is counted on."""
+    """Compute the Euler angles on the side of the vertical that the pitch is counted on."""
     near = rotations.euler_angles(state.rotation)
     return np.where(state.beyond[:, None], np.pi + near * [1.0, -1.0, 1.0], near)
 
@@ -293,7 +293,7 @@ def _solved(matrices: Array, right_side: Array) -> Acceleration:
 
 
 def _positive_definite(matrices: Array) -> BoolArray:
-    """Tell by the leading minors (Sylvester), ten times as fast as by eigenvalues."""
+    """Flag positive definite matrices by their leading minors (Sylvester), ten times as fast as by eigenvalues."""
     first, second = matrices[:, 0, 0], matrices[:, 1, 1]
     minor = first * second - matrices[:, 0, 1] ** 2
     return np.asarray((first > 0) & (minor > 0) & (np.linalg.det(matrices) > 0))

@@ -122,7 +122,7 @@ class _EulerAngles:
 def free_runs(
     law: AccelerationLaw, start: RotationState, time: Array, torque: Array, fastest: float
 ) -> Iterator[RotationState]:
-    """Run freely from given states under torques that are known at samples, ``R' = R [omega]_x`` and ``omega'``.
+    """Integrate free runs under torques that are known at samples, ``R' = R [omega]_x`` and ``omega'`` by the law.
 
     Each sample is integrated in as many steps as keep each turn below 0.1 rad. Between samples the torque is a straight
     line. A run is lost where the inertia is not positive definite, or where it turns faster than any step can follow.
@@ -174,7 +174,7 @@ class _RotationMatrices:
         return _RotationSlope(turning, acceleration.value, state.exists & acceleration.exists)
 
     def moved(self, state: RotationState, slope: _RotationSlope, share: float) -> RotationState:
-        """Move on; what would leave every bound stays, and is lost."""
+        """Move on; a body that would turn too far in a step stays, and is lost."""
         interval = share * self.step
         body_rate = state.body_rate + interval * slope.body_rate
         exists = slope.exists & (np.linalg.norm(body_rate, axis=1) * interval[:, 0] < _LARGEST_TURN)
@@ -198,7 +198,7 @@ class _RotationMatrices:
 
 @dataclass(frozen=True)
 class ReplayModel:
-    """What turns actuation into rotation.
+    """Torque and inertia that a flight is replayed with.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ class ReplayModel:
 def momentum_runs(
     model: ReplayModel, starts: IntArray, rate: Array, rotation: Array | None, period: float, horizon: int
 ) -> Iterator[tuple[Array, Array | None]]:
-    """Run freely from samples of a flight in momentum form, which a torque along the flight drives.
+    """Integrate free runs in momentum form from samples of a flight, driven by a torque along the flight.
 
     ``d/dt momentum = M - direct(attitude, rate)`` and ``dR/dt = R [rate]_x``; for a rigid body the momentum is
     ``I omega`` and the direct term ``omega x I omega``. Between samples the torque is a straight line.
@@ -303,7 +303,7 @@ class _Momenta:
         return state
 
     def _matrices(self, rotation: Array | None, runs: int) -> tuple[Array, _Evaluated | None]:
-        """Give the matrix from rate to momentum, ``W^-T J W^-1`` in Euler coordinates."""
+        """Compute the matrix from rate to momentum, ``W^-T J W^-1`` in Euler coordinates."""
         if isinstance(self.inertia, np.ndarray):
             return np.broadcast_to(self.inertia, (runs, 3, 3)), None
         assert rotation is not None

@@ -17,7 +17,7 @@ _ROUNDING, _VERTICAL_ROUNDING = 1e-9, 0.01
 
 
 def inertia_tensor(vehicle: VehicleSettings) -> Array:
-    """Arrange the inertia tensor of a vehicle.
+    """Build the inertia tensor of a vehicle.
 
     Returns
     -------
@@ -197,7 +197,7 @@ def not_positive_definite(matrices: Array, attitude: Array) -> BoolArray:
 
 
 def why_unphysical(inertia: Array) -> str | None:
-    """Say why six inertia parameters cannot be those of a body.
+    """Explain why six inertia parameters cannot be those of a body.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ def start_samples(signals: Signals, every: int, horizon: int) -> IntArray:
 
 
 def replay(signals: Signals, starts: IntArray, horizon: int, model: ReplayModel) -> ReplayError:
-    """Simulate from every start and compare with what was measured.
+    """Simulate free runs from every start and compare them with the measurements.
 
     The torque is that along the measured motion, so that the error of one start does not change what drives it. Each
     run starts from `start_rate`.
@@ -186,7 +186,7 @@ class Replayed:
 
 
 def replayed(flights: Sequence[Signals], model: ExtendedModel | None, horizon: int) -> Replayed:
-    """Replay the actuation of flights through a model from every fifth sample.
+    """Replay flights through a model from every fifth sample and average the errors by horizon.
 
     Parameters
     ----------

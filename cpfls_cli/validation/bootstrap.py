@@ -75,8 +75,8 @@ class BlockScores:
         along *= np.maximum(1.0 - values, _SMALLEST_REST) ** -self.power
         return np.asarray(weights @ np.einsum("bij,bj->bi", vectors, along) @ half.T)
 
-    def under(self, penalty: Array, rank_tolerance: float) -> BlockScores:
-        """Solve the same least squares under another penalty.
+    def with_penalty(self, penalty: Array, rank_tolerance: float) -> BlockScores:
+        """Solve the same least squares with another penalty.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class BlockScores:
         return np.asarray((values * self.penalty) @ half @ half.T + values - values @ kept @ kept.T)
 
     def solution(self, rank_tolerance: float) -> Array:
-        """Solve for the parameters of smallest norm that the scores, taken as ``A_b^T tau_b``, ask for."""
+        """Solve for the parameters of smallest norm, with the scores taken as ``A_b^T tau_b``."""
         half = self._half_inverse(rank_tolerance)
         return np.asarray(half @ (half.T @ np.sum(self.score, axis=0)))
 
@@ -119,7 +119,7 @@ class BlockScores:
 
 @dataclass(frozen=True)
 class MissedTorque:
-    """The motion of a source with the torque that a model misses: measured less predicted."""
+    """The motion of a source with the torque that a model misses: measured minus predicted."""
 
     source: TorqueSource
     model: Model
@@ -136,7 +136,7 @@ class MissedTorque:
 
 @dataclass(frozen=True)
 class Draws:
-    """Parameters of a model as other flights of the same noise might give them.
+    """Bootstrap draws of the parameters of a model: what other flights with the same noise might give.
 
     They scatter about the model's own. A band is wider than their spread by a factor that the number of blocks gives:
     see `cpfls_cli.validation.bands.band`.
@@ -226,7 +226,7 @@ def bootstrap(
     hidden = _BIAS_DEVIATION * rng.standard_normal((settings.draws, 1))
     scores, parameters = _model_scores(products, model, fit, over_rigid_body=learned.ready.rigid)
     held = scores.penalty > 0
-    weakest = scores.under(np.where(held, _mean_square(products), 0.0), tolerance)
+    weakest = scores.with_penalty(np.where(held, _mean_square(products), 0.0), tolerance)
     prior = np.zeros((settings.draws, len(held)))
     prior[:, held] = rng.standard_normal((settings.draws, np.count_nonzero(held)))
     deviations = np.zeros((settings.draws, columns))
@@ -244,7 +244,7 @@ def bootstrap(
 
 
 def _model_scores(products: Products, model: Model, fit: Fit, *, over_rigid_body: bool) -> tuple[BlockScores, slice]:
-    """Take the columns that the model has, in the size that the ridge holds them in; tell which they are."""
+    """Select the columns that the model has, scaled as the ridge holds them, and return which they are."""
     off = np.isinf(fit.ridge_weight)
     parameters = slice(0 if over_rigid_body else RIGID, RIGID if off else None)
     divide = _divide(fit)
@@ -257,7 +257,7 @@ def _model_scores(products: Products, model: Model, fit: Fit, *, over_rigid_body
 
 
 def _rigid_scores(products: Products, model: Model, rank_tolerance: float) -> tuple[BlockScores, Array]:
-    """Fit a rigid body in place of the model; the torque that the model misses is what the products know."""
+    """Fit a rigid body in place of the model, from products with the torque that the model misses."""
     rigid, x = slice(0, RIGID), np.concatenate([model.rigid_body, model.coefficients])
     gram = products.gram[:, rigid, rigid]
     torque = products.moment[:, rigid] + products.gram[:, rigid] @ x
@@ -272,5 +272,5 @@ def _mean_square(products: Products) -> float:
 
 
 def _divide(fit: Fit) -> Array:
-    """Give what turns parameters that the ridge holds into those of the model."""
+    """Compute the factors from the parameters that the ridge holds to those of the model."""
     return np.concatenate([np.ones(RIGID), 1.0 / fit.column_size])

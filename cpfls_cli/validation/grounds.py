@@ -1,4 +1,4 @@
-"""What a verdict on a model rests on, and what follows from it without any judgement."""
+"""Evidence that the verdict on a model rests on, and the facts that follow from it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _MANY_LOST = 0.05
 
 @dataclass(frozen=True)
 class Grounds:
-    """Evidence on a model.
+    """Evidence that the verdict on a model rests on.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Grounds:
 
     @property
     def everywhere(self) -> bool:
-        """Whether what was learned holds at every attitude: one rule, seen all round, determined, a body anywhere."""
+        """Whether the model holds at every attitude: one rule, trained all round, determined, definite everywhere."""
         return self.one_rule and self.physics.indefinite_anywhere == 0
 
     @property
@@ -89,17 +89,17 @@ class Grounds:
 
     @property
     def hardly_excited(self) -> BoolArray:
-        """Body axes, shape (3,), that move so little that their torque is mostly not inertia's."""
+        """Body axes, shape (3,), that accelerate so little that their torque is mostly not inertial."""
         acceleration = self.identification.axes.acceleration
         return np.asarray(acceleration < HARDLY_EXCITED_SHARE * np.max(acceleration))
 
     def r2(self, predictor: str) -> Array:
-        """Give the worst R2 of body torque over the judged parts, shape (3,)."""
+        """Find the worst R2 of body torque over the judged parts, shape (3,)."""
         scores = [self.identification.scores[part][predictor].r2_body for part in self.judged]
         return np.asarray(np.fmin.reduce(scores))
 
     def rate_error(self, predictor: str) -> Array:
-        """Give the root mean square error of the body rate over a window, worst judged part, shape (3,), rad/s."""
+        """Compute the root mean square error of the body rate over a window, worst judged part, shape (3,), rad/s."""
         errors = [steps.window_error[steps.model.index(predictor)] for steps in self.replayed.values()]
         return np.asarray(np.max([np.sqrt(_mean(squares)) for squares in errors], axis=0))
 
@@ -141,7 +141,7 @@ class Grounds:
 
     @property
     def impossible(self) -> bool:
-        """Whether no body has the inertia D(q), somewhere where training was."""
+        """Whether D(q) is not positive definite at an attitude that training visited."""
         return self.physics.indefinite > 0 or self.identification.indefinite > 0
 
 

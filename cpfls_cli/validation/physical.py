@@ -22,7 +22,7 @@ _AWAY = 2 * np.pi * np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 @dataclass(frozen=True)
 class Physics:
-    """Physical sense of a model over the cells of roll and pitch that training visited.
+    """Physical plausibility of a model over the cells of roll and pitch that training visited.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Physics:
 
 
 def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
-    """Examine a model at the centres of the cells that training visited, and its D(q) at those of all.
+    """Check the plausibility of a model at the cells that training visited, and its D(q) at all cells.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
 
 
 def energy_share(values: InertiaValues, coriolis: Array, rate: Array) -> float:
-    """Measure the power of ``dD/dt - 2 C`` against the sizes of its terms.
+    """Compute the power of ``dD/dt - 2 C`` relative to the sizes of its terms.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def energy_share(values: InertiaValues, coriolis: Array, rate: Array) -> float:
 
 
 def cell_centres(visited: BoolArray) -> Array:
-    """Give the attitudes at the centres of cells, without those near a pitch of +-90 degrees.
+    """Compute the attitudes at the centres of cells, without those near a pitch of +-90 degrees.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class PeriodErrors:
 
 
 def one_period_away(model: Model, parts: Mapping[str, TorqueSource]) -> PeriodErrors | None:
-    """Judge a model with roll one turn on, and with pitch one turn back, against the same torque.
+    """Compute the errors of a model with roll one turn on, and with pitch one turn back, against the same torque.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What speaks for a model and against it, one sentence each."""
+"""Reasons for and against a model, one sentence each."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _LARGE_BESIDE_NOISE, _SMALL = 0.25, 0.01
 
 
 class Reason(NamedTuple):
-    """A reason.
+    """One sentence on a model, and whether it speaks for or against it.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Reason(NamedTuple):
 
 
 def numbers(values: Array, shown: BoolArray | None = None) -> str:
-    """Print the numbers of the three axes.
+    """Format the values of the three axes.
 
     Parameters
     ----------
@@ -58,10 +58,10 @@ def numbers(values: Array, shown: BoolArray | None = None) -> str:
 
 
 def reasons(grounds: Grounds) -> Iterator[Reason]:
-    """List what speaks for a model and against it, the most important first."""
-    yield from reasons_of_errors(grounds)
-    sense = (_definite, _draws, _elsewhere, _fuzzy_part, _determined)
-    for rule in (*sense, _band, _search, _outside, _white):
+    """List the reasons for and against a model, the most important first."""
+    of_errors = (_held_out, _hardly_excited, _beside_rigid_body, _constant, _steps, _lost)
+    of_inertia = (_definite, _draws, _elsewhere, _fuzzy_part, _determined)
+    for rule in (*of_errors, *of_inertia, _band, _search, _outside, _white):
         yield from rule(grounds)
 
 
@@ -86,7 +86,7 @@ def _draws(grounds: Grounds) -> Iterator[Reason]:
 
 
 def _elsewhere(grounds: Grounds) -> Iterator[Reason]:
-    """Where training went all round but not everywhere, a rule of all attitudes may be no body at others."""
+    """Report attitudes without a definite D(q) that training, though it went all round, did not visit."""
     physics = grounds.physics
     if grounds.one_rule and not grounds.impossible and physics.indefinite_anywhere:
         text = (
@@ -163,12 +163,6 @@ def _white(grounds: Grounds) -> Iterator[Reason]:
 
 def _printed(p_value: float) -> str:
     return f"{p_value:.2g}" if p_value > _SMALLEST_P else f"below {_SMALLEST_P:g}"
-
-
-def reasons_of_errors(grounds: Grounds) -> Iterator[Reason]:
-    """List what the errors on held-out data speak for, the most important first."""
-    for rule in (_held_out, _hardly_excited, _beside_rigid_body, _constant, _steps, _lost):
-        yield from rule(grounds)
 
 
 def _held_out(grounds: Grounds) -> Iterator[Reason]:

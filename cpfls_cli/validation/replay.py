@@ -27,7 +27,7 @@ NOTHING_MOVES = "nothing-moves"
 
 @dataclass(frozen=True)
 class ReplayWindows:
-    """What was measured in windows of equal length.
+    """Measured motion and torque in windows of equal length.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class ReplayWindows:
 
     @property
     def start(self) -> RotationState:
-        """What was measured at the start of the windows."""
+        """Measured state at the start of the windows."""
         return RotationState(
             self.rotation[:, 0], self.body_rate[:, 0], self.beyond, np.ones(len(self.time), dtype=bool)
         )
@@ -56,7 +56,7 @@ class ReplayWindows:
 
 @dataclass(frozen=True)
 class WindowPlan:
-    """Where windows start, and how long they are.
+    """Starts and length of windows.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class WindowPlan:
 
 
 def plan_windows(source: TorqueSource, horizon: int, most: int) -> WindowPlan:
-    """Choose windows, evenly spread over all that hold no pause and no pitch within 17 degrees of the vertical.
+    """Select windows, evenly spread over all that hold no pause and no pitch within 17 degrees of the vertical.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def plan_windows(source: TorqueSource, horizon: int, most: int) -> WindowPlan:
 
 
 def read_windows(source: TorqueSource, plan: WindowPlan) -> Iterator[ReplayWindows]:
-    """Gather what was measured in the windows, some windows at a time."""
+    """Read the measurements in the windows, some windows at a time."""
     at_once = max(_SAMPLES_AT_ONCE // (plan.horizon + 1), 1)
     for first in range(0, len(plan.start), at_once):
         wanted = plan.start[first : first + at_once, None] + np.arange(plan.horizon + 1)
@@ -174,7 +174,7 @@ def replay_steps(
     windows: int,
     missing: Mapping[str, Array] = MappingProxyType({}),
 ) -> StepErrors:
-    """Replay measured torques from many starts and compare with what was measured.
+    """Replay measured torques from many starts and compare the motion with the measured one.
 
     The body torque is that measured, whatever attitude the prediction has come to.
 

@@ -1,4 +1,4 @@
-"""What a model leaves of the torque: white or not, biased or not, related to its inputs or not, normal or not."""
+"""Residual analysis of the torque of a model: whiteness, bias, correlation with its inputs, distribution."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def _histogram(errors: Array) -> tuple[Array, IntArray]:
 
 
 def autocorrelation(errors: Array, number: IntArray, without: BoolArray, lags: int) -> tuple[Array, Array]:
-    """Correlate errors with themselves a lag later, about the mean of them all.
+    """Compute the autocorrelation of errors about their mean, and the p-value of the test of Ljung and Box.
 
     ``r_k = sum_k e(t) e(t + k) / sum e^2`` over the n_k pairs that are k samples apart, whatever is missing between
     them. ``Q = n (n + 2) sum_k r_k^2 / n_k`` is held against chi square with as many degrees of freedom as lags.
@@ -230,7 +230,7 @@ def mean_p_value(errors: Array, without: BoolArray) -> Array:
 
 @dataclass(frozen=True)
 class ModelInputs:
-    """Signals that errors may follow.
+    """Inputs of a model, which its errors may be correlated with.
 
     Attributes
     ----------
@@ -276,7 +276,7 @@ def model_inputs(data: TorqueData, predicted: Array) -> ModelInputs:
 
 
 def cross_correlation(errors: Array, inputs: ModelInputs, number: IntArray, without: BoolArray, lags: int) -> Array:
-    """Correlate errors with inputs a lag earlier or later, both about their means.
+    """Compute the cross-correlation of errors with inputs at lags to both sides, both about their means.
 
     ``r(k) = sum_k u(t) e(t + k) / sqrt(sum u^2 sum e^2)`` over the pairs that are k samples apart.
 

@@ -38,7 +38,7 @@ RIGID_BODY_NAME = "rigid body"
 
 
 def candidate_structures(model: StructureSettings) -> tuple[StructureSettings, ...]:
-    """List a structure and others that differ from it in one choice.
+    """List a structure and those that differ from it in one choice.
 
     The choices are the number of membership functions, the input map, and the consequents: the triangle wave, or
     harmonics up to the first, second or third order.
@@ -147,7 +147,7 @@ class StructureFolds:
 
     @classmethod
     def of(cls, training: TorqueSource, learned: TorqueSource, settings: IdentificationSettings) -> StructureFolds:
-        """Take some of the samples where there are many, and label them.
+        """Thin out the samples where there are many, and label them by fold.
 
         Raises
         ------
@@ -263,7 +263,7 @@ class StructureComparison:
 def compare_structures(
     training: TorqueSource, learned: TorqueSource, settings: IdentificationSettings
 ) -> StructureComparison:
-    """Cross-validate structures that differ from the settings' in one choice, and the rigid body alone.
+    """Cross-validate the rigid body alone, the structure of the settings, and those that differ in one choice.
 
     All have equidistant partitions: nothing is searched for, so a structure whose partitions matter looks worse here
     than a search would leave it, the model's own as well. The ridge weight of a fuzzy part over a rigid body is chosen

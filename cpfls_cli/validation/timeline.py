@@ -38,7 +38,7 @@ def sample_period(time: Array) -> float:
 
 
 def stretch_numbers(time: Array) -> IntArray:
-    """Count the stretches of samples that follow each other without a pause.
+    """Label every sample by its stretch, in which samples follow each other without a pause.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def sample_numbers(time: Array, longest: int) -> IntArray:
 
 
 def lagged_pairs(number: IntArray, lag: int) -> tuple[IntArray, IntArray]:
-    """Find the samples that are a lag apart.
+    """Find the pairs of samples that are a lag apart.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether to fly with a model, and where: a verdict by rules, each with its reason."""
+"""The verdict on a model, by rules: whether to control with it, at which attitudes, and why."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Label = Literal["good-for-control", "good-inside-region", "not-better-than-rigid
 
 @dataclass(frozen=True)
 class Verdict:
-    """A verdict in words.
+    """Verdict on a model, with its reasons.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Verdict:
 
 
 def verdict(grounds: Grounds) -> Verdict:
-    """Judge a model by rules, the first that applies.
+    """Judge a model by the first rule that applies.
 
     1. *do-not-use* where D(q) is not positive definite at an attitude that training visited: then some torque turns
        the model the wrong way, and a controller that inverts D(q) diverges.
@@ -120,7 +120,7 @@ def _better(grounds: Grounds) -> bool:
 
 
 def _not_good_enough(grounds: Grounds) -> str | None:
-    """Say why a model that is better than the rigid body is not to be used; None where it is."""
+    """Explain why a model that is better than the rigid body is not to be used; None where it is."""
     if grounds.loses_many:
         return f"{grounds.lost(MODEL)} of {grounds.windows} windows replayed do not come to their end"
     if grounds.definite is not None and grounds.definite < DEFINITE_SHARE:
@@ -135,7 +135,7 @@ def _not_good_enough(grounds: Grounds) -> str | None:
 
 
 def _r2_in_words(grounds: Grounds, predictor: str) -> str:
-    """Give the R2 of the axes that it confirms, and name those that nothing confirms."""
+    """Format the R2 of the axes that it confirms, and name those that nothing confirms."""
     confirmed, r2 = confirmed_axes(grounds, predictor), grounds.r2(predictor)
     text = f"R2 of body torque {numbers(r2, confirmed)}; {grounds.r2_min:g} is asked for"
     return text if np.all(confirmed) else f"{text}; about {_names(~confirmed)} nothing confirms it"
@@ -157,7 +157,7 @@ def _beside_rigid_body(grounds: Grounds) -> tuple[Label, Reason]:
 
 
 def _rigid_body_instead(grounds: Grounds) -> Reason:
-    """Say whether the rigid body is to be used in place of a model that is not better."""
+    """Explain whether the rigid body is to be used in place of a model that is not better."""
     bad = ~good_axes(grounds, RIGID_BODY)
     if not np.any(bad):
         use = "use the rigid body: it is simpler, and the model is not better by more than chance on held-out data"

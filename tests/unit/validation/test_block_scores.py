@@ -47,7 +47,7 @@ def test_other_powers_correct_the_residuals_themselves(case, power):
 
 def test_another_penalty_is_that_of_all_rows_solved_again(case):
     penalty = np.array([0.0, 0.0, 0.1, 0.3, 0.2])
-    other = case.scores.under(penalty, TOLERANCE)
+    other = case.scores.with_penalty(penalty, TOLERANCE)
     np.testing.assert_allclose(other.parameters, solved(case.A, case.y, penalty), atol=1e-12)
     residual = case.y - case.A @ other.parameters
     np.testing.assert_allclose(other.score, np.einsum("bnp,bn->bp", case.A, residual), atol=1e-12)
