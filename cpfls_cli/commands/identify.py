@@ -34,7 +34,7 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.validation.verdict import Verdict
-from cpfls_cli.workers.worker_error import WorkerError
+from cpfls_cli.workers.workforce import WorkerError
 
 
 def run(

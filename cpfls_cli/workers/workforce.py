@@ -1,13 +1,17 @@
-"""What all kinds of workers are to the genetic algorithm: an evaluator whose rows can be watched as they finish."""
+"""What all kinds of workers share: an evaluator whose rows are watched as they finish, their shares, and failures."""
 
 from __future__ import annotations
 
+import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from cpfls_cli.arrays import IntArray
+from cpfls_cli.errors import ComputationError, CpflsError
 from cpfls_cli.evolution.archive import Evaluation
 
 
@@ -69,3 +73,86 @@ def gathered(parts: Sequence[tuple[IntArray, Evaluation]]) -> tuple[IntArray, Ev
     genes = np.concatenate([evaluation.genes for _, evaluation in parts])
     objectives = np.concatenate([evaluation.objectives for _, evaluation in parts])
     return rows[order], Evaluation(genes[order], objectives[order])
+
+
+_CHUNKS_PER_WORKER = 4
+
+
+def chunks(rows: int, workers: int) -> list[IntArray]:
+    """Cut rows into chunks that shrink towards the end, down to a single row.
+
+    Each chunk takes a fixed share of what is left, so there are few of them, and yet nobody waits long for the
+    last one, however uneven the rows are (guided self-scheduling).
+
+    Returns
+    -------
+    list of array of int
+        Consecutive rows; one empty chunk where there are no rows.
+
+    References
+    ----------
+    Polychronopoulos and Kuck, Guided self-scheduling, IEEE Transactions on Computers C-36(12), 1987.
+    """
+    bounds = [0]
+    while bounds[-1] < rows:
+        left = rows - bounds[-1]
+        bounds.append(bounds[-1] - (-left // (_CHUNKS_PER_WORKER * workers)))
+    return np.split(np.arange(rows), bounds[1:-1])
+
+
+class WorkerError(ComputationError):
+    """Workers cannot be had, vanished, or failed for a reason that is not in the data."""
+
+
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What went wrong in a worker.
+
+    Parameters
+    ----------
+    message : str
+        For the user.
+    origin : str
+        Traceback in the worker, for whoever looks for a fault of the program; empty where the message says all.
+    of_data : bool
+        Whether it is the data that cannot be worked on, whoever works.
+    """
+
+    message: str
+    origin: str = ""
+    of_data: bool = False
+
+
+def attempt(work: Callable[[], _Result]) -> _Result | Failure:
+    """Do some work and return its result, or else what went wrong."""
+    try:
+        return work()
+    except CpflsError as error:
+        return Failure(str(error), of_data=True)
+    except MemoryError:
+        return Failure("a worker ran out of memory: take fewer workers, or give the machine more memory")
+    except Exception as error:
+        kind = type(error).__name__
+        message = f"a worker failed with {kind}: {error}; take one worker without a scheduler to see more"
+        return Failure(message, traceback.format_exc())
+
+
+def result_of(outcome: _Result | Failure) -> _Result:
+    """Return what an attempt brought, or raise what it failed with.
+
+    Raises
+    ------
+    ComputationError
+        With the message of a failure that is in the data.
+    WorkerError
+        With the message of any other; the worker's traceback, if there is one, is a note on it.
+    """
+    if isinstance(outcome, Failure):
+        error = ComputationError(outcome.message) if outcome.of_data else WorkerError(outcome.message)
+        if outcome.origin:
+            error.add_note(outcome.origin)
+        raise error
+    return outcome
