@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.evolution.dominance import pareto_front, worst_where_not_finite
+from cpfls_cli.evolution.ranking import pareto_front, worst_where_not_finite
 
 
 @dataclass(frozen=True)

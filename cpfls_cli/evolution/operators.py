@@ -1,10 +1,102 @@
-"""Recombination of pairs, and mutation of bit strings."""
+"""Genetic operators of one population: Gray coding, choice of parents, recombination and mutation."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from cpfls_cli.arrays import BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.evolution.ranking import positions
+
+BITS_PER_GENE = 16
+
+
+def gray_encode(genes: IntArray, bits_per_gene: int = BITS_PER_GENE) -> BoolArray:
+    """Write genes as reflected Gray code, ``g XOR (g >> 1)``, most significant bit first.
+
+    Parameters
+    ----------
+    genes : array, shape (individuals, genes)
+        Integers from 0 to ``2**bits_per_gene - 1``.
+    bits_per_gene : int
+
+    Returns
+    -------
+    array of bool, shape (individuals, genes * bits_per_gene)
+        Neighbouring integers differ in one bit.
+    """
+    code = genes ^ (genes >> 1)
+    bits = (code[..., np.newaxis] >> _shifts(bits_per_gene)) & 1
+    return bits.astype(np.bool_).reshape(len(genes), -1)
+
+
+def gray_decode(bits: BoolArray, bits_per_gene: int = BITS_PER_GENE) -> IntArray:
+    """Read genes from reflected Gray code, as BS2RV of the Sheffield toolbox does with integer bounds.
+
+    Parameters
+    ----------
+    bits : array of bool, shape (individuals, genes * bits_per_gene)
+        Most significant bit first.
+    bits_per_gene : int
+
+    Returns
+    -------
+    array of int, shape (individuals, genes)
+    """
+    code = bits.reshape(len(bits), bits.shape[1] // bits_per_gene, bits_per_gene)
+    binary = np.logical_xor.accumulate(code, axis=-1)
+    genes: IntArray = (binary.astype(np.int64) << _shifts(bits_per_gene)).sum(axis=-1)
+    return genes
+
+
+def _shifts(bits_per_gene: int) -> IntArray:
+    return np.arange(bits_per_gene, dtype=np.int64)[::-1]
+
+
+def linear_ranking_fitness(ranks: IntArray, selective_pressure: float) -> Array:
+    """Assign fitness linear in the position among the sorted ranks (RANKING of the Sheffield toolbox).
+
+    ``2 - SP + 2 (SP - 1) (position - 1) / (individuals - 1)``, where position 1 is the least fit.
+
+    Parameters
+    ----------
+    ranks : array of int, shape (individuals,)
+        Smaller is better; two individuals at least.
+    selective_pressure : float
+        SP, from 1 (all equal) to 2 (the least fit gets nothing).
+
+    Returns
+    -------
+    array, shape (individuals,)
+        With mean 1; individuals of equal rank share the mean of their positions.
+    """
+    slope = 2.0 * (selective_pressure - 1.0) / (len(ranks) - 1)
+    fitness: Array = 2.0 - selective_pressure + slope * (positions(-ranks) - 1.0)
+    return fitness
+
+
+def stochastic_universal_sampling(fitness: Array, count: int, rng: np.random.Generator) -> IntArray:
+    """Choose parents with one spin of a wheel with equally spaced pointers (SUS of the Sheffield toolbox).
+
+    Parameters
+    ----------
+    fitness : array, shape (individuals,)
+        Not negative, with a positive sum.
+    count : int
+        Parents to choose.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array of int, shape (count,)
+        Indices in random order. An individual occurs ``count * fitness / sum(fitness)`` times, rounded down
+        or up.
+    """
+    wheel = np.cumsum(fitness)
+    pointers = wheel[-1] * (rng.random() + np.arange(count)) / count
+    chosen = np.searchsorted(wheel, pointers, side="right")
+    # Rounding may put the last pointer on the end of the wheel.
+    return rng.permutation(np.minimum(chosen, len(fitness) - 1))
+
 
 _BEYOND = 0.25
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.evolution.history import History
+from cpfls_cli.evolution.state import History
 from cpfls_cli.identification.baselines import Baseline
 from cpfls_cli.identification.cross_validation import RidgeCurve
 from cpfls_cli.identification.findings import Evidence

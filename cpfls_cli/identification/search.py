@@ -10,9 +10,7 @@ from cpfls_cli.arrays import IntArray
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
 from cpfls_cli.evolution.engine import start, step
-from cpfls_cli.evolution.history import History
-from cpfls_cli.evolution.state import EvolutionState
-from cpfls_cli.evolution.stopping import ended
+from cpfls_cli.evolution.state import EvolutionState, History, ended
 from cpfls_cli.identification.choice import choose, require_flights
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.data import TorqueSource

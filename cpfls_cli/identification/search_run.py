@@ -9,8 +9,7 @@ from typing import Literal, get_args
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Evaluate, Evaluation
-from cpfls_cli.evolution.state import EvolutionState
-from cpfls_cli.evolution.stopping import End
+from cpfls_cli.evolution.state import End, EvolutionState
 from cpfls_cli.workers.employ import employ
 from cpfls_cli.workers.workforce import Workforce
 

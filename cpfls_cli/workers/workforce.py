@@ -95,8 +95,8 @@ def chunks(rows: int, workers: int) -> list[IntArray]:
     """
     bounds = [0]
     while bounds[-1] < rows:
-        left = rows - bounds[-1]
-        bounds.append(bounds[-1] - (-left // (_CHUNKS_PER_WORKER * workers)))
+        remaining = rows - bounds[-1]
+        bounds.append(bounds[-1] - (-remaining // (_CHUNKS_PER_WORKER * workers)))
     return np.split(np.arange(rows), bounds[1:-1])
 
 

@@ -1,6 +1,56 @@
 import numpy as np
 
-from cpfls_cli.evolution.operators import intermediate_recombination, mutate, single_point_crossover
+from cpfls_cli.evolution import gray_decode, gray_encode
+from cpfls_cli.evolution.operators import (
+    intermediate_recombination,
+    linear_ranking_fitness,
+    mutate,
+    single_point_crossover,
+    stochastic_universal_sampling,
+)
+
+
+def test_three_bit_code_is_the_published_table():
+    table = ["000", "001", "011", "010", "110", "111", "101", "100"]
+    bits = gray_encode(np.arange(8)[:, np.newaxis], bits_per_gene=3)
+    assert ["".join(str(int(bit)) for bit in row) for row in bits] == table
+
+
+def test_genes_lie_one_after_another_most_significant_bit_first():
+    bits = gray_encode(np.array([[65535, 0]]))
+    assert np.flatnonzero(bits[0]).tolist() == [0]
+    assert gray_decode(bits).tolist() == [[65535, 0]]
+
+
+def test_every_pair_of_neighbours_differs_in_one_bit():
+    bits = gray_encode(np.arange(2**16)[:, np.newaxis])
+    assert np.all(np.count_nonzero(bits[1:] != bits[:-1], axis=1) == 1)
+
+
+def test_fitness_falls_linearly_from_the_pressure_to_its_complement():
+    np.testing.assert_allclose(linear_ranking_fitness(np.array([30, 10, 50, 20, 40]), 1.5), [1.0, 1.5, 0.5, 1.25, 0.75])
+
+
+def test_equal_ranks_share_the_mean_fitness():
+    np.testing.assert_allclose(linear_ranking_fitness(np.array([1, 1, 1, 2]), 2.0), [4 / 3, 4 / 3, 4 / 3, 0])
+
+
+def test_pressure_of_one_makes_all_equal():
+    np.testing.assert_array_equal(linear_ranking_fitness(np.array([3, 1, 2]), 1.0), 1.0)
+
+
+def test_parents_come_in_random_order():
+    chosen = stochastic_universal_sampling(np.ones(200), 200, np.random.default_rng(1))
+    assert sorted(chosen.tolist()) == list(range(200))
+    assert np.count_nonzero(np.diff(chosen) > 0) < 150
+
+
+def test_mean_number_of_copies_is_the_expectation():
+    rng, fitness = np.random.default_rng(2), np.array([0.3, 1.1, 0.0, 1.6])
+    spins = 4000
+    counts = sum(np.bincount(stochastic_universal_sampling(fitness, 5, rng), minlength=4) for _ in range(spins))
+    # A spin's count differs from its expectation by less than one: 0.5 / sqrt(4000) = 0.008 at most.
+    np.testing.assert_allclose(counts / spins, 5 * fitness / 3.0, atol=0.04)
 
 
 def alternating(individuals, length):
