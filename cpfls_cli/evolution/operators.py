@@ -8,6 +8,8 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.evolution.ranking import positions
 
 BITS_PER_GENE = 16
+# Share of the distance between two parents by which offspring may lie beyond them.
+_BEYOND = 0.25
 
 
 def gray_encode(genes: IntArray, bits_per_gene: int = BITS_PER_GENE) -> BoolArray:
@@ -96,9 +98,6 @@ def stochastic_universal_sampling(fitness: Array, count: int, rng: np.random.Gen
     chosen = np.searchsorted(wheel, pointers, side="right")
     # Rounding may put the last pointer on the end of the wheel.
     return rng.permutation(np.minimum(chosen, len(fitness) - 1))
-
-
-_BEYOND = 0.25
 
 
 def intermediate_recombination(genes: IntArray, rate: float, largest: int, rng: np.random.Generator) -> IntArray:

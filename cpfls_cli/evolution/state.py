@@ -11,6 +11,8 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Archive
 from cpfls_cli.evolution.settings import EvolutionSettings
 
+End = Literal["generations", "converged"]
+
 
 @dataclass(frozen=True)
 class History:
@@ -147,9 +149,6 @@ def best(generation: Generation) -> Array:
     # The front holds the smallest value of every objective, so the archive itself is not needed.
     smallest: Array = generation.front_objectives.min(axis=0)
     return smallest
-
-
-End = Literal["generations", "converged"]
 
 
 def ended(state: EvolutionState, settings: EvolutionSettings) -> End | None:

@@ -24,6 +24,10 @@ from cpfls_cli.workers.workforce import Failure, WorkerError, Workforce, attempt
 _LONGEST_SILENCE_S = 1.0
 
 
+# Those that Dask gives a level or a handler of their own; all others take theirs from these.
+_NOISY = ("distributed", "distributed.client", "tornado", "tornado.application", "asyncio")
+
+
 class Cluster(Workforce):
     """Workers of a Dask cluster, which hold the evaluator.
 
@@ -227,10 +231,6 @@ def evaluate_shipped(genes: IntArray, name: str) -> Evaluation | Failure:
     """
     shipped: Shipped = get_worker().plugins[name]
     return attempt(partial(shipped.evaluate, genes))
-
-
-# Those that Dask gives a level or a handler of their own; all others take theirs from these.
-_NOISY = ("distributed", "distributed.client", "tornado", "tornado.application", "asyncio")
 
 
 @contextmanager

@@ -12,6 +12,8 @@ from cpfls_cli.evolution.archive import Evaluate, Evaluation
 from cpfls_cli.workers.processes import processes
 from cpfls_cli.workers.workforce import WorkerError, Workforce, chunks
 
+_SCHEMES = ("tcp", "tls")
+
 
 def employ(evaluate: Evaluate, *, count: int = 1, scheduler: str | None = None) -> AbstractContextManager[Workforce]:
     """Employ workers to evaluate chromosomes; the result is the same for all kinds.
@@ -67,9 +69,6 @@ class Serial(Workforce):
         """Evaluate chromosomes in order; parameters are those of `Workforce.stream`."""
         for rows in chunks(len(genes), max(len(genes), 1)):
             yield rows, self._evaluate(genes[rows])
-
-
-_SCHEMES = ("tcp", "tls")
 
 
 def require_address(address: str) -> None:

@@ -14,6 +14,9 @@ from cpfls_cli.arrays import IntArray
 from cpfls_cli.errors import ComputationError, CpflsError
 from cpfls_cli.evolution.archive import Evaluation
 
+_CHUNKS_PER_WORKER = 4
+_Result = TypeVar("_Result")
+
 
 class Workforce(ABC):
     """Evaluate chromosomes somewhere.
@@ -75,9 +78,6 @@ def gathered(parts: Sequence[tuple[IntArray, Evaluation]]) -> tuple[IntArray, Ev
     return rows[order], Evaluation(genes[order], objectives[order])
 
 
-_CHUNKS_PER_WORKER = 4
-
-
 def chunks(rows: int, workers: int) -> list[IntArray]:
     """Cut rows into chunks that shrink towards the end, down to a single row.
 
@@ -102,9 +102,6 @@ def chunks(rows: int, workers: int) -> list[IntArray]:
 
 class WorkerError(ComputationError):
     """Workers cannot be had, vanished, or failed for a reason that is not in the data."""
-
-
-_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.excitation.conditioning import regressor_of
+from cpfls_cli.excitation.objective import regressor_of
 from cpfls_cli.regressor import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationPath
 from cpfls_cli.vehicle import inertia_matrix, torque
