@@ -6,7 +6,7 @@ import numpy as np
 from scipy import linalg
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.fuzzy.partition import breakpoint_jacobian, breakpoints
+from cpfls_cli.fuzzy.membership import breakpoint_jacobian, breakpoints
 from cpfls_cli.regressor.structure import ModelStructure
 
 LARGEST_GENE = 2**16 - 1

@@ -259,6 +259,14 @@ def _locate(functions: int, breakpoints: Array, antecedent: Array, interval: Int
 
 
 @_compiled
+def _z_function(u: float) -> tuple[float, float, float]:
+    """Zadeh's z-function with its first and second derivative: the copy of `cpfls_cli.fuzzy.membership.z_function`."""
+    first, rest = u < 0.5, 1.0 - u
+    value = 1.0 - 2.0 * u * u if first else 2.0 * rest * rest
+    return value, -4.0 * (u if first else rest), -4.0 if first else 4.0
+
+
+@_compiled
 def _fire(table: Table, index: int, breakpoints: Array, count: int, at: _Batch) -> None:
     """Find the two functions of a partition that fire; see `cpfls_cli.fuzzy.membership.memberships`."""
     axis, functions = table.partitions[index, _ANGLE], table.partitions[index, _FUNCTIONS]
@@ -278,10 +286,8 @@ def _fire(table: Table, index: int, breakpoints: Array, count: int, at: _Batch) 
         inverse = 1.0 / (end - start if wide else 1.0)
         u = min(max(x, 0.0) - start, end - start) * inverse if wide else 1.0
         inside = antecedent_slope[n] if x >= 0.0 and x <= 1.0 else 0.0
-        first = u < 0.5
-        rest = 1.0 - u
-        falling = 1.0 - 2.0 * u * u if first else 2.0 * rest * rest
-        slope = -4.0 * (u if first else rest) * inside * inverse
+        falling, falling_slope, _ = _z_function(u)
+        slope = falling_slope * inside * inverse
         position[n], width[n], input_slope[n] = u, (end - start if wide else 1.0), inside
         left[n], right[n], left_slope[n], right_slope[n] = falling, 1.0 - falling, slope, -slope
     for n in range(count):
@@ -776,8 +782,7 @@ def _move(table: Table, block: IntArray, carried: Array, place: int, count: int,
             inner = k >= 1 and k <= functions - 2
             column[n] = first + k - 1 if inner else -1
             moves = 1.0 if inner and input_slope[n] != 0.0 else 0.0
-            falling = -4.0 * u if u < 0.5 else -4.0 * (1.0 - u)
-            bending = -4.0 if u < 0.5 else 4.0
+            _, falling, bending = _z_function(u)
             towards = u - 1.0 if end == 0 else -u
             per_width = moves / width[n]
             degree = falling * towards * per_width

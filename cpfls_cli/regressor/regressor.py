@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.basis import Antecedent, Basis, antecedent, basis, rule_firing
-from cpfls_cli.fuzzy.consequents import Features, features
+from cpfls_cli.fuzzy.basis import Antecedent, Basis, Features, antecedent, basis, features, rule_firing
 from cpfls_cli.fuzzy.inputs import InputRange, MappedInput, input_range, map_input
-from cpfls_cli.fuzzy.partition import breakpoints, uniform_weights
+from cpfls_cli.fuzzy.membership import breakpoints, uniform_weights
 from cpfls_cli.regressor.motion import Carrier, Motion, carrier
 from cpfls_cli.regressor.structure import PITCH, ROLL, Block, ModelStructure
 

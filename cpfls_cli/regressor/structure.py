@@ -10,7 +10,7 @@ from annotated_types import Ge, Le
 from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.fuzzy.consequents import Consequents, Products, feature_count
+from cpfls_cli.fuzzy.basis import Consequents, Products, feature_count
 from cpfls_cli.fuzzy.inputs import InputMap
 from cpfls_cli.settings import Settings
 
