@@ -11,7 +11,7 @@ from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale
 from cpfls_cli.identification.judge import Explained
 from cpfls_cli.identification.least_squares import Triangle
 from cpfls_cli.identification.physics import vertical
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
 from cpfls_cli.rotations import body_acceleration, body_torque, euler_rate_matrix
 
 

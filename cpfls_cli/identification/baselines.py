@@ -10,9 +10,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.least_squares import Triangle
-from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.inertia import symmetric_columns
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.motion import Motion, rigid_columns
 
 Columns = Callable[[Motion], Array]
 

@@ -9,8 +9,8 @@ from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
-from cpfls_cli.identification.rigid_columns import RIGID
 from cpfls_cli.identification.samples import Products
+from cpfls_cli.regressor.motion import RIGID
 
 SMALLEST_ERROR = 1e-12
 """Share of the mean squared torque below which sums of products cannot tell errors apart."""

@@ -11,8 +11,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.least_squares import LeastSquares, Triangle
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.identification.samples import Samples
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
 from cpfls_cli.regressor.regressor import Breakpoints, Regressor
 
 # Samples written out at a time: some 10 MB for 113 parameters.

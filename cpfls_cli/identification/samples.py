@@ -11,9 +11,9 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.data import TorqueData, TorqueSource
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.kernels import Chunk, Table
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.regressor.structure import ModelStructure
 from cpfls_cli.regressor.table import padded_breakpoints, structure_table

@@ -12,8 +12,8 @@ from cpfls_cli.identification.dense import decomposed
 from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.normal_equations import NormalEquations, Project, solve_normal
-from cpfls_cli.identification.rigid_columns import RIGID
 from cpfls_cli.identification.samples import Products, Samples
+from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Breakpoints
 
 NO_RIGID_BODY = np.zeros(RIGID)

@@ -1,4 +1,4 @@
-"""What a motion contributes to the regressor before any fuzzy system is evaluated."""
+"""What a motion contributes to the regressor: how each inertia function enters it, and the columns of a rigid body."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray, require_columns
 from cpfls_cli.regressor.structure import InertiaFunction
+from cpfls_cli.vehicle.rigid_body import rigid_body_regressor
+
+RIGID = 6
+"""Inertia parameters of a rigid body."""
 
 
 @dataclass(frozen=True)
@@ -75,3 +79,13 @@ def carrier(function: InertiaFunction, motion: Motion) -> Carrier:
     places[function.row, function.column] = places[function.column, function.row] = 1.0
     rate = motion.rate @ places
     return Carrier(motion.acceleration @ places, rate, 0.5 * np.sum(motion.rate * rate, axis=1))
+
+
+def rigid_columns(motion: Motion) -> Array:
+    """Columns of the six inertia parameters Ixx, Iyy, Izz, Ixy, Ixz, Iyz in the generalised torque.
+
+    Returns
+    -------
+    array, shape (samples, 3, 6)
+    """
+    return rigid_body_regressor(motion.attitude, motion.rate, motion.acceleration)

@@ -185,12 +185,12 @@ def model_structure(settings: StructureSettings) -> ModelStructure:
 def _blocks(settings: StructureSettings, partitions: tuple[Partition, ...]) -> Iterator[Block]:
     start = 0
     for function in INERTIA_FUNCTIONS:
-        own = tuple(i for i, partition in enumerate(partitions) if partition.function == function.name)
+        of_function = tuple(i for i, partition in enumerate(partitions) if partition.function == function.name)
         rules = 1
-        for i in own:
+        for i in of_function:
             rules *= _rules(partitions[i].functions, settings.structure == "cpfls")
-        features = _features(len(own), settings)
-        yield Block(function, own, rules, features, slice(start, start + rules * features))
+        features = _features(len(of_function), settings)
+        yield Block(function, of_function, rules, features, slice(start, start + rules * features))
         start += rules * features
 
 

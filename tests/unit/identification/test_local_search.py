@@ -9,9 +9,9 @@ import pytest
 from cpfls_cli.identification import IdentificationSettings, TorqueData, local_search
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
 from cpfls_cli.vehicle import newton_euler_torque
 
 STRUCTURES = {

@@ -9,9 +9,9 @@ from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.data import Flights, gathered, joined, sample_times
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score, score_of
-from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges
+from cpfls_cli.regressor.motion import rigid_columns
 from cpfls_cli.vehicle import newton_euler_torque
 
 SETTINGS = {

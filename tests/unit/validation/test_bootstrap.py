@@ -12,9 +12,9 @@ from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
 from cpfls_cli.validation.bootstrap import bootstrap
 from cpfls_cli.vehicle import newton_euler_torque
 

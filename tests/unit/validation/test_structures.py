@@ -10,9 +10,9 @@ from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.cross_validation import contiguous_blocks
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import rigid_columns
 from cpfls_cli.validation.candidates import candidates
 from cpfls_cli.validation.structures import RIGID_BODY, compare_structures
 from cpfls_cli.vehicle import newton_euler_torque
