@@ -15,7 +15,7 @@ from cpfls_cli.artifacts.formats import CHECKPOINT
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.evolution.archive import Archive, Evaluation
 from cpfls_cli.evolution.state import EvolutionState, History
-from cpfls_cli.identification.search_run import Unfinished
+from cpfls_cli.identification.search import Unfinished
 
 _BEFORE_ALL = -1
 _SEAL = "sha256"

@@ -235,9 +235,9 @@ class Samples:
         total = np.zeros((self.labels, columns, columns))
         for chunk, label in self._chunks():
             dense = chunk.dense * self.scale[:, None]
-            for own in np.unique(label):
-                rows = dense[label == own].reshape(-1, columns)
-                total[own] += rows.T @ rows
+            for value in np.unique(label):
+                rows = dense[label == value].reshape(-1, columns)
+                total[value] += rows.T @ rows
         return total
 
     def _chunks(self) -> Iterator[tuple[Chunk, IntArray]]:

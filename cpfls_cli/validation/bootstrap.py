@@ -9,10 +9,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import Evaluator
-from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.samples import Products, Ready
 from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.identification.solver import Fit
 from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.validation.blocks import time_blocks
 from cpfls_cli.validation.scores import BlockScores

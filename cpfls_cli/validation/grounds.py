@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.findings import HARDLY_EXCITED_SHARE
-from cpfls_cli.identification.results import Identification
+from cpfls_cli.identification.identify import Identification
 from cpfls_cli.validation.memory import BLOCKS
 from cpfls_cli.validation.paired import Comparison
 from cpfls_cli.validation.paired_windows import apart, compare_windows

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.normal_equations import SMALLEST_SINGULAR_SHARE
+from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 
 POWER = 0.75
 """Of the correction for leverage: between 1/2, CR2, and 1, CR3; benchmarks/band_coverage.py measures all three."""

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification import IdentificationSettings, TorqueData
-from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.motion import rigid_columns
 from cpfls_cli.vehicle import newton_euler_torque

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data
-from cpfls_cli.identification.baselines import fit_baselines
-from cpfls_cli.identification.chromosome import uniform_chromosome
+from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.excitation import visited_cells
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import Motion, uniform_breakpoints
 from cpfls_cli.validation.blocks import time_blocks

@@ -8,8 +8,7 @@ from cpfls_cli.config.load import validate
 from cpfls_cli.config.study import resolved
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.evolution import EvolutionSettings
-from cpfls_cli.identification.presets import PRESETS
-from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.identification.settings import PRESETS, IdentificationSettings
 
 # Section 9 and Table 5 of the paper.
 PAPER = {

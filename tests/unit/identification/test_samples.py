@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data
-from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.identification.cross_validation import contiguous_blocks
-from cpfls_cli.identification.folds import with_folds
+from cpfls_cli.identification.cross_validation import contiguous_blocks, with_folds
+from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import RidgeSettings

@@ -7,10 +7,10 @@ import pytest
 from scipy import linalg
 
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data
-from cpfls_cli.identification.baselines import fit_baselines
-from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import axis_scale
+from cpfls_cli.identification.evaluator import decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor
