@@ -13,8 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.excitation.variables import design
 from cpfls_cli.regressor import ModelStructure, Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import PITCH, ROLL, Block, InertiaFunction
-from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_path import RotationMotion, RotationPath
+from cpfls_cli.trajectory.rotation import RotationLimits, RotationMotion, RotationPath
 
 # Share of the largest eigenvalue below which an eigenvalue of a Gram matrix is rounding error.
 _ROUNDING = 1e-15

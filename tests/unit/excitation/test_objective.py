@@ -13,10 +13,8 @@ from cpfls_cli.excitation.objective import (
 from cpfls_cli.excitation.optimise import adam
 from cpfls_cli.excitation.variables import design, path_of, variables_of
 from cpfls_cli.regressor import StructureSettings, model_structure
-from cpfls_cli.trajectory.rotation import full_rotation
-from cpfls_cli.trajectory.rotation_limits import RotationLimits
-from cpfls_cli.trajectory.rotation_path import RotationPath
-from cpfls_cli.trajectory.rotation_settings import RotationSettings
+from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation
+from cpfls_cli.trajectory.settings import RotationSettings
 
 # A low order of the harmonics keeps the curvature over the step in attitude small.
 STRUCTURE = model_structure(StructureSettings(harmonic_order=1))
