@@ -136,7 +136,7 @@ class Archive:
 
 
 def _whole(blocks: list[_Block]) -> _Block:
-    """Put what was stored block by block into one array, and keep it so."""
+    """Join the stored blocks to one array, and keep it in their place."""
     if len(blocks) > 1:
         blocks[:] = [cast(_Block, np.concatenate(blocks))]
     return blocks[0]

@@ -9,7 +9,7 @@ from cpfls_cli.evolution.settings import Ranking
 
 
 def worst_where_not_finite(objectives: Array) -> Array:
-    """Replace every objective that is not finite by +inf, the worst there is.
+    """Replace every objective that is not finite by +inf, the worst value.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""State of a running evolution, its course so far, what is reported of it, and when it has reached its end."""
+"""State of a running evolution, its history, the report of a generation, and the conditions of its end."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class History:
 
     @classmethod
     def empty(cls, objectives: int) -> History:
-        """Begin a history of so many objectives."""
+        """Create the history of no generation, for this number of objectives."""
         none = np.empty(0, dtype=np.int64)
         return cls(none, np.empty((0, objectives)), none)
 

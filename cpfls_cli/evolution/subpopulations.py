@@ -1,4 +1,4 @@
-"""Subpopulations that breed apart: their members, the return of offspring into them, and migration between them."""
+"""Subpopulations that breed apart: their members, reinsertion of offspring into them, and migration between them."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ ALL_INPUTS = tuple(product(range(3), range(3)))
 
 @dataclass(frozen=True)
 class Conditioning:
-    """How well a Gram matrix is conditioned.
+    """Conditioning of a Gram matrix.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ def conditioning_gradient(structure: ModelStructure, motion: Array, exponent: fl
 
 
 def penalty_gradient(limits: RotationLimits, motion: Array, cost: float) -> Array:
-    """Differentiate the mean square of what exceeds the limits by the motion.
+    """Differentiate the mean square of the excess over the limits by the motion.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ _SMALL = 1e-12
 
 @dataclass(frozen=True)
 class Excitation:
-    """An optimised path and what it is worth.
+    """An optimised path, its condition number, and the course of the search.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ def _better(
 
 
 class _Report:
-    """Count what is done, and pass on what it reached."""
+    """Count evaluations, and report the condition number that each reached."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = progress, total, 0

@@ -1,4 +1,4 @@
-"""The basis of a fuzzy system: rule firing times consequent features, with gradients by the input angles."""
+"""Basis functions of a fuzzy system: rule firing times consequent features, with gradients by the input angles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A periodic fuzzy system of one or two angles: its columns, its coefficients, the samples that it is asked for."""
+"""A periodic fuzzy system of one or two angles: its columns and coefficients, and checks of samples given to it."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class PeriodicStructure:
 
 @dataclass(frozen=True)
 class FitQuality:
-    """How well the samples determine a system, and how well it fits them.
+    """Rank, conditioning and errors of a fit.
 
     Attributes
     ----------

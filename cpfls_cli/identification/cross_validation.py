@@ -88,7 +88,7 @@ def contiguous_blocks(judged: Array, learned: Array, folds: int, embargo: float)
 
 
 def ridge_curve(learned: Products, judged: Products, left_out: BoolArray, weights: Array, size: Array) -> RidgeCurve:
-    """Cross-validate the ridge weight on the columns after the first six.
+    """Cross-validate the ridge weight of the fuzzy columns, which stand after the six of the rigid body.
 
     The six rigid-body columns are free of penalty. For each fold they are eliminated (Schur complement), and one
     eigendecomposition of the rest serves all weights. Errors that only rounding tells apart count as equal.
@@ -148,7 +148,7 @@ def _ridge_path(gram: Array, moment: Array, weights: Array) -> Array:
 
 @dataclass(frozen=True)
 class RidgeChoice:
-    """What chooses the ridge weight of a fuzzy part over a rigid body.
+    """Folds and candidates from which cross-validation chooses the ridge weight of a fuzzy part over a rigid body.
 
     Attributes
     ----------

@@ -89,7 +89,7 @@ def uniform_chromosome(structure: ModelStructure) -> IntArray:
 
 @dataclass(frozen=True)
 class _Linearised:
-    """The residual of all samples and its Jacobian, turned so that all but the first few rows are zero.
+    """The residual of all samples and its Jacobian, rotated so that all but the first few rows are zero.
 
     A turn changes neither the sum of squares nor its derivatives, and a trust-region method sees nothing else.
     """
@@ -186,7 +186,7 @@ def _turned(normal: Array, gradient: Array, square: float) -> _Linearised:
 
 @dataclass(frozen=True)
 class Evaluator:
-    """Gives chromosomes their objectives: mean squared error, largest error, condition number.
+    """Evaluate chromosomes by their objectives: mean squared error, largest error, condition number.
 
     Attributes
     ----------

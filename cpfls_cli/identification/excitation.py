@@ -1,4 +1,4 @@
-"""What the training data excited: cells of attitude, rules, axes."""
+"""Excitation by the training data: visited cells of attitude, fired rules, and what explains each axis."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ DETERMINED_SHARE = 0.5
 
 @dataclass(frozen=True)
 class RuleExcitation:
-    """How far data excite each rule.
+    """Excitation of each rule by data.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ def _cells(angle: Array) -> IntArray:
 
 @dataclass(frozen=True)
 class AxisEvidence:
-    """What a rigid body and a constant torque explain of each body axis.
+    """Share of each body axis that a rigid body and a constant torque explain.
 
     Attributes
     ----------
@@ -160,7 +160,7 @@ class AxisEvidence:
 
 
 def axis_evidence(source: TorqueSource, rank_tolerance: float) -> AxisEvidence:
-    """Fit six inertia parameters and a constant body torque."""
+    """Fit six inertia parameters and a constant body torque, and measure what they explain of each axis."""
     scale = 1.0 / axis_scale(source)
     rows = ((_columns(data) * scale[:, None], data.torque * scale) for data in source.chunks())
     triangle = Triangle.of((columns.reshape(-1, columns.shape[2]), torque.reshape(-1)) for columns, torque in rows)

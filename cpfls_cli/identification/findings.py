@@ -190,7 +190,7 @@ def _outside(diagnostics: FitDiagnostics) -> Iterator[str]:
 
 
 def _vertical(diagnostics: FitDiagnostics) -> Iterator[str]:
-    """Say which samples the shares of body torque in the other sentences leave out."""
+    """Name the samples that the shares of body torque in the other sentences leave out."""
     samples, vertical = diagnostics.samples, diagnostics.vertical
     left_out = [f"{count} of {samples[part]} ({part})" for part, count in vertical.items() if count]
     if left_out:

@@ -198,7 +198,7 @@ def _excitation(
     scores: Mapping[str, Score],
     settings: IdentificationSettings,
 ) -> RuleExcitation:
-    """Measure what of the fuzzy part alone the samples determine beyond their noise, whatever lies underneath."""
+    """Measure how much of the fuzzy part alone the samples determine beyond their noise."""
     noise = float(np.sqrt(min(np.mean(scores[name].mse) for name in ("model", rigid_body.name))))
     inertia = float(np.mean(np.abs(rigid_body.parameters[:3])))
     return rule_excitation(evaluator.solver.learned, model.partitions, noise, inertia, settings.rank_tolerance)

@@ -1,4 +1,4 @@
-"""Judge torque predictions, axis by axis; simple models that any other must beat; the spread over replicates."""
+"""Scores of torque predictions by axis, the baselines that a model must beat, and the spread over replicates."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Columns = Callable[[Motion], Array]
 
 @dataclass(frozen=True)
 class Score:
-    """How well a prediction meets measured torque.
+    """Scores of a torque prediction.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Explained:
         self._measured, self._error, self._square = _AboutMean(), _AboutMean(), np.zeros(3)
 
     def add(self, measured: Array, error: Array) -> None:
-        """Take note of samples, if any; both arrays have the shape (samples, 3)."""
+        """Add samples, if any; both arrays have the shape (samples, 3)."""
         if len(measured) == 0:
             return
         self._measured.add(measured)
@@ -108,7 +108,7 @@ class Explained:
 
     @property
     def vaf(self) -> Array:
-        """The same of the error about its mean: what is left when a constant is forgiven."""
+        """Variance accounted for by channel: the same of the error about its mean, without its constant part."""
         return 1.0 - _ratio(self._error.square, self._measured.square)
 
 
@@ -133,7 +133,7 @@ class _AboutMean:
 
 
 class _Sums:
-    """What a score needs of the samples."""
+    """Sums over samples that a score is made of."""
 
     def __init__(self) -> None:
         self._largest, self._largest_error = np.zeros(3), np.zeros(3)
@@ -185,7 +185,7 @@ class Baseline:
 
 
 def constant_inertia_columns(motion: Motion) -> Array:
-    """Columns of a constant symmetric J in ``J qdd``: J11, J22, J33, J12, J13, J23.
+    """Build the columns of a constant symmetric J in ``J qdd``: J11, J22, J33, J12, J13, J23.
 
     Returns
     -------
@@ -195,7 +195,7 @@ def constant_inertia_columns(motion: Motion) -> Array:
 
 
 def no_torque_columns(motion: Motion) -> Array:
-    """Columns of the prediction that no torque acts: none.
+    """Build the columns of the prediction that no torque acts: none.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def _fit(columns: Columns, source: TorqueSource, row_scale: Array, rank_toleranc
 
 @dataclass(frozen=True)
 class Spread:
-    """A measure over replicates.
+    """Mean and variance of a measure over replicates.
 
     Attributes
     ----------

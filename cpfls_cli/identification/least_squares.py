@@ -57,7 +57,7 @@ class LeastSquares:
 
 @dataclass(frozen=True)
 class Triangle:
-    """Triangular factor of columns and a right-hand side: all that least squares need to know of any number of rows.
+    """Triangular factor of columns and a right-hand side, which stands for any number of rows.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
 
 
 def quick_solution(equations: NormalEquations) -> tuple[Array, tuple[Array, bool], Array]:
-    """Solve normal equations by Cholesky decomposition, with a trace of ridge where columns are dependent.
+    """Solve normal equations by Cholesky decomposition, with a tiny ridge for dependent columns.
 
     Returns
     -------

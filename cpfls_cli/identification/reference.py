@@ -1,4 +1,4 @@
-"""The plain evaluator that the fast one is held against: dense Q, singular value decomposition, 2-point Jacobian."""
+"""The reference that the fast evaluator is tested against: dense Q, singular value decomposition, 2-point Jacobian."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cpfls_cli.regressor.structure import ModelStructure, model_structure
 
 @dataclass(frozen=True)
 class ReferenceEvaluator:
-    """Gives chromosomes their objectives as plainly as the paper writes them; for tests and benchmarks.
+    """Evaluate chromosomes step by step as the paper writes it; for tests and benchmarks.
 
     Attributes
     ----------

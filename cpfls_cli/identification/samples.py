@@ -1,4 +1,4 @@
-"""Samples to fit or to judge: sums over them for any partitions, without a regressor in memory."""
+"""Samples to fit or to judge, and sums over them for any partitions without a regressor in memory."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class MovedProducts:
 
 @dataclass(frozen=True)
 class Ready:
-    """Samples made ready for compiled loops, chunk by chunk.
+    """Samples in the layout of the compiled loops, chunk by chunk.
 
     Attributes
     ----------
@@ -86,11 +86,11 @@ class Ready:
     rigid: bool
 
     def __reduce__(self) -> tuple[type[Ready], tuple[TorqueSource, bool]]:
-        """Send the source alone to workers, who make it ready themselves."""
+        """Pickle the source alone; workers convert it themselves."""
         return type(self), (self.source, self.rigid)
 
     def __iter__(self) -> Iterator[Chunk]:
-        """Make one chunk ready after the other, or take those that are kept."""
+        """Convert one chunk after the other, or take those that are kept."""
         return iter(self._kept) if len(self.source) <= _KEPT else self._made()
 
     @cached_property
@@ -178,7 +178,7 @@ class Samples:
         return square[:, 0], largest[:, 0]
 
     def projected(self, partitions: Breakpoints, parameters: Array, directions: Array) -> tuple[Array, Array]:
-        """Multiply out residual and columns, without the loss that products of products would have.
+        """Multiply residual and columns directly, without the loss of digits of products of products.
 
         Parameters
         ----------

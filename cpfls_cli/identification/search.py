@@ -1,4 +1,4 @@
-"""The search for non-dominated partitions: how it is run and stopped, what it found, and the choice among that."""
+"""The search for non-dominated partitions: how it is run and stopped, its result, and the choice of a member."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def is_end(reason: StopReason) -> bool:
 
 @dataclass(frozen=True)
 class SearchStep:
-    """How far a search has come.
+    """Progress of a search.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class SearchStep:
 
 @dataclass(frozen=True)
 class Unfinished:
-    """What was evaluated of a generation that was not finished.
+    """Evaluated part of a generation that was not finished.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def _unstopped() -> None:
 
 @dataclass(frozen=True)
 class SearchRun:
-    """How one search is run; nothing of it changes what a search that comes to its end finds.
+    """Conditions under which a search is run; they do not change the result of a search that comes to its end.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class Front:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What a search found.
+    """Result of a search.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class NothingFoundError(ComputationError):
 
 
 class _StoppedError(Exception):
-    """Leave a generation, with what was evaluated of it."""
+    """A stop within a generation, with the part that was evaluated."""
 
     def __init__(self, reason: Stop, unfinished: Unfinished) -> None:
         super().__init__(reason)
@@ -263,7 +263,7 @@ def _watched(
 
 
 def _recalled(genes: IntArray, unfinished: Unfinished | None) -> tuple[list[tuple[IntArray, Evaluation]], IntArray]:
-    """Take what is evaluated already; also the rows that are not."""
+    """Return the evaluations that are known already, and the rows that are not."""
     if unfinished is None:
         return [], np.arange(len(genes))
     row_of = {chromosome.tobytes(): row for row, chromosome in enumerate(unfinished.submitted)}
@@ -329,7 +329,7 @@ def choose(objectives: Array, rule: Choice, held_out: Array | None = None) -> in
 
 
 def require_flights(rule: Choice, *, given: bool) -> None:
-    """Refuse a rule that needs flights kept for the choice without them, and flights that no rule needs.
+    """Require that a rule and the flights kept for the choice go together.
 
     Parameters
     ----------
@@ -348,7 +348,7 @@ def require_flights(rule: Choice, *, given: bool) -> None:
 
 
 def held_out_errors(evaluator: Evaluator, kept: TorqueSource, chromosomes: IntArray) -> Array:
-    """Judge chromosomes on data that neither trains nor judges the model in the end.
+    """Compute the errors of chromosomes on data that is neither trained nor judged on in the end.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ LARGEST_SQUARE = 1e200
 
 @dataclass(frozen=True)
 class Fit:
-    """Linear parameters of a model, and how they were found.
+    """Linear parameters of a model, with the weights and the conditioning of their fit.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ def _rows(learned: Samples, partitions: Breakpoints, fit: Fit, *, fuzzy: bool) -
 
 @dataclass(frozen=True)
 class Solver:
-    """Solves for fuzzy coefficients: all torque from them, the paper's; or over six free inertia parameters.
+    """Solve for the fuzzy coefficients, alone as in the paper or with six free inertia parameters under them.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class Solver:
     rank_tolerance: float
 
     def fit(self, partitions: Breakpoints) -> Fit | None:
-        """Solve for the linear parameters, with a ridge weight of their own.
+        """Solve for the linear parameters, with the ridge weight that these partitions need.
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class Solver:
         return self._equations(self.learned.products(partitions).sum(), weight, size)
 
     def parameters(self, solution: Array, size: Array) -> tuple[Array, Array]:
-        """Take apart a solution of the equations: fuzzy coefficients and rigid body."""
+        """Split a solution of the equations into fuzzy coefficients and rigid body."""
         if self.ridge is None:
             return solution / size, NO_RIGID_BODY
         return solution[RIGID:] / size, solution[:RIGID]
@@ -231,7 +231,7 @@ class Solver:
 
 
 def column_size(products: Products) -> Array:
-    """Root mean square of the fuzzy columns; 1 for columns of zeros.
+    """Compute the root mean square of the fuzzy columns; 1 for columns of zeros.
 
     Parameters
     ----------

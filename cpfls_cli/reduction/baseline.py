@@ -1,4 +1,4 @@
-"""Samples taken at random, the baseline of every selection."""
+"""Random selections of samples, the baseline of every other."""
 
 from __future__ import annotations
 

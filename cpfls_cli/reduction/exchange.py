@@ -100,7 +100,7 @@ class Compound:
 
 @dataclass(frozen=True)
 class Exchanged:
-    """What the exchanges end with.
+    """Result of the exchanges.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Find the best of many samples exactly while evaluating only the few that can be best; of equals, the first."""
+"""Exact search for the best of many samples that evaluates only the few that can be best; ties go to the first."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def starting_samples(space: RowSpace, criterion: CriterionName, limit: int) -> I
 
 
 def stop_reason(run: Run, settings: ReductionSettings, limit: int) -> StopReason | None:
-    """Say what ends a selection, None while nothing does.
+    """Return the limit that ends a selection, None while there is none.
 
     Parameters
     ----------

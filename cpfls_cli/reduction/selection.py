@@ -1,4 +1,4 @@
-"""What a reduction returns, and the selection under way: the start's samples first, then the criterion's."""
+"""The result of a reduction, and the selection in progress: the samples of the start, then those of the criterion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A regressor in chunks, however large: its samples counted, its row space found, samples expressed in that space."""
+"""The row space of a regressor read in chunks, and its samples in coordinates of that space."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BLOCK = 1024
 
 
 class Spectrum:
-    """What the kept singular values of a regressor tell of it."""
+    """Rank and condition number by the kept singular values of a regressor."""
 
     singular_values: Array
 
@@ -37,7 +37,7 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Survey(Spectrum):
-    """What one pass over a regressor tells.
+    """Number of samples and row space of a regressor, found in one pass.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a motion contributes to the regressor: how each inertia function enters it, and the columns of a rigid body."""
+"""Motion of the attitude, how each inertia function enters the torque along it, and the columns of a rigid body."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Carrier:
-    """How one inertia function enters the torque.
+    """Factors with which one inertia function enters the torque.
 
     With E the symmetric matrix that has ones in the function's places, a function f(q) there gives the torque
     ``E qdd f + E qd (df/dt) - 1/2 (qd^T E qd) grad f``: the Christoffel form of equations (3) and (4).
@@ -69,7 +69,7 @@ class Carrier:
 
 
 def carrier(function: InertiaFunction, motion: Motion) -> Carrier:
-    """Evaluate how an inertia function enters the torque along a motion.
+    """Evaluate the factors of an inertia function along a motion.
 
     References
     ----------
@@ -82,7 +82,7 @@ def carrier(function: InertiaFunction, motion: Motion) -> Carrier:
 
 
 def rigid_columns(motion: Motion) -> Array:
-    """Columns of the six inertia parameters Ixx, Iyy, Izz, Ixy, Ixz, Iyz in the generalised torque.
+    """Build the columns of the six inertia parameters Ixx, Iyy, Izz, Ixy, Ixz, Iyz in the generalised torque.
 
     Returns
     -------

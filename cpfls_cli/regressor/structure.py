@@ -1,4 +1,4 @@
-"""What a model consists of: which inertia function has which inputs, partitions, rules and coefficients."""
+"""Structure of a model: inputs, partitions, rules and coefficients of each inertia function."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class Block:
 
 @dataclass(frozen=True)
 class ModelStructure:
-    """The fuzzy part of a model, counted out.
+    """Partitions and blocks of coefficients of the fuzzy part of a model.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A model structure in the numbers that compiled loops read."""
+"""A model structure as the table of numbers that compiled loops read."""
 
 from __future__ import annotations
 

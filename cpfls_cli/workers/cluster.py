@@ -161,7 +161,7 @@ def require_workers(client: Client, patience_s: float) -> None:
 
 @contextmanager
 def explained(client: Client) -> Iterator[None]:
-    """Say in words what Dask raises, which is of many types.
+    """Turn whatever Dask raises into an error with a remedy.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def evaluate_shipped(genes: IntArray, name: str) -> Evaluation | Failure:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Silence Dask's log; what matters of it comes as an error."""
+    """Silence Dask's log, whose failures are raised as errors anyway."""
     loggers = [logging.getLogger(name) for name in _NOISY]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

@@ -79,7 +79,7 @@ def _described(answer: object, here: Processor) -> str:
 
 @dataclass(frozen=True)
 class Processor:
-    """What a compiler makes code for.
+    """Processor that a compiler makes code for.
 
     Attributes
     ----------

@@ -150,7 +150,7 @@ def _start(started: list[_Process], count: int) -> None:
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Hold signals back, also in the processes started meanwhile, which are open to them before they run our code."""
+    """Block signals, also in the processes started meanwhile, which would take them before they run our code."""
     if sys.platform == "win32":
         yield
         return

@@ -1,4 +1,4 @@
-"""What all kinds of workers share: an evaluator whose rows are watched as they finish, their shares, and failures."""
+"""The interface of all kinds of workers, the shares of rows that they get, and the failures that they report."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _Result = TypeVar("_Result")
 
 
 class Workforce(ABC):
-    """Evaluate chromosomes somewhere.
+    """Evaluate chromosomes, and yield each part as soon as it is finished.
 
     The evaluator must treat each chromosome by itself, whatever others it is given with. Then the result does not
     depend on the number or the kind of workers.
@@ -106,7 +106,7 @@ class WorkerError(ComputationError):
 
 @dataclass(frozen=True)
 class Failure:
-    """What went wrong in a worker.
+    """Failure of a worker, as plain text.
 
     Parameters
     ----------
@@ -124,7 +124,10 @@ class Failure:
 
 
 def attempt(work: Callable[[], _Result]) -> _Result | Failure:
-    """Do some work and return its result, or else what went wrong."""
+    """Do some work and return its result, or else its failure.
+
+    Failures travel as plain text, because not every exception survives being pickled.
+    """
     try:
         return work()
     except CpflsError as error:
@@ -138,7 +141,7 @@ def attempt(work: Callable[[], _Result]) -> _Result | Failure:
 
 
 def result_of(outcome: _Result | Failure) -> _Result:
-    """Return what an attempt brought, or raise what it failed with.
+    """Return the result of an attempt, or raise its failure.
 
     Raises
     ------
