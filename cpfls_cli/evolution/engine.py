@@ -16,14 +16,17 @@ from cpfls_cli.evolution.operators import (
     gray_encode,
     intermediate_recombination,
     linear_ranking_fitness,
+    members,
+    migrate,
     mutate,
+    reinsert,
     single_point_crossover,
     stochastic_universal_sampling,
+    subpopulation_labels,
 )
 from cpfls_cli.evolution.ranking import rank
 from cpfls_cli.evolution.settings import EvolutionSettings
 from cpfls_cli.evolution.state import EvolutionState, Generation, History, ended
-from cpfls_cli.evolution.subpopulations import members, migrate, reinsert, subpopulation_labels
 
 
 def evolve(
