@@ -23,18 +23,15 @@ from cpfls_cli.flights.choosing import choosing_roles, choosing_source
 from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.flights.training import TrainingData, flight_roles, read_training
-from cpfls_cli.identification.choice import require_flights
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.identify import TRAINING, identify
+from cpfls_cli.identification.identify import TRAINING, Identification, identify
 from cpfls_cli.identification.judge import Score
-from cpfls_cli.identification.results import Identification
-from cpfls_cli.identification.search import NothingFoundError
-from cpfls_cli.identification.search_run import SearchRun, SearchStep
+from cpfls_cli.identification.search import NothingFoundError, SearchRun, SearchStep, require_flights
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.validation.verdict import Verdict
-from cpfls_cli.workers.worker_error import WorkerError
+from cpfls_cli.workers.workforce import WorkerError
 
 
 def run(

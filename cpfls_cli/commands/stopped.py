@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.errors import ComputationError, CpflsError, StoppedError
-from cpfls_cli.identification.search_run import StopReason, is_end
+from cpfls_cli.identification.search import StopReason, is_end
 from cpfls_cli.report.outcome import Outcome
 
 _STOPPED = {"interrupted": "the search was interrupted", "time-limit": "--time-limit ended the search"}

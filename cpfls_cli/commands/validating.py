@@ -12,7 +12,7 @@ from cpfls_cli.commands.stopped import FROM_SIGNAL
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.flights.training import TrainingData
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.results import Identification
+from cpfls_cli.identification.identify import Identification
 from cpfls_cli.report.outcome import Outcome
 from cpfls_cli.validation.validate import Validation, validate
 from cpfls_cli.validation.verdict import Verdict

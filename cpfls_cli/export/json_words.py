@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
 from cpfls_cli.dynamics.rigid_body import VERTICAL
+from cpfls_cli.fuzzy.membership import Z_FUNCTION
 
 CONVENTIONS = {
     "q": f"roll, pitch, yaw in rad; {EULER}: R = Rz(yaw) Ry(pitch) Rx(roll) turns body vectors into the world frame",
@@ -25,10 +26,10 @@ HOW_TO_EVALUATE = (
     "x = (s - minimum) / width by fuzzy.inputs is the input of memberships and of seesaw consequents. With "
     "full-circle, memberships take x = (q mod 2 pi) / 2 pi, seesaw consequents take s. Structure fls: q wrapped to "
     "[-pi, pi) in place of s, and with full-circle both inputs are q / 2 pi + 1/2.",
-    "Breakpoints b are peaks. Between two, u = (x - b1) / (b2 - b1): the left function falls by 1 - 2 u^2 up to "
-    "u = 1/2 and 2 (1 - u)^2 after it, the right one is 1 minus that; x beyond the ends counts as the end. Structure "
-    "cpfls: rule 1 fires by the first function plus the last, the others by their own; one function alone fires by 1. "
-    "The firing of two inputs is multiplied, the rule index of pitch runs fastest.",
+    f"Breakpoints b are peaks. Between two, u = (x - b1) / (b2 - b1): the left function falls by {Z_FUNCTION}, the "
+    "right one is 1 minus that; x beyond the ends counts as the end. Structure cpfls: rule 1 fires by the first "
+    "function plus the last, the others by their own; one function alone fires by 1. The firing of two inputs is "
+    "multiplied, the rule index of pitch runs fastest.",
     "Features of one input: 1 and its own, which are the seesaw consequent input, or sin q .. sin nq, cos q .. cos nq "
     "with n = harmonic_order. Of two inputs: 1, those of roll, those of pitch (additive), or all products of (1, "
     "roll's) and (1, pitch's), pitch's running fastest (tensor).",

@@ -17,9 +17,9 @@ from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.flights.choosing import choosing_source
 from cpfls_cli.flights.training import TrainingData
-from cpfls_cli.identification.choice import require_flights
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING
+from cpfls_cli.identification.search import require_flights
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.search.sweep_samples import SweepSamples
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cpfls_cli.fuzzy.partition import breakpoints
+from cpfls_cli.fuzzy.membership import breakpoints
 from cpfls_cli.pages.claims.compared import ComparedFigure, agreement, not_shown, reading
 from cpfls_cli.pages.judged import MODEL, TRAINING, judged
 from cpfls_cli.pages.printed import PRINTED_BREAKPOINTS, PRINTED_RELATIVE_ERROR, PRINTED_WEIGHTS, TABLE_4

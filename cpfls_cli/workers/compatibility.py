@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import platform
+from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
-from cpfls_cli.workers.processor import Processor, processor
-from cpfls_cli.workers.worker_error import WorkerError
+from cpfls_cli.workers.workforce import WorkerError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -73,3 +75,27 @@ def _described(answer: object, here: Processor) -> str:
     if answer.name != here.name:
         return answer.name
     return f"{answer.name} with other instructions ({', '.join(sorted(answer.instructions ^ here.instructions))})"
+
+
+@dataclass(frozen=True)
+class Processor:
+    """Processor that a compiler makes code for.
+
+    Attributes
+    ----------
+    name : str
+        Architecture and model.
+    instructions : frozenset of str
+        Extensions of the instruction set that may be used.
+    """
+
+    name: str
+    instructions: frozenset[str]
+
+
+def processor() -> Processor:
+    """Describe the processor of this machine."""
+    # The compiler behind numba; slow to load, and needed only where workers are elsewhere.
+    compiler = import_module("llvmlite.binding")
+    usable = (name for name, there in compiler.get_host_cpu_features().items() if there)
+    return Processor(f"{platform.machine()} {compiler.get_host_cpu_name()}", frozenset(usable))

@@ -1,4 +1,4 @@
-"""Refinement of partition weights: its Jacobian, and what it does to a chromosome."""
+"""Chromosomes, and the refinement of partition weights: its Jacobian, and what it does to a chromosome."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -7,12 +7,41 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification import IdentificationSettings, TorqueData, local_search
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, uniform_chromosome
+from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.identification import evaluator as evaluating
+from cpfls_cli.identification.evaluator import LARGEST_GENE, decode, encode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.identification.settings import LocalSearchSettings
-from cpfls_cli.regressor import Motion, Regressor, data_ranges
+from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
+
+STRUCTURE = model_structure(StructureSettings(membership_functions=(2, 3, 1, 5, 6, 7)))
+
+
+def test_encode_rounds_and_clips_without_making_a_function_of_zero_width():
+    genes = encode(np.array([-0.1, 0.0, 0.5, 1.0, 1.2, 1.6 / LARGEST_GENE]))
+    assert genes.tolist() == [1, 1, 32768, 65535, 65535, 2]
+
+
+def test_encoded_weights_decode_to_their_breakpoints():
+    weights = np.random.default_rng(21).uniform(0.1, 1, STRUCTURE.genes)
+    exact, rounded = (decode(STRUCTURE, w) for w in (weights, encode(weights).astype(float)))
+    for b, b_rounded in zip(exact, rounded, strict=True):
+        np.testing.assert_allclose(b_rounded, b, atol=1e-4)
+
+
+def test_uniform_chromosome_is_equidistant():
+    decoded = decode(STRUCTURE, uniform_chromosome(STRUCTURE).astype(float))
+    for b, uniform in zip(decoded, uniform_breakpoints(STRUCTURE), strict=True):
+        np.testing.assert_allclose(b, uniform, atol=1e-15)
+
+
+def test_only_the_all_zero_partition_is_undefined():
+    weights = np.ones(STRUCTURE.genes)
+    weights[1:3] = 0
+    finite = [bool(np.isfinite(b).all()) for b in decode(STRUCTURE, weights)]
+    assert finite == [True, False, True, True, True, True]
+
 
 STRUCTURES = {
     "seesaw": {"consequents": "seesaw", "products": "additive", "membership_functions": (3, 4, 2, 3, 3, 4)},
@@ -42,9 +71,9 @@ def captured(monkeypatch, solver, weights):
         handed.update(residual=residual, jacobian=jac)
         return SimpleNamespace(x=start)
 
-    monkeypatch.setattr(local_search, "least_squares", optimiser)
+    monkeypatch.setattr(evaluating, "least_squares", optimiser)
     start = solver.fit(decode(solver.learned.structure, weights))
-    local_search.refine(solver, weights, start, 1)
+    evaluating.refine(solver, weights, start, 1)
     return handed["residual"], handed["jacobian"], start
 
 
