@@ -24,7 +24,7 @@ from cpfls_cli.gap.naming.results import Diagnosis, NamedEffect, Verdict
 from cpfls_cli.gap.naming.search import Step, block_index, forward, look
 from cpfls_cli.gap.naming.sensor_numbers import sensor_estimates
 from cpfls_cli.gap.naming.unseen import look_alikes, not_excited
-from cpfls_cli.gap.naming.vehicle_numbers import impossible, parameter_error
+from cpfls_cli.gap.naming.vehicle_numbers import impossible, wrong_numbers
 from cpfls_cli.gap.naming.verdict import gap_stays, matters, verdict_of
 from cpfls_cli.gap.sensors.audit import Audit, audit
 from cpfls_cli.gap.sensors.audit_findings import AuditFinding
@@ -173,7 +173,7 @@ def _concluded(
 ) -> Diagnosis:
     named = sorted((each.effect for each in judged), key=lambda effect: -effect.share)
     effects = [*faults, *named]
-    numbers = parameter_error(found, effects, unseen.explained_by_parameters(), _pull(hypothesis, steps[-1].floor))
+    numbers = wrong_numbers(found, effects, unseen.explained_by_parameters(), _pull(hypothesis, steps[-1].floor))
     effects += [numbers] if numbers is not None else []
     share = unseen.share() if named else 1.0
     rivals = tuple(rival for each in judged for rival in each.alternatives)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.effects.catalogue.parameter_error import coupling, inertia_correction
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
@@ -20,9 +21,6 @@ from cpfls_cli.gap.replay.rate_equation import ReplayModel
 from cpfls_cli.gap.sensors.audit import Audit
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
-
-_COUPLING = (3, 4, 5)
-"""Places of what a wrong scale of the rotor torque leaves between the rates; no inertia holds it."""
 
 
 class FittedEffect(NamedTuple):
@@ -48,7 +46,7 @@ class ExtendedModel:
     base : InertiaModel or None
         None for the rigid body of the vehicle.
     parameters : array, shape (parameter,)
-        Relative errors of the vehicle's own numbers, in the order of the effect ``parameter_error``.
+        Relative errors of the vehicle's own numbers, in the order of the catalogue.
     effects : tuple of FittedEffect
     audit : Audit or None
         Faults of the sensors, which are taken out of signals first.
@@ -136,7 +134,7 @@ class ExtendedModel:
         -------
         array, shape (3, 3), kg m^2
         """
-        return np.diag(self.parameters[:3] * np.array(signals.vehicle.inertia_kg_m2[:3]))
+        return inertia_correction(self.parameters, signals.vehicle)
 
     def inertia(self, signals: Signals) -> Array | InertiaModel:
         """Give the refitted inertia.
@@ -164,8 +162,7 @@ class ExtendedModel:
         signals : Signals
             With the faults of sensors taken out.
         """
-        coupling = np.where(np.isin(np.arange(len(self.parameters)), _COUPLING), self.parameters, 0.0)
-        left = instantaneous(columns_of(nuisance(), signals), coupling, signals.time)
+        left = instantaneous(columns_of(nuisance(), signals), coupling(self.parameters), signals.time)
         torque = signals.wrench[:, :3] + self.effect_wrench(signals)[:, :3] + left[:, :3]
         return ReplayModel(torque, self.inertia(signals))
 

@@ -107,8 +107,13 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     return Columns(stack(*levers, wrench(drag), wrench(force=lift)))
 
 
+def _accounts(_number: str, values: Mapping[str, float]) -> float:
+    return sum(abs(value) for name, value in values.items() if name.startswith("difference"))
+
+
 EFFECT = Effect(
     name="rotor_mismatch",
+    order=200,
     title="rotors that differ",
     kind="wrench",
     formula="dT_i = kappa_i T_i,  M = sum r_i x dT_i z;  M_z += delta sum b_i w_i^2",
@@ -137,4 +142,5 @@ EFFECT = Effect(
     source="rotor by rotor thrust factors in quad_race_env (tudelft) and SkyFlow",
     columns=_columns,
     told=_told,
+    accounts=_accounts,
 )

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.effects.catalogue.parameter_error import shown
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.inertial import Balance, InertiaModel, rotation_balance, translation_balance
 from cpfls_cli.gap.balance.noise_floor import noise_floor
@@ -164,9 +165,7 @@ def _turns(flight: WeakFlight) -> Array:
     left = flight.residual(flight.signals)
     floor = noise_floor(left, flight.windows)[:3]
     moved = flight.averaged(flight.inertial)[:, :3].std(axis=0) > _TURNING * floor
-    names = [coefficient.name for coefficient in nuisance().effect.coefficients]
-    about = {f"{kind}_{axis}": moved[n] for kind in ("inertia", "coupling") for n, axis in enumerate("xyz")}
-    return np.array([float(about.get(name, True)) for name in names])
+    return shown(moved)
 
 
 def columns_of(candidate: Candidate, signals: Signals) -> Columns:
@@ -189,7 +188,7 @@ def columns_of(candidate: Candidate, signals: Signals) -> Columns:
 
 def nuisance() -> Candidate:
     """Give the parameters of the vehicle that stay free in every fit."""
-    return Candidate(CATALOGUE["parameter_error"], {})
+    return Candidate(VEHICLE_NUMBERS, {})
 
 
 def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:

@@ -10,17 +10,11 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 def sensor_estimates(finding: AuditFinding, vehicle: VehicleSettings) -> tuple[Estimate, ...]:
     """Give the named numbers of a fault."""
-    known = _known(finding.name, vehicle)
+    effect = CATALOGUE[finding.name]
+    assert effect.test is not None, "the audit tests what has a test"
+    by_label = dict(zip(effect.test.labels, effect.numbers, strict=True))
     return tuple(
-        Estimate(*known[number.name][:2], number.value, number.low, number.high, known[number.name][2])
+        Estimate(known.name, known.unit, number.value, number.low, number.high, known.bounds(vehicle))
         for number in finding.coefficients
-        if number.named
+        if number.named and (known := by_label[number.name])
     )
-
-
-def _known(name: str, vehicle: VehicleSettings) -> dict[str, tuple[str, str, tuple[float, float]]]:
-    """Give name, unit and plausible range by the label of the audit: an axis, or the delay."""
-    effect = CATALOGUE[name]
-    axes = {c.name.rsplit("_", 1)[-1]: (c.name, c.unit, c.bounds(vehicle)) for c in effect.coefficients}
-    delays = [("delay", (shape.name, shape.unit, (shape.grid[0], shape.grid[-1]))) for shape in effect.shapes]
-    return axes | dict(delays)

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.stats import norm
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 
@@ -21,7 +22,7 @@ _PULLS = 2.0
 """Multiple of the pull of noise that an error has to exceed."""
 
 
-def parameter_error(found: Estimates, effects: Sequence[NamedEffect], share: float, pull: Array) -> NamedEffect | None:
+def wrong_numbers(found: Estimates, effects: Sequence[NamedEffect], share: float, pull: Array) -> NamedEffect | None:
     """Name wrong numbers of the vehicle where they are sure, matter, and nothing named accounts for them.
 
     Parameters
@@ -39,8 +40,8 @@ def parameter_error(found: Estimates, effects: Sequence[NamedEffect], share: flo
     if not wrong or share < _LEAST_SHARE:
         return None
     p_value = min(2 * float(norm.sf(3.92 * abs(n.value) / (n.high - n.low))) if n.high > n.low else 0.0 for n in wrong)
-    effect = CATALOGUE["parameter_error"]
-    return NamedEffect(effect.name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, effect.sentence)
+    name, sentence = VEHICLE_NUMBERS.name, VEHICLE_NUMBERS.sentence
+    return NamedEffect(name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, sentence)
 
 
 def impossible(numbers: Sequence[Estimate]) -> tuple[str, ...]:
@@ -57,23 +58,15 @@ def impossible(numbers: Sequence[Estimate]) -> tuple[str, ...]:
         Sentences.
     """
     return tuple(
-        f"{_WORDS[number.name]} would have to be {1 + number.value:.3g} times that of the config, which no vehicle has:"
-        " check signs, units and order of the gyroscope's and the rotors' columns"
+        f"{NUMBERS[number.name]} would have to be {1 + number.value:.3g} times that of the config, which no vehicle"
+        " has: check signs, units and order of the gyroscope's and the rotors' columns"
         for number in numbers
-        if number.name in _WORDS and (number.high < number.plausible[0] or number.low > number.plausible[1])
+        if number.name in NUMBERS and (number.high < number.plausible[0] or number.low > number.plausible[1])
     )
 
 
-_WORDS = {
-    "inertia_x": "the inertia about x",
-    "inertia_y": "the inertia about y",
-    "inertia_z": "the inertia about z",
-    "thrust_scale": "the thrust",
-}
-
-
 def _told(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
-    if not number.name.startswith(("inertia", "thrust")):
+    if number.name not in NUMBERS:
         return False
     half = 0.5 * (number.high - number.low)
     sure = abs(number.value) > 1.5 * half and abs(number.value) > _MATTERS
@@ -84,12 +77,7 @@ def _accounted(name: str, effects: Sequence[NamedEffect]) -> float:
     """Give the relative error that named effects leave in a number: they change it themselves."""
     accounted = 0.0
     for effect in effects:
-        if effect.name == "rotor_mismatch":
-            accounted += sum(abs(c.value) for c in effect.coefficients if c.name.startswith("difference"))
-        if effect.name == "payload":
-            accounted += np.inf if name == "thrust_scale" else 0.05
-        if effect.name == "com_offset":
-            accounted += 0.05
-        if effect.name in ("battery_sag", "ground_effect", "vertical_descent"):
-            accounted += 0.05
+        accounts = CATALOGUE[effect.name].accounts
+        if accounts is not None:
+            accounted += accounts(name, {c.name: c.value for c in effect.coefficients})
     return accounted

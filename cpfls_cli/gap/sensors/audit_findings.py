@@ -1,33 +1,26 @@
-"""Faults of the gyroscope that are significant and matter, in words a pilot understands."""
+"""Faults of sensors that are significant and matter, each in one sentence."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
 
-from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.gap.sensors.audit_gyro import GyroFit
-
-FaultName = Literal["gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay"]
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.hooks import FaultFit, SensorTest
 
 # Largest probability of chance, after Holm over all that is tested: an audit that cries wolf is not read.
 _SIGNIFICANCE = 1e-3
-# Below these sizes a fault moves no torque by more than the noise of one window, so there is nothing to repair.
-_SMALLEST_BIAS = 0.0015
-_SMALLEST_SCALE = 0.003
-_SMALLEST_MISALIGNMENT = 0.0025
-_SMALLEST_DELAY_S = 0.002
-_SMALLEST_DELAY_SAMPLES = 0.2
-# Share of that size which must be exceeded significantly: a jackknife over two dozen blocks has heavier tails than
-# Student's t where few of them tell, and what it then calls significant is small.
+# Share of the size that matters which must be exceeded significantly: a jackknife over two dozen blocks has heavier
+# tails than Student's t where few of them tell, and what it then calls significant is small.
 _SHARE_EXCEEDED = 0.5
 
 
-class Coefficient(NamedTuple):
+class FaultNumber(NamedTuple):
     """One number of a fault.
 
     Attributes
@@ -55,8 +48,9 @@ class AuditFinding:
 
     Attributes
     ----------
-    name : {"gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay"}
-    coefficients : tuple of Coefficient
+    name : str
+        Of the effect.
+    coefficients : tuple of FaultNumber
     p_value : float
         Probability that chance takes the most significant coefficient past half of the size that matters, after Holm.
     named : bool
@@ -64,8 +58,8 @@ class AuditFinding:
     sentence : str
     """
 
-    name: FaultName
-    coefficients: tuple[Coefficient, ...]
+    name: str
+    coefficients: tuple[FaultNumber, ...]
     p_value: float
     named: bool
     sentence: str
@@ -82,71 +76,33 @@ class AuditFinding:
         return np.array([found.get(name, 0.0) for name in names])
 
 
-class _Fault(NamedTuple):
-    name: FaultName
-    start: int
-    labels: tuple[str, ...]
-    unit: str
-    smallest: float
-    say: Callable[[str, float], str]
+@dataclass(frozen=True)
+class CheckedFault:
+    """An effect that the audit tests, with its estimate."""
+
+    effect: Effect
+    fit: FaultFit
+
+    @property
+    def test(self) -> SensorTest:
+        """How the fault is tested."""
+        assert self.effect.test is not None, "chosen so"
+        return self.effect.test
+
+    def smallest(self, period: float) -> float:
+        """Give the size that matters at a sampling period in s."""
+        return max(self.test.smallest, self.test.smallest_samples * period)
 
 
-def _side(value: float) -> str:
-    return "much" if value > 0 else "little"
+def findings(faults: Sequence[CheckedFault], period: float) -> tuple[AuditFinding, ...]:
+    """Test faults of sensors.
 
-
-def _faults(period: float) -> tuple[_Fault, ...]:
-    shortest = max(_SMALLEST_DELAY_S, _SMALLEST_DELAY_SAMPLES * period)
-    axes = ("x", "y", "z")
-    return (
-        _Fault("gyro_bias", 0, axes, "rad/s", _SMALLEST_BIAS, lambda at, v: f"{v:+.4f} rad/s about {at}"),
-        _Fault(
-            "gyro_scale", 3, axes, "", _SMALLEST_SCALE, lambda at, v: f"{100 * abs(v):.2g} % too {_side(v)} about {at}"
-        ),
-        _Fault(
-            "imu_misalignment",
-            6,
-            axes,
-            "rad",
-            _SMALLEST_MISALIGNMENT,
-            lambda at, v: f"{np.degrees(v):+.2f} deg about {at}",
-        ),
-        _Fault(
-            "channel_delay",
-            12,
-            ("delay",),
-            "s",
-            shortest,
-            lambda _, v: f"{1000 * abs(v):.3g} ms {'behind' if v > 0 else 'ahead of'}",
-        ),
-    )
-
-
-_SENTENCES: Mapping[FaultName, tuple[str, str]] = {
-    "gyro_bias": (
-        "The gyroscope shows a rate where there is none: {}.",
-        "No constant error of the gyroscope that matters.",
-    ),
-    "gyro_scale": ("The gyroscope reads {}.", "The gyroscope's scale agrees with the attitude."),
-    "imu_misalignment": (
-        "The gyroscope sits turned against the attitude: {}.",
-        "The gyroscope sits straight against the attitude.",
-    ),
-    "channel_delay": ("The gyroscope runs {} the attitude.", "Gyroscope and attitude keep the same time."),
-}
-
-
-def findings(fit: GyroFit, tested: Sequence[FaultName], period: float) -> tuple[AuditFinding, ...]:
-    """Test each fault that the motion can tell.
-
-    A coefficient is named when its size matters, and Student's t of what exceeds the possible pull of noise and half
-    of that size stays significant after Holm's correction over all coefficients.
+    A number is named when its size matters, and Student's t of what exceeds the possible pull of noise and half of
+    that size stays significant after Holm's correction over all numbers that the motion can tell.
 
     Parameters
     ----------
-    fit : GyroFit
-    tested : sequence of str
-        Names of faults.
+    faults : sequence of CheckedFault
     period : float
         Sampling period, s.
 
@@ -154,27 +110,21 @@ def findings(fit: GyroFit, tested: Sequence[FaultName], period: float) -> tuple[
     ----------
     Holm 1979.
     """
-    faults = [fault for fault in _faults(period) if fault.name in tested]
-    used = np.zeros(len(fit.value), dtype=bool)
-    for fault in faults:
-        used[fault.start : fault.start + len(fault.labels)] = True
-    used &= fit.known
-    p_values = _p_values(fit, used, faults)
-    return tuple(_finding(fault, fit, used, p_values) for fault in faults if used[_own(fault)].any())
+    told = [fault for fault in faults if fault.fit.known.any()]
+    if not told:
+        return ()
+    known = np.concatenate([fault.fit.known for fault in told])
+    p_values = np.ones(len(known))
+    p_values[known] = _holm(np.concatenate([_chance(fault, period) for fault in told])[known])
+    by_fault = np.split(p_values, np.cumsum([len(fault.fit.known) for fault in told])[:-1])
+    return tuple(_finding(fault, own, period) for fault, own in zip(told, by_fault, strict=True))
 
 
-def _own(fault: _Fault) -> slice:
-    return slice(fault.start, fault.start + len(fault.labels))
-
-
-def _p_values(fit: GyroFit, used: BoolArray, faults: Sequence[_Fault]) -> Array:
-    floor = fit.pull.copy()
-    for fault in faults:
-        floor[_own(fault)] += _SHARE_EXCEEDED * fault.smallest
+def _chance(fault: CheckedFault, period: float) -> Array:
+    fit = fault.fit
+    floor = fit.pull + _SHARE_EXCEEDED * fault.smallest(period)
     excess = np.maximum(np.abs(fit.value) - floor, 0.0) / np.maximum(fit.error, np.finfo(float).tiny)
-    p_values = np.ones(len(used))
-    p_values[used] = _holm(2 * stats.t.sf(excess[used], fit.blocks - 1))
-    return p_values
+    return np.asarray(2 * stats.t.sf(excess, fit.blocks - 1))
 
 
 def _holm(p_values: Array) -> Array:
@@ -185,22 +135,22 @@ def _holm(p_values: Array) -> Array:
     return adjusted
 
 
-def _finding(fault: _Fault, fit: GyroFit, used: BoolArray, p_values: Array) -> AuditFinding:
+def _finding(fault: CheckedFault, p_values: Array, period: float) -> AuditFinding:
+    fit, test = fault.fit, fault.test
     reach = float(stats.t.ppf(0.975, fit.blocks - 1)) * fit.error + fit.pull
-    named = used & (p_values < _SIGNIFICANCE) & (np.abs(fit.value) > fault.smallest)
-    places = [i for i in range(fault.start, fault.start + len(fault.labels)) if used[i]]
-    coefficients = tuple(
-        Coefficient(
-            fault.labels[i - fault.start],
+    named = fit.known & (p_values < _SIGNIFICANCE) & (np.abs(fit.value) > fault.smallest(period))
+    numbers = tuple(
+        FaultNumber(
+            label,
             float(fit.value[i]),
-            fault.unit,
+            "" if number.unit == "1" else number.unit,
             float(fit.value[i] - reach[i]),
             float(fit.value[i] + reach[i]),
             bool(named[i]),
         )
-        for i in places
+        for i, (label, number) in enumerate(zip(test.labels, fault.effect.numbers, strict=True))
+        if fit.known[i]
     )
-    found, nothing = _SENTENCES[fault.name]
-    parts = [fault.say(each.name, each.value) for each in coefficients if each.named]
-    sentence = found.format(", ".join(parts)) if parts else nothing
-    return AuditFinding(fault.name, coefficients, float(p_values[places].min()), bool(parts), sentence)
+    parts = [test.number(each.name, each.value) for each in numbers if each.named]
+    sentence = test.found.format(", ".join(parts)) if parts else test.nothing
+    return AuditFinding(fault.effect.name, numbers, float(p_values[fit.known].min()), bool(parts), sentence)

@@ -10,6 +10,7 @@ from scipy.linalg import polar
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.effects.hooks import FaultFit
 from cpfls_cli.gap.balance.folds import blocks_of, folds
 from cpfls_cli.gap.sensors.audit_kinematics import LONGEST_DELAY_S, Kinematics
 
@@ -23,6 +24,9 @@ _ROUNDS = 4
 # A rate about an axis counts as excited from this multiple of the variance of what is left; below it, noise of the
 # gyroscope would pull its scale by more than a tenth.
 _EXCITED = 10.0
+
+
+_NUMBERS = {"bias": slice(0, 3), "scale": slice(3, 6), "misalignment": slice(6, 9), "delay": slice(12, 13)}
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,16 @@ class GyroFit:
     variance: Array
     flight_bias: Array
     flight_bias_error: Array
+
+    def of(self, name: str) -> FaultFit:
+        """Give the numbers of one kind of fault.
+
+        Parameters
+        ----------
+        name : {"bias", "scale", "misalignment", "delay"}
+        """
+        own = _NUMBERS[name]
+        return FaultFit(self.value[own], self.error[own], self.pull[own], self.known[own], self.blocks)
 
 
 def scan(flights: Sequence[Kinematics]) -> Scan:

@@ -6,7 +6,7 @@ from scipy.stats import norm
 
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
-from cpfls_cli.gap.naming.vehicle_numbers import parameter_error
+from cpfls_cli.gap.naming.vehicle_numbers import wrong_numbers
 
 
 def number(name, value, half):
@@ -25,7 +25,7 @@ SURE = number("inertia_x", 0.15, 0.02)
 
 
 def told(*numbers, effects=(), share=0.5, pull=0.001):
-    effect = parameter_error(found(*numbers), effects, share, np.full(len(numbers), pull))
+    effect = wrong_numbers(found(*numbers), effects, share, np.full(len(numbers), pull))
     return () if effect is None else tuple(each.name for each in effect.coefficients)
 
 
@@ -57,7 +57,7 @@ def test_an_error_that_noise_in_the_motion_can_make_is_not_told():
 
 
 def test_probability_is_that_of_a_normal_error_of_the_surest_number():
-    effect = parameter_error(found(SURE, number("inertia_y", 0.05, 0.02)), (), 0.5, np.zeros(2))
+    effect = wrong_numbers(found(SURE, number("inertia_y", 0.05, 0.02)), (), 0.5, np.zeros(2))
     assert effect.p_value == pytest.approx(2 * norm.sf(1.96 * 0.15 / 0.02))
     assert (effect.name, effect.share) == ("parameter_error", 0.5)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.simulation import flyability
-from cpfls_cli.simulation.flyable import single_axis_torque
+from cpfls_cli.simulation.inverse import single_axis_torque
 from cpfls_cli.trajectory import TrajectorySettings, plan
 from cpfls_cli.vehicle import VehicleSettings
 

@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 from cpfls_cli import rotations
 from cpfls_cli.errors import SettingError
 from cpfls_cli.simulation import SimulationSettings, simulate
-from cpfls_cli.simulation.collective import collective_thrust
+from cpfls_cli.simulation.inverse import collective_thrust
 from cpfls_cli.vehicle import RotorSettings, VehicleSettings, allocation_matrix, body_wrench
 
 RATE = np.array([2.0, 1.5, 0.7])

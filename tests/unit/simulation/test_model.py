@@ -6,9 +6,9 @@ import pytest
 from cpfls_cli import rotations
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError, SettingError
-from cpfls_cli.simulation import ClosedLoopSettings, SimulationSettings, flown_effects
+from cpfls_cli.simulation import ClosedLoopSettings, SimulationSettings, simulated_effects
+from cpfls_cli.simulation.actuators import mixer
 from cpfls_cli.simulation.autopilot import upright
-from cpfls_cli.simulation.mixer import mixer
 from cpfls_cli.vehicle import VehicleSettings, body_wrench
 
 VEHICLE = VehicleSettings()
@@ -18,15 +18,15 @@ def test_values_are_taken_in_the_order_of_the_catalogue_or_by_name():
     payload = CATALOGUE["payload"]
     values = {entry.name: 0.2 + 0.01 * place for place, entry in enumerate(payload.coefficients)}
     shapes = {shape.name: shape.grid[1] for shape in payload.shapes}
-    by_order = flown_effects({"payload": [*values.values(), *shapes.values()]}, VEHICLE)
-    by_name = flown_effects({"payload": {**dict(reversed(values.items())), **shapes}}, VEHICLE)
+    by_order = simulated_effects({"payload": [*values.values(), *shapes.values()]}, VEHICLE)
+    by_name = simulated_effects({"payload": {**dict(reversed(values.items())), **shapes}}, VEHICLE)
     assert by_order.values("payload") == by_name.values("payload") == {**values, **shapes}
-    assert by_order.flown[0].shape == shapes
+    assert by_order.listed[0].shape == shapes
     assert by_order.values("wind") is None
 
 
 def test_coefficients_without_a_value_are_zero():
-    assert flown_effects({"torque_bias": {"M_y": 0.1}}, VEHICLE).values("torque_bias") == {
+    assert simulated_effects({"torque_bias": {"M_y": 0.1}}, VEHICLE).values("torque_bias") == {
         "M_x": 0.0,
         "M_y": 0.1,
         "M_z": 0.0,
@@ -34,7 +34,7 @@ def test_coefficients_without_a_value_are_zero():
 
 
 def test_wind_becomes_drag_times_wind():
-    (one,) = flown_effects({"wind": [1e-3, 3.0, -2.0]}, VEHICLE).flown
+    (one,) = simulated_effects({"wind": [1e-3, 3.0, -2.0]}, VEHICLE).listed
     np.testing.assert_allclose(one.linear, [1e-3, 3e-3, -2e-3])
 
 
@@ -53,13 +53,13 @@ def test_wind_becomes_drag_times_wind():
 )
 def test_impossible_values_are_refused(asked, message):
     with pytest.raises(SettingError, match=message) as refused:
-        flown_effects(asked, VEHICLE)
+        simulated_effects(asked, VEHICLE)
     assert refused.value.key.split(".")[:2] == ["closed_loop", "effects"]
 
 
 def test_unknown_effect_names_the_nearest():
     with pytest.raises(InputError, match="did you mean rotor_drag"):
-        flown_effects({"rotr_drag": [1.0]}, VEHICLE)
+        simulated_effects({"rotr_drag": [1.0]}, VEHICLE)
 
 
 def test_inverse_dynamics_has_no_effects_and_no_gyro():
