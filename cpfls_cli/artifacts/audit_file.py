@@ -7,7 +7,7 @@ from typing import Any
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.tables import rows_of, table, texts
 from cpfls_cli.gap.sensors.audit import Audit
-from cpfls_cli.gap.sensors.audit_findings import AuditFinding, FaultNumber
+from cpfls_cli.gap.sensors.findings import AuditFinding, FaultNumber
 
 _FINDING = (("finding", "sentence"), ("named", "p_value"))
 _NUMBER = (("finding", "name", "unit"), ("value", "low", "high", "named"))

@@ -21,10 +21,9 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.same_vehicle import require_vehicle_of
 from cpfls_cli.flights.sources import read_good
-from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.extend import Extension, extend, worse_axes
-from cpfls_cli.gap.extended import plain
+from cpfls_cli.gap.balance.windows import Recording
+from cpfls_cli.gap.extended import Extension, extend, plain, worse_axes
 from cpfls_cli.gap.naming.results import GapSize, NamedEffect, Verdict
 from cpfls_cli.gap.replayed import Replayed, replayed
 from cpfls_cli.gap.sensors.audit import Audit

@@ -10,17 +10,15 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
-from cpfls_cli.gap.balance.recording import Recording, common_windows
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, weak_flight
+from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.extended import ExtendedModel
+from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.results import NotExcited
 from cpfls_cli.gap.naming.search import best_floor, block_index
-from cpfls_cli.gap.naming.unseen import not_excited
 from cpfls_cli.gap.replayed import Replayed, replayed
-from cpfls_cli.gap.residual.dependence import Dependence, rank_dependence
-from cpfls_cli.gap.residual.heat_map import HeatMap, heat_map
-from cpfls_cli.gap.residual.state_signals import joined_states, state_signals
-from cpfls_cli.gap.residual.stretches import Stretch, stretches
+from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
+from cpfls_cli.gap.residual.views import HeatMap, Stretch, heat_map, stretches
 from cpfls_cli.gap.sensors.audit import Audit, audit
 from cpfls_cli.gap.settings import GapSettings
 

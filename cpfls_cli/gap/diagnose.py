@@ -12,23 +12,17 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.inertial import InertiaModel
-from cpfls_cli.gap.balance.recording import Recording, common_windows
 from cpfls_cli.gap.balance.refine import fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.contributions import shares
+from cpfls_cli.gap.balance.windows import Recording, common_windows
+from cpfls_cli.gap.naming.causes import Judged, impossible, judge_effect, sensor_estimates, shares, wrong_numbers
 from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
-from cpfls_cli.gap.naming.judged import Judged, judge_effect
-from cpfls_cli.gap.naming.leftover import Leftover, leftover
-from cpfls_cli.gap.naming.results import Diagnosis, NamedEffect, Verdict
+from cpfls_cli.gap.naming.leftover import Leftover, leftover, look_alikes, not_excited
+from cpfls_cli.gap.naming.results import Diagnosis, NamedEffect, Verdict, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import Step, block_index, forward, look
-from cpfls_cli.gap.naming.sensor_numbers import sensor_estimates
-from cpfls_cli.gap.naming.unseen import look_alikes, not_excited
-from cpfls_cli.gap.naming.vehicle_numbers import impossible, wrong_numbers
-from cpfls_cli.gap.naming.verdict import gap_stays, matters, verdict_of
-from cpfls_cli.gap.sensors.audit import Audit, audit
-from cpfls_cli.gap.sensors.audit_findings import AuditFinding
-from cpfls_cli.gap.sensors.preparation import Preparation
+from cpfls_cli.gap.sensors.audit import Audit, Preparation, audit
+from cpfls_cli.gap.sensors.findings import AuditFinding
 from cpfls_cli.gap.settings import GapSettings
 
 _EXCITED_FLOORS = 3.0

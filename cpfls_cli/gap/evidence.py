@@ -10,16 +10,14 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.inertial import InertiaModel
-from cpfls_cli.gap.balance.recording import Recording, common_windows
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
-from cpfls_cli.gap.balance.windows import Windows
+from cpfls_cli.gap.balance.windows import Recording, Windows, common_windows
 from cpfls_cli.gap.diagnose import Diagnosed
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.replay.worst_stretch import WorstStretch, worst_stretch
 from cpfls_cli.gap.replayed import Replayed, replayed
-from cpfls_cli.gap.residual.stretches import stretches
-from cpfls_cli.gap.residual.whiteness import Whiteness, whiteness
+from cpfls_cli.gap.residual.views import Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 
 _SHORTEST_S = 4.0

@@ -1,4 +1,4 @@
-"""Shapes between the points of their grids: the best value, all other coefficients following."""
+"""Fits of a hypothesis: its free columns, the derivatives by its shapes, and the best values of the shapes."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from scipy.optimize import least_squares, minimize_scalar
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Shape
 from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.told_torque import compensation
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 
 _EVALUATIONS = 14
 _JOINT_EVALUATIONS = 8
+_STEP = 1e-3
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
@@ -136,3 +136,66 @@ def _together(
         ftol=1e-5,
     )
     return moved(found.x)
+
+
+def free_shapes(hypothesis: System) -> list[tuple[Candidate, str]]:
+    """List the shapes of a hypothesis in the order of its effects.
+
+    Returns
+    -------
+    list of (Candidate, str)
+    """
+    return [(candidate, shape.name) for candidate in hypothesis.chosen for shape in candidate.effect.shapes]
+
+
+def shape_columns(hypothesis: System, linear: Array) -> Array:
+    """Differentiate what the hypothesis explains by each of its shapes, by central differences.
+
+    Parameters
+    ----------
+    hypothesis : System
+    linear : array, shape (column,)
+        Coefficients of the base, held.
+
+    Returns
+    -------
+    array, shape (window, 6, shape)
+    """
+    shapes = free_shapes(hypothesis)
+    columns = np.zeros((*hypothesis.residual.shape, len(shapes)))
+    for place, (candidate, name) in enumerate(shapes):
+        value = candidate.shape[name]
+        step = _STEP * (abs(value) or 1.0)
+        ahead, behind = (_residual_at(hypothesis, linear, candidate, name, value + s) for s in (step, -step))
+        columns[..., place] = (behind - ahead) / (2 * step)
+    return columns
+
+
+def _residual_at(hypothesis: System, linear: Array, moved: Candidate, name: str, value: float) -> Array:
+    chosen = [Candidate(c.effect, {**c.shape, name: value}) if c is moved else c for c in hypothesis.chosen]
+    there = system(hypothesis.flights, chosen)
+    return np.asarray(there.residual - there.base @ linear)
+
+
+def compensation(before: Array, after: Array) -> Array:
+    """Weigh the channels against what an effect on the actuation takes off their torque.
+
+    Inertia is free in every fit. Where motion follows the torque only in part, a torque half as large with half the
+    inertia leaves half of the residual and explains nothing: a lag would look better the longer it is. With residuals
+    times this factor, what counts is the share of the torque that the motion does not follow.
+
+    Parameters
+    ----------
+    before, after : array, shape (window, 6), N m and N
+        Wrench of the rotors without and with the effect.
+
+    Returns
+    -------
+    array, shape (6,)
+        Ratio of the standard deviations; 1 for the forces, where weight and mass hold the scale.
+    """
+    factor = np.ones(before.shape[1])
+    spread, shrunk = before[:, :3].std(axis=0), after[:, :3].std(axis=0)
+    moving = (spread > 0) & (shrunk > 0)
+    factor[:3][moving] = spread[moving] / shrunk[moving]
+    return factor

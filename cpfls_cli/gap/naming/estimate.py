@@ -1,4 +1,4 @@
-"""Coefficients with confidence intervals: all of them fitted together, scattered by leaving out blocks of time."""
+"""Coefficients with confidence intervals, from blocks of time left out, and what they say in words."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from scipy.stats import t as student
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free
-from cpfls_cli.gap.balance.refine import fit
-from cpfls_cli.gap.balance.shape_columns import free_shapes, shape_columns
+from cpfls_cli.gap.balance.refine import fit, free_shapes, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 @dataclass(frozen=True)
@@ -150,3 +150,23 @@ def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:
     ridge = 1e-9 * np.eye(gram.shape[1])
     change = -np.linalg.solve(gram.sum(axis=0) - gram + ridge, moment[..., None])[..., 0]
     return np.asarray(change / np.where(scale > 0, scale, 1.0))
+
+
+def told_effect(effect: Effect, numbers: Sequence[Estimate], vehicle: VehicleSettings) -> str:
+    """Say what a pilot understands of an effect as it was found.
+
+    Parameters
+    ----------
+    effect : Effect
+    numbers : sequence of Estimate
+        Coefficients, then shapes.
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    str
+        The sentence of the catalogue, and what the numbers that are surely not zero add to it.
+    """
+    sure = {number.name: number.value for number in numbers if number.low > 0 or number.high < 0}
+    more = "" if effect.told is None else effect.told(vehicle, sure)
+    return f"{effect.sentence} {more}".rstrip()

@@ -9,14 +9,12 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.floor import floors
-from cpfls_cli.gap.balance.recording import Recording
+from cpfls_cli.gap.balance.balance_system import System, floors, scatter_variance, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.naming.results import GapSize
-from cpfls_cli.gap.naming.scatter import scatter_variance
-from cpfls_cli.gap.sensors.preparation import Preparation
+from cpfls_cli.gap.sensors.audit import Preparation
 
 _MARGIN = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""

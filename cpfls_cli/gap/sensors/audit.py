@@ -15,13 +15,20 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import FaultFit, ReadingError, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.windows import Windows
-from cpfls_cli.gap.sensors.audit_actuation import ActuationDelay, actuation_delay
-from cpfls_cli.gap.sensors.audit_channels import channel_warnings
-from cpfls_cli.gap.sensors.audit_consistency import ChannelMatch, consistency, frame_warnings
-from cpfls_cli.gap.sensors.audit_findings import AuditFinding, CheckedFault, findings
-from cpfls_cli.gap.sensors.audit_gyro import GyroFit, fit_gyro, scan
-from cpfls_cli.gap.sensors.audit_kinematics import kinematics
+from cpfls_cli.gap.balance.inertial import InertiaModel
+from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
+from cpfls_cli.gap.balance.windows import Recording, Windows
+from cpfls_cli.gap.sensors.channels import (
+    ActuationDelay,
+    ChannelMatch,
+    actuation_delay,
+    channel_warnings,
+    consistency,
+    frame_warnings,
+)
+from cpfls_cli.gap.sensors.findings import AuditFinding, CheckedFault, findings
+from cpfls_cli.gap.sensors.gyro import GyroFit, fit_gyro, kinematics, scan
+from cpfls_cli.gap.settings import GapSettings
 
 # Agreement that no independent attitude reaches, rad/s in a window; every fault of practical size is larger.
 _ROUNDING = 1e-4
@@ -199,3 +206,34 @@ def _gyro_notes(fit: GyroFit) -> tuple[str, ...]:
         square = np.abs(fit.value[9:12])[cross].max()
         said.append(f"The axes of gyroscope or attitude are not square to each other, by {square:.3f}.")
     return tuple(said)
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """What all flights of one diagnosis share.
+
+    Attributes
+    ----------
+    windows : Windows
+    model : InertiaModel or None
+        None for the rigid body of the vehicle.
+    settings : GapSettings
+    audit : Audit
+        Faults that are repaired.
+    """
+
+    windows: Windows
+    model: InertiaModel | None
+    settings: GapSettings
+    audit: Audit
+
+    def logged(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
+        """Prepare flights as they were logged."""
+        return [self._weak(recording.name, recording.signals) for recording in recordings]
+
+    def repaired(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
+        """Prepare flights with the named faults of their sensors repaired."""
+        return [self._weak(recording.name, self.audit.repaired(recording.signals)) for recording in recordings]
+
+    def _weak(self, name: str, signals: Signals) -> WeakFlight:
+        return weak_flight(name, signals, self.windows, self.model, self.settings.force, self.settings.axes)

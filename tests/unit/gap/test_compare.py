@@ -9,12 +9,11 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.evidence import evidence
-from cpfls_cli.gap.extend import extend
-from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, extend, plain
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings

@@ -10,7 +10,7 @@ from cpfls_cli.commands.extend import require_named
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.extend import worse_axes
+from cpfls_cli.gap.extended import worse_axes
 from cpfls_cli.gap.naming.results import Alternative, Diagnosis, Estimate, GapSize, NamedEffect, Unexplained, Verdict
 from cpfls_cli.gap.replayed import Replayed
 from cpfls_cli.pages.diagnosis_words import diagnosis_lines, effect_line, headline

@@ -1,4 +1,4 @@
-"""Effects that could be there unseen: without their signals, or without their motion."""
+"""What stays open: effects that would not show, and which way a nameless torque feeds the motion."""
 
 from dataclasses import replace
 
@@ -6,10 +6,13 @@ import numpy as np
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.naming.unseen import not_excited
+from cpfls_cli.gap.naming.leftover import energy_words, not_excited
 from tests.unit.gap.synthetic_flights import candidate, fly, weak
 
 FLOOR = np.full(6, 0.05)
+RNG = np.random.default_rng(1)
+RATE = RNG.normal(size=(400, 3))
+BLOCK = np.repeat(np.arange(10), 40)
 
 
 def reasons(signals, chosen=(), floor=FLOOR):
@@ -54,3 +57,22 @@ def test_what_is_chosen_or_the_vehicle_itself_is_not_unseen():
 def test_more_noise_hides_more():
     quiet, loud = reasons([fly(1)], floor=0.1 * FLOOR), reasons([fly(1)], floor=100 * FLOOR)
     assert set(quiet) < set(loud)
+
+
+def test_damping_drains_and_its_opposite_feeds():
+    noise = RNG.normal(size=(400, 3))
+    torque = np.column_stack([-0.5 * RATE[:, 0], 0.5 * RATE[:, 1], np.zeros(400)]) + noise
+    assert energy_words(torque, RATE, BLOCK) == ["drains", "feeds", "neither"]
+
+
+def test_a_constant_torque_does_neither():
+    assert energy_words(np.ones((400, 3)), RATE + 1, BLOCK) == ["neither"] * 3
+
+
+def test_few_blocks_say_nothing():
+    assert energy_words(-RATE, RATE, BLOCK // 4) == ["neither"] * 3
+
+
+def test_noise_is_seldom_taken_for_either():
+    found = [energy_words(RNG.normal(size=(400, 3)), RATE, BLOCK) for _ in range(100)]
+    assert sum(word != "neither" for words in found for word in words) < 15

@@ -5,8 +5,8 @@ import pytest
 from scipy import stats
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.sensors.audit_findings import CheckedFault, findings
-from cpfls_cli.gap.sensors.audit_gyro import GyroFit
+from cpfls_cli.gap.sensors.findings import CheckedFault, findings
+from cpfls_cli.gap.sensors.gyro import GyroFit
 
 NAMES = ("gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay")
 

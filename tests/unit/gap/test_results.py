@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.naming.results import Alternative, NamedEffect, Unexplained, Verdict
-from cpfls_cli.gap.naming.verdict import gap_stays, matters, verdict_of
+from cpfls_cli.gap.naming.results import Alternative, NamedEffect, Unexplained, Verdict, gap_stays, matters, verdict_of
 from cpfls_cli.gap.settings import GapSettings
 
 RIVAL = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")

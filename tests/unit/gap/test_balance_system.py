@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.naming.scatter import scatter_size, scatter_variance
+from cpfls_cli.gap.balance.balance_system import scatter_size, scatter_variance, system
 from tests.unit.gap.synthetic_flights import candidate, fly, weak
 
 RING = candidate("vertical_descent", sideways=1.0)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.gap.residual.narrow_band import narrow_band
-from cpfls_cli.gap.residual.spectrum import background, grid, noise_like, pooled_power
+from cpfls_cli.gap.residual.narrow_band import background, grid, narrow_band, noise_like, pooled_power
 
 LENGTHS = [2000, 1500]
 

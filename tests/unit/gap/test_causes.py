@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from cpfls_cli.gap.naming.causes import wrong_numbers
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
-from cpfls_cli.gap.naming.vehicle_numbers import wrong_numbers
 
 
 def number(name, value, half):

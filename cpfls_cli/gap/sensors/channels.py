@@ -1,17 +1,30 @@
-"""Channels that say the same thing twice: position and velocity, velocity and acceleration, and their frames."""
+"""What channels show by themselves and beside each other: broken, inconsistent or late."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.flightlog.alignment import estimate_delay
+from cpfls_cli.flightlog.results import DelayEstimate
 from cpfls_cli.gap.balance.windows import Windows
 
-_AXES = "xyz"
+# A gyroscope at its limit stays there for several samples, and far longer than at the level just before it; the peak
+# of a slow signal that is rounded stays too, but longer at the level before.
+_CLIPPED_SAMPLES = 5
+_CLIPPED_TO_NEXT = 3
+# No gyroscope of a multirotor has its limit lower; a common smallest range is 125 deg/s.
+_LOWEST_LIMIT_RAD_S = 1.0
+# Rounding to this step adds as much noise as a poor gyroscope has.
+_COARSE_STEP_RAD_S = 0.02
+_AXES = ("x", "y", "z")
+_ANGLES = ("roll", "pitch", "yaw")
 # Correlations that noise does not reach over a flight, and that noise does not hide where the motion is worth a look.
 _SAME = 0.9
 _OTHER = 0.5
@@ -19,6 +32,67 @@ _SCALE_OFF = 0.2
 _DELAY_OFF_S = 0.03
 _R2_FOR_DELAY = 0.8
 _GRAVITY_OFF_M_S2 = 3.0
+# Above the motion of a multirotor and below most of the noise of its derivative.
+_LOWPASS_HZ = 8.0
+_SHARE_OF_RATE = 0.2
+_DELAY_MAX_S = 0.2
+# A rigid body that explains less leaves the delay to chance.
+_SMALLEST_R2 = 0.3
+
+
+def channel_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:
+    """Name channels that never change, and a gyroscope that is clipped or coarsely rounded."""
+    return (*_constant(flights), *_gyro_warnings(np.concatenate([signals.body_rate for signals in flights])))
+
+
+def _constant(flights: Sequence[Signals]) -> Iterator[str]:
+    for name in _channels(flights[0]):
+        columns = [found[name] for signals in flights if name in (found := _channels(signals))]
+        if all(np.ptp(column) == 0 for column in columns):
+            yield f"The channel {name} never changes."
+
+
+def _channels(signals: Signals) -> Mapping[str, Array]:
+    numbered = tuple(str(i + 1) for i in range(len(signals.vehicle.rotors)))
+    groups: tuple[tuple[str, tuple[str, ...], Array | None], ...] = (
+        ("gyroscope", _AXES, signals.body_rate if "body_rate" in signals.available else None),
+        ("attitude", _ANGLES, signals.attitude),
+        ("velocity", _AXES, signals.velocity),
+        ("position", _AXES, signals.position),
+        ("acceleration", _AXES, signals.acceleration),
+        ("accelerometer", _AXES, signals.specific_force),
+        ("rotor speed", numbered, signals.rotor_speed),
+        ("voltage", ("",), None if signals.voltage is None else signals.voltage[:, None]),
+    )
+    return {
+        f"{group} {label}".strip(): column
+        for group, labels, values in groups
+        if values is not None
+        for label, column in zip(labels, values.T, strict=True)
+    }
+
+
+def _gyro_warnings(body_rate: Array) -> Iterator[str]:
+    for axis, column in zip(_AXES, body_rate.T, strict=True):
+        if np.ptp(column) == 0:
+            continue
+        if _clipped(column) or _clipped(-column):
+            yield f"The gyroscope about {axis} is clipped at {np.abs(column).max():.3g} rad/s."
+        step = float(np.diff(np.unique(column)).min())
+        if step > _COARSE_STEP_RAD_S:
+            yield f"The gyroscope about {axis} is rounded to steps of {step:.3g} rad/s."
+
+
+def _clipped(column: Array) -> bool:
+    before, last = np.unique(column)[-2:]
+    highest = column == last
+    crowded = highest.sum() > _CLIPPED_TO_NEXT * (column == before).sum()
+    return bool(crowded and last >= _LOWEST_LIMIT_RAD_S and _longest_run(highest) >= _CLIPPED_SAMPLES)
+
+
+def _longest_run(mask: BoolArray) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return int(np.max(edges[1::2] - edges[::2]))
 
 
 class ChannelMatch(NamedTuple):
@@ -152,3 +226,57 @@ def _scale_off(match: ChannelMatch) -> bool:
     """Whether the scale is off whichever side the noise is on."""
     either = (match.scale * np.sqrt(match.r2), match.scale / np.sqrt(match.r2))
     return all(each > 1 + _SCALE_OFF for each in either) or all(each < 1 - _SCALE_OFF for each in either)
+
+
+@dataclass(frozen=True)
+class ActuationDelay:
+    """Delay of the motion behind the torque that the log tells, for information.
+
+    Attributes
+    ----------
+    commanded : bool
+        Whether that torque was commanded, not measured.
+    delay_s : float
+        Median over the flights, s.
+    spread_s : float
+        Largest less smallest over the flights, s.
+    sentence : str
+    """
+
+    commanded: bool
+    delay_s: float
+    spread_s: float
+    sentence: str
+
+
+def actuation_delay(flights: Sequence[Signals]) -> ActuationDelay | None:
+    """Estimate how late the motion follows the torque, flight by flight.
+
+    Returns
+    -------
+    ActuationDelay or None
+        None where no flight tells.
+    """
+    told = [(signals.commanded, found) for signals in flights if (found := _estimate(signals)) is not None]
+    if not told:
+        return None
+    delays = [found.delay_s for _, found in told]
+    commanded = told[0][0]
+    delay = float(np.median(delays))
+    whom = "commands" if commanded else "measured rotors"
+    bound = "at least" if any(found.at_bound for _, found in told) else "about"
+    sentence = f"The motion follows the {whom} by {bound} {1000 * delay:.0f} ms."
+    return ActuationDelay(commanded, delay, float(np.ptp(delays)), sentence)
+
+
+def _estimate(signals: Signals) -> DelayEstimate | None:
+    if signals.torque is None:
+        return None
+    lowpass = min(_LOWPASS_HZ, _SHARE_OF_RATE / signals.period)
+    try:
+        found = estimate_delay(
+            signals.time, signals.body_rate, signals.torque, delay_max_s=_DELAY_MAX_S, lowpass_hz=lowpass
+        )
+    except (ComputationError, SettingError):
+        return None
+    return found if found.pooled_r2 > _SMALLEST_R2 else None

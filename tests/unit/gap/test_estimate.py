@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.naming.estimate import told_effect
 from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.gap.naming.told_effect import told_effect
 from cpfls_cli.vehicle import VehicleSettings
 from cpfls_cli.vehicle.settings import RotorSettings
 

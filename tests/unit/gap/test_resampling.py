@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.gap.balance.folds import blocks_of, folds
+from cpfls_cli.gap.balance.resampling import blocks_of, folds
 
 WINDOWS, CHANNELS, COLUMNS, BLOCKS = 60, 6, 5, 4
 

@@ -9,9 +9,8 @@ from cpfls_cli.effects.effect import Coefficient, Columns
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.ambiguity import alternatives, simplest, unbeaten
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import look
+from cpfls_cli.gap.naming.search import alternatives, look, simplest, unbeaten
 from cpfls_cli.gap.settings import GapSettings
 from tests.unit.gap.synthetic_flights import fly, weak
 

@@ -1,0 +1,205 @@
+"""Causes of a gap: each chosen effect judged beside the others, faults of the sensors, wrong numbers of the vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
+from cpfls_cli.gap.balance.balance_system import is_free, system
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.estimate import Estimates, told_effect
+from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
+from cpfls_cli.gap.naming.scoring import Scored
+from cpfls_cli.gap.naming.search import Step, alternatives, look
+from cpfls_cli.gap.sensors.findings import AuditFinding
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_MATTERS = 0.02
+"""Relative error of a moment of inertia or of the thrust from which on it is told."""
+
+_LEAST_SHARE = 0.05
+
+_PULLS = 2.0
+"""Multiple of the pull of noise that an error has to exceed."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A chosen effect and its rivals."""
+
+    effect: NamedEffect
+    alternatives: tuple[Alternative, ...]
+
+
+def judge_effect(
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    place: int,
+    found: Estimates,
+    share: float,
+    effects: Sequence[Effect],
+    settings: GapSettings,
+    rng: np.random.Generator,
+) -> Judged:
+    """Judge a chosen effect as if it were the last one to be found.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    place : int
+        Of the effect among them.
+    found : Estimates
+    share : float
+        Of what all effects explain.
+    effects : sequence of Effect
+    settings : GapSettings
+    rng : numpy.random.Generator
+    """
+    candidate = chosen[place]
+    others = [other for other in chosen if other is not candidate]
+    step = look(flights, others, effects, settings, rng, also=(candidate,))
+    own = next(scored for scored in step.ranking if scored.candidate.effect.name == candidate.effect.name)
+    effect = NamedEffect(
+        candidate.effect.name,
+        candidate,
+        found.of_effect[place],
+        found.effects[place],
+        step.p_value(own.gain),
+        share,
+        _frequency(own, step),
+        told_effect(candidate.effect, found.effects[place], flights[0].signals.vehicle),
+    )
+    return Judged(effect, tuple(alternatives(own, step.ranking, step.above_floor)))
+
+
+def _frequency(own: Scored, step: Step) -> float:
+    """Give the share of the blocks without which the effect would still explain most."""
+    total = np.array([scored.block_error.sum() - scored.block_error for scored in step.ranking if _real(scored)])
+    names = [scored.candidate.effect.name for scored in step.ranking if _real(scored)]
+    if own.candidate.effect.name not in names:
+        return 0.0
+    return float(np.mean(np.argmin(total, axis=0) == names.index(own.candidate.effect.name)))
+
+
+def _real(scored: Scored) -> bool:
+    return bool(np.isfinite(scored.gain))
+
+
+def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], found: Estimates, floor: Array) -> Array:
+    """Split what the effects explain among them.
+
+    The share of an effect is the part of the explained residual that points its way, in floors; the shares add up to
+    1. Effects that work against each other can have more than 1, or less than 0.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    found : Estimates
+        Of the hypothesis with all of them.
+    floor : array, shape (6,)
+
+    Returns
+    -------
+    array, shape (effect,)
+    """
+    everything = _left(flights, chosen, found, range(len(chosen)))
+    total = (_left(flights, chosen, found, ()) - everything) / floor
+    parts = [
+        (_left(flights, chosen, found, [p for p in range(len(chosen)) if p != place]) - everything) / floor
+        for place in range(len(chosen))
+    ]
+    along = np.array([(part * total).sum() for part in parts])
+    return np.asarray(along / max(abs(along.sum()), 1e-12) if len(along) else along)
+
+
+def _left(
+    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], found: Estimates, kept: Sequence[int] | range
+) -> Array:
+    """Give what some of the effects leave, with the coefficients of all of them."""
+    there = system(flights, [chosen[place] for place in kept])
+    parameters = found.linear[: len(found.linear) - sum(len(own) for own in found.of_effect)]
+    own = [found.of_effect[place] for place in kept if is_free(chosen[place])]
+    return np.asarray(there.residual - there.base @ np.concatenate([parameters, *own]))
+
+
+def wrong_numbers(found: Estimates, effects: Sequence[NamedEffect], share: float, pull: Array) -> NamedEffect | None:
+    """Name wrong numbers of the vehicle where they are sure, matter, and nothing named accounts for them.
+
+    Parameters
+    ----------
+    found : Estimates
+    effects : sequence of NamedEffect
+        Already named.
+    share : float
+        Part of the gap of the model as given that refitting its numbers takes off.
+    pull : array, shape (parameter,)
+        Error of each number that noise in the motion can make: a noisy acceleration asks for less inertia.
+    """
+    pairs = zip(found.parameters, pull, strict=True)
+    wrong = [number for number, drawn in pairs if abs(number.value) > _PULLS * drawn and _told(number, effects)]
+    if not wrong or share < _LEAST_SHARE:
+        return None
+    p_value = min(2 * float(norm.sf(3.92 * abs(n.value) / (n.high - n.low))) if n.high > n.low else 0.0 for n in wrong)
+    name, sentence = VEHICLE_NUMBERS.name, VEHICLE_NUMBERS.sentence
+    return NamedEffect(name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, sentence)
+
+
+def impossible(numbers: Sequence[Estimate]) -> tuple[str, ...]:
+    """Say which numbers of the vehicle would have to be what no vehicle has: then the log is wrong, not the vehicle.
+
+    Parameters
+    ----------
+    numbers : sequence of Estimate
+        Relative errors.
+
+    Returns
+    -------
+    tuple of str
+        Sentences.
+    """
+    return tuple(
+        f"{NUMBERS[number.name]} would have to be {1 + number.value:.3g} times that of the config, which no vehicle"
+        " has: check signs, units and order of the gyroscope's and the rotors' columns"
+        for number in numbers
+        if number.name in NUMBERS and (number.high < number.plausible[0] or number.low > number.plausible[1])
+    )
+
+
+def _told(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
+    if number.name not in NUMBERS:
+        return False
+    half = 0.5 * (number.high - number.low)
+    sure = abs(number.value) > 1.5 * half and abs(number.value) > _MATTERS
+    return sure and abs(number.value) > _accounted(number.name, effects)
+
+
+def _accounted(name: str, effects: Sequence[NamedEffect]) -> float:
+    """Give the relative error that named effects leave in a number: they change it themselves."""
+    accounted = 0.0
+    for effect in effects:
+        accounts = CATALOGUE[effect.name].accounts
+        if accounts is not None:
+            accounted += accounts(name, {c.name: c.value for c in effect.coefficients})
+    return accounted
+
+
+def sensor_estimates(finding: AuditFinding, vehicle: VehicleSettings) -> tuple[Estimate, ...]:
+    """Give the named numbers of a fault."""
+    effect = CATALOGUE[finding.name]
+    assert effect.test is not None, "the audit tests what has a test"
+    by_label = dict(zip(effect.test.labels, effect.numbers, strict=True))
+    return tuple(
+        Estimate(known.name, known.unit, number.value, number.low, number.high, known.bounds(vehicle))
+        for number in finding.coefficients
+        if number.named and (known := by_label[number.name])
+    )
