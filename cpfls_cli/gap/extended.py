@@ -19,7 +19,7 @@ from cpfls_cli.gap.balance.inertial import InertiaModel, rotation_balance
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, actuated, columns_of, nuisance
 from cpfls_cli.gap.balance.windows import Recording, common_windows
-from cpfls_cli.gap.naming.estimate import Estimates, told_effect, weighted_estimates
+from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.naming.search import best_floor, block_index
@@ -134,8 +134,8 @@ class ExtendedModel:
         total = moved.wrench - signals.wrench
         for candidate, linear in self.effects:
             if candidate.effect.kind == "wrench":
-                own = linear if is_free(candidate) else np.ones(1)
-                total = total + instantaneous(columns_of(candidate, moved), own, signals.time)
+                coefficients = linear if is_free(candidate) else np.ones(1)
+                total = total + instantaneous(columns_of(candidate, moved), coefficients, signals.time)
         return np.asarray(total)
 
     def correction(self, signals: Signals) -> Array:
@@ -178,8 +178,8 @@ class ExtendedModel:
         signals : Signals
             With the faults of sensors taken out.
         """
-        left = instantaneous(columns_of(nuisance(), signals), coupling(self.parameters), signals.time)
-        torque = signals.wrench[:, :3] + self.effect_wrench(signals)[:, :3] + left[:, :3]
+        coupled = instantaneous(columns_of(nuisance(), signals), coupling(self.parameters), signals.time)
+        torque = signals.wrench[:, :3] + self.effect_wrench(signals)[:, :3] + coupled[:, :3]
         return ReplayModel(torque, self.inertia(signals))
 
     def inertial_torque(self, signals: Signals) -> Array:
@@ -263,7 +263,7 @@ def _require(signals: Signals, chosen: Sequence[Candidate], name: str) -> None:
 
 
 @dataclass(frozen=True)
-class Extension:
+class Refit:
     """A model with effects and how it does.
 
     Attributes
@@ -271,13 +271,13 @@ class Extension:
     model : ExtendedModel
     effects : tuple of NamedEffect
         With refitted numbers.
-    found : Estimates
+    estimates : Estimates
     unseen : HeldOut
     """
 
     model: ExtendedModel
     effects: tuple[NamedEffect, ...]
-    found: Estimates
+    estimates: Estimates
     unseen: HeldOut
 
 
@@ -288,7 +288,7 @@ def extend(
     audit: Audit,
     settings: GapSettings,
     base: InertiaModel | None,
-) -> Extension:
+) -> Refit:
     """Refit a model together with effects.
 
     Parameters
@@ -312,25 +312,25 @@ def extend(
     chosen = [effect.candidate for effect in effects if effect.candidate is not None]
     hypothesis = refined(flights, chosen, best_floor(system(flights, chosen)))
     floor = best_floor(hypothesis)
-    found = weighted_estimates(hypothesis, floor, block_index(hypothesis, settings))
-    left = hypothesis.residual - hypothesis.base @ found.linear
-    scatter = scatter_size(scatter_variance(hypothesis), left, floor)
-    unseen = judged_unseen(held, prepared, hypothesis, found.linear, scatter)
-    _require_smaller(unseen)
-    fitted = tuple(FittedEffect(*pair) for pair in zip(hypothesis.chosen, found.of_effect, strict=True))
-    width = len(found.linear) - sum(len(linear) for linear in found.of_effect)
-    model = ExtendedModel(base, found.linear[:width], fitted, audit)
-    return Extension(model, tuple(_renewed(effects, hypothesis, found)), found, unseen)
+    estimates = weighted_estimates(hypothesis, floor, block_index(hypothesis, settings))
+    residual = hypothesis.residual - hypothesis.base @ estimates.linear
+    scatter = scatter_size(scatter_variance(hypothesis), residual, floor)
+    held_out = judged_unseen(held, prepared, hypothesis, estimates.linear, scatter)
+    _require_smaller(held_out)
+    fitted = tuple(FittedEffect(*pair) for pair in zip(hypothesis.chosen, estimates.of_effect, strict=True))
+    width = len(estimates.linear) - sum(len(linear) for linear in estimates.of_effect)
+    model = ExtendedModel(base, estimates.linear[:width], fitted, audit)
+    return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, held_out)
 
 
-def _require_smaller(unseen: HeldOut) -> None:
-    before, after = unseen.size(unseen.before).floors, unseen.size(unseen.after).floors
-    moved = unseen.size(unseen.before - unseen.after).floors > _TOUCHED
+def _require_smaller(held_out: HeldOut) -> None:
+    before, after = held_out.size(held_out.before).floors, held_out.size(held_out.after).floors
+    moved = held_out.size(held_out.before - held_out.after).floors > _TOUCHED
     if not moved.any():
         raise ComputationError("not extended: what is named changes no channel of the held-out flights by its noise")
     if (after[moved] ** 2).sum() >= (before[moved] ** 2).sum():
-        grown = ", ".join(f"{CHANNELS[c]} {before[c]:.3g} -> {after[c]:.3g} floors" for c in np.flatnonzero(moved))
-        raise ComputationError(f"not extended: the gap on the held-out flights does not shrink: {grown}")
+        sizes = ", ".join(f"{CHANNELS[c]} {before[c]:.3g} -> {after[c]:.3g} floors" for c in np.flatnonzero(moved))
+        raise ComputationError(f"not extended: the gap on the held-out flights does not shrink: {sizes}")
 
 
 def worse_axes(before: Array, after: Array) -> list[int]:
@@ -343,10 +343,10 @@ def worse_axes(before: Array, after: Array) -> list[int]:
     return [int(c) for c in np.flatnonzero((before[:3] > _CLEAR) & (after[:3] > _WORSE * before[:3]))]
 
 
-def _renewed(effects: Sequence[NamedEffect], hypothesis: System, found: Estimates) -> list[NamedEffect]:
+def _renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Estimates) -> list[NamedEffect]:
     fitted = {
         candidate.effect.name: (candidate, linear, numbers)
-        for candidate, linear, numbers in zip(hypothesis.chosen, found.of_effect, found.effects, strict=True)
+        for candidate, linear, numbers in zip(hypothesis.chosen, estimates.of_effect, estimates.effects, strict=True)
     }
     renewed = []
     for effect in effects:
@@ -354,6 +354,6 @@ def _renewed(effects: Sequence[NamedEffect], hypothesis: System, found: Estimate
             renewed.append(effect)
             continue
         candidate, linear, numbers = fitted[effect.name]
-        told = told_effect(candidate.effect, numbers, hypothesis.flights[0].signals.vehicle)
-        renewed.append(replace(effect, candidate=candidate, linear=linear, coefficients=numbers, sentence=told))
+        sentence = effect_sentence(candidate.effect, numbers, hypothesis.flights[0].signals.vehicle)
+        renewed.append(replace(effect, candidate=candidate, linear=linear, coefficients=numbers, sentence=sentence))
     return renewed

@@ -56,11 +56,11 @@ class System:
     def residual(self) -> Array:
         """What inertia and rotors leave, without the effects of unit coefficient; shape (window, 6)."""
         pairs = zip(self.flights, self.signals, strict=True)
-        left = np.concatenate([flight.averaged(flight.residual(signals)) for flight, signals in pairs])
+        residual = np.concatenate([flight.averaged(flight.residual(signals)) for flight, signals in pairs])
         for candidate in self.chosen:
             if candidate.effect.kind == "wrench" and candidate.effect.unit_coefficient:
-                left = left - self.columns(candidate)[..., 0]
-        return left
+                residual = residual - self.columns(candidate)[..., 0]
+        return residual
 
     @cached_property
     def base(self) -> Array:
@@ -151,26 +151,29 @@ def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
         Of shape (time, 6).
     """
     flight, signals = hypothesis.flights[number], hypothesis.signals[number]
-    left = flight.residual(signals)
-    direct, momentum = left.direct, left.momentum
+    residual = flight.residual(signals)
+    direct, momentum = residual.direct, residual.momentum
     assert momentum is not None
     used = 0
     for candidate in hypothesis.free:
         width = hypothesis.columns(candidate).shape[2]
-        own = coefficients[used : used + width]
+        linear = coefficients[used : used + width]
         used += width
-        direct, momentum = _less(direct, momentum, candidate, own, signals)
+        direct, momentum = _less(direct, momentum, candidate, linear, signals)
     for candidate in hypothesis.chosen:
         if candidate.effect.kind == "wrench" and candidate.effect.unit_coefficient:
             direct, momentum = _less(direct, momentum, candidate, np.ones(1), signals)
     return Columns(direct * flight.known, momentum * flight.known)
 
 
-def _less(direct: Array, momentum: Array, candidate, own: Array, signals) -> tuple[Array, Array]:  # type: ignore[no-untyped-def] # noqa: ANN001
+def _less(direct: Array, momentum: Array, candidate: Candidate, linear: Array, signals: Signals) -> tuple[Array, Array]:
+    """Subtract what a candidate does with its coefficients."""
     if candidate.effect.missing(signals):
         return direct, momentum
     columns = columns_of(candidate, signals)
-    return direct - columns.direct @ own, momentum if columns.momentum is None else momentum - columns.momentum @ own
+    if columns.momentum is not None:
+        momentum = momentum - columns.momentum @ linear
+    return direct - columns.direct @ linear, momentum
 
 
 def _activity(hypothesis: System) -> Array:

@@ -45,8 +45,8 @@ def noise_floor(residual: Columns, windows: Windows) -> Array:
     frequencies = np.linspace(lowest, max(_HIGHEST_OF_RATE / windows.period, 1.5 * lowest), _FREQUENCIES)
     power = np.array([_power(residual, longer, frequency) for frequency in frequencies]) / _energy(longer)
     terms = np.array([_terms(longer, frequency) for frequency in frequencies])
-    own = _terms(windows, 0.0) * _energy(windows)
-    return np.array([_extrapolated(terms, channel, own) for channel in power.T])
+    window_terms = _terms(windows, 0.0) * _energy(windows)
+    return np.array([_extrapolated(terms, channel, window_terms) for channel in power.T])
 
 
 def _terms(windows: Windows, centre: float) -> Array:
@@ -71,7 +71,7 @@ def _energy(windows: Windows) -> float:
     return float((windows.weight**2).sum())
 
 
-def _extrapolated(terms: Array, power: Array, own: Array) -> float:
+def _extrapolated(terms: Array, power: Array, window_terms: Array) -> float:
     """Fit a flat and a rising spectrum, each of one colour; white ones unless others fit clearly better."""
     if not power.min() > 0:
         return 0.0
@@ -81,7 +81,7 @@ def _extrapolated(terms: Array, power: Array, own: Array) -> float:
     fits = [nnls(relative[:, pair], np.ones(len(power))) for pair in pairs]
     best = int(np.argmin([misfit for _, misfit in fits]))
     chosen = 0 if fits[0][1] ** 2 <= _CLEARLY_BETTER * fits[best][1] ** 2 else best
-    return float(np.sqrt(fits[chosen][0] @ own[list(pairs[chosen])]))
+    return float(np.sqrt(fits[chosen][0] @ window_terms[list(pairs[chosen])]))
 
 
 def _power(residual: Columns, windows: Windows, frequency: float) -> Array:

@@ -30,13 +30,13 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     floor : array, shape (6,)
     """
     best = list(chosen)
-    told = system(flights).rotor_wrench
-    shapes = [(place, shape) for place, candidate in enumerate(best) for shape in candidate.effect.shapes]
-    newest = [(place, shape) for place, shape in shapes if place == len(best) - 1]
+    rotor_wrench = system(flights).rotor_wrench
+    shapes = [(index, shape) for index, candidate in enumerate(best) for shape in candidate.effect.shapes]
+    newest = [(index, shape) for index, shape in shapes if index == len(best) - 1]
     # A second round where there are several: the best length of a cable depends on its damping.
-    for place, shape in newest * min(len(newest), 2):
-        best[place] = _improved(flights, best, place, shape, floor, told)
-    return system(flights, _together(flights, best, shapes, floor, told) if len(shapes) > 1 else best)
+    for index, shape in newest * min(len(newest), 2):
+        best[index] = _improved(flights, best, index, shape, floor, rotor_wrench)
+    return system(flights, _together(flights, best, shapes, floor, rotor_wrench) if len(shapes) > 1 else best)
 
 
 def fit(hypothesis: System, floor: Array) -> Array:
@@ -58,52 +58,52 @@ def fit(hypothesis: System, floor: Array) -> Array:
     return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale)
 
 
-def left(hypothesis: System, floor: Array, told: Array) -> Array:
+def weighted_residual(hypothesis: System, floor: Array, rotor_wrench: Array) -> Array:
     """Compute what a hypothesis leaves after its fit, in floors, as if its rotors gave as much torque as told.
 
     Parameters
     ----------
     hypothesis : System
     floor : array, shape (6,)
-    told : array, shape (window, 6), N m and N
+    rotor_wrench : array, shape (window, 6), N m and N
         Wrench of the rotors without effects on the actuation.
 
     Returns
     -------
     array, shape (window, 6)
     """
-    weight = compensation(told, hypothesis.rotor_wrench) / floor
+    weight = compensation(rotor_wrench, hypothesis.rotor_wrench) / floor
     return np.asarray((hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)) * weight)
 
 
 def _improved(
     flights: Sequence[WeakFlight],
     chosen: Sequence[Candidate],
-    place: int,
+    index: int,
     shape: Shape,
     floor: Array,
-    told: Array,
+    rotor_wrench: Array,
 ) -> Candidate:
-    candidate = chosen[place]
+    candidate = chosen[index]
 
     def moved(value: float) -> Candidate:
         return Candidate(candidate.effect, {**candidate.shape, shape.name: float(value)})
 
     def error(value: float) -> float:
-        hypothesis = system(flights, [*chosen[:place], moved(value), *chosen[place + 1 :]])
-        return float((left(hypothesis, floor, told) ** 2).sum())
+        hypothesis = system(flights, [*chosen[:index], moved(value), *chosen[index + 1 :]])
+        return float((weighted_residual(hypothesis, floor, rotor_wrench) ** 2).sum())
 
     bracket = _bracket(shape.grid, candidate.shape[shape.name])
-    found = minimize_scalar(
+    optimum = minimize_scalar(
         error, bounds=bracket, method="bounded", options={"maxiter": _EVALUATIONS, "xatol": 1e-3 * np.ptp(bracket)}
     )
-    return moved(found.x)
+    return moved(optimum.x)
 
 
 def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
     """Find the neighbours of a value on its grid."""
-    place = int(np.argmin(np.abs(np.asarray(grid) - value)))
-    return float(grid[max(0, place - 1)]), float(grid[min(len(grid) - 1, place + 1)])
+    nearest = int(np.argmin(np.abs(np.asarray(grid) - value)))
+    return float(grid[max(0, nearest - 1)]), float(grid[min(len(grid) - 1, nearest + 1)])
 
 
 def _together(
@@ -111,22 +111,22 @@ def _together(
     chosen: list[Candidate],
     shapes: list[tuple[int, Shape]],
     floor: Array,
-    told: Array,
+    rotor_wrench: Array,
 ) -> list[Candidate]:
     low = np.array([shape.grid[0] for _, shape in shapes])
     high = np.array([shape.grid[-1] for _, shape in shapes])
-    start = np.array([chosen[place].shape[shape.name] for place, shape in shapes])
+    start = np.array([chosen[index].shape[shape.name] for index, shape in shapes])
 
     def moved(values: Array) -> list[Candidate]:
         there = list(chosen)
-        for (place, shape), value in zip(shapes, low + values * (high - low), strict=True):
-            there[place] = Candidate(there[place].effect, {**there[place].shape, shape.name: float(value)})
+        for (index, shape), value in zip(shapes, low + values * (high - low), strict=True):
+            there[index] = Candidate(there[index].effect, {**there[index].shape, shape.name: float(value)})
         return there
 
     def error(values: Array) -> Array:
-        return left(system(flights, moved(values)), floor, told).reshape(-1)
+        return weighted_residual(system(flights, moved(values)), floor, rotor_wrench).reshape(-1)
 
-    found = least_squares(
+    optimum = least_squares(
         error,
         np.clip((start - low) / (high - low), 1e-6, 1 - 1e-6),
         bounds=(0.0, 1.0),
@@ -135,7 +135,7 @@ def _together(
         xtol=1e-4,
         ftol=1e-5,
     )
-    return moved(found.x)
+    return moved(optimum.x)
 
 
 def free_shapes(hypothesis: System) -> list[tuple[Candidate, str]]:
@@ -163,11 +163,11 @@ def shape_columns(hypothesis: System, linear: Array) -> Array:
     """
     shapes = free_shapes(hypothesis)
     columns = np.zeros((*hypothesis.residual.shape, len(shapes)))
-    for place, (candidate, name) in enumerate(shapes):
+    for number, (candidate, name) in enumerate(shapes):
         value = candidate.shape[name]
         step = _STEP * (abs(value) or 1.0)
         ahead, behind = (_residual_at(hypothesis, linear, candidate, name, value + s) for s in (step, -step))
-        columns[..., place] = (behind - ahead) / (2 * step)
+        columns[..., number] = (behind - ahead) / (2 * step)
     return columns
 
 

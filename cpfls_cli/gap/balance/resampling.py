@@ -137,8 +137,8 @@ def folds(columns: Array, right: Array, block: IntArray, prior: Array | None = N
         None for nothing known.
     """
     draws = right.reshape(*right.shape[:2], -1)
-    own = [block == b for b in range(int(block.max()) + 1)]
-    parts = [(columns[rows].swapaxes(0, 1), draws[rows].swapaxes(0, 1)) for rows in own]
+    in_block = [block == b for b in range(int(block.max()) + 1)]
+    parts = [(columns[rows].swapaxes(0, 1), draws[rows].swapaxes(0, 1)) for rows in in_block]
     return Folds(
         np.array([x.swapaxes(1, 2) @ x for x, _ in parts]),
         np.array([x.swapaxes(1, 2) @ y for x, y in parts]),
@@ -169,10 +169,10 @@ def blocks_of(flight_index: IntArray, centres: Array, block_s: float) -> IntArra
     block = np.zeros(len(centres), dtype=int)
     first = 0
     for flight, span in zip(np.unique(flight_index), spans, strict=True):
-        own = flight_index == flight
+        in_flight = flight_index == flight
         number = max(1, round(span / length))
-        order = np.arange(own.sum()) * number // max(1, own.sum())
-        block[own] = first + order
+        order = np.arange(in_flight.sum()) * number // max(1, in_flight.sum())
+        block[in_flight] = first + order
         first += number
     return block
 
@@ -198,8 +198,8 @@ def about_flight_mean(values: Array, flight_index: IntArray) -> Array:
     -------
     array, shape (window, ...)
     """
-    flights, own = np.unique(flight_index, return_inverse=True)
-    return np.asarray(values - np.array([values[own == f].mean(axis=0) for f in range(len(flights))])[own])
+    flights, number = np.unique(flight_index, return_inverse=True)
+    return np.asarray(values - np.array([values[number == f].mean(axis=0) for f in range(len(flights))])[number])
 
 
 def mirror_shifted(residual: Array, flight_index: IntArray, shifts: int, rng: np.random.Generator) -> Array:
@@ -223,11 +223,11 @@ def mirror_shifted(residual: Array, flight_index: IntArray, shifts: int, rng: np
     """
     draws = np.zeros((*residual.shape, shifts))
     for flight in np.unique(flight_index):
-        own = np.flatnonzero(flight_index == flight)
-        circle = np.concatenate([residual[own], residual[own][::-1]])
-        least = max(1, len(own) // _LEAST_SHARE)
+        indices = np.flatnonzero(flight_index == flight)
+        circle = np.concatenate([residual[indices], residual[indices][::-1]])
+        least = max(1, len(indices) // _LEAST_SHARE)
         offsets = rng.integers(least, max(least + 1, len(circle) - least + 1), size=shifts)
-        places = (np.arange(len(own))[:, None] - offsets) % len(circle)
-        rows = np.moveaxis(circle[places], 1, 2) * rng.choice([-1.0, 1.0], size=shifts)
-        draws[own] = rows - rows.mean(axis=0)
+        sources = (np.arange(len(indices))[:, None] - offsets) % len(circle)
+        rows = np.moveaxis(circle[sources], 1, 2) * rng.choice([-1.0, 1.0], size=shifts)
+        draws[indices] = rows - rows.mean(axis=0)
     return draws

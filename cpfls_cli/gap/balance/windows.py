@@ -150,11 +150,11 @@ def common_windows(recordings: Sequence[Recording], settings: GapSettings) -> Wi
         raise InputError(
             f"gap.window_s = {settings.window_s:g}: longer than {shortest.name}, {len(shortest.signals) * period:.3g} s"
         )
-    own = windows(period, settings.window_s, settings.overlap)
+    shared = windows(period, settings.window_s, settings.overlap)
     for recording in recordings:
-        if own.count(len(recording.signals)) < _FEWEST_WINDOWS:
+        if shared.count(len(recording.signals)) < _FEWEST_WINDOWS:
             raise InputError(
                 f"{recording.name}: {len(recording.signals) * period:.3g} s are too short; "
                 f"{_FEWEST_WINDOWS} windows of gap.window_s = {settings.window_s:g} s are needed"
             )
-    return own
+    return shared

@@ -14,10 +14,10 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.estimate import Estimates, told_effect
+from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import Step, alternatives, look
+from cpfls_cli.gap.naming.search import SearchStep, alternatives, rank_effects
 from cpfls_cli.gap.sensors.findings import AuditFinding
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -32,7 +32,7 @@ _PULLS = 2.0
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedEffect:
     """A chosen effect and its rivals."""
 
     effect: NamedEffect
@@ -42,59 +42,59 @@ class Judged:
 def judge_effect(
     flights: Sequence[WeakFlight],
     chosen: Sequence[Candidate],
-    place: int,
-    found: Estimates,
+    index: int,
+    estimates: Estimates,
     share: float,
     effects: Sequence[Effect],
     settings: GapSettings,
     rng: np.random.Generator,
-) -> Judged:
+) -> JudgedEffect:
     """Judge a chosen effect as if it were the last one to be found.
 
     Parameters
     ----------
     flights : sequence of WeakFlight
     chosen : sequence of Candidate
-    place : int
+    index : int
         Of the effect among them.
-    found : Estimates
+    estimates : Estimates
     share : float
         Of what all effects explain.
     effects : sequence of Effect
     settings : GapSettings
     rng : numpy.random.Generator
     """
-    candidate = chosen[place]
+    candidate = chosen[index]
     others = [other for other in chosen if other is not candidate]
-    step = look(flights, others, effects, settings, rng, also=(candidate,))
-    own = next(scored for scored in step.ranking if scored.candidate.effect.name == candidate.effect.name)
+    step = rank_effects(flights, others, effects, settings, rng, also=(candidate,))
+    scored = next(scored for scored in step.ranking if scored.candidate.effect.name == candidate.effect.name)
     effect = NamedEffect(
         candidate.effect.name,
         candidate,
-        found.of_effect[place],
-        found.effects[place],
-        step.p_value(own.gain),
+        estimates.of_effect[index],
+        estimates.effects[index],
+        step.p_value(scored.gain),
         share,
-        _frequency(own, step),
-        told_effect(candidate.effect, found.effects[place], flights[0].signals.vehicle),
+        _frequency(scored, step),
+        effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
     )
-    return Judged(effect, tuple(alternatives(own, step.ranking, step.above_floor)))
+    return JudgedEffect(effect, tuple(alternatives(scored, step.ranking, step.above_floor)))
 
 
-def _frequency(own: Scored, step: Step) -> float:
+def _frequency(chosen: Scored, step: SearchStep) -> float:
     """Give the share of the blocks without which the effect would still explain most."""
     total = np.array([scored.block_error.sum() - scored.block_error for scored in step.ranking if _real(scored)])
     names = [scored.candidate.effect.name for scored in step.ranking if _real(scored)]
-    if own.candidate.effect.name not in names:
+    if chosen.candidate.effect.name not in names:
         return 0.0
-    return float(np.mean(np.argmin(total, axis=0) == names.index(own.candidate.effect.name)))
+    return float(np.mean(np.argmin(total, axis=0) == names.index(chosen.candidate.effect.name)))
 
 
 def _real(scored: Scored) -> bool:
     return bool(np.isfinite(scored.gain))
 
 
-def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], found: Estimates, floor: Array) -> Array:
+def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, floor: Array) -> Array:
     """Split what the effects explain among them.
 
     The share of an effect is the part of the explained residual that points its way, in floors; the shares add up to
@@ -104,7 +104,7 @@ def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], found: Es
     ----------
     flights : sequence of WeakFlight
     chosen : sequence of Candidate
-    found : Estimates
+    estimates : Estimates
         Of the hypothesis with all of them.
     floor : array, shape (6,)
 
@@ -112,32 +112,34 @@ def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], found: Es
     -------
     array, shape (effect,)
     """
-    everything = _left(flights, chosen, found, range(len(chosen)))
-    total = (_left(flights, chosen, found, ()) - everything) / floor
+    everything = _remaining(flights, chosen, estimates, range(len(chosen)))
+    total = (_remaining(flights, chosen, estimates, ()) - everything) / floor
     parts = [
-        (_left(flights, chosen, found, [p for p in range(len(chosen)) if p != place]) - everything) / floor
-        for place in range(len(chosen))
+        (_remaining(flights, chosen, estimates, [p for p in range(len(chosen)) if p != index]) - everything) / floor
+        for index in range(len(chosen))
     ]
     along = np.array([(part * total).sum() for part in parts])
     return np.asarray(along / max(abs(along.sum()), 1e-12) if len(along) else along)
 
 
-def _left(
-    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], found: Estimates, kept: Sequence[int] | range
+def _remaining(
+    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, kept: Sequence[int] | range
 ) -> Array:
     """Give what some of the effects leave, with the coefficients of all of them."""
-    there = system(flights, [chosen[place] for place in kept])
-    parameters = found.linear[: len(found.linear) - sum(len(own) for own in found.of_effect)]
-    own = [found.of_effect[place] for place in kept if is_free(chosen[place])]
-    return np.asarray(there.residual - there.base @ np.concatenate([parameters, *own]))
+    hypothesis = system(flights, [chosen[index] for index in kept])
+    parameters = estimates.linear[: len(estimates.linear) - sum(len(linear) for linear in estimates.of_effect)]
+    linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
+    return np.asarray(hypothesis.residual - hypothesis.base @ np.concatenate([parameters, *linear]))
 
 
-def wrong_numbers(found: Estimates, effects: Sequence[NamedEffect], share: float, pull: Array) -> NamedEffect | None:
+def wrong_numbers(
+    estimates: Estimates, effects: Sequence[NamedEffect], share: float, pull: Array
+) -> NamedEffect | None:
     """Name wrong numbers of the vehicle where they are sure, matter, and nothing named accounts for them.
 
     Parameters
     ----------
-    found : Estimates
+    estimates : Estimates
     effects : sequence of NamedEffect
         Already named.
     share : float
@@ -145,8 +147,8 @@ def wrong_numbers(found: Estimates, effects: Sequence[NamedEffect], share: float
     pull : array, shape (parameter,)
         Error of each number that noise in the motion can make: a noisy acceleration asks for less inertia.
     """
-    pairs = zip(found.parameters, pull, strict=True)
-    wrong = [number for number, drawn in pairs if abs(number.value) > _PULLS * drawn and _told(number, effects)]
+    pairs = zip(estimates.parameters, pull, strict=True)
+    wrong = [number for number, drawn in pairs if abs(number.value) > _PULLS * drawn and _is_wrong(number, effects)]
     if not wrong or share < _LEAST_SHARE:
         return None
     p_value = min(2 * float(norm.sf(3.92 * abs(n.value) / (n.high - n.low))) if n.high > n.low else 0.0 for n in wrong)
@@ -175,7 +177,7 @@ def impossible(numbers: Sequence[Estimate]) -> tuple[str, ...]:
     )
 
 
-def _told(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
+def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
     if number.name not in NUMBERS:
         return False
     half = 0.5 * (number.high - number.low)

@@ -63,17 +63,18 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     jacobian = np.concatenate([hypothesis.base, shape_columns(hypothesis, linear)], axis=2)
     rows = (jacobian / weight[:, None], (hypothesis.residual - hypothesis.base @ linear) / weight)
     left_out = values + _one_step(*rows, block)
-    found, own_linear, first = [], [], hypothesis.columns(hypothesis.free[0]).shape[2]
+    by_effect, linear_by_effect, first = [], [], hypothesis.columns(hypothesis.free[0]).shape[2]
     parameters = _of(hypothesis.free[0], hypothesis, values[:first], left_out[:, :first], np.zeros(0), left_out[:, :0])
-    place, shape_place = first, len(linear)
+    column, shape_column = first, len(linear)
     for candidate in hypothesis.chosen:
         width = hypothesis.columns(candidate).shape[2] if is_free(candidate) else 0
         depth = len(candidate.effect.shapes)
-        own, shaped = slice(place, place + width), slice(shape_place, shape_place + depth)
-        found.append(_of(candidate, hypothesis, values[own], left_out[:, own], values[shaped], left_out[:, shaped]))
-        own_linear.append(linear[own])
-        place, shape_place = place + width, shape_place + depth
-    return Estimates(linear, tuple(found), parameters, tuple(own_linear))
+        linear_at, shape_at = slice(column, column + width), slice(shape_column, shape_column + depth)
+        numbers = (values[linear_at], left_out[:, linear_at], values[shape_at], left_out[:, shape_at])
+        by_effect.append(_of(candidate, hypothesis, *numbers))
+        linear_by_effect.append(linear[linear_at])
+        column, shape_column = column + width, shape_column + depth
+    return Estimates(linear, tuple(by_effect), parameters, tuple(linear_by_effect))
 
 
 def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
@@ -85,8 +86,8 @@ def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Est
     floor : array, shape (6,)
     block : array of int, shape (window,)
     """
-    left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-    return estimates(hypothesis, np.maximum(floor, np.sqrt(np.mean(left**2, axis=0))), block)
+    residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+    return estimates(hypothesis, np.maximum(floor, np.sqrt(np.mean(residual**2, axis=0))), block)
 
 
 def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
@@ -152,7 +153,7 @@ def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:
     return np.asarray(change / np.where(scale > 0, scale, 1.0))
 
 
-def told_effect(effect: Effect, numbers: Sequence[Estimate], vehicle: VehicleSettings) -> str:
+def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: VehicleSettings) -> str:
     """Say what a pilot understands of an effect as it was found.
 
     Parameters

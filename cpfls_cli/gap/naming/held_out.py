@@ -130,8 +130,8 @@ def share_removed(before: Array, after: Array, known: Array) -> float:
         0 where nothing is gained.
     """
     gone = float(((before**2 - after**2) * known).sum())
-    left = _above(after, known)
-    return max(0.0, gone / (gone + left)) if gone > 0 else 0.0
+    remaining = _above(after, known)
+    return max(0.0, gone / (gone + remaining)) if gone > 0 else 0.0
 
 
 def _above(residual: Array, known: Array) -> float:

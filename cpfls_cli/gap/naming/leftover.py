@@ -83,10 +83,10 @@ def leftover(
     settings : GapSettings
     rng : numpy.random.Generator
     """
-    left = hypothesis.residual - hypothesis.base @ linear
+    residual = hypothesis.residual - hypothesis.base @ linear
     variance = scatter_variance(hypothesis)
-    scatter = scatter_size(variance, left, floor)
-    in_floors = left / np.sqrt(floor**2 + scatter * variance)
+    scatter = scatter_size(variance, residual, floor)
+    in_floors = residual / np.sqrt(floor**2 + scatter * variance)
     sizes = np.sqrt(np.mean(in_floors**2, axis=0))
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
     dependence = rank_dependence(
@@ -95,24 +95,24 @@ def leftover(
     band = _band(hypothesis, linear, settings, rng)
     rates = np.concatenate([flight.windows.average(flight.signals.body_rate) for flight in hypothesis.flights])
     # A force turns nothing.
-    energy = [*energy_words(left[:, :3], rates, block), *["neither"] * 3]
+    directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
     unexplained = [
-        _unexplained(channel, float(size), dependence, band, own, settings)
-        for channel, size, own in zip(CHANNELS, sizes, energy, strict=True)
+        _unexplained(channel, float(size), dependence, band, direction, settings)
+        for channel, size, direction in zip(CHANNELS, sizes, directions, strict=True)
         if size > _SMALL
     ]
-    return Leftover(sizes, dependence, scatter, tuple(found for found in unexplained if found is not None))
+    return Leftover(sizes, dependence, scatter, tuple(entry for entry in unexplained if entry is not None))
 
 
 def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:
     """Look for a narrow band, with windows close enough that none is mistaken for another."""
     rows, rates = [], []
     for number, flight in enumerate(hypothesis.flights):
-        own = flight.windows
-        dense = replace(own, hop=max(1, len(own.weight) // _PER_WINDOW))
-        left = left_over(hypothesis, number, linear)
-        direct = dense.average(left.direct)
-        rows.append(direct if left.momentum is None else direct + dense.derivative(left.momentum))
+        windows = flight.windows
+        dense = replace(windows, hop=max(1, len(windows.weight) // _PER_WINDOW))
+        remainder = left_over(hypothesis, number, linear)
+        direct = dense.average(remainder.direct)
+        rows.append(direct if remainder.momentum is None else direct + dense.derivative(remainder.momentum))
         rates.append(dense.average(flight.signals.body_rate))
     hop = max(1, len(hypothesis.flights[0].windows.weight) // _PER_WINDOW) * hypothesis.flights[0].windows.period
     return narrow_band(rows, rates, hop, settings.shifts, rng)
@@ -143,7 +143,7 @@ def _unexplained(
     )
 
 
-def energy_words(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
+def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
     """Tell which way the power ``M omega`` goes about each axis, beyond the scatter over blocks.
 
     Parameters
@@ -178,8 +178,8 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
     """
     # The vehicle's own numbers are free in every fit, so beyond themselves they never show.
     names = {candidate.effect.name for candidate in hypothesis.free} | {c.effect.name for c in hypothesis.chosen}
-    found = ((effect.name, _reason(hypothesis, effect, floor)) for effect in effects if effect.name not in names)
-    return tuple(NotExcited(name, reason) for name, reason in found if reason)
+    reasons = ((effect.name, _reason(hypothesis, effect, floor)) for effect in effects if effect.name not in names)
+    return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
 
 
 def look_alikes(hypothesis: System, named: Sequence[NamedEffect]) -> tuple[str, ...]:
@@ -235,7 +235,7 @@ def _usual(hypothesis: System, effect: Effect, width: int) -> Array:
 
 
 def _beyond_base(base: Array, columns: Array) -> Array:
-    flat, own = base.reshape(-1, base.shape[2]), columns.reshape(-1, columns.shape[2])
+    flat, tested = base.reshape(-1, base.shape[2]), columns.reshape(-1, columns.shape[2])
     length = np.linalg.norm(flat, axis=0)
     scaled = flat / np.where(length > 0, length, 1.0)
-    return np.asarray((own - scaled @ np.linalg.lstsq(scaled, own, rcond=1e-9)[0]).reshape(columns.shape))
+    return np.asarray((tested - scaled @ np.linalg.lstsq(scaled, tested, rcond=1e-9)[0]).reshape(columns.shape))

@@ -28,7 +28,7 @@ _MAIN = 0.1
 """Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
 
 
-class Verdict(StrEnum):
+class GapVerdict(StrEnum):
     """What is known of a gap."""
 
     NAMED = "NAMED"
@@ -169,7 +169,7 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict : Verdict
+    verdict : GapVerdict
     effects : tuple of NamedEffect
     closest : tuple of NamedEffect
         What explained most where the verdict names nothing.
@@ -193,7 +193,7 @@ class Diagnosis:
         Numbers of the vehicle that would have to be what no vehicle has, in sentences: the log is wrong.
     """
 
-    verdict: Verdict
+    verdict: GapVerdict
     effects: tuple[NamedEffect, ...]
     closest: tuple[NamedEffect, ...]
     alternatives: tuple[Alternative, ...]
@@ -218,7 +218,7 @@ def verdict_of(
     stays: bool,
     excited: bool,
     settings: GapSettings,
-) -> Verdict:
+) -> GapVerdict:
     """Give the verdict.
 
     Parameters
@@ -237,14 +237,14 @@ def verdict_of(
     """
     if not effects:
         if unexplained:
-            return Verdict.UNEXPLAINED
-        return Verdict.NO_GAP if excited else Verdict.NOT_EXCITED
+            return GapVerdict.UNEXPLAINED
+        return GapVerdict.NO_GAP if excited else GapVerdict.NOT_EXCITED
     if share < settings.partial_share:
-        return Verdict.UNEXPLAINED
+        return GapVerdict.UNEXPLAINED
     if share < settings.named_share or unexplained or stays:
-        return Verdict.PARTIAL
+        return GapVerdict.PARTIAL
     main = {effect.name for effect in effects if effect.share >= _MAIN}
-    return Verdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else Verdict.NAMED
+    return GapVerdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else GapVerdict.NAMED
 
 
 def gap_stays(before: Array, after: Array) -> bool:
@@ -258,22 +258,22 @@ def gap_stays(before: Array, after: Array) -> bool:
     return any(_stays(before[kind], after[kind]) for kind in (slice(0, 3), slice(3, 6)))
 
 
-def _stays(own: Array, left: Array) -> bool:
-    clear = (own > _CLEAR) & (own**2 > _PART * np.nanmax(own, initial=0.0) ** 2)
-    large = (left > _LARGE) & (left > _REST * own)
-    return bool((clear & ((left > _STAYS * own) | large)).any())
+def _stays(before: Array, after: Array) -> bool:
+    clear = (before > _CLEAR) & (before**2 > _PART * np.nanmax(before, initial=0.0) ** 2)
+    large = (after > _LARGE) & (after > _REST * before)
+    return bool((clear & ((after > _STAYS * before) | large)).any())
 
 
-def matters(left: Unexplained, before: Array) -> bool:
+def matters(unexplained: Unexplained, before: Array) -> bool:
     """Tell whether what is left beside named effects shows a second cause that is not small.
 
     Parameters
     ----------
-    left : Unexplained
+    unexplained : Unexplained
     before : array, shape (6,), floors
         The gap of each channel without effects.
     """
-    follows = left.signal is not None or left.frequency_hz is not None
-    kind = slice(0, 3) if left.axis.startswith("torque") else slice(3, 6)
+    follows = unexplained.signal is not None or unexplained.frequency_hz is not None
+    kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)
     largest = float(np.nanmax(before[kind] ** 2, initial=1.0))
-    return follows and left.share * left.floors**2 > _SECOND_CAUSE * largest
+    return follows and unexplained.share * unexplained.floors**2 > _SECOND_CAUSE * largest

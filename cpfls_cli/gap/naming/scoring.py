@@ -45,7 +45,7 @@ class Scored:
     coefficients: Array
 
 
-class Place(NamedTuple):
+class PlacedCandidate(NamedTuple):
     """Where a candidate stands in a layout.
 
     Attributes
@@ -70,14 +70,14 @@ class Layout:
     matrix : array, shape (window, 6, column)
         Weighted.
     base : array of int
-    candidates : tuple of Place
+    candidates : tuple of PlacedCandidate
     prior : array, shape (column,)
         What bounds say of the coefficients before any data.
     """
 
     matrix: Array
     base: IntArray
-    candidates: tuple[Place, ...]
+    candidates: tuple[PlacedCandidate, ...]
     prior: Array
 
 
@@ -104,22 +104,23 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
     """
     moving = shape_columns(hypothesis, fit(hypothesis, floor))
     parts: list[Array] = [hypothesis.base, moving]
-    places: list[Place] = []
+    placed: list[PlacedCandidate] = []
     first = hypothesis.base.shape[2] + moving.shape[2]
     base = np.arange(first)
     for candidate in candidates:
         columns = primary(candidate, hypothesis.columns(candidate))
         parts.append(columns)
-        places.append(Place(candidate, np.arange(first, first + columns.shape[2]), _weight(hypothesis, candidate)))
+        indices = np.arange(first, first + columns.shape[2])
+        placed.append(PlacedCandidate(candidate, indices, _weight(hypothesis, candidate)))
         first += columns.shape[2]
     widths = [(each, hypothesis.columns(each).shape[2]) for each in hypothesis.free]
-    widths += [(place.candidate, len(place.columns)) for place in places]
+    widths += [(one.candidate, len(one.columns)) for one in placed]
     vehicle = hypothesis.flights[0].signals.vehicle
     known = [information(each.effect, width, vehicle) for each, width in widths]
     free, offered = known[: len(hypothesis.free)], known[len(hypothesis.free) :]
     shapes = np.array([1.0 / np.ptp(_grid(each, name)) ** 2 for each, name in free_shapes(hypothesis)])
     prior = np.concatenate([*free, shapes, *offered])
-    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(places), prior)
+    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(placed), prior)
 
 
 def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
@@ -159,8 +160,8 @@ def score(arranged: Layout, normal: Folds, hypothesis: System) -> list[Scored]:
     """
     _, before = normal.solve(arranged.base)
     vehicle = hypothesis.flights[0].signals.vehicle
-    scored = [_scored(place, arranged.base, normal, before[:, 0], vehicle) for place in arranged.candidates]
-    return sorted(scored, key=lambda found: -found.gain)
+    scored = [_scored(placed, arranged.base, normal, before[:, 0], vehicle) for placed in arranged.candidates]
+    return sorted(scored, key=lambda candidate: -candidate.gain)
 
 
 def chance(arranged: Layout, normal: Folds) -> Array:
@@ -180,8 +181,8 @@ def chance(arranged: Layout, normal: Folds) -> Array:
     """
     _, before = normal.solve(arranged.base)
     best = np.full(before.shape[1], -np.inf)
-    for place in arranged.candidates:
-        best = np.maximum(best, (before - _error(place, place.columns, arranged.base, normal)).sum(axis=0))
+    for placed in arranged.candidates:
+        best = np.maximum(best, (before - _error(placed, placed.columns, arranged.base, normal)).sum(axis=0))
     return best
 
 
@@ -202,22 +203,22 @@ def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArr
 def _weight(hypothesis: System, candidate: Candidate) -> Array:
     if candidate.effect.kind != "actuator":
         return np.ones(6)
-    told = hypothesis.rotor_wrench
-    return compensation(told, told + hypothesis.columns(candidate)[..., 0])
+    rotor_wrench = hypothesis.rotor_wrench
+    return compensation(rotor_wrench, rotor_wrench + hypothesis.columns(candidate)[..., 0])
 
 
-def _error(place: Place, columns: IntArray, base: IntArray, normal: Folds) -> Array:
-    if place.candidate.effect.unit_coefficient:
-        return normal.subtracted(int(columns[0]), base, place.weight).solve(np.arange(len(base)))[1]
+def _error(placed: PlacedCandidate, columns: IntArray, base: IntArray, normal: Folds) -> Array:
+    if placed.candidate.effect.unit_coefficient:
+        return normal.subtracted(int(columns[0]), base, placed.weight).solve(np.arange(len(base)))[1]
     return normal.solve(np.concatenate([base, columns]))[1]
 
 
-def _scored(place: Place, base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings) -> Scored:
-    candidate, columns, _ = place
+def _scored(placed: PlacedCandidate, base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings) -> Scored:
+    candidate, columns, _ = placed
     if len(columns) == 0:
         return Scored(candidate, columns, REFUSED, before, np.zeros(0))
     if candidate.effect.unit_coefficient:
-        error = _error(place, columns, base, normal)[:, 0]
+        error = _error(placed, columns, base, normal)[:, 0]
         return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
     for _ in range(len(columns)):
@@ -231,7 +232,7 @@ def _scored(place: Place, base: IntArray, normal: Folds, before: Array, vehicle:
             break
         kept &= keep
     used = columns[kept]
-    error = _error(place, used, base, normal)[:, 0]
+    error = _error(placed, used, base, normal)[:, 0]
     return Scored(candidate, used, float((before - error).sum()), error, fitted)
 
 

@@ -84,35 +84,35 @@ def rank_dependence(
     """
     shifted = mirror_shifted(residual, flight_index, shifts, rng)
     draws = np.concatenate([about_flight_mean(residual, flight_index)[..., None], shifted], axis=2)
-    judged: list[tuple[int, str, Array]] = []
+    shares: list[tuple[int, str, Array]] = []
     for name, signal in state.items():
         for channels, rows in _where_known(residual, flight_index, np.isfinite(signal)):
             curve = _curve(name, signal[rows])
             if curve.size and len(np.unique(block[rows])) >= _FEWEST_BLOCKS:
                 curve = about_flight_mean(curve, flight_index[rows])
                 share = _share(curve, draws[np.ix_(rows, channels)], block[rows])
-                judged += [(int(channel), name, own) for channel, own in zip(channels, share, strict=True)]
-    return _ranked(judged, shifts)
+                shares += [(int(channel), name, by_draw) for channel, by_draw in zip(channels, share, strict=True)]
+    return _ranked(shares, shifts)
 
 
-def _ranked(judged: list[tuple[int, str, Array]], shifts: int) -> tuple[Dependence, ...]:
-    if not judged:
+def _ranked(shares: list[tuple[int, str, Array]], shifts: int) -> tuple[Dependence, ...]:
+    if not shares:
         return ()
-    chance = np.max([share[1:] for _, _, share in judged], axis=0)
-    found = [
+    chance = np.max([share[1:] for _, _, share in shares], axis=0)
+    ranked = [
         Dependence(CHANNELS[channel], name, float(share[0]), float((1 + (chance >= share[0]).sum()) / (1 + shifts)))
-        for channel, name, share in judged
+        for channel, name, share in shares
     ]
-    return tuple(sorted(found, key=lambda one: -one.r2))
+    return tuple(sorted(ranked, key=lambda one: -one.r2))
 
 
 def _where_known(residual: Array, flight_index: IntArray, finite: BoolArray) -> Iterator[tuple[IntArray, IntArray]]:
     """Group channels by the flights that have them: channels, and windows with both channel and signal."""
-    flights, own = np.unique(flight_index, return_inverse=True)
-    present = np.array([(residual[own == f] != 0).any(axis=0) for f in range(len(flights))])
+    flights, number = np.unique(flight_index, return_inverse=True)
+    present = np.array([(residual[number == f] != 0).any(axis=0) for f in range(len(flights))])
     for pattern in np.unique(present, axis=1).T:
         channels = np.flatnonzero((present == pattern[:, None]).all(axis=0))
-        rows = np.flatnonzero(pattern[own] & finite)
+        rows = np.flatnonzero(pattern[number] & finite)
         if len(rows):
             yield channels, rows
 

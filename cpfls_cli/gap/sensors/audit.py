@@ -118,12 +118,12 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
     faults, untested, fit, frames = _gyroscope(flights, windows)
     matches, disagreements = consistency(flights, windows)
     actuation = actuation_delay(flights)
-    told = () if actuation is None else (actuation.sentence,)
+    delay_note = () if actuation is None else (actuation.sentence,)
     return Audit(
         findings=findings([*faults, *_others(flights)], windows.period),
         untested=untested,
         warnings=(*frames, *disagreements, *channel_warnings(flights)),
-        notes=(*told, *(_gyro_notes(fit) if fit is not None else ())),
+        notes=(*delay_note, *(_gyro_notes(fit) if fit is not None else ())),
         gyro=fit,
         matches=matches,
         actuation=actuation,
@@ -154,7 +154,7 @@ def _others(flights: Sequence[Signals]) -> Iterator[CheckedFault]:
 def _gyroscope(flights: Sequence[Signals], windows: Windows) -> _Outcome:
     if all(signals.attitude is None for signals in flights):
         return _none("there is no attitude to judge the gyroscope by")
-    cut = [found for signals in flights if (found := kinematics(signals, windows)) is not None]
+    cut = [motion for signals in flights if (motion := kinematics(signals, windows)) is not None]
     if not cut:
         return _none("the flights are too short")
     scanned = scan(cut)
@@ -170,7 +170,7 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> _Outcome:
         return _none("the flights are too short")
     fits = {name: fit.of(str(test.estimate)) for name, test in _of_gyroscope().items()}
     untested = _untestable(fits, fit, flights, windows)
-    faults = [CheckedFault(CATALOGUE[name], own) for name, own in fits.items() if name not in untested]
+    faults = [CheckedFault(CATALOGUE[name], numbers) for name, numbers in fits.items() if name not in untested]
     return faults, untested, fit, ()
 
 
@@ -182,7 +182,7 @@ def _untestable(
     fits: Mapping[str, FaultFit], fit: GyroFit, flights: Sequence[Signals], windows: Windows
 ) -> Mapping[str, str]:
     still = "the flights hardly turn, so it would not show"
-    untested = {name: still for name, own in fits.items() if not own.known.any()}
+    untested = {name: still for name, numbers in fits.items() if not numbers.known.any()}
     if np.sqrt(fit.variance.max()) < _SHARE_OF_NOISE * _gyro_noise(flights, windows):
         derived = "the attitude contains the gyroscope's own noise, so it is integrated from it and would not show it"
         untested |= {name: derived for name, test in _of_gyroscope().items() if test.integrated}
@@ -198,14 +198,14 @@ def _gyro_noise(flights: Sequence[Signals], windows: Windows) -> float:
 def _gyro_notes(fit: GyroFit) -> tuple[str, ...]:
     apart = np.abs(fit.flight_bias) > np.maximum(_BIAS_APART, _SIGMAS_APART * fit.flight_bias_error)
     cross = fit.known[9:12] & (np.abs(fit.value[9:12]) > np.maximum(_CROSS, _SIGMAS_APART * fit.error[9:12]))
-    said = []
+    notes = []
     if apart.any():
         between = np.ptp(fit.flight_bias, axis=0).max()
-        said.append(f"The gyroscope's constant error differs between flights by {between:.4f} rad/s.")
+        notes.append(f"The gyroscope's constant error differs between flights by {between:.4f} rad/s.")
     if cross.any():
         square = np.abs(fit.value[9:12])[cross].max()
-        said.append(f"The axes of gyroscope or attitude are not square to each other, by {square:.3f}.")
-    return tuple(said)
+        notes.append(f"The axes of gyroscope or attitude are not square to each other, by {square:.3f}.")
+    return tuple(notes)
 
 
 @dataclass(frozen=True)

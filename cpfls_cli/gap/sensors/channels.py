@@ -47,7 +47,7 @@ def channel_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:
 
 def _constant(flights: Sequence[Signals]) -> Iterator[str]:
     for name in _channels(flights[0]):
-        columns = [found[name] for signals in flights if name in (found := _channels(signals))]
+        columns = [columns_[name] for signals in flights if name in (columns_ := _channels(signals))]
         if all(np.ptp(column) == 0 for column in columns):
             yield f"The channel {name} never changes."
 
@@ -148,9 +148,9 @@ def consistency(flights: Sequence[Signals], windows: Windows) -> tuple[tuple[Cha
         rows = list(_rows(pair, flights, windows))
         if rows:
             first, second, change = (np.concatenate(part) for part in zip(*rows, strict=True))
-            own = _matches(pair.name, first, second, change)
-            matches += own
-            warnings += frame_warnings(pair.name, first, second, pair.floor) or _small_warnings(own)
+            pair_matches = _matches(pair.name, first, second, change)
+            matches += pair_matches
+            warnings += frame_warnings(pair.name, first, second, pair.floor) or _small_warnings(pair_matches)
     return tuple(matches), tuple(warnings)
 
 
@@ -198,28 +198,32 @@ def frame_warnings(name: str, first: Array, second: Array, floor: float) -> list
         np.minimum(first.std(axis=0), second.std(axis=0)),
     )
     alike = (smaller > floor) & (larger < 2 * smaller)
-    said = []
+    sentences = []
     for axis in np.flatnonzero(moving):
-        own, best = correlation[axis, axis], int(np.argmax(np.abs(correlation[axis])))
-        if own < -_SAME:
-            said.append(f"{name} have opposite signs along {_AXES[axis]}")
-        elif abs(own) < _OTHER and abs(correlation[axis, best]) > _SAME:
-            said.append(f"{_AXES[axis]} of the one is {_AXES[best]} of the other in {name}: axes are swapped")
-        elif abs(own) < _OTHER and alike[axis]:
-            said.append(f"{name} do not belong together along {_AXES[axis]}: their correlation is {own:.2f}")
-    return [f"{sentence[0].upper()}{sentence[1:]}." for sentence in said]
+        same, best = correlation[axis, axis], int(np.argmax(np.abs(correlation[axis])))
+        if same < -_SAME:
+            sentences.append(f"{name} have opposite signs along {_AXES[axis]}")
+        elif abs(same) < _OTHER and abs(correlation[axis, best]) > _SAME:
+            sentences.append(f"{_AXES[axis]} of the one is {_AXES[best]} of the other in {name}: axes are swapped")
+        elif abs(same) < _OTHER and alike[axis]:
+            sentences.append(f"{name} do not belong together along {_AXES[axis]}: their correlation is {same:.2f}")
+    return [f"{sentence[0].upper()}{sentence[1:]}." for sentence in sentences]
 
 
 def _small_warnings(matches: Sequence[ChannelMatch]) -> list[str]:
-    said = []
+    sentences = []
     for each in matches:
         if each.r2 > _SAME**2 and _scale_off(each):
-            said.append(f"The scales of {each.channels} along {each.axis} differ by a factor of {each.scale:.2f}.")
+            sentences.append(f"The scales of {each.channels} along {each.axis} differ by a factor of {each.scale:.2f}.")
         elif each.r2 > _R2_FOR_DELAY and abs(each.delay_s) > _DELAY_OFF_S:
-            said.append(f"In {each.channels} along {each.axis}, the second is late by {1000 * each.delay_s:.0f} ms.")
+            sentences.append(
+                f"In {each.channels} along {each.axis}, the second is late by {1000 * each.delay_s:.0f} ms."
+            )
         if each.channels != _PAIRS[0].name and abs(each.offset) > _GRAVITY_OFF_M_S2:
-            said.append(f"{each.channels.capitalize()} differ by {each.offset:.1f} m/s^2 along {each.axis}: gravity?")
-    return said
+            sentences.append(
+                f"{each.channels.capitalize()} differ by {each.offset:.1f} m/s^2 along {each.axis}: gravity?"
+            )
+    return sentences
 
 
 def _scale_off(match: ChannelMatch) -> bool:
@@ -257,14 +261,14 @@ def actuation_delay(flights: Sequence[Signals]) -> ActuationDelay | None:
     ActuationDelay or None
         None where no flight tells.
     """
-    told = [(signals.commanded, found) for signals in flights if (found := _estimate(signals)) is not None]
-    if not told:
+    estimates = [(signals.commanded, estimate) for signals in flights if (estimate := _estimate(signals)) is not None]
+    if not estimates:
         return None
-    delays = [found.delay_s for _, found in told]
-    commanded = told[0][0]
+    delays = [estimate.delay_s for _, estimate in estimates]
+    commanded = estimates[0][0]
     delay = float(np.median(delays))
     whom = "commands" if commanded else "measured rotors"
-    bound = "at least" if any(found.at_bound for _, found in told) else "about"
+    bound = "at least" if any(estimate.at_bound for _, estimate in estimates) else "about"
     sentence = f"The motion follows the {whom} by {bound} {1000 * delay:.0f} ms."
     return ActuationDelay(commanded, delay, float(np.ptp(delays)), sentence)
 
@@ -274,9 +278,9 @@ def _estimate(signals: Signals) -> DelayEstimate | None:
         return None
     lowpass = min(_LOWPASS_HZ, _SHARE_OF_RATE / signals.period)
     try:
-        found = estimate_delay(
+        estimate = estimate_delay(
             signals.time, signals.body_rate, signals.torque, delay_max_s=_DELAY_MAX_S, lowpass_hz=lowpass
         )
     except (ComputationError, SettingError):
         return None
-    return found if found.pooled_r2 > _SMALLEST_R2 else None
+    return estimate if estimate.pooled_r2 > _SMALLEST_R2 else None

@@ -72,8 +72,8 @@ class AuditFinding:
         names : sequence of str
             Names of coefficients.
         """
-        found = {each.name: each.value for each in self.coefficients if each.named}
-        return np.array([found.get(name, 0.0) for name in names])
+        by_name = {each.name: each.value for each in self.coefficients if each.named}
+        return np.array([by_name.get(name, 0.0) for name in names])
 
 
 @dataclass(frozen=True)
@@ -110,14 +110,14 @@ def findings(faults: Sequence[CheckedFault], period: float) -> tuple[AuditFindin
     ----------
     Holm 1979.
     """
-    told = [fault for fault in faults if fault.fit.known.any()]
-    if not told:
+    known_faults = [fault for fault in faults if fault.fit.known.any()]
+    if not known_faults:
         return ()
-    known = np.concatenate([fault.fit.known for fault in told])
+    known = np.concatenate([fault.fit.known for fault in known_faults])
     p_values = np.ones(len(known))
-    p_values[known] = _holm(np.concatenate([_chance(fault, period) for fault in told])[known])
-    by_fault = np.split(p_values, np.cumsum([len(fault.fit.known) for fault in told])[:-1])
-    return tuple(_finding(fault, own, period) for fault, own in zip(told, by_fault, strict=True))
+    p_values[known] = _holm(np.concatenate([_chance(fault, period) for fault in known_faults])[known])
+    by_fault = np.split(p_values, np.cumsum([len(fault.fit.known) for fault in known_faults])[:-1])
+    return tuple(_finding(fault, chance, period) for fault, chance in zip(known_faults, by_fault, strict=True))
 
 
 def _chance(fault: CheckedFault, period: float) -> Array:

@@ -35,7 +35,7 @@ LONGEST_DELAY_S = 0.1
 
 
 @dataclass(frozen=True)
-class Scan:
+class DelayScan:
     """The delay at which the readings as they are fit best.
 
     Attributes
@@ -96,11 +96,11 @@ class GyroFit:
         ----------
         name : {"bias", "scale", "misalignment", "delay"}
         """
-        own = _NUMBERS[name]
-        return FaultFit(self.value[own], self.error[own], self.pull[own], self.known[own], self.blocks)
+        numbers = _NUMBERS[name]
+        return FaultFit(self.value[numbers], self.error[numbers], self.pull[numbers], self.known[numbers], self.blocks)
 
 
-def scan(flights: Sequence[Kinematics]) -> Scan:
+def scan(flights: Sequence[Kinematics]) -> DelayScan:
     """Scan the delay between gyroscope and attitude, positive where the gyroscope is late."""
     step = max(float(flights[0].time[0, 1] - flights[0].time[0, 0]), _SCAN_STEP_S)
     half = int(LONGEST_DELAY_S / step)
@@ -109,7 +109,7 @@ def scan(flights: Sequence[Kinematics]) -> Scan:
     delay = float(delays[np.argmin([_unexplained(seen, _read(flights, delay)) for delay in delays])])
     read = _read(flights, delay)
     variance = np.maximum((seen - read).var(axis=0), np.finfo(float).tiny)
-    return Scan(delay, variance, _alone(read) > _EXCITED * variance, seen, read)
+    return DelayScan(delay, variance, _alone(read) > _EXCITED * variance, seen, read)
 
 
 def _read(flights: Sequence[Kinematics], delay: float) -> Array:
@@ -129,7 +129,7 @@ def _alone(read: Array) -> Array:
     return np.asarray(1.0 / np.diag(np.linalg.inv(covariance)))
 
 
-def fit_gyro(flights: Sequence[Kinematics], scanned: Scan) -> GyroFit | None:
+def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | None:
     """Regress the rate by the attitude on the readings, and turn the result round.
 
     The gyroscope is the cleaner side, hence the reverse regression ``omega(t) = M omega_gyro(t + delay) - c``; its
@@ -154,17 +154,17 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: Scan) -> GyroFit | None:
     for _ in range(_ROUNDS):
         design, right = _design(flights, matrix, delay), scanned.seen - _read(flights, delay)
         normal = folds(design / np.sqrt(variance)[:, None], right / np.sqrt(variance), block)
-        found = _padded(normal.fit(columns)[0][None, :, 0], columns)[0]
-        rest = right - design @ found
+        solution = _padded(normal.fit(columns)[0][None, :, 0], columns)[0]
+        rest = right - design @ solution
         base, variance = delay, np.maximum(rest.var(axis=0), np.finfo(float).tiny)
-        matrix = np.eye(3) + found[:9].reshape(3, 3)
-        delay = float(np.clip(base + found[12], -LONGEST_DELAY_S, LONGEST_DELAY_S))
+        matrix = np.eye(3) + solution[:9].reshape(3, 3)
+        delay = float(np.clip(base + solution[12], -LONGEST_DELAY_S, LONGEST_DELAY_S))
     left_out = _padded(normal.solve(columns)[0][..., 0], columns)
     draws = np.array([_faults(each, base) for each in left_out])
     spread = ((draws - draws.mean(axis=0)) ** 2).sum(axis=0) * (len(draws) - 1) / len(draws)
     bias, error = _flight_bias(rest, index, block)
     return GyroFit(
-        value=_faults(found, base),
+        value=_faults(solution, base),
         error=np.sqrt(spread),
         pull=_pull(scanned.read, variance),
         known=_known(scanned.excited),
@@ -195,19 +195,20 @@ def _design(flights: Sequence[Kinematics], matrix: Array, delay: float) -> Array
     return np.concatenate(parts)
 
 
-def _padded(found: Array, columns: IntArray) -> Array:
-    whole = np.zeros((len(found), 13))
-    whole[:, columns] = found
+def _padded(solutions: Array, columns: IntArray) -> Array:
+    whole = np.zeros((len(solutions), 13))
+    whole[:, columns] = solutions
     return whole
 
 
-def _faults(found: Array, base: float) -> Array:
+def _faults(solution: Array, base: float) -> Array:
     """Turn ``M, c`` round into faults; the left polar form parts scale and cross-axis from rotation exactly."""
-    inverse = np.linalg.inv(np.eye(3) + found[:9].reshape(3, 3))
+    inverse = np.linalg.inv(np.eye(3) + solution[:9].reshape(3, 3))
     turned, stretched = polar(inverse, side="left")
     misalignment = -Rotation.from_matrix(turned).as_rotvec()
     cross = [stretched[1, 2], stretched[2, 0], stretched[0, 1]]
-    return np.concatenate([inverse @ found[9:12], np.diag(stretched) - 1, misalignment, cross, [base + found[12]]])
+    bias, scale = inverse @ solution[9:12], np.diag(stretched) - 1
+    return np.concatenate([bias, scale, misalignment, cross, [base + solution[12]]])
 
 
 def _pull(read: Array, variance: Array) -> Array:
@@ -226,11 +227,11 @@ def _known(excited: BoolArray) -> BoolArray:
 def _flight_bias(rest: Array, index: IntArray, block: IntArray) -> tuple[Array, Array]:
     means = np.array([-rest[block == b].mean(axis=0) for b in range(block.max() + 1)])
     owner = np.array([index[block == b][0] for b in range(block.max() + 1)])
-    own = np.array([means[owner == flight].mean(axis=0) for flight in np.unique(owner)])
+    flight_mean = np.array([means[owner == flight].mean(axis=0) for flight in np.unique(owner)])
     count = np.array([np.sum(owner == flight) for flight in np.unique(owner)])
-    spread = np.sqrt(((means - own[np.searchsorted(np.unique(owner), owner)]) ** 2).sum(axis=0))
-    error = spread / np.sqrt(max(1, len(means) - len(own))) / np.sqrt(count)[:, None]
-    return own, error
+    spread = np.sqrt(((means - flight_mean[np.searchsorted(np.unique(owner), owner)]) ** 2).sum(axis=0))
+    error = spread / np.sqrt(max(1, len(means) - len(flight_mean))) / np.sqrt(count)[:, None]
+    return flight_mean, error
 
 
 @dataclass(frozen=True)
@@ -289,8 +290,8 @@ class Kinematics:
         array, shape (window, 3, to, from), rad/s or rad/s^2
         """
         turning = np.moveaxis(self.turning, 1, 3)
-        found = turning.reshape(len(turning), 9, -1) @ self.gyro(self.time + delay, order)
-        return np.asarray(found.reshape(-1, 3, 3, 3))
+        averages = turning.reshape(len(turning), 9, -1) @ self.gyro(self.time + delay, order)
+        return np.asarray(averages.reshape(-1, 3, 3, 3))
 
     def constants(self) -> Array:
         """Average a constant about each axis.
@@ -341,9 +342,9 @@ def _relative(turned: Array) -> Array:
     """Take quaternions (x, y, z, scalar) relative to the middle of their window."""
     vector, scalar = turned[..., :3], turned[..., 3:]
     middle = turned[:, [turned.shape[1] // 2]]
-    own, known = -middle[..., :3], middle[..., 3:]
-    product = known * vector + scalar * own + np.cross(own, vector)
-    rest = known * scalar - (own * vector).sum(axis=-1, keepdims=True)
+    conjugate, known = -middle[..., :3], middle[..., 3:]
+    product = known * vector + scalar * conjugate + np.cross(conjugate, vector)
+    rest = known * scalar - (conjugate * vector).sum(axis=-1, keepdims=True)
     return np.concatenate([product, rest], axis=-1)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.naming.estimate import told_effect
+from cpfls_cli.gap.naming.estimate import effect_sentence
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.vehicle import VehicleSettings
 from cpfls_cli.vehicle.settings import RotorSettings
@@ -12,7 +12,7 @@ from cpfls_cli.vehicle.settings import RotorSettings
 
 def told(name, vehicle=None, **values):
     numbers = [Estimate(key, "1", v, v - e, v + e, (-1.0, 1.0)) for key, (v, e) in values.items()]
-    sentence = told_effect(CATALOGUE[name], numbers, vehicle or VehicleSettings())
+    sentence = effect_sentence(CATALOGUE[name], numbers, vehicle or VehicleSettings())
     assert sentence.startswith(CATALOGUE[name].sentence)
     return sentence.removeprefix(CATALOGUE[name].sentence).strip()
 

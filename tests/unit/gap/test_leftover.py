@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.naming.leftover import energy_words, not_excited
+from cpfls_cli.gap.naming.leftover import energy_directions, not_excited
 from tests.unit.gap.synthetic_flights import candidate, fly, weak
 
 FLOOR = np.full(6, 0.05)
@@ -62,17 +62,17 @@ def test_more_noise_hides_more():
 def test_damping_drains_and_its_opposite_feeds():
     noise = RNG.normal(size=(400, 3))
     torque = np.column_stack([-0.5 * RATE[:, 0], 0.5 * RATE[:, 1], np.zeros(400)]) + noise
-    assert energy_words(torque, RATE, BLOCK) == ["drains", "feeds", "neither"]
+    assert energy_directions(torque, RATE, BLOCK) == ["drains", "feeds", "neither"]
 
 
 def test_a_constant_torque_does_neither():
-    assert energy_words(np.ones((400, 3)), RATE + 1, BLOCK) == ["neither"] * 3
+    assert energy_directions(np.ones((400, 3)), RATE + 1, BLOCK) == ["neither"] * 3
 
 
 def test_few_blocks_say_nothing():
-    assert energy_words(-RATE, RATE, BLOCK // 4) == ["neither"] * 3
+    assert energy_directions(-RATE, RATE, BLOCK // 4) == ["neither"] * 3
 
 
 def test_noise_is_seldom_taken_for_either():
-    found = [energy_words(RNG.normal(size=(400, 3)), RATE, BLOCK) for _ in range(100)]
+    found = [energy_directions(RNG.normal(size=(400, 3)), RATE, BLOCK) for _ in range(100)]
     assert sum(word != "neither" for words in found for word in words) < 15

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.naming.results import Alternative, NamedEffect, Unexplained, Verdict, gap_stays, matters, verdict_of
+from cpfls_cli.gap.naming.results import (
+    Alternative,
+    GapVerdict,
+    NamedEffect,
+    Unexplained,
+    gap_stays,
+    matters,
+    verdict_of,
+)
 from cpfls_cli.gap.settings import GapSettings
 
 RIVAL = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")
@@ -17,19 +25,19 @@ def effect(name="com_offset", share=0.9):
 BIG, SMALL = effect(), effect("com_offset", 0.05)
 
 CASES = {
-    "nothing moved": ([], [], [], 1.0, False, Verdict.NOT_EXCITED),
-    "nothing wrong": ([], [], [], 1.0, True, Verdict.NO_GAP),
-    "a gap without a name": ([], [], [LEFT], 1.0, True, Verdict.UNEXPLAINED),
-    "a gap without a name in a still flight": ([], [], [LEFT], 1.0, False, Verdict.UNEXPLAINED),
-    "all": ([BIG], [], [], 0.95, True, Verdict.NAMED),
-    "exactly enough": ([BIG], [], [], 0.9, True, Verdict.NAMED),
-    "not all": ([BIG], [], [], 0.89, True, Verdict.PARTIAL),
-    "exactly partly": ([BIG], [], [], 0.5, True, Verdict.PARTIAL),
-    "too little": ([BIG], [], [], 0.49, True, Verdict.UNEXPLAINED),
-    "a second cause": ([BIG], [], [LEFT], 0.97, True, Verdict.PARTIAL),
-    "a rival": ([BIG], [RIVAL], [], 0.95, True, Verdict.AMBIGUOUS),
-    "a rival of a small part": ([effect("rotor_drag"), SMALL], [RIVAL], [], 0.95, True, Verdict.NAMED),
-    "a rival, but not all": ([BIG], [RIVAL], [], 0.7, True, Verdict.PARTIAL),
+    "nothing moved": ([], [], [], 1.0, False, GapVerdict.NOT_EXCITED),
+    "nothing wrong": ([], [], [], 1.0, True, GapVerdict.NO_GAP),
+    "a gap without a name": ([], [], [LEFT], 1.0, True, GapVerdict.UNEXPLAINED),
+    "a gap without a name in a still flight": ([], [], [LEFT], 1.0, False, GapVerdict.UNEXPLAINED),
+    "all": ([BIG], [], [], 0.95, True, GapVerdict.NAMED),
+    "exactly enough": ([BIG], [], [], 0.9, True, GapVerdict.NAMED),
+    "not all": ([BIG], [], [], 0.89, True, GapVerdict.PARTIAL),
+    "exactly partly": ([BIG], [], [], 0.5, True, GapVerdict.PARTIAL),
+    "too little": ([BIG], [], [], 0.49, True, GapVerdict.UNEXPLAINED),
+    "a second cause": ([BIG], [], [LEFT], 0.97, True, GapVerdict.PARTIAL),
+    "a rival": ([BIG], [RIVAL], [], 0.95, True, GapVerdict.AMBIGUOUS),
+    "a rival of a small part": ([effect("rotor_drag"), SMALL], [RIVAL], [], 0.95, True, GapVerdict.NAMED),
+    "a rival, but not all": ([BIG], [RIVAL], [], 0.7, True, GapVerdict.PARTIAL),
 }
 
 
@@ -40,8 +48,8 @@ def test_verdicts(effects, rivals, left, share, excited, expected):
 
 def test_shares_of_the_settings_decide():
     strict = GapSettings(named_share=0.99, partial_share=0.97)
-    assert verdict_of([BIG], [], [], 0.98, False, True, strict) is Verdict.PARTIAL
-    assert verdict_of([BIG], [], [], 0.96, False, True, strict) is Verdict.UNEXPLAINED
+    assert verdict_of([BIG], [], [], 0.98, False, True, strict) is GapVerdict.PARTIAL
+    assert verdict_of([BIG], [], [], 0.96, False, True, strict) is GapVerdict.UNEXPLAINED
 
 
 GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
@@ -63,7 +71,7 @@ def test_what_is_left_matters_where_it_follows_something_and_is_not_small(left, 
 
 
 def test_an_axis_that_keeps_its_gap_is_not_all_explained():
-    assert verdict_of([BIG], [], [], 0.99, True, True, GapSettings()) is Verdict.PARTIAL
+    assert verdict_of([BIG], [], [], 0.99, True, True, GapSettings()) is GapVerdict.PARTIAL
 
 
 @pytest.mark.parametrize(

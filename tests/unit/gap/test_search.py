@@ -10,7 +10,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import alternatives, look, simplest, unbeaten
+from cpfls_cli.gap.naming.search import alternatives, rank_effects, simplest, unbeaten
 from cpfls_cli.gap.settings import GapSettings
 from tests.unit.gap.synthetic_flights import fly, weak
 
@@ -43,7 +43,7 @@ def step():
     for seed in (1, 2):
         signals = fly(seed, [(Candidate(SPECIAL, {}), [0.3])], gyro=0.003, rotor=0.5)
         known.append(weak(signals))
-    return look(known, (), [SPECIAL, TWIN, GENERAL, OTHER], SETTINGS, None)
+    return rank_effects(known, (), [SPECIAL, TWIN, GENERAL, OTHER], SETTINGS, None)
 
 
 def of(step, name):

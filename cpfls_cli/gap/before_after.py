@@ -9,11 +9,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.balance.windows import Recording, Windows, common_windows
-from cpfls_cli.gap.diagnose import Diagnosed
-from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
+from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.replay.worst_stretch import WorstStretch, worst_stretch
 from cpfls_cli.gap.replayed import Replayed, replayed
@@ -25,7 +23,7 @@ _PER_WINDOW = 16
 
 
 @dataclass(frozen=True)
-class Picture:
+class StretchCurves:
     """Torque or force over the stretch in which model and flight disagreed most.
 
     Attributes
@@ -49,7 +47,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class BeforeAfter:
     """How a model with effects does on held-out flights, beside the model as given.
 
     Attributes
@@ -61,7 +59,7 @@ class Evidence:
     white_before, white_after : Whiteness
     lag_s : float
         Between windows without common samples.
-    picture : Picture
+    picture : StretchCurves
     run_flight : int
         Number of the flight of `run`.
     run : WorstStretch
@@ -76,20 +74,14 @@ class Evidence:
     white_before: Whiteness
     white_after: Whiteness
     lag_s: float
-    picture: Picture
+    picture: StretchCurves
     run_flight: int
     run: WorstStretch
 
 
-def model_of(diagnosed: Diagnosed, base: InertiaModel | None) -> ExtendedModel:
-    """Give the model that a diagnosis arrives at."""
-    found, chosen = diagnosed.found, diagnosed.hypothesis.chosen
-    effects = tuple(FittedEffect(*pair) for pair in zip(chosen, found.of_effect, strict=True))
-    own = len(found.linear) - sum(len(linear) for linear in found.of_effect)
-    return ExtendedModel(base, found.linear[:own], effects, diagnosed.audit)
-
-
-def evidence(held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, settings: GapSettings) -> Evidence:
+def before_after(
+    held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, settings: GapSettings
+) -> BeforeAfter:
     """Gather what shows that the gap shrank.
 
     Parameters
@@ -101,15 +93,15 @@ def evidence(held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, s
     model : ExtendedModel
     settings : GapSettings
     """
-    own = common_windows(held, settings)
+    windows = common_windows(held, settings)
     signals = [recording.signals for recording in held]
-    centres = [own.centres(each.time) for each in signals]
+    centres = [windows.centres(each.time) for each in signals]
     index = np.repeat(np.arange(len(held)), [len(each) for each in centres])
     given = plain(model.base)
-    stride = -(-len(own.weight) // own.hop)
+    stride = -(-len(windows.weight) // windows.hop)
     runs = [_run(each, given, model) for each in signals]
     worst = int(np.argmax([_size(run) for run in runs]))
-    return Evidence(
+    return BeforeAfter(
         np.concatenate(centres),
         index,
         replayed(signals, given, settings.horizon),
@@ -117,8 +109,8 @@ def evidence(held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, s
         replayed(signals, None, settings.horizon),
         whiteness(unseen.before * unseen.known, index, stride),
         whiteness(unseen.after * unseen.known, index, stride),
-        stride * own.hop * own.period,
-        _picture(held, unseen, np.concatenate(centres), index, own, model, settings),
+        stride * windows.hop * windows.period,
+        _picture(held, unseen, np.concatenate(centres), index, windows, model, settings),
         worst,
         runs[worst],
     )
@@ -139,23 +131,23 @@ def _picture(
     unseen: HeldOut,
     centres: Array,
     index: IntArray,
-    own: Windows,
+    windows: Windows,
     model: ExtendedModel,
     settings: GapSettings,
-) -> Picture:
+) -> StretchCurves:
     in_floors = unseen.before * unseen.known / unseen.floor
-    found = stretches(in_floors, centres, index, level=0.0, most=1)[0]
-    place = CHANNELS.index(found.channel)
-    dense = replace(own, hop=max(1, len(own.weight) // _PER_WINDOW))
-    recording = held[found.flight]
+    stretch = stretches(in_floors, centres, index, level=0.0, most=1)[0]
+    channel = CHANNELS.index(stretch.channel)
+    dense = replace(windows, hop=max(1, len(windows.weight) // _PER_WINDOW))
+    recording = held[stretch.flight]
     raw = weak_flight(recording.name, recording.signals, dense, model.base, settings.force, settings.axes)
     repaired = weak_flight(
         recording.name, model.repaired(recording.signals), dense, model.base, settings.force, settings.axes
     )
     time = dense.centres(recording.signals.time)
-    middle, half = 0.5 * (found.start_s + found.end_s), 0.5 * max(_SHORTEST_S, found.end_s - found.start_s)
+    middle, half = 0.5 * (stretch.start_s + stretch.end_s), 0.5 * max(_SHORTEST_S, stretch.end_s - stretch.start_s)
     shown = np.abs(time - middle) <= half
-    measured = repaired.averaged(repaired.inertial)[shown, place]
-    logged = dense.average(raw.signals.wrench)[shown, place]
-    after = measured - model.residual([repaired])[shown, place]
-    return Picture(found.flight, found.channel, time[shown], measured, logged, after)
+    measured = repaired.averaged(repaired.inertial)[shown, channel]
+    logged = dense.average(raw.signals.wrench)[shown, channel]
+    after = measured - model.residual([repaired])[shown, channel]
+    return StretchCurves(stretch.flight, stretch.channel, time[shown], measured, logged, after)
