@@ -1,4 +1,4 @@
-"""What an effect is: columns of wrench that are linear in its coefficients, and what a reader has to know of it."""
+"""An effect: wrench columns that are linear in its coefficients, its description, and its hooks."""
 
 from __future__ import annotations
 
@@ -149,8 +149,8 @@ class Effect:
     apply : callable or None
         For actuator and sensor effects: ``apply(signals, shape) -> Signals`` as they would be without the effect's
         error, so that all other columns can be computed from them.
-    told : callable or None
-        ``told(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
+    describe : callable or None
+        ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
     rate_derivative : bool
         Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
     holds : frozenset of str
@@ -193,7 +193,7 @@ class Effect:
     linear: Callable[[Array], Array] | None = None
     apply: Callable[[Signals, Mapping[str, float]], Signals] | None = None
     scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
-    told: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
+    describe: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
     holds: frozenset[str] = frozenset()
     rate_derivative: bool = False
     order: int = 1000

@@ -1,4 +1,4 @@
-"""What an effect brings along beside its columns: its place in the closed loop, and its test by the sensor audit."""
+"""Hooks of an effect beside its columns: its place in the closed loop, and its test by the sensor audit."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Carrier(NamedTuple):
 
 
 class Pull(NamedTuple):
-    """What a carried body does to its carrier.
+    """Acceleration of the carrier by a carried body, and the derivative of its state.
 
     Attributes
     ----------
@@ -97,12 +97,12 @@ class CarriedBody(Protocol):
         ...
 
     def pull(self, carrier: Carrier, state: Array) -> Pull:
-        """Pull at a carrier."""
+        """Compute the pull on a carrier."""
         ...
 
 
 class TrueMotion(NamedTuple):
-    """What truly happens at the samples of a flight.
+    """True motion at the samples of a simulated flight.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class TrueMotion(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class SensorLog:
-    """What a sensor makes of the truth.
+    """How the log of a sensor differs from the truth.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ class ReadingError(NamedTuple):
 
 
 class FaultFit(NamedTuple):
-    """Numbers of a fault as estimated.
+    """Estimated numbers of a fault.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a flight tells an effect: motion, actuation and environment, with everything derived from them."""
+"""Signals of a flight that effects are evaluated on, with the quantities derived from them."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Signals:
 
     @cached_property
     def available(self) -> frozenset[str]:
-        """Names of what effects can ask for and this flight has."""
+        """Names of the signals that effects can need and the flight has."""
         radius = all(rotor.radius_m is not None for rotor in self.vehicle.rotors)
         found = {
             # A log without gyroscope and attitude is taken as at rest: it holds the balance and no motion.

@@ -1,4 +1,4 @@
-"""What shows that a gap shrank, on flights that the fit did not see: replays, whiteness, and the worst stretches."""
+"""A model before and after its effects, on held-out flights: replay errors, whiteness, and the worst stretches."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PER_WINDOW = 16
 
 @dataclass(frozen=True)
 class StretchCurves:
-    """Torque or force over the stretch in which model and flight disagreed most.
+    """Measured and simulated torque or force over the stretch of the largest gap.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class StretchCurves:
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """How a model with effects does on held-out flights, beside the model as given.
+    """Errors of the model as given and of the model with effects on held-out flights.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class BeforeAfter:
 def before_after(
     held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, settings: GapSettings
 ) -> BeforeAfter:
-    """Gather what shows that the gap shrank.
+    """Compare a model with effects with the model as given on held-out flights.
 
     Parameters
     ----------

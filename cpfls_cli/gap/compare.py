@@ -1,4 +1,4 @@
-"""Comparison: where a model and flights disagree, on which axis, when, in which state, and what was never flown."""
+"""Comparison of a model with flights: the gap by axis, time and state, and effects that were not excited."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from cpfls_cli.gap.settings import GapSettings
 
 @dataclass(frozen=True)
 class WorstChannel:
-    """The channel with the largest gap over the two signals that tell most about it.
+    """The channel with the largest gap, over the two signals that explain most of it.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class WorstChannel:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """Where a model and flights disagree.
+    """The gap between a model and flights.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ def _rms(rows: Array, known: Array) -> Array:
 
 
 def _activity(hypothesis: System, known: Array) -> Array:
-    """Take the larger of what the motion takes and what the rotors give: one of them can be small."""
+    """Compute the root mean square of inertial or rotor wrench, whichever is larger."""
     pairs = list(zip(hypothesis.flights, hypothesis.signals, strict=True))
     taken = np.concatenate([flight.averaged(flight.inertial) for flight, _ in pairs])
     given = np.concatenate([flight.windows.average(signals.wrench) for flight, signals in pairs])

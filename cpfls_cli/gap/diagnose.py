@@ -12,18 +12,17 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.inertial import InertiaModel
-from cpfls_cli.gap.balance.refine import fit, refined
+from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
-from cpfls_cli.gap.naming.causes import JudgedEffect, impossible, judge_effect, sensor_estimates, shares, wrong_numbers
+from cpfls_cli.gap.naming.causes import JudgedEffect, impossible, judge_effect, sensor_fault, shares, wrong_numbers
 from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
 from cpfls_cli.gap.naming.leftover import Leftover, leftover, look_alikes, not_excited
 from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import SearchStep, block_index, forward_selection, rank_effects
 from cpfls_cli.gap.sensors.audit import Audit, Preparation, audit
-from cpfls_cli.gap.sensors.findings import AuditFinding
 from cpfls_cli.gap.settings import GapSettings
 
 _EXCITED_FLOORS = 3.0
@@ -31,7 +30,7 @@ _EXCITED_FLOORS = 3.0
 
 @dataclass(frozen=True)
 class DiagnosisRun:
-    """A diagnosis with what it was made from.
+    """A diagnosis with the fits and residuals that it was made from.
 
     Attributes
     ----------
@@ -53,7 +52,7 @@ class DiagnosisRun:
     held_out: HeldOut
 
     def model(self, base: InertiaModel | None) -> ExtendedModel:
-        """Give the model that the diagnosis arrives at."""
+        """Build the model with the effects of the diagnosis."""
         chosen, by_effect = self.hypothesis.chosen, self.estimates.of_effect
         effects = tuple(FittedEffect(*pair) for pair in zip(chosen, by_effect, strict=True))
         width = len(self.estimates.linear) - sum(len(linear) for linear in by_effect)
@@ -69,7 +68,7 @@ def diagnose(
     model: InertiaModel | None = None,
     progress: Callable[[float, str], None] = lambda _done, _note: None,
 ) -> DiagnosisRun:
-    """Name what a model misses.
+    """Name the effects that a model misses.
 
     The sensors are audited first and repaired where they are at fault. Effects are then added one at a time while each
     explains more of blocks it has not seen than chance does anywhere in the catalogue; what is chosen is judged on
@@ -110,7 +109,7 @@ def diagnose(
         for index in range(len(chosen))
     ]
     progress(0.9, "sensor faults")
-    faults = [_fault(finding, prepared.logged(training), weak) for finding in audited.named]
+    faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, effects)
     diagnosis = _concluded(
         judged, faults, estimates, held_out, remainder, steps, hypothesis, settings, torque_alone, audited
@@ -130,7 +129,7 @@ def considered(settings: GapSettings) -> list[Effect]:
 def _sure(
     weak: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings
 ) -> tuple[System, IntArray, Estimates]:
-    """Fit the chosen effects, and once more without those that may as well be zero."""
+    """Fit the chosen effects, and refit without those whose size does not differ from zero."""
     hypothesis = system(weak, chosen)
     block = block_index(hypothesis, settings)
     estimates = weighted_estimates(hypothesis, floor, block)
@@ -142,20 +141,10 @@ def _sure(
     return hypothesis, block, weighted_estimates(hypothesis, floor, block)
 
 
-def _fault(finding: AuditFinding, as_logged: Sequence[WeakFlight], weak: Sequence[WeakFlight]) -> NamedEffect:
-    logged = system(as_logged)
-    repaired = system(weak)
-    weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
-    before, after = ((s.residual - s.base @ fit(s, weight)) / weight for s in (logged, repaired))
-    share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
-    coefficients = sensor_estimates(finding, weak[0].signals.vehicle)
-    return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)
-
-
 def _torque_alone(
     weak: Sequence[WeakFlight], settings: GapSettings, effects: Sequence[Effect]
 ) -> tuple[tuple[str, float], ...]:
-    """Tell what the torques alone would name first, where the force balance was used too."""
+    """List the effects that the torques alone would name first, where the force balance was used too."""
     if not any(flight.known[3:].any() for flight in weak):
         return ()
     step = rank_effects([flight.without_force() for flight in weak], (), effects, settings, None)
@@ -210,7 +199,7 @@ def _concluded(
 
 
 def _pull(hypothesis: System, floor: Array) -> Array:
-    """Bound by how much noise in the motion itself can draw each number of the vehicle towards zero torque."""
+    """Bound the bias of each number of the vehicle that noise in the motion causes."""
     columns = hypothesis.columns(hypothesis.free[0]) / floor[:, None]
     information = (columns**2).mean(axis=0).max(axis=0)
     return np.asarray(1.0 / np.maximum(information, 1e-12))

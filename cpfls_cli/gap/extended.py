@@ -40,7 +40,7 @@ _WORSE = 1.2
 
 
 class FittedEffect(NamedTuple):
-    """An effect of a model.
+    """An effect of a model with its linear coefficients.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class ExtendedModel:
         return np.concatenate([self.parameters, *(e.linear for e in self.effects if is_free(e.candidate))])
 
     def repaired(self, signals: Signals) -> Signals:
-        """Take the faults of the sensors out."""
+        """Correct the signals for the faults of the sensors."""
         return signals if self.audit is None else self.audit.repaired(signals)
 
     def system(self, flights: Sequence[WeakFlight]) -> System:
@@ -115,7 +115,7 @@ class ExtendedModel:
         return np.asarray(hypothesis.residual - hypothesis.base @ self.linear)
 
     def effect_wrench(self, signals: Signals) -> Array:
-        """Compute what the effects do, sample by sample.
+        """Compute the wrench of the effects, sample by sample.
 
         Momentum parts are differentiated by a cubic spline, so noise of the signals shows in them.
 
@@ -171,7 +171,7 @@ class ExtendedModel:
         return _Corrected(self.base, correction)
 
     def replay_model(self, signals: Signals) -> ReplayModel:
-        """Give what drives a replay: rotors and effects along the measured motion, and the refitted inertia.
+        """Build the model of a replay: torque along the measured motion, and the refitted inertia.
 
         Parameters
         ----------
@@ -183,7 +183,7 @@ class ExtendedModel:
         return ReplayModel(torque, self.inertia(signals))
 
     def inertial_torque(self, signals: Signals) -> Array:
-        """Compute the torque that the motion takes, with the inertia refitted.
+        """Compute the inertial torque of the motion with the refitted inertia.
 
         Parameters
         ----------
@@ -200,7 +200,7 @@ class ExtendedModel:
         return np.asarray(torque - refitted[:, :3])
 
     def rotor_torque(self, signals: Signals) -> Array:
-        """Compute the body torque that the rotors as logged have to give for the motion.
+        """Compute the body torque of the rotors that the motion requires.
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class ExtendedModel:
 
 @dataclass(frozen=True)
 class _Corrected:
-    """An inertia model with what its moments of inertia lack."""
+    """An inertia model plus a correction of its inertia tensor."""
 
     base: InertiaModel
     correction: Array
@@ -264,7 +264,7 @@ def _require(signals: Signals, chosen: Sequence[Candidate], name: str) -> None:
 
 @dataclass(frozen=True)
 class Refit:
-    """A model with effects and how it does.
+    """A refitted model with effects and its residuals on held-out flights.
 
     Attributes
     ----------
@@ -289,7 +289,7 @@ def extend(
     settings: GapSettings,
     base: InertiaModel | None,
 ) -> Refit:
-    """Refit a model together with effects.
+    """Refit a model together with effects and evaluate it on held-out flights.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From the wrench that the autopilot asks for to what the rotors do: allocation, lag, delay, and the battery."""
+"""The actuator chain from the commanded wrench to the rotors: allocation, lag, links of effects, battery."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 @dataclass(frozen=True)
 class Reference:
-    """What an autopilot follows; time is the first axis.
+    """A planned motion at the steps of the autopilot; time is the first axis.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ def reference(planned: Mapping[str, Array], time: Array, at: Array) -> Reference
 
 
 class Autopilot:
-    """Follow a planned motion with the vehicle's model; what the model lacks, it does not know.
+    """Track a planned motion with the vehicle's model, without knowledge of the effects.
 
     References
     ----------
@@ -109,7 +109,7 @@ class Autopilot:
         return np.array([self._mass * (pull @ rotation[:, 2]), *torque])
 
     def _torque(self, step: int, turned: Array, body_rate: Array) -> Array:
-        """Turn the body to the target, of which the body is turned away by the given rotation."""
+        """Compute the torque that turns the body to its target attitude."""
         skew = 0.5 * (turned - turned.T)
         error = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
         rate_error = body_rate - turned.T @ self._planned.body_rate[step]

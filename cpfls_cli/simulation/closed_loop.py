@@ -78,7 +78,7 @@ def clock_of(time: Array, rate: float) -> Clock:
 
 
 def between(middles: Array) -> Array:
-    """Bring values from the middles of steps to their ends, on straight lines.
+    """Interpolate values from the middles of steps to their ends linearly.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def between(middles: Array) -> Array:
 
 @dataclass(frozen=True)
 class LoopStep:
-    """What one step passes through.
+    """Derivative, rotors and demand in the middle of a step.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class SimulatedMotion:
-    """What happened, at the samples of the plan.
+    """The simulated motion at the samples of the plan.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ def fly(
     model: SimulatedModel,
     progress: Callable[[float, int], None],
 ) -> SimulatedMotion:
-    """Integrate a flight.
+    """Integrate a closed-loop flight along a planned motion.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def _loop(
     time: Array,
     clock: Clock,
 ) -> Loop:
-    """Put a vehicle at the start, its rotors as the autopilot wants them there."""
+    """Set up the loop at the start of the plan, with the rotors at their commanded speed."""
     autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
     carried = tuple(
         one.effect.carried(vehicle, one.values) for one in model.effects.ordered if one.effect.carried is not None
@@ -276,7 +276,7 @@ def _refuse_lost(state: Array, planned: Array, time: float, limit: float) -> Non
 
 
 def _sampled(states: Array, steps: Sequence[LoopStep], parts: int) -> SimulatedMotion:
-    """Bring what is known in the middle of steps to the samples."""
+    """Interpolate values in the middle of steps to the samples."""
     change, demand = ([getattr(step, name) for step in steps] for name in ("change", "demand"))
     rotors = [step.rotors for step in steps]
     command, lagged, speed, voltage = (

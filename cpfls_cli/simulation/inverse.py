@@ -77,7 +77,7 @@ def simulate(
 
 @dataclass(frozen=True)
 class TooMuch:
-    """Something that a motion asks for beyond its limit.
+    """A demand of a motion beyond its limit.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class TooMuch:
 
 @dataclass(frozen=True)
 class Flyability:
-    """What a motion asks of a vehicle.
+    """Demands of a motion on a vehicle.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
 
 
 def single_axis_torque(vehicle: VehicleSettings) -> Array:
-    """Find the largest torque about each axis alone, either way, that the rotors of a held vehicle can give.
+    """Compute the largest torque about each axis alone, in either direction, of a held vehicle.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def single_axis_torque(vehicle: VehicleSettings) -> Array:
 
 
 def collective_thrust(vehicle: VehicleSettings, body_torque: Array, acceleration: Array | None) -> Array:
-    """Find the total thrust along body z.
+    """Compute the total thrust along body z.
 
     In flight it is ``m |a + g e3|``. A vehicle that is held at its centre of mass has it free: it is then the
     smallest at which the torque asks no rotor to turn backwards, as every rotor of a lone thrust turns forwards.
@@ -201,7 +201,7 @@ def _refuse_noise_of_nothing(exact: Mapping[str, Array], settings: SimulationSet
 
 
 def _torques(signals: Mapping[str, Array], noised: frozenset[str]) -> tuple[Array, Array]:
-    """Generalised and body torque; whichever has no noise of its own follows from the other and the noisy attitude."""
+    """Compute generalised and body torque; one without noise of its own follows from the other."""
     if "body_torque" in noised:
         return rotations.generalised_torque(signals["attitude"], signals["body_torque"]), signals["body_torque"]
     if noised & {"torque", "attitude"}:

@@ -20,7 +20,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 @dataclass(frozen=True)
 class MeasuredFlight:
-    """A flight as its log has it.
+    """A simulated flight as logged.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ def measure(
     progress: Callable[[float, int], None] = lambda _done, _total: None,
     model: SimulatedModel | None = None,
 ) -> MeasuredFlight:
-    """Fly a planned motion in closed loop and log it.
+    """Simulate a planned motion in closed loop and log it.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _motion(motion: SimulatedMotion) -> dict[str, Array]:
 
 
 def _actuation(motion: SimulatedMotion, effects: SimulatedEffects) -> dict[str, Array]:
-    """Log rotor speeds, or the command that the slowest known link of the chain got.
+    """Log rotor speeds, or the command where effects hide them.
 
     Where no effect replaces the lag of the rotors, a hidden flight logs the command after it, so that the effects are
     all that is left between log and rotors.

@@ -102,7 +102,7 @@ def simulated_effects(
 
 @dataclass(frozen=True)
 class SimulatedModel:
-    """A vehicle as a model has it.
+    """A vehicle as described by a model with effects.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class SimulatedModel:
 def simulated_model(
     base: InertiaModel | None, fitted: Mapping[str, Mapping[str, float]], vehicle: VehicleSettings
 ) -> SimulatedModel:
-    """Fly a model with its effects.
+    """Build a model with its effects for the simulation.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class EffectWrench:
     rotor_coupling: Array
 
     def direct(self, signals: Signals) -> Array:
-        """Evaluate what acts at once.
+        """Evaluate the direct part of the wrench.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class Plant:
 
 
 def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signals:
-    """Show one instant as a flight of one sample.
+    """Build the signals of one instant.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Battery sag: a motor that is told a speed turns slower on an empty battery."""
+"""Battery sag: a motor turns slower than commanded on an empty battery."""
 
 from __future__ import annotations
 

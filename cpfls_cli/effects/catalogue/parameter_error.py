@@ -91,7 +91,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 
 def _coupling(body_rate: Array, moments: Array) -> Array:
-    """Products of the two other rates times the mean of their moments of inertia, shape (time, 3), N m."""
+    """Multiply the two other rates by the mean of their moments of inertia, shape (time, 3), N m."""
     after, later = (1, 2, 0), (2, 0, 1)
     mean = 0.5 * (moments[list(after)] + moments[list(later)])
     return np.asarray(mean * body_rate[:, after] * body_rate[:, later])

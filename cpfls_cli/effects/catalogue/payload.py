@@ -26,7 +26,7 @@ _State = tuple[float, float, float, float, float, float]
 
 
 def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
-    """Swing a load on a cable under a moving hook.
+    """Integrate the swing of a load on a cable under a moving hook.
 
     ``n'' = -(a + g z)_across / L - |n'|^2 n - c n'`` for the direction n of the cable, with the part of the
     acceleration across it; integrated by the classical Runge-Kutta method. Large swings are slower than small ones,
@@ -80,7 +80,7 @@ def _smooth_derivative(signals: Signals, values: Array) -> Array:
 
 
 def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
-    """Add to the driven swing the one that a flight starts with, as its force balance shows it.
+    """Add the free swing at the start, estimated from the force balance, to the driven swing.
 
     The horizontal pull on the vehicle is ``m_p g`` times the whole swing. Where forces are known, least squares find
     ``m_p`` and the two free swings of each direction; else the cable starts at rest.
@@ -193,7 +193,7 @@ def _moved(state: Sequence[float], rate: Sequence[float], step: float) -> tuple[
 
 
 def _unit(state: Sequence[float]) -> _State:
-    """Bring the direction back to length 1 and its rate across it, which rounding spoils."""
+    """Normalise the direction and project its rate onto the plane across it, against rounding."""
     x, y, z, u, v, w = state
     scale = 1.0 / (x * x + y * y + z * z) ** 0.5
     x, y, z = x * scale, y * scale, z * scale

@@ -103,7 +103,7 @@ def _name(knot: float) -> str:
     return f"f_{knot:g}".replace(".", "_")
 
 
-def _told(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
+def _describe(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     """Name the state in which the thrust changes most."""
     changes = {knot: values[_name(knot)] for knot in _KNOTS[1:] if _name(knot) in values}
     if not changes:
@@ -135,5 +135,5 @@ EFFECT = Effect(
     accounts=lambda _number, _values: 0.05,
     shapes=(Shape("sideways", "1", (0.4, 0.7, 1.0, 1.5), "sideways speed over v_h that blows the effect away"),),
     scatter=_scatter,
-    told=_told,
+    describe=_describe,
 )

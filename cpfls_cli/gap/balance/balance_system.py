@@ -1,4 +1,4 @@
-"""All flights as one linear system: what is left, what stays free, what each candidate explains, and the noise."""
+"""All flights as one linear system: residual, free columns, columns of candidates, and noise."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
 
 
 def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
-    """Compute what a fitted hypothesis leaves of one flight, sample by sample.
+    """Compute the residual of a fitted hypothesis along one flight, sample by sample.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def _less(direct: Array, momentum: Array, candidate: Candidate, linear: Array, s
 
 
 def _activity(hypothesis: System) -> Array:
-    """Root mean square of what inertia and rotors do in each channel, about its mean."""
+    """Compute the root mean square of the inertial torque and force of each channel about its mean."""
     rows = np.concatenate([flight.averaged(flight.inertial) for flight in hypothesis.flights])
     torque = np.sqrt(np.mean(rows[:, :3] ** 2, axis=0))
     weight = np.sqrt(np.mean(rows[:, 3:] ** 2))
@@ -185,7 +185,7 @@ def _activity(hypothesis: System) -> Array:
 
 
 def scatter_variance(hypothesis: System) -> Array:
-    """Average the variance that chosen effects can scatter, for a unit of scatter.
+    """Average over windows the variance of the random part of the chosen effects, for a unit of relative scatter.
 
     Returns
     -------
@@ -203,7 +203,7 @@ def scatter_variance(hypothesis: System) -> Array:
 
 
 def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
-    """Estimate the scatter from what is left: one number for all channels.
+    """Estimate the relative scatter, one number for all channels, from the residual.
 
     Parameters
     ----------

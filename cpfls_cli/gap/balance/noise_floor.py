@@ -1,4 +1,4 @@
-"""The noise floor of each channel, from the flight itself: what is left at frequencies where nothing moves."""
+"""The noise floor of each channel, from the residual at frequencies above the motion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MEDIAN_OF_EXPONENTIAL = float(np.log(2))
 
 
 def noise_floor(residual: Columns, windows: Windows) -> Array:
-    """Estimate the standard deviation that noise gives a window.
+    """Estimate the standard deviation of the window averages that noise causes.
 
     The power of the residual is taken at frequencies above the motion. Spectra that noise can have are fitted to it:
     flat ones, as of rotors and angles; growing with the square, as of a gyroscope, whose derivative is taken; and both
@@ -50,7 +50,7 @@ def noise_floor(residual: Columns, windows: Windows) -> Array:
 
 
 def _terms(windows: Windows, centre: float) -> Array:
-    """Average the spectra that noise can have over what a window at a frequency lets through."""
+    """Average the model spectra of noise over the passband of a window at a frequency."""
     length = len(windows.weight)
     through = np.abs(np.fft.rfft(windows.weight, _PADDED * length)) ** 2
     offset = np.fft.rfftfreq(_PADDED * length, windows.period)
@@ -72,7 +72,7 @@ def _energy(windows: Windows) -> float:
 
 
 def _extrapolated(terms: Array, power: Array, window_terms: Array) -> float:
-    """Fit a flat and a rising spectrum, each of one colour; white ones unless others fit clearly better."""
+    """Fit a flat and a rising spectrum, white unless coloured ones fit clearly better; evaluate them for a window."""
     if not power.min() > 0:
         return 0.0
     # Dividing by the power makes relative errors of equal weight.

@@ -1,4 +1,4 @@
-"""Fits of a hypothesis: its free columns, the derivatives by its shapes, and the best values of the shapes."""
+"""Fits of a hypothesis: linear coefficients, derivatives by shapes, and refinement of the shapes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _STEP = 1e-3
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
-    """Improve the shapes of the chosen effects by the error of the fit.
+    """Refine the shapes of the chosen effects by minimising the squared residual.
 
     The newest shapes first, one by one between the points of their grids; then, where there are several, all together,
     because a lag and a delay, say, trade with each other.
@@ -40,7 +40,7 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
 
 
 def fit(hypothesis: System, floor: Array) -> Array:
-    """Fit all free columns.
+    """Fit all free columns by weighted least squares.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def fit(hypothesis: System, floor: Array) -> Array:
 
 
 def weighted_residual(hypothesis: System, floor: Array, rotor_wrench: Array) -> Array:
-    """Compute what a hypothesis leaves after its fit, in floors, as if its rotors gave as much torque as told.
+    """Compute the residual of a fit in floors, compensated for a change of the rotor torque.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def _residual_at(hypothesis: System, linear: Array, moved: Candidate, name: str,
 
 
 def compensation(before: Array, after: Array) -> Array:
-    """Weigh the channels against what an effect on the actuation takes off their torque.
+    """Weigh the channels by how much an actuator effect reduces their rotor torque.
 
     Inertia is free in every fit. Where motion follows the torque only in part, a torque half as large with half the
     inertia leaves half of the residual and explains nothing: a lag would look better the longer it is. With residuals

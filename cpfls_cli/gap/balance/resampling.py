@@ -58,7 +58,7 @@ class Folds:
         return len(self.grams)
 
     def solve(self, columns: IntArray) -> tuple[Array, Array]:
-        """Fit a subset of columns without each block, and judge it on that block.
+        """Fit a subset of columns without each block and evaluate it on that block.
 
         Returns
         -------
@@ -104,7 +104,7 @@ class Folds:
         return np.asarray(self.square - explained)
 
     def subtracted(self, column: int, kept: IntArray, weight: Array) -> Folds:
-        """Subtract a column with coefficient 1 from the right side, and weigh the channels.
+        """Subtract a column with coefficient 1 from the right side and weigh the channels.
 
         Parameters
         ----------
@@ -187,7 +187,7 @@ def _solve(gram: Array, moment: Array) -> Array:
 
 
 def about_flight_mean(values: Array, flight_index: IntArray) -> Array:
-    """Take out the mean over each flight.
+    """Subtract the mean over each flight.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def about_flight_mean(values: Array, flight_index: IntArray) -> Array:
 
 
 def mirror_shifted(residual: Array, flight_index: IntArray, shifts: int, rng: np.random.Generator) -> Array:
-    """Shift the residual of each flight around a circle that holds it forwards and backwards, with random signs.
+    """Draw circular shifts of the residual of each flight joined with its mirror image, with random signs.
 
     A plain circle joins the end of a flight to its start. Slow residuals jump there and slow signals do not, so chance
     explains less of the shifted residual than of a residual without any cause: with neighbouring windows correlated

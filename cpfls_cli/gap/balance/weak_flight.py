@@ -1,4 +1,4 @@
-"""A flight as rows of the balance: one window, three torques and three forces."""
+"""A flight as rows of the torque and force balance, six for each window."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True)
 class WeakFlight:
-    """A flight with the inertial side of its balance.
+    """A flight with its inertial torque and force.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class WeakFlight:
         return rows * self.turns if candidate.effect.kind == "parameter" else rows
 
     def without_force(self) -> WeakFlight:
-        """Leave the force balance out."""
+        """Drop the force balance."""
         known = self.known & (np.arange(6) < 3)
         seen = {key: rows * known[:, None] for key, rows in self.seen.items()}
         return replace(self, known=known, seen=seen)
@@ -130,7 +130,7 @@ def weak_flight(
     force: bool,
     axes: Sequence[str] = _AXES,
 ) -> WeakFlight:
-    """Write down the inertial side of a flight.
+    """Compute the inertial torque and force of a flight.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def weak_flight(
 
 
 def _turns(flight: WeakFlight) -> Array:
-    """Find what the flight shows of the vehicle's own numbers.
+    """Mark the vehicle's own numbers that the flight can show.
 
     Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to be rid of the noise
     of the gyroscope, which is not what anybody asked.

@@ -1,4 +1,4 @@
-"""Weak form: averages over smooth windows that flights share, with derivatives moved onto the window by parts."""
+"""Weak form: averages over smooth windows, with derivatives moved onto the window by integration by parts."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Windows:
         return max(0, (samples - len(self.weight)) // self.hop + 1)
 
     def centres(self, time: Array) -> Array:
-        """Give the middle of each window.
+        """Compute the middle of each window.
 
         Parameters
         ----------

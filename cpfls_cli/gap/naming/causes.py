@@ -13,6 +13,7 @@ from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.balance.balance_system import is_free, system
+from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
@@ -82,7 +83,7 @@ def judge_effect(
 
 
 def _frequency(chosen: Scored, step: SearchStep) -> float:
-    """Give the share of the blocks without which the effect would still explain most."""
+    """Compute the share of blocks whose omission leaves the effect the best candidate."""
     total = np.array([scored.block_error.sum() - scored.block_error for scored in step.ranking if _real(scored)])
     names = [scored.candidate.effect.name for scored in step.ranking if _real(scored)]
     if chosen.candidate.effect.name not in names:
@@ -95,7 +96,7 @@ def _real(scored: Scored) -> bool:
 
 
 def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, floor: Array) -> Array:
-    """Split what the effects explain among them.
+    """Split the explained part of the residual among the effects.
 
     The share of an effect is the part of the explained residual that points its way, in floors; the shares add up to
     1. Effects that work against each other can have more than 1, or less than 0.
@@ -125,7 +126,7 @@ def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates
 def _remaining(
     flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, kept: Sequence[int] | range
 ) -> Array:
-    """Give what some of the effects leave, with the coefficients of all of them."""
+    """Compute the residual with some of the effects only, at the coefficients of all of them."""
     hypothesis = system(flights, [chosen[index] for index in kept])
     parameters = estimates.linear[: len(estimates.linear) - sum(len(linear) for linear in estimates.of_effect)]
     linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
@@ -135,7 +136,7 @@ def _remaining(
 def wrong_numbers(
     estimates: Estimates, effects: Sequence[NamedEffect], share: float, pull: Array
 ) -> NamedEffect | None:
-    """Name wrong numbers of the vehicle where they are sure, matter, and nothing named accounts for them.
+    """Name the numbers of the vehicle that are significantly wrong, relevant, and not explained by a named effect.
 
     Parameters
     ----------
@@ -157,7 +158,7 @@ def wrong_numbers(
 
 
 def impossible(numbers: Sequence[Estimate]) -> tuple[str, ...]:
-    """Say which numbers of the vehicle would have to be what no vehicle has: then the log is wrong, not the vehicle.
+    """List the numbers of the vehicle with impossible estimates: then the log is wrong, not the vehicle.
 
     Parameters
     ----------
@@ -186,7 +187,7 @@ def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
 
 
 def _accounted(name: str, effects: Sequence[NamedEffect]) -> float:
-    """Give the relative error that named effects leave in a number: they change it themselves."""
+    """Sum the relative error of a number that named effects account for."""
     accounted = 0.0
     for effect in effects:
         accounts = CATALOGUE[effect.name].accounts
@@ -195,8 +196,27 @@ def _accounted(name: str, effects: Sequence[NamedEffect]) -> float:
     return accounted
 
 
-def sensor_estimates(finding: AuditFinding, vehicle: VehicleSettings) -> tuple[Estimate, ...]:
-    """Give the named numbers of a fault."""
+def sensor_fault(
+    finding: AuditFinding, as_logged: Sequence[WeakFlight], as_repaired: Sequence[WeakFlight]
+) -> NamedEffect:
+    """Name a fault of the sensors with the share of the gap that its repair removes.
+
+    Parameters
+    ----------
+    finding : AuditFinding
+    as_logged, as_repaired : sequence of WeakFlight
+        The training flights without and with the repair.
+    """
+    logged, repaired = system(as_logged), system(as_repaired)
+    weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
+    before, after = ((s.residual - s.base @ fit(s, weight)) / weight for s in (logged, repaired))
+    share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
+    coefficients = _sensor_estimates(finding, as_repaired[0].signals.vehicle)
+    return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)
+
+
+def _sensor_estimates(finding: AuditFinding, vehicle: VehicleSettings) -> tuple[Estimate, ...]:
+    """Convert the named numbers of a sensor fault to estimates."""
     effect = CATALOGUE[finding.name]
     assert effect.test is not None, "the audit tests what has a test"
     by_label = dict(zip(effect.test.labels, effect.numbers, strict=True))

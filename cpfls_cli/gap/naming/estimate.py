@@ -1,4 +1,4 @@
-"""Coefficients with confidence intervals, from blocks of time left out, and what they say in words."""
+"""Coefficients with confidence intervals by the jackknife over blocks of time, and their sentence."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Estimates:
 
 
 def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
-    """Fit a hypothesis and scatter its numbers.
+    """Fit a hypothesis and compute confidence intervals of its numbers by the jackknife.
 
     The jackknife leaves out one block after another, so it holds for residuals that are correlated within blocks and
     for noise of unequal size. Shapes take part by their derivatives.
@@ -78,7 +78,7 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
 
 
 def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
-    """Fit once with the floors as weights, then with what is left, which is more where something is unexplained.
+    """Fit with the floors as weights, then with the larger of floor and residual.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Est
 
 
 def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
-    """Tell whether any number that gives an effect its size is surely not zero.
+    """Tell whether any number that sets the size of an effect differs significantly from zero.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def _of(
 
 
 def _interval(value: Array, left_out: Array) -> Array:
-    """Half the width of the 95 % interval by the jackknife."""
+    """Compute half the width of the 95 % confidence interval by the jackknife."""
     blocks = len(left_out)
     if blocks < 2:
         return np.full(len(value), np.inf)
@@ -140,7 +140,7 @@ def _interval(value: Array, left_out: Array) -> Array:
 
 
 def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:
-    """Change of all numbers where a block is left out, one Gauss-Newton step; shape (block, number)."""
+    """Compute the change of all numbers without each block by one Gauss-Newton step, shape (block, number)."""
     scale = np.sqrt((jacobian**2).sum(axis=(0, 1)))
     scaled = jacobian / np.where(scale > 0, scale, 1.0)
     parts = [
@@ -154,7 +154,7 @@ def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:
 
 
 def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: VehicleSettings) -> str:
-    """Say what a pilot understands of an effect as it was found.
+    """Compose the sentence on an effect and its significant numbers.
 
     Parameters
     ----------
@@ -169,5 +169,5 @@ def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: Vehicl
         The sentence of the catalogue, and what the numbers that are surely not zero add to it.
     """
     sure = {number.name: number.value for number in numbers if number.low > 0 or number.high < 0}
-    more = "" if effect.told is None else effect.told(vehicle, sure)
+    more = "" if effect.describe is None else effect.describe(vehicle, sure)
     return f"{effect.sentence} {more}".rstrip()

@@ -1,4 +1,4 @@
-"""What stays open: residuals that the catalogue does not explain, and effects that the flights could not show."""
+"""Open questions of a diagnosis: unexplained residuals, and effects that the flights could not show."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _VISIBLE = 0.2
 
 @dataclass(frozen=True)
 class Leftover:
-    """What is left of a fit.
+    """The residual of a fit and what it follows.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ def leftover(
     settings: GapSettings,
     rng: np.random.Generator,
 ) -> Leftover:
-    """Look at what a fit leaves.
+    """Analyse the residual of a fit: size, dependence on signals, narrow band, energy.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def leftover(
 
 
 def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:
-    """Look for a narrow band, with windows close enough that none is mistaken for another."""
+    """Search for a narrow band with windows dense enough to exclude aliases."""
     rows, rates = [], []
     for number, flight in enumerate(hypothesis.flights):
         windows = flight.windows
@@ -144,7 +144,7 @@ def _unexplained(
 
 
 def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
-    """Tell which way the power ``M omega`` goes about each axis, beyond the scatter over blocks.
+    """Test the sign of the mean power ``M omega`` about each axis against its scatter over blocks.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
 
 
 def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> tuple[NotExcited, ...]:
-    """List the effects that could be there unseen, and why.
+    """List the effects that could be present unseen, with the reason.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
 
 
 def look_alikes(hypothesis: System, named: Sequence[NamedEffect]) -> tuple[str, ...]:
-    """Say which effects look like a named one and cannot be ruled out, because the flights lack their signals.
+    """List the rivals of named effects that cannot be ruled out because the flights lack their signals.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a diagnosis says, as typed objects, and the verdict that follows from them."""
+"""Results of a diagnosis as typed objects, and the verdict that follows from them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MAIN = 0.1
 
 
 class GapVerdict(StrEnum):
-    """What is known of a gap."""
+    """Verdict on a gap."""
 
     NAMED = "NAMED"
     PARTIAL = "PARTIAL"
@@ -41,7 +41,7 @@ class GapVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class Estimate:
-    """A coefficient as found.
+    """An estimated coefficient with its confidence interval.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class GapSize:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What is missing in a model.
+    """Result of a diagnosis: the effects that a model misses.
 
     Attributes
     ----------
@@ -219,7 +219,7 @@ def verdict_of(
     excited: bool,
     settings: GapSettings,
 ) -> GapVerdict:
-    """Give the verdict.
+    """Derive the verdict from named effects, rivals and unexplained residuals.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def verdict_of(
 
 
 def gap_stays(before: Array, after: Array) -> bool:
-    """Tell whether the gap about an axis, or along one, stays that is a part of the whole.
+    """Tell whether a relevant gap about or along an axis is not reduced.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ def _stays(before: Array, after: Array) -> bool:
 
 
 def matters(unexplained: Unexplained, before: Array) -> bool:
-    """Tell whether what is left beside named effects shows a second cause that is not small.
+    """Tell whether an unexplained residual beside named effects shows a second cause of relevant size.
 
     Parameters
     ----------

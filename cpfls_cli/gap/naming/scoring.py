@@ -1,4 +1,4 @@
-"""What each candidate explains of blocks that its fit did not see, within physical bounds, and what chance explains."""
+"""Cross-validated gain of each candidate within physical bounds, and the gain of chance."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ERRORS = 2.0
 
 @dataclass(frozen=True)
 class Scored:
-    """A candidate and what it explains.
+    """A candidate with its cross-validated gain.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
 
 
 def primary(candidate: Candidate, columns: Array) -> Array:
-    """Leave out the columns that come in only once an effect is chosen.
+    """Drop the columns of secondary coefficients.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def score(arranged: Layout, normal: Folds, hypothesis: System) -> list[Scored]:
 
 
 def chance(arranged: Layout, normal: Folds) -> Array:
-    """Find what the best candidate explains of each draw of shifted residuals.
+    """Compute the gain of the best candidate on each draw of shifted residuals.
 
     Signs and bounds are not used, so chance is given more than its due.
 
@@ -237,7 +237,7 @@ def _scored(placed: PlacedCandidate, base: IntArray, normal: Folds, before: Arra
 
 
 def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:
-    """Hold coefficients against the bounds of their effect.
+    """Check coefficients against the bounds of their effect.
 
     What the data leave open is no reason to refuse: a coefficient counts as beyond a bound only by more than its
     uncertainty.
@@ -273,7 +273,7 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
 
 
 def information(effect: Effect, columns: int, vehicle: VehicleSettings) -> Array:
-    """Give what bounds say of linear coefficients before any data.
+    """Compute the prior information of linear coefficients from their bounds.
 
     A coefficient that only one block of a flight determines would be anything where that block is left out; with its
     bound as the standard deviation of a normal prior it is small there.

@@ -1,4 +1,4 @@
-"""The search for the effects that explain a gap: one at a time, against chance, with exchange, dropping and rivals."""
+"""Forward selection of the effects that explain a gap, tested against chance, with exchange and rivals."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _NEAR = 0.6
 
 @dataclass(frozen=True)
 class SearchStep:
-    """One look at all candidates beside a hypothesis.
+    """All candidates ranked beside a hypothesis.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ def forward_selection(
     rng: np.random.Generator,
     progress: Callable[[int], None] = lambda _: None,
 ) -> tuple[tuple[Candidate, ...], list[SearchStep]]:
-    """Add effects one at a time while each explains more than chance and enough of what is left.
+    """Add effects one at a time while each explains more than chance and a relevant part of the residual.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def forward_selection(
 
 
 def acceptable(step: SearchStep, settings: GapSettings) -> bool:
-    """Tell whether the best candidate of a look is more than chance and enough."""
+    """Tell whether the best candidate explains more than chance and a relevant part of the residual."""
     if not step.ranking or step.ranking[0].gain == REFUSED:
         return False
     best = step.ranking[0]
@@ -176,7 +176,7 @@ def acceptable(step: SearchStep, settings: GapSettings) -> bool:
 
 
 def _enough(step: SearchStep) -> float:
-    """Give what an effect has to explain to be worth a name, in squared floors."""
+    """Compute the least gain of an effect that is named, in squared floors."""
     return max(_LEAST_SHARE * step.above_floor, _LEAST_IN_FLOORS**2 * len(step.hypothesis.residual))
 
 
@@ -207,7 +207,7 @@ def quiet_enough(gain: float, step: SearchStep, refitted: System) -> bool:
 def exchanged(
     flights: Sequence[WeakFlight], chosen: Sequence[Candidate], effects: Sequence[Effect], settings: GapSettings
 ) -> tuple[Candidate, ...]:
-    """Drop effects that later ones made needless, and replace those that another serves better beside the rest."""
+    """Drop effects that later ones made needless, and exchange those that another beats beside the rest."""
     kept = list(chosen)
     for candidate in list(chosen):
         others = [other for other in kept if other is not candidate]
@@ -228,7 +228,7 @@ def exchanged(
 
 
 def best_floor(hypothesis: System) -> Array:
-    """Estimate the floors from what a hypothesis leaves.
+    """Estimate the noise floors from the residual of a hypothesis.
 
     The fit and the floors depend on each other; starting from equal weights, a second round changes nothing any more.
 
@@ -244,7 +244,7 @@ def best_floor(hypothesis: System) -> Array:
 
 
 def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
-    """Give each window the number of its cross-validation block.
+    """Assign each window to a block of the cross-validation.
 
     Returns
     -------
@@ -309,7 +309,7 @@ def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
 
 
 def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Alternative]:
-    """List what is as good as the chosen effect; an effect that holds it as a special case is none."""
+    """List the rivals of a chosen effect, without effects that hold it as a special case."""
     effect = chosen.candidate.effect
     return [
         Alternative(

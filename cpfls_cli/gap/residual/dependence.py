@@ -24,7 +24,7 @@ _ACTUATION = ("rotor torque", "rotor speed", "thrust")
 
 
 class Dependence(NamedTuple):
-    """How well one signal alone tells a channel of the residual.
+    """Share of a channel of the residual that one signal alone explains.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ def _share(curve: Array, draws: Array, block: IntArray) -> Array:
 
 
 def state_signals(flight: WeakFlight, signals: Signals) -> dict[str, Array]:
-    """Average everything the flight has of motion and actuation over its windows.
+    """Average the signals of motion and actuation over the windows of a flight.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def state_signals(flight: WeakFlight, signals: Signals) -> dict[str, Array]:
 
 
 def joined_states(states: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
-    """Put the states of several flights one after another; what a flight lacks is not a number there.
+    """Concatenate the states of several flights, NaN where a flight lacks a signal.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def joined_states(states: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
 
 
 def without_actuation(state: Mapping[str, Array]) -> dict[str, Array]:
-    """Leave out what the rotors do.
+    """Drop the signals of the rotors.
 
     The controller answers every disturbance with the rotors, and their noise is noise of the residual, so that a
     residual nearly always follows their torque, whatever causes it. Causes are looked for among the other signals.

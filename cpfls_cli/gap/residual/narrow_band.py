@@ -58,7 +58,7 @@ class NarrowBand:
 def narrow_band(
     residual: Sequence[Array], body_rate: Sequence[Array], hop_s: float, draws: int, rng: np.random.Generator
 ) -> NarrowBand | None:
-    """Look for one narrow band that stands out of the smooth spectrum of the residual.
+    """Search for one narrow band that stands out of the smooth spectrum of the residual.
 
     The periodogram over all flights is divided by its background; the largest ratio of all frequencies and channels is
     compared with that of noise drawn from the background. Rows from windows of 0.4 s at a hop of 0.2 s show lines up
@@ -198,7 +198,7 @@ def grid(lengths: Sequence[int], period: float) -> Grid:
 
 
 def pooled_power(series: Sequence[Array], on: Grid) -> Array:
-    """Add up the periodograms of flights under a Hann taper.
+    """Sum the periodograms of flights under a Hann taper.
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ def _of_channel(
 
 
 def _local_rms(residual: Array) -> Array:
-    """Average over neighbours: a residual that swings through zero is not small there."""
+    """Compute the root mean square over neighbouring windows, which a zero crossing does not make small."""
     # The filter is a running sum, whose rounding can end below 0.
     return np.asarray(np.sqrt(np.maximum(uniform_filter1d(residual**2, _AVERAGED_WINDOWS, mode="nearest"), 0.0)))
 

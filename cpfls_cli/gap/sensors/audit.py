@@ -43,7 +43,7 @@ _SIGMAS_APART = 4.0
 
 @dataclass(frozen=True)
 class Audit:
-    """What the sensors say about each other.
+    """Result of the sensor audit.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ def _gyro_notes(fit: GyroFit) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Preparation:
-    """What all flights of one diagnosis share.
+    """Windows, model, settings and sensor repair that all flights of a diagnosis share.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What channels show by themselves and beside each other: broken, inconsistent or late."""
+"""Checks of single channels and of pairs of channels: broken, inconsistent or late."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def _matches(name: str, first: Array, second: Array, change: Array) -> list[Chan
 
 
 def frame_warnings(name: str, first: Array, second: Array, floor: float) -> list[str]:
-    """Look for an axis that is swapped, turned round or missing.
+    """Detect axes that are swapped, reversed or missing.
 
     Parameters
     ----------
@@ -227,14 +227,14 @@ def _small_warnings(matches: Sequence[ChannelMatch]) -> list[str]:
 
 
 def _scale_off(match: ChannelMatch) -> bool:
-    """Whether the scale is off whichever side the noise is on."""
+    """Tell whether the scale is off whichever side the noise is on."""
     either = (match.scale * np.sqrt(match.r2), match.scale / np.sqrt(match.r2))
     return all(each > 1 + _SCALE_OFF for each in either) or all(each < 1 - _SCALE_OFF for each in either)
 
 
 @dataclass(frozen=True)
 class ActuationDelay:
-    """Delay of the motion behind the torque that the log tells, for information.
+    """Delay of the motion behind the logged torque, for information.
 
     Attributes
     ----------
@@ -254,7 +254,7 @@ class ActuationDelay:
 
 
 def actuation_delay(flights: Sequence[Signals]) -> ActuationDelay | None:
-    """Estimate how late the motion follows the torque, flight by flight.
+    """Estimate the delay of the motion behind the torque, flight by flight.
 
     Returns
     -------

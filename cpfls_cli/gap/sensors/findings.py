@@ -85,12 +85,12 @@ class CheckedFault:
 
     @property
     def test(self) -> SensorTest:
-        """How the fault is tested."""
+        """Test of the effect."""
         assert self.effect.test is not None, "chosen so"
         return self.effect.test
 
     def smallest(self, period: float) -> float:
-        """Give the size that matters at a sampling period in s."""
+        """Compute the smallest relevant size at a sampling period in s."""
         return max(self.test.smallest, self.test.smallest_samples * period)
 
 

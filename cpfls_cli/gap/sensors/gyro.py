@@ -90,7 +90,7 @@ class GyroFit:
     flight_bias_error: Array
 
     def of(self, name: str) -> FaultFit:
-        """Give the numbers of one kind of fault.
+        """Select the numbers of one kind of fault.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ def _read(flights: Sequence[Kinematics], delay: float) -> Array:
 
 
 def _unexplained(seen: Array, read: Array) -> float:
-    """Log-likelihood of any matrix on the readings, so that a swapped axis does not shift the delay."""
+    """Compute the log variance left by any matrix on the readings, so that a swapped axis does not shift the delay."""
     right, left = seen - seen.mean(axis=0), read - read.mean(axis=0)
     rest = right - left @ np.linalg.lstsq(left, right, rcond=None)[0]
     return float(np.log(np.maximum((rest**2).mean(axis=0), np.finfo(float).tiny)).sum())
@@ -130,7 +130,7 @@ def _alone(read: Array) -> Array:
 
 
 def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | None:
-    """Regress the rate by the attitude on the readings, and turn the result round.
+    """Regress the rate by the attitude on the gyroscope, and invert the result.
 
     The gyroscope is the cleaner side, hence the reverse regression ``omega(t) = M omega_gyro(t + delay) - c``; its
     noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
@@ -181,7 +181,7 @@ def _blocks(index: IntArray, centres: Array) -> IntArray:
 
 
 def _columns(excited: BoolArray) -> IntArray:
-    """Leave out what the motion cannot tell: a matrix column of an axis that does not turn, a delay where none does."""
+    """Select the columns that the motion excites: axes that turn, and the delay if any does."""
     used = np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), [excited.any()]])
     return np.flatnonzero(used)
 
@@ -202,7 +202,7 @@ def _padded(solutions: Array, columns: IntArray) -> Array:
 
 
 def _faults(solution: Array, base: float) -> Array:
-    """Turn ``M, c`` round into faults; the left polar form parts scale and cross-axis from rotation exactly."""
+    """Invert ``M, c`` to faults; the left polar form separates scale and cross-axis from rotation exactly."""
     inverse = np.linalg.inv(np.eye(3) + solution[:9].reshape(3, 3))
     turned, stretched = polar(inverse, side="left")
     misalignment = -Rotation.from_matrix(turned).as_rotvec()
