@@ -15,14 +15,14 @@ from cpfls_cli.errors import InputError
 
 def _discover() -> Mapping[str, Effect]:
     modules = [import_module(f"{catalogue.__name__}.{module.name}") for module in iter_modules(catalogue.__path__)]
-    effects: list[Effect] = sorted((module.EFFECT for module in modules), key=lambda found: (found.order, found.name))
-    return MappingProxyType({found.name: found for found in effects})
+    effects: list[Effect] = sorted((module.EFFECT for module in modules), key=lambda known: (known.order, known.name))
+    return MappingProxyType({known.name: known for known in effects})
 
 
 CATALOGUE: Mapping[str, Effect] = _discover()
 """Effects by identifier."""
 
-VEHICLE_NUMBERS: Effect = next(found for found in CATALOGUE.values() if found.kind == "parameter")
+VEHICLE_NUMBERS: Effect = next(known for known in CATALOGUE.values() if known.kind == "parameter")
 """The vehicle's own numbers, which stay free in every fit."""
 
 

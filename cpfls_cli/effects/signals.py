@@ -71,7 +71,7 @@ class Signals:
     def available(self) -> frozenset[str]:
         """Names of the signals that effects can need and the flight has."""
         radius = all(rotor.radius_m is not None for rotor in self.vehicle.rotors)
-        found = {
+        signals = {
             # A log without gyroscope and attitude is taken as at rest: it holds the balance and no motion.
             "body_rate": bool(self.body_rate.any()),
             "attitude": self.attitude is not None,
@@ -86,7 +86,7 @@ class Signals:
             "rotor_radius": radius,
             "force": self.has_force,
         }
-        return frozenset(name for name, there in found.items() if there)
+        return frozenset(name for name, known in signals.items() if known)
 
     @property
     def has_force(self) -> bool:

@@ -144,8 +144,8 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     thrust = collective_thrust(vehicle, about_body, planned.get("acceleration"))
     tilt = _tilt(attitude)
     limits = [("thrust, N", thrust, _most_thrust(vehicle))] + ([("tilt, rad", tilt, tilt_max)] if tilt_max else [])
-    found = [too_much for name, values, limit in limits for too_much in _beyond(name, values, limit)]
-    return Flyability(thrust, tilt, tuple(found), rotor_demand(vehicle, thrust, about_body).violations)
+    excesses = [too_much for name, values, limit in limits for too_much in _beyond(name, values, limit)]
+    return Flyability(thrust, tilt, tuple(excesses), rotor_demand(vehicle, thrust, about_body).violations)
 
 
 def single_axis_torque(vehicle: VehicleSettings) -> Array:

@@ -122,13 +122,13 @@ class SimulatedModel:
         SettingError
             If the model has one of them already, or two of them do not go together.
         """
-        own = {one.effect.name: one for one in self.effects.listed}
+        by_name = {one.effect.name: one for one in self.effects.listed}
         for one in asked.listed:
             name = one.effect.name
-            own[name] = _added(own[name], one) if name in own else one
-        together = SimulatedEffects(tuple(own.values()))
-        _refuse_conflict(together)
-        return SimulatedModel(self.base, together)
+            by_name[name] = _added(by_name[name], one) if name in by_name else one
+        effects = SimulatedEffects(tuple(by_name.values()))
+        _refuse_conflict(effects)
+        return SimulatedModel(self.base, effects)
 
 
 def simulated_model(
@@ -209,9 +209,9 @@ def _key(name: str) -> str:
     return f"closed_loop.effects.{name}"
 
 
-def _added(own: SimulatedEffect, asked: SimulatedEffect) -> SimulatedEffect:
-    name = own.effect.name
-    if own.effect.kind != "parameter":
-        has = ", ".join(f"{key} = {value:.4g}" for key, value in own.values.items())
+def _added(known: SimulatedEffect, asked: SimulatedEffect) -> SimulatedEffect:
+    name = known.effect.name
+    if known.effect.kind != "parameter":
+        has = ", ".join(f"{key} = {value:.4g}" for key, value in known.values.items())
         raise SettingError(f"closed_loop.effects.{name}", f"the model has it already{': ' + has if has else ''}")
-    return SimulatedEffect(own.effect, {key: value + asked.values[key] for key, value in own.values.items()})
+    return SimulatedEffect(known.effect, {key: value + asked.values[key] for key, value in known.values.items()})

@@ -141,11 +141,11 @@ class Plant:
         body_rate = state[BODY_RATE]
         signals = instant(self.vehicle, state, rotors.speed)
         wrench = signals.wrench[0] + self.wrench.direct(signals)
-        own = self.turning(state[ATTITUDE], body_rate)
-        torque = wrench[:3] - own.direct + self.wrench.rotor_coupling @ rotors.acceleration
+        inertial = self.turning(state[ATTITUDE], body_rate)
+        torque = wrench[:3] - inertial.direct + self.wrench.rotor_coupling @ rotors.acceleration
         acceleration = signals.rotation[0] @ wrench[3:] / self.vehicle.mass_kg
         acceleration[2] -= self.vehicle.gravity_m_s2
-        inertia = own.inertia + self.wrench.added_inertia
+        inertia = inertial.inertia + self.wrench.added_inertia
         turning = np.linalg.solve(inertia, torque)
         change = np.zeros(len(state))
         first = VEHICLE_STATES

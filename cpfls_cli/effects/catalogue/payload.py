@@ -111,8 +111,8 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
             np.column_stack([driven[:, 1], nothing, free, nothing[:, 0], np.ones(len(free))]),
         ]
     )
-    found = np.linalg.lstsq(columns, pull.T.reshape(-1), rcond=None)[0]
-    start = found[1:5] / found[0] if found[0] > 0 else np.zeros(4)
+    solution = np.linalg.lstsq(columns, pull.T.reshape(-1), rcond=None)[0]
+    start = solution[1:5] / solution[0] if solution[0] > 0 else np.zeros(4)
     if np.abs(start).max() > _LARGEST_START:
         return driven
     return np.asarray(driven + np.column_stack([free @ start[:2], free @ start[2:]]))

@@ -74,7 +74,7 @@ def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     """Name the weak rotor; a strong opposite one looks the same."""
     differences = np.array([values.get(f"difference_{mode}", 0.0) for mode in (1, 2)])
     loss = gains(vehicle, differences).tolist()
-    other = {place: pair[1 - pair.index(place)] for pair in opposite_pairs(vehicle) for place in pair}
+    other = {rotor: pair[1 - pair.index(rotor)] for pair in opposite_pairs(vehicle) for rotor in pair}
     if len(other) != len(loss):
         weak = loss.index(min(loss))
         return f"Rotor {weak + 1} pulls least, {-100 * loss[weak]:.2g} % less than modelled." if any(loss) else ""

@@ -93,14 +93,14 @@ def narrow_band(
     power = pooled_power([rows[:, channels].T for rows in flights], on)
     smooth = background(power, on)
     prominence = _prominence(power, on)
-    place, peak = (int(i) for i in np.unravel_index(prominence.argmax(), prominence.shape))
+    strongest, peak = (int(i) for i in np.unravel_index(prominence.argmax(), prominence.shape))
     noise = [_prominence(noise_like(smooth, lengths, present[:, channels], on, rng), on).max() for _ in range(draws)]
-    channel, frequency = int(channels[place]), _between_bins(power[place], peak, on)
+    channel, frequency = int(channels[strongest]), _between_bins(power[strongest], peak, on)
     mean, error = _mean_power(channel, frequency, hop_s, flights, rates)
     return NarrowBand(
         channel=CHANNELS[channel],
         frequency_hz=frequency,
-        share=_share(power[place], smooth[place], peak, on),
+        share=_share(power[strongest], smooth[strongest], peak, on),
         p_value=float((1 + (np.array(noise) >= prominence.max()).sum()) / (1 + draws)),
         energy=_energy(mean, error),
         power=mean,
@@ -255,9 +255,9 @@ def _running_median(power: Array, on: Grid) -> Array:
     return _between(np.median(views, axis=-1), (np.arange(power.shape[-1]) - on.lowest) / step)
 
 
-def _between(values: Array, place: Array) -> Array:
+def _between(values: Array, position: Array) -> Array:
     """Interpolate along the last axis at fractional places, constant beyond the ends."""
-    inside = np.clip(place, 0, values.shape[-1] - 1)
+    inside = np.clip(position, 0, values.shape[-1] - 1)
     left = np.minimum(inside.astype(int), max(0, values.shape[-1] - 2))
     right = np.minimum(left + 1, values.shape[-1] - 1)
     share = inside - left

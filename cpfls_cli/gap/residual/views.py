@@ -67,11 +67,11 @@ def stretches(
     tuple of Stretch
         Largest first.
     """
-    found = []
+    largest = []
     for channel in range(residual.shape[1]):
-        own = list(_of_channel(channel, residual[:, channel], centres, flight_index, level))
-        found += sorted(own, key=_size)[:most]
-    return tuple(sorted(found, key=_size))
+        of_channel = list(_of_channel(channel, residual[:, channel], centres, flight_index, level))
+        largest += sorted(of_channel, key=_size)[:most]
+    return tuple(sorted(largest, key=_size))
 
 
 def _size(stretch: Stretch) -> float:
@@ -102,7 +102,7 @@ def _local_rms(residual: Array) -> Array:
 def _runs(above: BoolArray, pause: int) -> list[slice]:
     padded = np.pad(above, pause)
     joined = above | binary_closing(padded, np.ones(pause + 1, dtype=bool))[pause : pause + len(above)]
-    return [found[0] for found in find_objects(label(joined)[0])]
+    return [run[0] for run in find_objects(label(joined)[0])]
 
 
 @dataclass(frozen=True)
@@ -198,18 +198,20 @@ def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: in
     ----------
     Ljung and Box 1978, equation 1.4.
     """
-    flights = [residual[flight_index == flight][::stride] for flight in np.unique(flight_index)]
-    longest = max((len(rows) for rows in flights), default=0)
+    flights = [residual[flight_index == number][::stride] for number in np.unique(flight_index)]
+    longest = max((len(centred) for centred in flights), default=0)
     lags = min(lags, longest // _FEWEST_PER_LAG)
-    rows = [about_flight_mean(own, np.zeros(len(own), dtype=int)) for own in flights]
-    used = sum(len(own) for own in rows)
-    square = np.sum([(own**2).sum(axis=0) for own in rows], axis=0)
-    products = np.array([_product(rows, lag) for lag in range(1, lags + 1)]).reshape(lags, residual.shape[1])
-    pairs = np.array([sum(max(0, len(own) - lag) for own in rows) for lag in range(1, lags + 1)])
+    centred = [about_flight_mean(flight, np.zeros(len(flight), dtype=int)) for flight in flights]
+    used = sum(len(flight) for flight in centred)
+    square = np.sum([(flight**2).sum(axis=0) for flight in centred], axis=0)
+    products = np.array([_product(centred, lag) for lag in range(1, lags + 1)]).reshape(lags, residual.shape[1])
+    pairs = np.array([sum(max(0, len(flight) - lag) for flight in centred) for lag in range(1, lags + 1)])
     correlation = np.divide(products, square, out=np.zeros_like(products), where=square > 0)
     statistic = used * (used + 2) * (correlation**2 / pairs[:, None]).sum(axis=0)
     return Whiteness(correlation, statistic, chi2.sf(statistic, lags) if lags else np.ones_like(statistic), used)
 
 
 def _product(rows: list[Array], lag: int) -> Array:
-    return np.asarray(np.sum([(own[lag:] * own[: max(0, len(own) - lag)]).sum(axis=0) for own in rows], axis=0))
+    return np.asarray(
+        np.sum([(flight[lag:] * flight[: max(0, len(flight) - lag)]).sum(axis=0) for flight in rows], axis=0)
+    )

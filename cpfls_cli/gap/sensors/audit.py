@@ -83,7 +83,9 @@ class Audit:
         faults = [(test, finding) for finding in self.named if (test := CATALOGUE[finding.name].test) is not None]
         truth: dict[str, Any] = {}
         for signal in dict.fromkeys(test.signal for test, _ in faults):
-            errors = [test.error(found.named_values(test.labels)) for test, found in faults if test.signal == signal]
+            errors = [
+                test.error(finding.named_values(test.labels)) for test, finding in faults if test.signal == signal
+            ]
             if getattr(signals, signal) is not None:
                 truth[signal] = _corrected(getattr(signals, signal), signals.time, errors)
         return replace(signals, **truth) if truth else signals
