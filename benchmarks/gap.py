@@ -18,7 +18,7 @@ from benchmarks.blind.generator import COLUMNS, simulate_many
 from benchmarks.blind.measure import disturb
 from benchmarks.shared.measure import table
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.recording import Recording
+from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings

@@ -7,7 +7,7 @@ from typing import Any
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.tables import rows_of, table, texts
 from cpfls_cli.gap.sensors.audit import Audit
-from cpfls_cli.gap.sensors.audit_findings import AuditFinding, Coefficient
+from cpfls_cli.gap.sensors.findings import AuditFinding, FaultNumber
 
 _FINDING = (("finding", "sentence"), ("named", "p_value"))
 _NUMBER = (("finding", "name", "unit"), ("value", "low", "high", "named"))
@@ -73,8 +73,8 @@ def audit_lines(audit: Audit) -> list[str]:
     return [*(named or ["sensors: no fault that matters."]), *(f"sensors: {note}" for note in audit.notes)]
 
 
-def _coefficients(finding: str, numbers: list[dict[str, Any]]) -> tuple[Coefficient, ...]:
+def _coefficients(finding: str, numbers: list[dict[str, Any]]) -> tuple[FaultNumber, ...]:
     own = [
         {key: value for key, value in row.items() if key != "finding"} for row in numbers if row["finding"] == finding
     ]
-    return tuple(Coefficient(**{**row, "named": bool(row["named"])}) for row in own)
+    return tuple(FaultNumber(**{**row, "named": bool(row["named"])}) for row in own)

@@ -12,14 +12,14 @@ from cpfls_cli.artifacts.effects_file import effects_data
 from cpfls_cli.artifacts.tables import table, texts
 from cpfls_cli.flights.split import Split
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.diagnose import Diagnosed
-from cpfls_cli.gap.evidence import Evidence
+from cpfls_cli.gap.before_after import BeforeAfter
+from cpfls_cli.gap.diagnose import DiagnosisRun
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.results import Diagnosis, GapSize
 from cpfls_cli.gap.replay import Replayed
 
 
-def diagnosis_data(found: Diagnosed, shown: Evidence, model: ExtendedModel, split: Split) -> dict[str, Any]:
+def diagnosis_data(found: DiagnosisRun, shown: BeforeAfter, model: ExtendedModel, split: Split) -> dict[str, Any]:
     """Arrange a diagnosis as datasets."""
     diagnosis = found.diagnosis
     effects = diagnosis.effects or diagnosis.closest
@@ -87,14 +87,14 @@ def _lists(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _residual(found: Diagnosed, shown: Evidence) -> dict[str, Any]:
+def _residual(found: DiagnosisRun, shown: BeforeAfter) -> dict[str, Any]:
     unseen = found.held_out
     parts = {"before": unseen.before, "parameters": unseen.parameters, "after": unseen.after}
     rows = {f"residual/{name}": np.where(unseen.known, rows, np.nan) for name, rows in parts.items()}
     return {"residual/time": shown.centres, "residual/flight": shown.flight_index, **rows}
 
 
-def _whiteness(shown: Evidence) -> dict[str, Any]:
+def _whiteness(shown: BeforeAfter) -> dict[str, Any]:
     lags = len(shown.white_before.autocorrelation)
     return {
         "whiteness/lag": shown.lag_s * np.arange(1, lags + 1),
@@ -105,7 +105,7 @@ def _whiteness(shown: Evidence) -> dict[str, Any]:
     }
 
 
-def _picture(shown: Evidence, split: Split) -> dict[str, Any]:
+def _picture(shown: BeforeAfter, split: Split) -> dict[str, Any]:
     picture = shown.picture
     series = {name: getattr(picture, name) for name in ("time", "measured", "before", "after")}
     return {
@@ -115,7 +115,7 @@ def _picture(shown: Evidence, split: Split) -> dict[str, Any]:
     }
 
 
-def _run(shown: Evidence, split: Split) -> dict[str, Any]:
+def _run(shown: BeforeAfter, split: Split) -> dict[str, Any]:
     run = shown.run
     return {
         "run/flight": np.array(split.held_out[shown.run_flight].name),

@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.audit_file import audit_data
 from cpfls_cli.artifacts.tables import table, texts
 from cpfls_cli.flights.recordings import Flights
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.compare import Disagreement, Worst
+from cpfls_cli.gap.compare import Disagreement, WorstChannel
 
 
 def disagreement_data(found: Disagreement, given: Flights) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def _replay(found: Disagreement) -> dict[str, Any]:
     }
 
 
-def _heat_map(worst: Worst) -> dict[str, Any]:
+def _heat_map(worst: WorstChannel) -> dict[str, Any]:
     first, second = worst.heat_map.edges
     return {
         "heat_map/channel": np.array(worst.channel),

@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.audit_file import audit_of
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.tables import rows_of, table
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
-from cpfls_cli.effects.registry import CATALOGUE, effect
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect
@@ -36,7 +36,7 @@ def effects_data(
     parameters : mapping of str to Estimate
         The vehicle's own numbers, as far as they are sure.
     linear : array, shape (parameter,)
-        All of them, in the order of the effect ``parameter_error``.
+        All of them, in the order of the catalogue.
     """
     heads = [{**vars(e), "kind": CATALOGUE[e.name].kind, "named": named} for e in effects]
     shapes = [(e.name, *item) for e in effects if e.candidate is not None for item in e.candidate.shape.items()]
@@ -101,7 +101,7 @@ def _estimate(row: Mapping[str, Any]) -> Estimate:
 def _parameters(known: Mapping[str, Estimate], linear: Array) -> list[dict[str, Any]]:
     """Take the interval from the estimate, and the number from the fit, which has those that are not sure too."""
     rows = []
-    for coefficient, value in zip(CATALOGUE["parameter_error"].coefficients, linear, strict=True):
+    for coefficient, value in zip(VEHICLE_NUMBERS.coefficients, linear, strict=True):
         own = known.get(coefficient.name)
         low, high = (np.nan, np.nan) if own is None else (own.low, own.high)
         rows.append({"name": coefficient.name, "unit": coefficient.unit, "value": value, "low": low, "high": high})

@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.recording import Recording
+from cpfls_cli.gap.balance.windows import Recording
 
 _SIGNALS = (
     "attitude",

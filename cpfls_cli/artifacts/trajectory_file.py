@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.formats import TRAJECTORY
 from cpfls_cli.commands.flyable_check import Checked
 from cpfls_cli.excitation.optimise import Excitation
 from cpfls_cli.report.outcome import Outcome
-from cpfls_cli.simulation.flyable import Flyability
+from cpfls_cli.simulation.inverse import Flyability
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 

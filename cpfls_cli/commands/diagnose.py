@@ -20,8 +20,8 @@ from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.flights.same_vehicle import require_vehicle_of
 from cpfls_cli.flights.sources import read_good
 from cpfls_cli.flights.split import Split, seen_twice, split_flights
-from cpfls_cli.gap.diagnose import Diagnosed, diagnose
-from cpfls_cli.gap.evidence import Evidence, evidence, model_of
+from cpfls_cli.gap.before_after import BeforeAfter, before_after
+from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.pages.diagnosis_words import diagnosis_lines, diagnosis_summary
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -31,8 +31,8 @@ from cpfls_cli.report.outcome import Outcome, nothing_written
 class Answer:
     """A diagnosis with all that shows it."""
 
-    found: Diagnosed
-    shown: Evidence
+    found: DiagnosisRun
+    shown: BeforeAfter
     model: ExtendedModel
     split: Split
 
@@ -102,5 +102,5 @@ def answered(
     model = base_model(base, path)
     rng = generator(study, "diagnose")
     found = diagnose(split.training, split.held_out, study.gap, rng, model=model, progress=progress)
-    extended = model_of(found, model)
-    return Answer(found, evidence(split.held_out, found.held_out, extended, study.gap), extended, split)
+    extended = found.model(model)
+    return Answer(found, before_after(split.held_out, found.held_out, extended, study.gap), extended, split)

@@ -21,11 +21,10 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.same_vehicle import require_vehicle_of
 from cpfls_cli.flights.sources import read_good
-from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.extend import Extension, extend, worse_axes
-from cpfls_cli.gap.extended import plain
-from cpfls_cli.gap.naming.results import GapSize, NamedEffect, Verdict
+from cpfls_cli.gap.balance.windows import Recording
+from cpfls_cli.gap.extended import Refit, extend, plain, worse_axes
+from cpfls_cli.gap.naming.results import GapSize, GapVerdict, NamedEffect
 from cpfls_cli.gap.replay import Replayed, replayed
 from cpfls_cli.gap.sensors.audit import Audit
 from cpfls_cli.inertia import six_parameters
@@ -33,14 +32,14 @@ from cpfls_cli.pages.diagnosis_words import effect_line, effect_summary, gap_lin
 from cpfls_cli.pages.disagreement_words import gap_summary, replay_lines
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
-_EXTENDS = (Verdict.NAMED, Verdict.PARTIAL, Verdict.AMBIGUOUS)
+_EXTENDS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 
 
 @dataclass(frozen=True)
 class Grown:
     """An extension with its sizes on held-out flights."""
 
-    extension: Extension
+    extension: Refit
     study: Study
     before: GapSize
     after: GapSize
@@ -56,7 +55,7 @@ class Grown:
         vehicle = self.study.vehicle
         moments = six_parameters(vehicle.inertia_kg_m2) if model.base is None else np.zeros(6)
         correction = np.array([*model.parameters[:3] * np.array(vehicle.inertia_kg_m2[:3]), 0.0, 0.0, 0.0])
-        numbers = {number.name: number for number in self.extension.found.parameters}
+        numbers = {number.name: number for number in self.extension.estimates.parameters}
         return {
             "inertia": moments + correction,
             "thrust_scale": 1.0 + numbers["thrust_scale"].value if "thrust_scale" in numbers else 1.0,
@@ -148,7 +147,7 @@ def require_named(verdict: str, effects: Sequence[NamedEffect]) -> None:
     ComputationError
     """
     if verdict not in _EXTENDS or not effects:
-        closest = " (those that it calls closest are not it)" if verdict == Verdict.UNEXPLAINED else ""
+        closest = " (those that it calls closest are not it)" if verdict == GapVerdict.UNEXPLAINED else ""
         raise ComputationError(
             f"not extended: the diagnosis is {verdict} and names no effect that could be added{closest}"
         )

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import SettingError
 from cpfls_cli.pages.flyable_words import flyability_sentences
-from cpfls_cli.simulation.flyable import Flyability, flyability, single_axis_torque
+from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
 from cpfls_cli.trajectory import PlannedRotation, Trajectory, TrajectorySettings, plan
 
 PlanAt = Callable[[float], PlannedRotation]

@@ -10,15 +10,14 @@ from cpfls_cli.artifacts.extended_file import is_extended
 from cpfls_cli.artifacts.formats import EXTENDED
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.study import Study
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flights.same_vehicle import require_vehicle_of
 from cpfls_cli.flights.sources import read_good
-from cpfls_cli.simulation import FlownModel, flown_model
-
-_OWN_NUMBERS = "parameter_error"
+from cpfls_cli.simulation import SimulatedModel, simulated_model
 
 
-def model_in_flight(path: Path, study: Study) -> FlownModel:
+def model_in_flight(path: Path, study: Study) -> SimulatedModel:
     """Read the model that is to be flown.
 
     Parameters
@@ -32,11 +31,11 @@ def model_in_flight(path: Path, study: Study) -> FlownModel:
         If the file is neither, was made with another vehicle, or has an effect that cannot be flown.
     """
     if not is_extended(path):
-        return FlownModel(base_model(model_base(path, study), path))
+        return SimulatedModel(base_model(model_base(path, study), path))
     artifact = read_good(path, EXTENDED)
     require_vehicle_of(path, artifact, study)
     try:
-        return flown_model(base_model(base_artifact(artifact), path), _fitted(artifact), study.vehicle)
+        return simulated_model(base_model(base_artifact(artifact), path), _fitted(artifact), study.vehicle)
     except SettingError as error:
         name = error.key.rsplit(".", 1)[-1]
         raise InputError(f"{path}: its effect {name} cannot be flown: {error}") from None
@@ -46,4 +45,4 @@ def _fitted(artifact: Artifact) -> dict[str, dict[str, float]]:
     """Take the values of all effects; refitted numbers of the vehicle are those of all that is flown."""
     effects = {e.name: {c.name: c.value for c in e.coefficients} for e in effects_of(artifact)}
     numbers = zip(artifact.texts("parameter/name"), artifact.array("parameter/value").tolist(), strict=True)
-    return {**effects, _OWN_NUMBERS: dict(numbers)}
+    return {**effects, VEHICLE_NUMBERS.name: dict(numbers)}

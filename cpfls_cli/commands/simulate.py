@@ -17,7 +17,7 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.sources import read_with
 from cpfls_cli.pages.flown import closed_loop_outcome, effect_record, exact_outcome, noise_record, violation_sentence
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.simulation import FlownModel, flown_effects, measure, simulate
+from cpfls_cli.simulation import SimulatedModel, measure, simulate, simulated_effects
 
 _TURNED = ("attitude", "attitude_rate", "attitude_acceleration")
 _MOVED = ("position", "velocity", "acceleration")
@@ -54,9 +54,9 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
         )
     inputs = begin(job, {"trajectory": trajectory} | ({} if model is None else {"model": model}))
     time, planned = _plan(trajectory, closed)
-    flown = FlownModel() if model is None else model_in_flight(model, job.study)
+    flown = SimulatedModel() if model is None else model_in_flight(model, job.study)
     with settings_of("simulation", job.study):
-        flown.with_effects(flown_effects(job.study.simulation.closed_loop.effects, job.study.vehicle))
+        flown.with_effects(simulated_effects(job.study.simulation.closed_loop.effects, job.study.vehicle))
     if job.dry_run:
         return nothing_written(job)
     if closed:
@@ -106,7 +106,7 @@ def _inverse(
 
 
 def _closed_loop(
-    job: Job, inputs: Mapping[str, InputFile], time: Array, planned: dict[str, Array], model: FlownModel
+    job: Job, inputs: Mapping[str, InputFile], time: Array, planned: dict[str, Array], model: SimulatedModel
 ) -> Outcome:
     rng = generator(job.study, "simulate")
     flight = measure(time, planned, job.study.vehicle, job.study.simulation, rng, job.progress, model)

@@ -72,7 +72,7 @@ def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signal
 
 
 def wrench_change(before: Signals, after: Signals) -> Columns:
-    """Make a column of what another actuation does to the wrench.
+    """Compute the change of wrench by another actuation as a column.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What an effect is: columns of wrench that are linear in its coefficients, and what a reader has to know of it."""
+"""An effect: wrench columns that are linear in its coefficients, its description, and its hooks."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.effects.hooks import Actuation, CarriedBody, SensorLog, SensorTest
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -30,6 +31,8 @@ class Coefficient:
         Natural size on a vehicle, in `unit`; None for 1.
     secondary : bool
         Whether it comes in only once the effect is chosen, because another effect would do as well for it alone.
+    of_log : bool
+        Whether it tells how the motion is logged, and leaves the motion itself as it is.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Coefficient:
     meaning: str
     scale: Callable[[VehicleSettings], float] | None = None
     secondary: bool = False
+    of_log: bool = False
 
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the coefficient on a vehicle.
@@ -72,6 +76,16 @@ class Shape:
     grid: tuple[float, ...]
     meaning: str
     first: float | None = None
+
+    def bounds(self, _vehicle: VehicleSettings) -> tuple[float, float]:
+        """Bound the shape, on any vehicle.
+
+        Returns
+        -------
+        tuple of float
+            In `unit`.
+        """
+        return self.grid[0], self.grid[-1]
 
     @property
     def tried(self) -> tuple[float, ...]:
@@ -135,8 +149,8 @@ class Effect:
     apply : callable or None
         For actuator and sensor effects: ``apply(signals, shape) -> Signals`` as they would be without the effect's
         error, so that all other columns can be computed from them.
-    told : callable or None
-        ``told(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
+    describe : callable or None
+        ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
     rate_derivative : bool
         Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
     holds : frozenset of str
@@ -144,6 +158,22 @@ class Effect:
     scatter : callable or None
         For effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque and
         force for a unit of relative scatter.
+    order : int
+        Place in the catalogue, in the actuator chain and, from the last to the first, in the log of the sensors.
+    of_all_forces : bool
+        Whether the columns have a lever for the forces of all other effects.
+    actuation : Actuation or None
+        For effects between command and rotors: how they are simulated.
+    carried : callable or None
+        For effects with a state of their own: ``carried(vehicle, values) -> CarriedBody``, simulated instead of the
+        columns.
+    log : SensorLog or None
+        For effects on the log: how they are simulated.
+    test : SensorTest or None
+        For effects that the sensor audit finds.
+    accounts : callable or None
+        ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself leaves,
+        so that the number is not called wrong.
     """
 
     name: str
@@ -163,9 +193,21 @@ class Effect:
     linear: Callable[[Array], Array] | None = None
     apply: Callable[[Signals, Mapping[str, float]], Signals] | None = None
     scatter: Callable[[Signals, Mapping[str, float]], Array] | None = None
-    told: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
+    describe: Callable[[VehicleSettings, Mapping[str, float]], str] | None = None
     holds: frozenset[str] = frozenset()
     rate_derivative: bool = False
+    order: int = 1000
+    of_all_forces: bool = False
+    actuation: Actuation | None = None
+    carried: Callable[[VehicleSettings, Mapping[str, float]], CarriedBody] | None = None
+    log: SensorLog | None = None
+    test: SensorTest | None = None
+    accounts: Callable[[str, Mapping[str, float]], float] | None = None
+
+    @property
+    def numbers(self) -> tuple[Coefficient | Shape, ...]:
+        """Coefficients, then shapes."""
+        return (*self.coefficients, *self.shapes)
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that the effect needs and the flight lacks."""

@@ -12,50 +12,18 @@ from cpfls_cli.effects import catalogue
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.errors import InputError
 
-_ORDER = (
-    "linear_damping",
-    "quadratic_damping",
-    "rotor_plane_damping",
-    "rotor_drag",
-    "flapping_moment",
-    "rolling_moment",
-    "inflow",
-    "translational_lift",
-    "parasitic_drag",
-    "ground_effect",
-    "vertical_descent",
-    "wind",
-    "rotor_gyroscopic",
-    "rotor_acceleration",
-    "motor_lag",
-    "command_delay",
-    "battery_sag",
-    "com_offset",
-    "products_of_inertia",
-    "rotor_mismatch",
-    "torque_bias",
-    "payload",
-    "euler_axis_torque",
-    "gyro_bias",
-    "gyro_scale",
-    "imu_misalignment",
-    "channel_delay",
-    "parameter_error",
-)
-
-
-def _place(name: str) -> tuple[int, str]:
-    """Sort by the usual order, and what is not in it last, by name."""
-    return (_ORDER.index(name) if name in _ORDER else len(_ORDER), name)
-
 
 def _discover() -> Mapping[str, Effect]:
-    names = sorted((module.name for module in iter_modules(catalogue.__path__)), key=_place)
-    return MappingProxyType({name: import_module(f"{catalogue.__name__}.{name}").EFFECT for name in names})
+    modules = [import_module(f"{catalogue.__name__}.{module.name}") for module in iter_modules(catalogue.__path__)]
+    effects: list[Effect] = sorted((module.EFFECT for module in modules), key=lambda known: (known.order, known.name))
+    return MappingProxyType({known.name: known for known in effects})
 
 
 CATALOGUE: Mapping[str, Effect] = _discover()
 """Effects by identifier."""
+
+VEHICLE_NUMBERS: Effect = next(known for known in CATALOGUE.values() if known.kind == "parameter")
+"""The vehicle's own numbers, which stay free in every fit."""
 
 
 def effect(name: str) -> Effect:

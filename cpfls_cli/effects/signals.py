@@ -1,4 +1,4 @@
-"""What a flight tells an effect: motion, actuation and environment, with everything derived from them."""
+"""Signals of a flight that effects are evaluated on, with the quantities derived from them."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ class Signals:
 
     @cached_property
     def available(self) -> frozenset[str]:
-        """Names of what effects can ask for and this flight has."""
+        """Names of the signals that effects can need and the flight has."""
         radius = all(rotor.radius_m is not None for rotor in self.vehicle.rotors)
-        found = {
+        signals = {
             # A log without gyroscope and attitude is taken as at rest: it holds the balance and no motion.
             "body_rate": bool(self.body_rate.any()),
             "attitude": self.attitude is not None,
@@ -86,7 +86,7 @@ class Signals:
             "rotor_radius": radius,
             "force": self.has_force,
         }
-        return frozenset(name for name, there in found.items() if there)
+        return frozenset(name for name, known in signals.items() if known)
 
     @property
     def has_force(self) -> bool:

@@ -22,7 +22,7 @@ from cpfls_cli.flights.log_quality import found_and_done
 from cpfls_cli.flights.rotor_torque import commanded_speed
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.flights.sources import read_good
-from cpfls_cli.gap.balance.recording import Recording
+from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.logs.formats import is_log
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")

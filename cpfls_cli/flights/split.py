@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.recording import Recording, common_windows
+from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.settings import GapSettings
 
 

@@ -1,4 +1,4 @@
-"""Comparison: where a model and flights disagree, on which axis, when, in which state, and what was never flown."""
+"""Comparison of a model with flights: the gap by axis, time and state, and effects that were not excited."""
 
 from __future__ import annotations
 
@@ -10,24 +10,22 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
-from cpfls_cli.gap.balance.recording import Recording, common_windows
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, weak_flight
+from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.extended import ExtendedModel
+from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.results import NotExcited
 from cpfls_cli.gap.naming.search import best_floor, block_index
-from cpfls_cli.gap.naming.unseen import not_excited
 from cpfls_cli.gap.replay import Replayed, replayed
-from cpfls_cli.gap.residual.dependence import Dependence, rank_dependence
-from cpfls_cli.gap.residual.heat_map import HeatMap, heat_map
-from cpfls_cli.gap.residual.state_signals import joined_states, state_signals
-from cpfls_cli.gap.residual.stretches import Stretch, stretches
+from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
+from cpfls_cli.gap.residual.views import HeatMap, Stretch, heat_map, stretches
 from cpfls_cli.gap.sensors.audit import Audit, audit
 from cpfls_cli.gap.settings import GapSettings
 
 
 @dataclass(frozen=True)
-class Worst:
-    """The channel with the largest gap over the two signals that tell most about it.
+class WorstChannel:
+    """The channel with the largest gap, over the two signals that explain most of it.
 
     Attributes
     ----------
@@ -44,7 +42,7 @@ class Worst:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """Where a model and flights disagree.
+    """The gap between a model and flights.
 
     Attributes
     ----------
@@ -58,7 +56,7 @@ class Disagreement:
     states : mapping of str to array, shape (window,)
     stretches : tuple of Stretch
     dependence : tuple of Dependence
-    worst : Worst or None
+    worst : WorstChannel or None
         None where no two signals tell anything.
     not_excited : tuple of NotExcited
     replayed, held : Replayed
@@ -75,7 +73,7 @@ class Disagreement:
     states: dict[str, Array]
     stretches: tuple[Stretch, ...]
     dependence: tuple[Dependence, ...]
-    worst: Worst | None
+    worst: WorstChannel | None
     not_excited: tuple[NotExcited, ...]
     replayed: Replayed
     held: Replayed
@@ -112,11 +110,11 @@ def compare(
     InputError
         If the flights are too short or of different rates, or lack a signal that the model needs.
     """
-    own = common_windows(recordings, settings)
+    windows = common_windows(recordings, settings)
     progress(0.0, "sensor audit")
-    checked = model.audit or audit([recording.signals for recording in recordings], own)
+    audited = model.audit or audit([recording.signals for recording in recordings], windows)
     flights = [
-        weak_flight(r.name, checked.repaired(r.signals), own, model.base, settings.force, settings.axes)
+        weak_flight(r.name, audited.repaired(r.signals), windows, model.base, settings.force, settings.axes)
         for r in recordings
     ]
     progress(0.3, "noise floor")
@@ -126,14 +124,14 @@ def compare(
     progress(0.5, "what the gap follows")
     states = joined_states([state_signals(f, s) for f, s in zip(flights, hypothesis.signals, strict=True)])
     block = block_index(hypothesis, settings)
-    centres = np.concatenate([own.centres(flight.signals.time) for flight in flights])
+    centres = np.concatenate([windows.centres(flight.signals.time) for flight in flights])
     index = hypothesis.flight_index
     dependence = rank_dependence(residual / floor, index, block, states, settings.shifts, rng)
     known = _known(flights)
     rms = _rms(residual, known)
     effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
     return Disagreement(
-        checked,
+        audited,
         rms,
         np.where(known.any(axis=0), floor, np.nan),
         _activity(hypothesis, known),
@@ -145,7 +143,7 @@ def compare(
         dependence,
         _worst(residual, rms / floor, dependence, states),
         not_excited(hypothesis, effects, floor),
-        replayed([recording.signals for recording in recordings], replace(model, audit=checked), settings.horizon),
+        replayed([recording.signals for recording in recordings], replace(model, audit=audited), settings.horizon),
         replayed([recording.signals for recording in recordings], None, settings.horizon),
     )
 
@@ -161,7 +159,7 @@ def _rms(rows: Array, known: Array) -> Array:
 
 
 def _activity(hypothesis: System, known: Array) -> Array:
-    """Take the larger of what the motion takes and what the rotors give: one of them can be small."""
+    """Compute the root mean square of inertial or rotor wrench, whichever is larger."""
     pairs = list(zip(hypothesis.flights, hypothesis.signals, strict=True))
     taken = np.concatenate([flight.averaged(flight.inertial) for flight, _ in pairs])
     given = np.concatenate([flight.windows.average(signals.wrench) for flight, signals in pairs])
@@ -170,10 +168,13 @@ def _activity(hypothesis: System, known: Array) -> Array:
     return np.concatenate([size[:3], np.full(3, np.sqrt((size[3:] ** 2).sum()))])
 
 
-def _worst(residual: Array, floors: Array, dependence: Sequence[Dependence], states: dict[str, Array]) -> Worst | None:
-    place = int(np.nanargmax(floors))
-    names = [found.signal for found in dependence if found.channel == CHANNELS[place]][:2]
+def _worst(
+    residual: Array, floors: Array, dependence: Sequence[Dependence], states: dict[str, Array]
+) -> WorstChannel | None:
+    channel = int(np.nanargmax(floors))
+    names = [entry.signal for entry in dependence if entry.channel == CHANNELS[channel]][:2]
     if len(names) < 2:
         return None
     first, second = names
-    return Worst(CHANNELS[place], (first, second), heat_map(residual[:, place], states[first], states[second]))
+    mean = heat_map(residual[:, channel], states[first], states[second])
+    return WorstChannel(CHANNELS[channel], (first, second), mean)

@@ -12,31 +12,25 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.recording import Recording, common_windows
-from cpfls_cli.gap.balance.refine import fit, refined
+from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.contributions import shares
+from cpfls_cli.gap.balance.windows import Recording, common_windows
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
+from cpfls_cli.gap.naming.causes import JudgedEffect, impossible, judge_effect, sensor_fault, shares, wrong_numbers
 from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
-from cpfls_cli.gap.naming.judged import Judged, judge_effect
-from cpfls_cli.gap.naming.leftover import Leftover, leftover
-from cpfls_cli.gap.naming.results import Diagnosis, NamedEffect, Verdict
-from cpfls_cli.gap.naming.search import Step, block_index, forward, look
-from cpfls_cli.gap.naming.sensor_numbers import sensor_estimates
-from cpfls_cli.gap.naming.unseen import look_alikes, not_excited
-from cpfls_cli.gap.naming.vehicle_numbers import impossible, parameter_error
-from cpfls_cli.gap.naming.verdict import gap_stays, matters, verdict_of
-from cpfls_cli.gap.sensors.audit import Audit, audit
-from cpfls_cli.gap.sensors.audit_findings import AuditFinding
-from cpfls_cli.gap.sensors.preparation import Preparation
+from cpfls_cli.gap.naming.leftover import Leftover, leftover, look_alikes, not_excited
+from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
+from cpfls_cli.gap.naming.search import SearchStep, block_index, forward_selection, rank_effects
+from cpfls_cli.gap.sensors.audit import Audit, Preparation, audit
 from cpfls_cli.gap.settings import GapSettings
 
 _EXCITED_FLOORS = 3.0
 
 
 @dataclass(frozen=True)
-class Diagnosed:
-    """A diagnosis with what it was made from.
+class DiagnosisRun:
+    """A diagnosis with the fits and residuals that it was made from.
 
     Attributes
     ----------
@@ -44,7 +38,7 @@ class Diagnosed:
     audit : Audit
     hypothesis : System
         Of the training flights, with the chosen effects.
-    found : Estimates
+    estimates : Estimates
     leftover : Leftover
         Of the training flights with the effects.
     held_out : HeldOut
@@ -53,9 +47,16 @@ class Diagnosed:
     diagnosis: Diagnosis
     audit: Audit
     hypothesis: System
-    found: Estimates
+    estimates: Estimates
     leftover: Leftover
     held_out: HeldOut
+
+    def model(self, base: InertiaModel | None) -> ExtendedModel:
+        """Build the model with the effects of the diagnosis."""
+        chosen, by_effect = self.hypothesis.chosen, self.estimates.of_effect
+        effects = tuple(FittedEffect(*pair) for pair in zip(chosen, by_effect, strict=True))
+        width = len(self.estimates.linear) - sum(len(linear) for linear in by_effect)
+        return ExtendedModel(base, self.estimates.linear[:width], effects, self.audit)
 
 
 def diagnose(
@@ -66,8 +67,8 @@ def diagnose(
     *,
     model: InertiaModel | None = None,
     progress: Callable[[float, str], None] = lambda _done, _note: None,
-) -> Diagnosed:
-    """Name what a model misses.
+) -> DiagnosisRun:
+    """Name the effects that a model misses.
 
     The sensors are audited first and repaired where they are at fault. Effects are then added one at a time while each
     explains more of blocks it has not seen than chance does anywhere in the catalogue; what is chosen is judged on
@@ -90,28 +91,30 @@ def diagnose(
         If the flights are too short, of different rates, or have nothing in common with the catalogue.
     """
     progress(0.0, "sensor audit")
-    own = common_windows([*training, *held], settings)
-    checked = audit([recording.signals for recording in training], own)
-    prepared = Preparation(own, model, settings, checked)
+    windows = common_windows([*training, *held], settings)
+    audited = audit([recording.signals for recording in training], windows)
+    prepared = Preparation(windows, model, settings, audited)
     weak = prepared.repaired(training)
     effects = considered(settings)
-    chosen, steps = forward(weak, effects, settings, rng, lambda n: progress(0.1 + 0.1 * min(n, 5), "search"))
+    chosen, steps = forward_selection(weak, effects, settings, rng, lambda n: progress(0.1 + 0.1 * min(n, 5), "search"))
     progress(0.65, "estimates")
-    hypothesis, block, found = _sure(weak, chosen, steps[-1].floor, settings)
+    hypothesis, block, estimates = _sure(weak, chosen, steps[-1].floor, settings)
     chosen = hypothesis.chosen
-    left = leftover(hypothesis, found.linear, steps[-1].floor, block, settings, rng)
-    unseen = judged_unseen(held, prepared, hypothesis, found.linear, left.scatter)
+    remainder = leftover(hypothesis, estimates.linear, steps[-1].floor, block, settings, rng)
+    held_out = judged_unseen(held, prepared, hypothesis, estimates.linear, remainder.scatter)
     progress(0.75, "rivals")
-    own_shares = shares(weak, chosen, found, steps[-1].floor)
+    effect_shares = shares(weak, chosen, estimates, steps[-1].floor)
     judged = [
-        judge_effect(weak, chosen, place, found, float(own_shares[place]), effects, settings, rng)
-        for place in range(len(chosen))
+        judge_effect(weak, chosen, index, estimates, float(effect_shares[index]), effects, settings, rng)
+        for index in range(len(chosen))
     ]
     progress(0.9, "sensor faults")
-    faults = [_fault(finding, prepared.logged(training), weak) for finding in checked.named]
+    faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, effects)
-    diagnosis = _concluded(judged, faults, found, unseen, left, steps, hypothesis, settings, torque_alone, checked)
-    return Diagnosed(diagnosis, checked, hypothesis, found, left, unseen)
+    diagnosis = _concluded(
+        judged, faults, estimates, held_out, remainder, steps, hypothesis, settings, torque_alone, audited
+    )
+    return DiagnosisRun(diagnosis, audited, hypothesis, estimates, remainder, held_out)
 
 
 def considered(settings: GapSettings) -> list[Effect]:
@@ -126,87 +129,77 @@ def considered(settings: GapSettings) -> list[Effect]:
 def _sure(
     weak: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings
 ) -> tuple[System, IntArray, Estimates]:
-    """Fit the chosen effects, and once more without those that may as well be zero."""
+    """Fit the chosen effects, and refit without those whose size does not differ from zero."""
     hypothesis = system(weak, chosen)
     block = block_index(hypothesis, settings)
-    found = weighted_estimates(hypothesis, floor, block)
-    pairs = zip(chosen, found.effects, strict=True)
+    estimates = weighted_estimates(hypothesis, floor, block)
+    pairs = zip(chosen, estimates.effects, strict=True)
     kept = [candidate for candidate, numbers in pairs if differs_from_zero(candidate.effect, numbers)]
     if len(kept) == len(chosen):
-        return hypothesis, block, found
+        return hypothesis, block, estimates
     hypothesis = refined(weak, kept, floor)
     return hypothesis, block, weighted_estimates(hypothesis, floor, block)
-
-
-def _fault(finding: AuditFinding, as_logged: Sequence[WeakFlight], weak: Sequence[WeakFlight]) -> NamedEffect:
-    logged = system(as_logged)
-    repaired = system(weak)
-    weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
-    before, after = ((s.residual - s.base @ fit(s, weight)) / weight for s in (logged, repaired))
-    share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
-    coefficients = sensor_estimates(finding, weak[0].signals.vehicle)
-    return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)
 
 
 def _torque_alone(
     weak: Sequence[WeakFlight], settings: GapSettings, effects: Sequence[Effect]
 ) -> tuple[tuple[str, float], ...]:
-    """Tell what the torques alone would name first, where the force balance was used too."""
+    """List the effects that the torques alone would name first, where the force balance was used too."""
     if not any(flight.known[3:].any() for flight in weak):
         return ()
-    step = look([flight.without_force() for flight in weak], (), effects, settings, None)
+    step = rank_effects([flight.without_force() for flight in weak], (), effects, settings, None)
     best = [scored for scored in step.ranking[:3] if np.isfinite(scored.gain) and scored.gain > 0]
     return tuple((s.candidate.effect.name, float(min(1.0, s.gain / step.above_floor))) for s in best)
 
 
 def _concluded(
-    judged: Sequence[Judged],
+    judged: Sequence[JudgedEffect],
     faults: Sequence[NamedEffect],
-    found: Estimates,
-    unseen: HeldOut,
-    left: Leftover,
-    steps: Sequence[Step],
+    estimates: Estimates,
+    held_out: HeldOut,
+    remainder: Leftover,
+    steps: Sequence[SearchStep],
     hypothesis: System,
     settings: GapSettings,
     torque_alone: tuple[tuple[str, float], ...],
-    checked: Audit,
+    audited: Audit,
 ) -> Diagnosis:
     named = sorted((each.effect for each in judged), key=lambda effect: -effect.share)
     effects = [*faults, *named]
-    numbers = parameter_error(found, effects, unseen.explained_by_parameters(), _pull(hypothesis, steps[-1].floor))
+    numbers = wrong_numbers(estimates, effects, held_out.explained_by_parameters(), _pull(hypothesis, steps[-1].floor))
     effects += [numbers] if numbers is not None else []
-    share = unseen.share() if named else 1.0
+    share = held_out.share() if named else 1.0
     rivals = tuple(rival for each in judged for rival in each.alternatives)
-    gap = unseen.size(unseen.before).floors
-    known = [each for each in left.unexplained if matters(each, gap)] if effects else left.unexplained
-    stays = gap_stays(unseen.size(unseen.parameters).floors, unseen.size(unseen.after).floors)
+    gap = held_out.size(held_out.before).floors
+    known = [each for each in remainder.unexplained if matters(each, gap)] if effects else remainder.unexplained
+    stays = gap_stays(held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors)
     verdict = verdict_of(effects, rivals, known, share, stays, _excited(hypothesis, steps[-1].floor), settings)
-    wrong = impossible(found.parameters)
+    wrong = impossible(estimates.parameters)
     if wrong:
-        verdict = Verdict.UNEXPLAINED
-    refused = verdict is Verdict.UNEXPLAINED
+        verdict = GapVerdict.UNEXPLAINED
+    refused = verdict is GapVerdict.UNEXPLAINED
     alike = look_alikes(hypothesis, faults if refused else effects)
     return Diagnosis(
         verdict,
         tuple(faults if refused else effects),
         tuple(named) if refused else (),
         rivals,
-        left.unexplained,
+        remainder.unexplained,
         not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], steps[-1].floor),
-        {number.name: number for number in found.parameters},
+        {number.name: number for number in estimates.parameters},
         share,
-        unseen.size(unseen.before),
-        unseen.size(unseen.after),
-        unseen.floor,
+        held_out.size(held_out.before),
+        held_out.size(held_out.after),
+        held_out.floor,
         torque_alone,
-        (*wrong, *alike, *checked.warnings, *checked.notes),
+        (*wrong, *alike, *audited.warnings, *audited.notes),
         alike,
         wrong,
     )
 
 
 def _pull(hypothesis: System, floor: Array) -> Array:
-    """Bound by how much noise in the motion itself can draw each number of the vehicle towards zero torque."""
+    """Bound the bias of each number of the vehicle that noise in the motion causes."""
     columns = hypothesis.columns(hypothesis.free[0]) / floor[:, None]
     information = (columns**2).mean(axis=0).max(axis=0)
     return np.asarray(1.0 / np.maximum(information, 1e-12))

@@ -1,9 +1,9 @@
-"""A model with effects in it: rigid body or identified model, its numbers refitted, and what it missed."""
+"""A model with effects: rigid body or identified model, evaluated, refitted with them, and judged on unseen flights."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,21 +13,35 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.dynamics.integration import ReplayModel
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
+from cpfls_cli.effects.catalogue.parameter_error import coupling, inertia_correction
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, is_free, system
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.gap.balance.balance_system import System, is_free, scatter_size, scatter_variance, system
 from cpfls_cli.gap.balance.inertial import rotation_balance
-from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, actuated, columns_of, nuisance
-from cpfls_cli.gap.sensors.audit import Audit
+from cpfls_cli.gap.balance.refine import refined
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.gap.balance.windows import Recording, common_windows
+from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
+from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
+from cpfls_cli.gap.naming.results import NamedEffect
+from cpfls_cli.gap.naming.search import best_floor, block_index
+from cpfls_cli.gap.sensors.audit import Audit, Preparation
+from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.regressor.regressor import InertiaValues
 
-_COUPLING = (3, 4, 5)
-"""Places of what a wrong scale of the rotor torque leaves between the rates; no inertia holds it."""
+_TOUCHED = 0.2
+"""Root mean square in floors by which effects and refit move a channel, from which on it has to get better."""
+
+_CLEAR = 1.5
+"""Root mean square in floors of a gap that is there."""
+
+_WORSE = 1.2
+"""Ratio from which on a gap has grown."""
 
 
 class FittedEffect(NamedTuple):
-    """An effect of a model.
+    """An effect of a model with its linear coefficients.
 
     Attributes
     ----------
@@ -49,7 +63,7 @@ class ExtendedModel:
     base : InertiaModel or None
         None for the rigid body of the vehicle.
     parameters : array, shape (parameter,)
-        Relative errors of the vehicle's own numbers, in the order of the effect ``parameter_error``.
+        Relative errors of the vehicle's own numbers, in the order of the catalogue.
     effects : tuple of FittedEffect
     audit : Audit or None
         Faults of the sensors, which are taken out of signals first.
@@ -71,7 +85,7 @@ class ExtendedModel:
         return np.concatenate([self.parameters, *(e.linear for e in self.effects if is_free(e.candidate))])
 
     def repaired(self, signals: Signals) -> Signals:
-        """Take the faults of the sensors out."""
+        """Correct the signals for the faults of the sensors."""
         return signals if self.audit is None else self.audit.repaired(signals)
 
     def system(self, flights: Sequence[WeakFlight]) -> System:
@@ -102,7 +116,7 @@ class ExtendedModel:
         return np.asarray(hypothesis.residual - hypothesis.base @ self.linear)
 
     def effect_wrench(self, signals: Signals) -> Array:
-        """Compute what the effects do, sample by sample.
+        """Compute the wrench of the effects, sample by sample.
 
         Momentum parts are differentiated by a cubic spline, so noise of the signals shows in them.
 
@@ -121,8 +135,8 @@ class ExtendedModel:
         total = moved.wrench - signals.wrench
         for candidate, linear in self.effects:
             if candidate.effect.kind == "wrench":
-                own = linear if is_free(candidate) else np.ones(1)
-                total = total + instantaneous(columns_of(candidate, moved), own, signals.time)
+                coefficients = linear if is_free(candidate) else np.ones(1)
+                total = total + instantaneous(columns_of(candidate, moved), coefficients, signals.time)
         return np.asarray(total)
 
     def correction(self, signals: Signals) -> Array:
@@ -137,7 +151,7 @@ class ExtendedModel:
         -------
         array, shape (3, 3), kg m^2
         """
-        return np.diag(self.parameters[:3] * np.array(signals.vehicle.inertia_kg_m2[:3]))
+        return inertia_correction(self.parameters, signals.vehicle)
 
     def inertia(self, signals: Signals) -> Array | InertiaModel:
         """Give the refitted inertia.
@@ -158,20 +172,19 @@ class ExtendedModel:
         return _Corrected(self.base, correction)
 
     def replay_model(self, signals: Signals) -> ReplayModel:
-        """Give what drives a replay: rotors and effects along the measured motion, and the refitted inertia.
+        """Build the model of a replay: torque along the measured motion, and the refitted inertia.
 
         Parameters
         ----------
         signals : Signals
             With the faults of sensors taken out.
         """
-        coupling = np.where(np.isin(np.arange(len(self.parameters)), _COUPLING), self.parameters, 0.0)
-        left = instantaneous(columns_of(nuisance(), signals), coupling, signals.time)
-        torque = signals.wrench[:, :3] + self.effect_wrench(signals)[:, :3] + left[:, :3]
+        coupled = instantaneous(columns_of(nuisance(), signals), coupling(self.parameters), signals.time)
+        torque = signals.wrench[:, :3] + self.effect_wrench(signals)[:, :3] + coupled[:, :3]
         return ReplayModel(torque, self.inertia(signals))
 
     def inertial_torque(self, signals: Signals) -> Array:
-        """Compute the torque that the motion takes, with the inertia refitted.
+        """Compute the inertial torque of the motion with the refitted inertia.
 
         Parameters
         ----------
@@ -188,7 +201,7 @@ class ExtendedModel:
         return np.asarray(torque - refitted[:, :3])
 
     def rotor_torque(self, signals: Signals) -> Array:
-        """Compute the body torque that the rotors as logged have to give for the motion.
+        """Compute the body torque of the rotors that the motion requires.
 
         Parameters
         ----------
@@ -204,7 +217,7 @@ class ExtendedModel:
 
 @dataclass(frozen=True)
 class _Corrected:
-    """An inertia model with what its moments of inertia lack."""
+    """An inertia model plus a correction of its inertia tensor."""
 
     base: InertiaModel
     correction: Array
@@ -248,3 +261,100 @@ def _require(signals: Signals, chosen: Sequence[Candidate], name: str) -> None:
         if missing:
             lacking = ", ".join(each.replace("_", " ") for each in missing)
             raise InputError(f"{name}: lacks {lacking}, which the model's effect {candidate.effect.name} needs")
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A refitted model with effects and its residuals on held-out flights.
+
+    Attributes
+    ----------
+    model : ExtendedModel
+    effects : tuple of NamedEffect
+        With refitted numbers.
+    estimates : Estimates
+    unseen : HeldOut
+    """
+
+    model: ExtendedModel
+    effects: tuple[NamedEffect, ...]
+    estimates: Estimates
+    unseen: HeldOut
+
+
+def extend(
+    training: Sequence[Recording],
+    held: Sequence[Recording],
+    effects: Sequence[NamedEffect],
+    audit: Audit,
+    settings: GapSettings,
+    base: InertiaModel | None,
+) -> Refit:
+    """Refit a model together with effects and evaluate it on held-out flights.
+
+    Parameters
+    ----------
+    training, held : sequence of Recording
+    effects : sequence of NamedEffect
+        To become part of the model; shapes start from theirs.
+    audit : Audit
+        Faults of the sensors that are repaired.
+    settings : GapSettings
+    base : InertiaModel or None
+        None for the rigid body of the vehicle.
+
+    Raises
+    ------
+    ComputationError
+        If the gap on the held-out flights does not shrink in the channels that change.
+    """
+    prepared = Preparation(common_windows([*training, *held], settings), base, settings, audit)
+    flights = prepared.repaired(training)
+    chosen = [effect.candidate for effect in effects if effect.candidate is not None]
+    hypothesis = refined(flights, chosen, best_floor(system(flights, chosen)))
+    floor = best_floor(hypothesis)
+    estimates = weighted_estimates(hypothesis, floor, block_index(hypothesis, settings))
+    residual = hypothesis.residual - hypothesis.base @ estimates.linear
+    scatter = scatter_size(scatter_variance(hypothesis), residual, floor)
+    held_out = judged_unseen(held, prepared, hypothesis, estimates.linear, scatter)
+    _require_smaller(held_out)
+    fitted = tuple(FittedEffect(*pair) for pair in zip(hypothesis.chosen, estimates.of_effect, strict=True))
+    width = len(estimates.linear) - sum(len(linear) for linear in estimates.of_effect)
+    model = ExtendedModel(base, estimates.linear[:width], fitted, audit)
+    return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, held_out)
+
+
+def _require_smaller(held_out: HeldOut) -> None:
+    before, after = held_out.size(held_out.before).floors, held_out.size(held_out.after).floors
+    moved = held_out.size(held_out.before - held_out.after).floors > _TOUCHED
+    if not moved.any():
+        raise ComputationError("not extended: what is named changes no channel of the held-out flights by its noise")
+    if (after[moved] ** 2).sum() >= (before[moved] ** 2).sum():
+        sizes = ", ".join(f"{CHANNELS[c]} {before[c]:.3g} -> {after[c]:.3g} floors" for c in np.flatnonzero(moved))
+        raise ComputationError(f"not extended: the gap on the held-out flights does not shrink: {sizes}")
+
+
+def worse_axes(before: Array, after: Array) -> list[int]:
+    """List the axes about which a clear gap grows.
+
+    Parameters
+    ----------
+    before, after : array, shape (6,), floors
+    """
+    return [int(c) for c in np.flatnonzero((before[:3] > _CLEAR) & (after[:3] > _WORSE * before[:3]))]
+
+
+def _renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Estimates) -> list[NamedEffect]:
+    fitted = {
+        candidate.effect.name: (candidate, linear, numbers)
+        for candidate, linear, numbers in zip(hypothesis.chosen, estimates.of_effect, estimates.effects, strict=True)
+    }
+    renewed = []
+    for effect in effects:
+        if effect.candidate is None:
+            renewed.append(effect)
+            continue
+        candidate, linear, numbers = fitted[effect.name]
+        sentence = effect_sentence(candidate.effect, numbers, hypothesis.flights[0].signals.vehicle)
+        renewed.append(replace(effect, candidate=candidate, linear=linear, coefficients=numbers, sentence=sentence))
+    return renewed

@@ -9,9 +9,9 @@ import numpy as np
 
 from cpfls_cli.artifacts.audit_file import audit_lines, audit_summary
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.diagnose import Diagnosed
-from cpfls_cli.gap.evidence import Evidence
-from cpfls_cli.gap.naming.results import Alternative, Diagnosis, Estimate, GapSize, NamedEffect, Unexplained, Verdict
+from cpfls_cli.gap.before_after import BeforeAfter
+from cpfls_cli.gap.diagnose import DiagnosisRun
+from cpfls_cli.gap.naming.results import Alternative, Diagnosis, Estimate, GapSize, GapVerdict, NamedEffect, Unexplained
 from cpfls_cli.pages.disagreement_words import UNITS, gap_summary, replay_lines, replay_summary, unseen_lines
 from cpfls_cli.pages.gap_words import whole_percent
 from cpfls_cli.report.rounded import with_interval
@@ -21,16 +21,16 @@ _ENERGY = {
     "drains": "; it drains energy from the rotation",
 }
 _VERDICTS = {
-    Verdict.NAMED: "what is missing has a name and explains the gap",
-    Verdict.PARTIAL: "what is named is the closest, and does not explain all of the gap",
-    Verdict.AMBIGUOUS: "these flights cannot tell what is named from something else",
-    Verdict.UNEXPLAINED: "there is a gap, and nothing in the catalogue explains it",
-    Verdict.NO_GAP: "model and flights agree to the noise",
-    Verdict.NOT_EXCITED: "these flights move too little to show a gap",
+    GapVerdict.NAMED: "what is missing has a name and explains the gap",
+    GapVerdict.PARTIAL: "what is named is the closest, and does not explain all of the gap",
+    GapVerdict.AMBIGUOUS: "these flights cannot tell what is named from something else",
+    GapVerdict.UNEXPLAINED: "there is a gap, and nothing in the catalogue explains it",
+    GapVerdict.NO_GAP: "model and flights agree to the noise",
+    GapVerdict.NOT_EXCITED: "these flights move too little to show a gap",
 }
 
 
-def diagnosis_lines(found: Diagnosed, shown: Evidence, split: str) -> list[str]:
+def diagnosis_lines(found: DiagnosisRun, shown: BeforeAfter, split: str) -> list[str]:
     """Say what a model misses."""
     diagnosis = found.diagnosis
     return [
@@ -48,7 +48,7 @@ def diagnosis_lines(found: Diagnosed, shown: Evidence, split: str) -> list[str]:
     ]
 
 
-def diagnosis_summary(found: Diagnosed, shown: Evidence, split: str) -> dict[str, Any]:
+def diagnosis_summary(found: DiagnosisRun, shown: BeforeAfter, split: str) -> dict[str, Any]:
     """Describe a diagnosis for machines."""
     diagnosis = found.diagnosis
     return {
@@ -90,7 +90,7 @@ def headline(diagnosis: Diagnosis) -> Iterator[str]:
     """Say the verdict and each effect; before them the flight that would tell, where the verdict hangs on it."""
     yield f"{diagnosis.verdict}: {_VERDICTS[diagnosis.verdict]}"
     rivals = [_rival_line(rival) for rival in diagnosis.alternatives]
-    ambiguous = diagnosis.verdict is Verdict.AMBIGUOUS
+    ambiguous = diagnosis.verdict is GapVerdict.AMBIGUOUS
     yield from rivals if ambiguous else []
     for effect in diagnosis.effects:
         yield effect_line(effect)

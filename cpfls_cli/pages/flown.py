@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.report.outcome import Outcome
-from cpfls_cli.simulation import FlownEffects, MeasuredFlight, SimulatedFlight
+from cpfls_cli.simulation import MeasuredFlight, SimulatedEffects, SimulatedFlight
 from cpfls_cli.vehicle.rotors import RotorViolation
 
 
@@ -91,7 +91,7 @@ def noise_record(noise_std: Mapping[str, Array]) -> dict[str, Any]:
     return {"noise/signal": np.array(names), "noise/std": np.array([noise_std[name] for name in names])}
 
 
-def effect_record(effects: FlownEffects) -> dict[str, Any]:
+def effect_record(effects: SimulatedEffects) -> dict[str, Any]:
     """Arrange the effects that were flown as datasets: the truth, for who wants to compare.
 
     Returns
@@ -106,8 +106,8 @@ def effect_record(effects: FlownEffects) -> dict[str, Any]:
     return {"effects/name": np.array(names), "effects/value": np.array(values)}
 
 
-def _effect_rows(effects: FlownEffects) -> Iterator[tuple[str, float]]:
-    for one in effects.flown:
+def _effect_rows(effects: SimulatedEffects) -> Iterator[tuple[str, float]]:
+    for one in effects.listed:
         name = one.effect.name
         # An effect without numbers is there once.
         yield from [(f"{name}.{entry}", value) for entry, value in one.values.items()] or [(name, 1.0)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.pages.flown import samples, violation_sentence
-from cpfls_cli.simulation.flyable import Flyability, TooMuch
+from cpfls_cli.simulation.inverse import Flyability, TooMuch
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 
 

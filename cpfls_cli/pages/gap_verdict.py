@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cpfls_cli.gap.naming.results import Verdict
+from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.pages.gap_words import (
     channel_words,
     effect_title,
@@ -21,12 +21,12 @@ from cpfls_cli.report.content import Box, Tone
 from cpfls_cli.report.numbers import number
 
 _TONES: dict[str, Tone] = {
-    Verdict.NAMED: "good",
-    Verdict.NO_GAP: "good",
-    Verdict.NOT_EXCITED: "note",
-    Verdict.AMBIGUOUS: "note",
-    Verdict.PARTIAL: "note",
-    Verdict.UNEXPLAINED: "warning",
+    GapVerdict.NAMED: "good",
+    GapVerdict.NO_GAP: "good",
+    GapVerdict.NOT_EXCITED: "note",
+    GapVerdict.AMBIGUOUS: "note",
+    GapVerdict.PARTIAL: "note",
+    GapVerdict.UNEXPLAINED: "warning",
 }
 _PHYSICS = ("wrench", "actuator")
 _ENERGY = {
@@ -87,16 +87,16 @@ def levels(diagnosis: Source) -> str:
 
 
 def _headline(diagnosis: Source, verdict: str) -> str:
-    if verdict == Verdict.NO_GAP:
+    if verdict == GapVerdict.NO_GAP:
         return "Nothing is missing that these flights can show."
-    if verdict == Verdict.NOT_EXCITED:
+    if verdict == GapVerdict.NOT_EXCITED:
         return "These flights move too little to show whether anything is missing."
-    if verdict == Verdict.UNEXPLAINED:
+    if verdict == GapVerdict.UNEXPLAINED:
         return "There is a gap that nothing in the catalogue explains."
-    if verdict == Verdict.AMBIGUOUS and len(diagnosis.artifact.texts("alternative/name")):
+    if verdict == GapVerdict.AMBIGUOUS and len(diagnosis.artifact.texts("alternative/name")):
         return _ambiguous(diagnosis)
     named = " ".join(_blame(diagnosis)) or "There is a gap without a name."
-    return f"{named} That is the closest, not all of it." if verdict == Verdict.PARTIAL else named
+    return f"{named} That is the closest, not all of it." if verdict == GapVerdict.PARTIAL else named
 
 
 def _blame(diagnosis: Source) -> Iterator[str]:
@@ -143,7 +143,7 @@ def _shrunk(diagnosis: Source, verdict: str) -> Iterator[str]:
         return
     worst, left = int(np.nanargmax(before)), int(np.nanargmax(after))
     names = [channel_words(channel) for channel in artifact.texts("gap/channel")]
-    if verdict in (Verdict.NO_GAP, Verdict.NOT_EXCITED) or not artifact.array("effect/named").any():
+    if verdict in (GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED) or not artifact.array("effect/named").any():
         still = f"; with the closest effects {number(after[left], 2)} are left" if artifact.texts("effect/name") else ""
         size = f"{number(before[worst], 2)} noise floors, in the {names[worst]}"
         yield f"On flights held out, the largest gap is {size}{still}."

@@ -1,14 +1,118 @@
-"""The way from a command to the rotors: lag, delay, and the voltage that is left."""
+"""The actuator chain from the commanded wrench to the rotors: allocation, lag, links of effects, battery."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from math import exp, floor
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import exp, prod
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.simulation.battery import Battery
+from cpfls_cli.effects.hooks import Link, RotorMotion
+from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.settings import ClosedLoopSettings
+from cpfls_cli.vehicle.rotors import rotor_demand
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_ROUNDING = 1e-12
+_LOWEST_VOLTAGE = 0.05
+
+
+@dataclass(frozen=True)
+class Mixer:
+    """Allocate a wrench; where a rotor cannot follow, yaw gives way first, and the rest is clipped.
+
+    Attributes
+    ----------
+    inverse : array, shape (4, rotor)
+        Squared speeds for one unit of thrust and of each torque.
+    limit : float, rad^2/s^2
+        Largest squared speed.
+    """
+
+    inverse: Array
+    limit: float
+
+    def demand(self, wrench: Array) -> Array:
+        """Compute the squared speeds that a wrench asks for, whether possible or not.
+
+        Parameters
+        ----------
+        wrench : array, shape (4,)
+
+        Returns
+        -------
+        array, shape (rotor,), rad^2/s^2
+        """
+        return np.asarray(wrench @ self.inverse)
+
+    def command(self, wrench: Array) -> Array:
+        """Compute rotor speeds that are possible.
+
+        Parameters
+        ----------
+        wrench : array, shape (4,)
+
+        Returns
+        -------
+        array, shape (rotor,), rad/s
+        """
+        upright, yaw = wrench[:3] @ self.inverse[:3], wrench[3] * self.inverse[3]
+        room = np.where(yaw > 0, self.limit - upright, upright)
+        # What yaw does not change by more than rounding sets no limit.
+        loaded = np.abs(yaw) > _ROUNDING * self.limit
+        share = np.min(room[loaded] / np.abs(yaw[loaded]), initial=1.0)
+        return np.asarray(np.sqrt(np.clip(upright + max(share, 0.0) * yaw, 0.0, self.limit)))
+
+
+def mixer(vehicle: VehicleSettings) -> Mixer:
+    """Invert the allocation of a vehicle.
+
+    Raises
+    ------
+    ComputationError
+        If the rotors cannot produce thrust, roll, pitch and yaw independently.
+    """
+    units = np.eye(4)
+    inverse = rotor_demand(vehicle, units[:, 0], units[:, 1:]).squared_speed
+    return Mixer(inverse, vehicle.rotor_speed_max_rad_s**2)
+
+
+@dataclass(frozen=True)
+class Battery:
+    """Voltage as a share of the full battery, ``V = 1 - use t / T - load (P / P_hover - 1)`` with P ~ sum w_i^3.
+
+    Attributes
+    ----------
+    use : float
+        Share lost by the end of the flight.
+    load : float
+        Share lost under twice the hover power.
+    duration : float, s
+        T.
+    hover_cubed : float, rad^3/s^3
+        Sum of the cubed rotor speeds in hover.
+    """
+
+    use: float
+    load: float
+    duration: float
+    hover_cubed: float
+
+    def voltage(self, time: float, rotor_speed: Array) -> float:
+        """Compute the voltage.
+
+        Parameters
+        ----------
+        time : float, s
+            From take-off.
+        rotor_speed : array, shape (rotor,), rad/s
+        """
+        power = float(np.sum(rotor_speed**3)) / self.hover_cubed
+        return max(1 - self.use * time / self.duration - self.load * (power - 1), _LOWEST_VOLTAGE)
 
 
 @dataclass(frozen=True)
@@ -17,18 +121,17 @@ class Rotors:
 
     Attributes
     ----------
-    told : array, shape (rotor,), rad/s
-        The command.
-    followed : array, shape (rotor,), rad/s
+    command : array, shape (rotor,), rad/s
+    lagged : array, shape (rotor,), rad/s
         The command after the lag.
     speed, acceleration : array, shape (rotor,), rad/s and rad/s^2
-        What the rotors do: late by the delay, slower on an empty battery.
+        What the rotors do: at the end of the chain.
     voltage : float
         Share of the full battery.
     """
 
-    told: Array
-    followed: Array
+    command: Array
+    lagged: Array
     speed: Array
     acceleration: Array
     voltage: float
@@ -36,36 +139,36 @@ class Rotors:
 
 @dataclass
 class Actuators:
-    """First-order lag, then a pure delay, then ``speed (V/V_0)^(n/2)``; the state moves on with each step.
+    """First-order lag, then the links of effects, then what the battery leaves; the state moves on with each step.
 
     Attributes
     ----------
     time_constant : float, s
-    delay : float, s
-    exponent : float
-        n; 0 for rotors that do not feel the battery.
+    links : tuple of callable
+    supplies : tuple of callable
+        Factors on the speed at a voltage.
     battery : Battery
     step : float, s
     speed : array, shape (rotor,), rad/s
         After the lag, at the start of the next step.
-    past : list of tuple of array
-        Speed and acceleration after the lag in the middle of each step so far.
+    steps : int
+        Taken so far.
     """
 
     time_constant: float
-    delay: float
-    exponent: float
+    links: tuple[Link, ...]
+    supplies: tuple[Callable[[float], float], ...]
     battery: Battery
     step: float
     speed: Array
-    past: list[tuple[Array, Array]] = field(default_factory=list)
+    steps: int = 0
 
-    def advance(self, told: Array) -> Rotors:
+    def advance(self, command: Array) -> Rotors:
         """Take one step, exactly for a command that stays the same during it.
 
         Parameters
         ----------
-        told : array, shape (rotor,), rad/s
+        command : array, shape (rotor,), rad/s
             In the middle of the step.
 
         Returns
@@ -74,22 +177,44 @@ class Actuators:
             In the middle of the step.
         """
         half = exp(-0.5 * self.step / self.time_constant)
-        followed = told + half * (self.speed - told)
-        self.past.append((followed, (told - followed) / self.time_constant))
-        self.speed = told + half**2 * (self.speed - told)
-        time = (len(self.past) - 0.5) * self.step
-        speed, acceleration = self._delayed()
-        voltage = self.battery.voltage(time, speed)
-        factor = voltage ** (self.exponent / 2)
-        return Rotors(told, followed, factor * speed, factor * acceleration, voltage)
+        lagged = command + half * (self.speed - command)
+        motion = RotorMotion(lagged, (command - lagged) / self.time_constant)
+        self.speed = command + half**2 * (self.speed - command)
+        self.steps += 1
+        for link in self.links:
+            motion = link(motion)
+        voltage = self.battery.voltage((self.steps - 0.5) * self.step, motion.speed)
+        factor = prod(supply(voltage) for supply in self.supplies)
+        return Rotors(command, lagged, factor * motion.speed, factor * motion.acceleration, voltage)
 
-    def _delayed(self) -> tuple[Array, Array]:
-        place = len(self.past) - 1 - self.delay / self.step
-        if place <= 0:
-            return self.past[0][0], np.zeros_like(self.speed) if self.delay else self.past[0][1]
-        first = floor(place)
-        if first == place:
-            return self.past[first]
-        share = place - first
-        (before, before_rate), (after, after_rate) = self.past[first], self.past[first + 1]
-        return (1 - share) * before + share * after, (1 - share) * before_rate + share * after_rate
+
+def actuators(
+    effects: SimulatedEffects,
+    vehicle: VehicleSettings,
+    settings: ClosedLoopSettings,
+    speed: Array,
+    step: float,
+    duration: float,
+) -> Actuators:
+    """Build the actuator chain of a vehicle with its effects.
+
+    Parameters
+    ----------
+    effects : SimulatedEffects
+    vehicle : VehicleSettings
+    settings : ClosedLoopSettings
+    speed : array, shape (rotor,), rad/s
+        At the start.
+    step, duration : float, s
+    """
+    acting = [(one.effect.actuation, one.values) for one in effects.ordered if one.effect.actuation is not None]
+    lags = [each.lag(values) for each, values in acting if each.lag is not None]
+    hover = len(vehicle.rotors) * hover_speed(vehicle) ** 3
+    return Actuators(
+        time_constant=lags[-1] if lags else settings.rotor_time_constant_s,
+        links=tuple(each.link(values, step) for each, values in acting if each.link is not None),
+        supplies=tuple(partial(each.supply, values) for each, values in acting if each.supply is not None),
+        battery=Battery(settings.battery_use, settings.battery_load, duration, hover),
+        step=step,
+        speed=speed,
+    )

@@ -1,20 +1,73 @@
-"""The autopilot: position control by thrust and attitude, geometric attitude control."""
+"""The autopilot: the planned motion between its samples, position control, and geometric attitude control."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
-from cpfls_cli.simulation.reference import Reference
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
+@dataclass(frozen=True)
+class Reference:
+    """A planned motion at the steps of the autopilot; time is the first axis.
+
+    Attributes
+    ----------
+    position, velocity, acceleration : array, shape (time, 3), m and s, world frame
+    attitude : array, shape (time, 3), rad
+    body_rate : array, shape (time, 3), rad/s, body frame
+    body_acceleration : array, shape (time, 3), rad/s^2, body frame
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    attitude: Array
+    body_rate: Array
+    body_acceleration: Array
+
+
+def reference(planned: Mapping[str, Array], time: Array, at: Array) -> Reference:
+    """Interpolate a planned motion by cubic splines.
+
+    Parameters
+    ----------
+    planned : mapping of str to array
+        `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
+        (time, 3) each.
+    time : array, shape (time,), s
+    at : array, shape (step,), s
+        Times asked for.
+
+    Returns
+    -------
+    Reference
+        Of shape (step, 3) each.
+    """
+    names = ("position", "velocity", "acceleration", "attitude", "attitude_rate", "attitude_acceleration")
+    splines = CubicSpline(time, np.stack([planned[name] for name in names], axis=1))
+    position, velocity, acceleration, q, qd, qdd = np.moveaxis(splines(at), 1, 0)
+    return Reference(
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        attitude=q,
+        body_rate=rotations.body_rate(q, qd),
+        body_acceleration=rotations.body_acceleration(q, qd, qdd),
+    )
+
+
 class Autopilot:
-    """Follow a planned motion with the vehicle's model; what the model lacks, it does not know.
+    """Track a planned motion with the vehicle's model, without knowledge of the effects.
 
     References
     ----------
@@ -56,7 +109,7 @@ class Autopilot:
         return np.array([self._mass * (pull @ rotation[:, 2]), *torque])
 
     def _torque(self, step: int, turned: Array, body_rate: Array) -> Array:
-        """Turn the body to the target, of which the body is turned away by the given rotation."""
+        """Compute the torque that turns the body to its target attitude."""
         skew = 0.5 * (turned - turned.T)
         error = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
         rate_error = body_rate - turned.T @ self._planned.body_rate[step]

@@ -1,38 +1,169 @@
-"""Fly a planned motion under an autopilot, with what the model of the vehicle lacks."""
+"""The closed loop of autopilot, actuators and vehicle, integrated along a planned motion."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import cos
+from math import ceil, cos
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import identified_turning, rigid_turning
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
+from cpfls_cli.effects.hooks import CarriedBody
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.simulation.autopilot import Autopilot
-from cpfls_cli.simulation.clock import between, clock_of
-from cpfls_cli.simulation.flown_model import FlownModel
-from cpfls_cli.simulation.loop import Step, loop
-from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, CABLE, POSITION, STATES, VELOCITY
-from cpfls_cli.simulation.reference import reference
+from cpfls_cli.simulation.actuators import Actuators, Mixer, Rotors, actuators, mixer
+from cpfls_cli.simulation.autopilot import Autopilot, reference
+from cpfls_cli.simulation.model import SimulatedModel
+from cpfls_cli.simulation.plant import (
+    ATTITUDE,
+    BODY_RATE,
+    POSITION,
+    VEHICLE_STATES,
+    VELOCITY,
+    Plant,
+    effect_wrench,
+    instant,
+)
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+_ROUNDING = 1e-6
 _STEPS_BETWEEN_REPORTS = 100
 _REMEDY = "fly gentler, make the effects smaller, or change the frequencies of simulation.closed_loop"
 
 
 @dataclass(frozen=True)
-class FlownMotion:
-    """What happened, at the samples of the plan.
+class Clock:
+    """Steps of the integration between the samples of the plan.
 
     Attributes
     ----------
-    state, change : array, shape (time, 18)
+    parts : int
+        Steps from sample to sample.
+    steps : int
+    step : float, s
+    instants : array, shape (1 + step,), s
+        The start, then the middle of each step.
+    """
+
+    parts: int
+    steps: int
+    step: float
+    instants: Array
+
+
+def clock_of(time: Array, rate: float) -> Clock:
+    """Divide the samples of a plan into steps.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+    rate : float, Hz
+        Of the steps, at least.
+
+    Raises
+    ------
+    ComputationError
+        If the plan is not sampled uniformly.
+    """
+    if len(time) < 2 or np.ptp(np.diff(time)) > _ROUNDING * (time[1] - time[0]):
+        raise ComputationError("a flight in closed loop needs a trajectory of two or more samples at one rate")
+    period = float(time[-1] - time[0]) / (len(time) - 1)
+    parts = ceil(period * rate - _ROUNDING)
+    steps, step = (len(time) - 1) * parts, period / parts
+    return Clock(parts, steps, step, time[0] + step * np.concatenate([[0.0], np.arange(steps) + 0.5]))
+
+
+def between(middles: Array) -> Array:
+    """Interpolate values from the middles of steps to their ends linearly.
+
+    Parameters
+    ----------
+    middles : array, shape (step, ...)
+
+    Returns
+    -------
+    array, shape (1 + step, ...)
+    """
+    if len(middles) < 2:
+        return np.concatenate([middles, middles])
+    ends = 2 * middles[0] - middles[1], 2 * middles[-1] - middles[-2]
+    longer = np.concatenate([ends[0][None], middles, ends[1][None]])
+    return np.asarray(0.5 * (longer[1:] + longer[:-1]))
+
+
+@dataclass(frozen=True)
+class LoopStep:
+    """Derivative, rotors and demand in the middle of a step.
+
+    Attributes
+    ----------
+    change : array, shape (state,)
+        Derivative of the state, in the middle of the step.
+    rotors : Rotors
+        In the middle of the step.
+    demand : array, shape (rotor,), rad^2/s^2
+        Squared speeds that the autopilot asked for, not clipped.
+    """
+
+    change: Array
+    rotors: Rotors
+    demand: Array
+
+
+@dataclass
+class Loop:
+    """The midpoint rule with one evaluation a step.
+
+    The middle of a step is reached with the derivative of the step before, so that the rule is of second order.
+
+    Attributes
+    ----------
+    autopilot : Autopilot
+    mixer : Mixer
+    actuators : Actuators
+    plant : Plant
+    state : array, shape (state,)
+    change : array, shape (state,)
+        Derivative of the state in the step before.
+    """
+
+    autopilot: Autopilot
+    mixer: Mixer
+    actuators: Actuators
+    plant: Plant
+    state: Array
+    change: Array
+
+    def advance(self, number: int) -> LoopStep:
+        """Take one step.
+
+        Parameters
+        ----------
+        number : int
+            Steps done so far.
+        """
+        middle = self.state + 0.5 * self.actuators.step * self.change
+        # The plan has the start before the middle of each step.
+        wrench = _wrench(self.autopilot, number + 1, middle)
+        rotors = self.actuators.advance(self.mixer.command(wrench))
+        self.change = self.plant.derivative(middle, rotors)
+        self.state = self.state + self.actuators.step * self.change
+        return LoopStep(self.change, rotors, self.mixer.demand(wrench))
+
+
+@dataclass(frozen=True)
+class SimulatedMotion:
+    """The simulated motion at the samples of the plan.
+
+    Attributes
+    ----------
+    state, change : array, shape (time, state)
         State of the plant and its derivative.
-    told, followed, speed : array, shape (time, rotor), rad/s
+    command, lagged, speed : array, shape (time, rotor), rad/s
         Command, command after the lag, and rotor speed.
     voltage : array, shape (time,)
         Share of the full battery.
@@ -42,8 +173,8 @@ class FlownMotion:
 
     state: Array
     change: Array
-    told: Array
-    followed: Array
+    command: Array
+    lagged: Array
     speed: Array
     voltage: Array
     demand: Array
@@ -54,10 +185,10 @@ def fly(
     planned: Mapping[str, Array],
     vehicle: VehicleSettings,
     settings: ClosedLoopSettings,
-    model: FlownModel,
+    model: SimulatedModel,
     progress: Callable[[float, int], None],
-) -> FlownMotion:
-    """Integrate a flight.
+) -> SimulatedMotion:
+    """Integrate a closed-loop flight along a planned motion.
 
     Parameters
     ----------
@@ -68,8 +199,7 @@ def fly(
         (time, 3) each.
     vehicle : VehicleSettings
     settings : ClosedLoopSettings
-    model : FlownModel
-        What is flown.
+    model : SimulatedModel
     progress : callable
         Takes steps done and steps in all.
 
@@ -79,8 +209,7 @@ def fly(
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
     clock = clock_of(time, settings.integration_rate_hz)
-    autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
-    flight = loop(vehicle, settings, model, autopilot, _start(planned), clock.step, float(time[-1] - time[0]))
+    flight = _loop(vehicle, settings, model, planned, time, clock)
     states, steps = [flight.state], []
     # A vehicle that is lost may reach infinity before the next sample, where it is told.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -96,13 +225,40 @@ def fly(
     return _sampled(np.array(states), steps, clock.parts)
 
 
-def _start(planned: Mapping[str, Array]) -> Array:
-    state = np.zeros(STATES)
+def _loop(
+    vehicle: VehicleSettings,
+    settings: ClosedLoopSettings,
+    model: SimulatedModel,
+    planned: Mapping[str, Array],
+    time: Array,
+    clock: Clock,
+) -> Loop:
+    """Set up the loop at the start of the plan, with the rotors at their commanded speed."""
+    autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
+    carried = tuple(
+        one.effect.carried(vehicle, one.values) for one in model.effects.ordered if one.effect.carried is not None
+    )
+    state = _start(planned, carried)
+    mix = mixer(vehicle)
+    speed = mix.command(_wrench(autopilot, 0, state))
+    turning = rigid_turning(inertia_tensor(vehicle)) if model.base is None else identified_turning(model.base)
+    plant = Plant(vehicle, turning, effect_wrench(model.effects, instant(vehicle, state, speed)), carried)
+    change = plant.derivative(state, Rotors(speed, speed, speed, np.zeros_like(speed), 1.0))
+    chain = actuators(model.effects, vehicle, settings, speed, clock.step, float(time[-1] - time[0]))
+    return Loop(autopilot, mix, chain, plant, state, change)
+
+
+def _start(planned: Mapping[str, Array], carried: Sequence[CarriedBody]) -> Array:
+    state = np.zeros(VEHICLE_STATES)
     state[POSITION], state[VELOCITY] = planned["position"][0], planned["velocity"][0]
     state[ATTITUDE] = planned["attitude"][0]
-    state[CABLE] = 0.0, 0.0, -1.0
     state[BODY_RATE] = rotations.body_rate(planned["attitude"][:1], planned["attitude_rate"][:1])[0]
-    return state
+    return np.concatenate([state, *(body.start for body in carried)])
+
+
+def _wrench(autopilot: Autopilot, number: int, state: Array) -> Array:
+    rotation = rotations.rotation_matrix(state[None, ATTITUDE])[0]
+    return autopilot.wrench(number, state[POSITION], state[VELOCITY], rotation, state[BODY_RATE])
 
 
 def _refuse_lost(state: Array, planned: Array, time: float, limit: float) -> None:
@@ -119,13 +275,13 @@ def _refuse_lost(state: Array, planned: Array, time: float, limit: float) -> Non
         )
 
 
-def _sampled(states: Array, steps: Sequence[Step], parts: int) -> FlownMotion:
-    """Bring what is known in the middle of steps to the samples."""
+def _sampled(states: Array, steps: Sequence[LoopStep], parts: int) -> SimulatedMotion:
+    """Interpolate values in the middle of steps to the samples."""
     change, demand = ([getattr(step, name) for step in steps] for name in ("change", "demand"))
     rotors = [step.rotors for step in steps]
-    told, followed, speed, voltage = (
+    command, lagged, speed, voltage = (
         between(np.array([getattr(one, name) for one in rotors]))[::parts]
-        for name in ("told", "followed", "speed", "voltage")
+        for name in ("command", "lagged", "speed", "voltage")
     )
     change_, demand_ = (between(np.array(values))[::parts] for values in (change, demand))
-    return FlownMotion(states, change_, told, followed, speed, voltage, demand_)
+    return SimulatedMotion(states, change_, command, lagged, speed, voltage, demand_)

@@ -1,4 +1,4 @@
-"""A measured flight: flown in closed loop, logged by sensors, compared with its plan."""
+"""A measured flight: simulated in closed loop, logged by sensors with faults and noise, held against its plan."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.simulation.closed_loop import fly
-from cpfls_cli.simulation.flown_effects import FlownEffects, flown_effects
-from cpfls_cli.simulation.flown_model import FlownModel
-from cpfls_cli.simulation.plant import ATTITUDE, POSITION
-from cpfls_cli.simulation.sensors import logged
+from cpfls_cli.effects.hooks import TrueMotion
+from cpfls_cli.simulation.closed_loop import SimulatedMotion, fly
+from cpfls_cli.simulation.model import SimulatedEffects, SimulatedModel, simulated_effects
+from cpfls_cli.simulation.plant import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.simulation.settings import SimulationSettings
-from cpfls_cli.vehicle.rotors import RotorViolation, violations
+from cpfls_cli.vehicle.rotors import RotorViolation, body_wrench, violations
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 @dataclass(frozen=True)
 class MeasuredFlight:
-    """A flight as its log has it.
+    """A simulated flight as logged.
 
     Attributes
     ----------
@@ -30,16 +30,16 @@ class MeasuredFlight:
         Standard deviation of the noise added to each channel, by signal.
     violations : tuple of RotorViolation
         What the autopilot asked for and no rotor can do; the commands were clipped there.
-    effects : FlownEffects
-        What was flown: the truth that a diagnosis has to find.
+    effects : SimulatedEffects
+        What was simulated: the truth that a diagnosis has to find.
     position_error, attitude_error : array, shape (time, 3), m and rad
-        Flown minus planned, without the noise.
+        Simulated minus planned, without the noise.
     """
 
     signals: Mapping[str, Array]
     noise_std: Mapping[str, Array]
     violations: tuple[RotorViolation, ...]
-    effects: FlownEffects
+    effects: SimulatedEffects
     position_error: Array
     attitude_error: Array
 
@@ -51,9 +51,9 @@ def measure(
     settings: SimulationSettings,
     rng: np.random.Generator,
     progress: Callable[[float, int], None] = lambda _done, _total: None,
-    model: FlownModel | None = None,
+    model: SimulatedModel | None = None,
 ) -> MeasuredFlight:
-    """Fly a planned motion in closed loop and log it.
+    """Simulate a planned motion in closed loop and log it.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def measure(
         Source of the noise.
     progress : callable
         Takes steps done and steps in all.
-    model : FlownModel or None
-        What is flown in place of the vehicle; effects of the settings come on top of its own.
+    model : SimulatedModel or None
+        In place of the vehicle; effects of the settings come on top of its own.
 
     Raises
     ------
@@ -81,14 +81,136 @@ def measure(
     ComputationError
         If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
     """
-    flown = (model or FlownModel()).with_effects(flown_effects(settings.closed_loop.effects, vehicle))
-    motion = fly(time, planned, vehicle, settings.closed_loop, flown, progress)
-    signals, noise_std = logged(time, motion, vehicle, settings, flown.effects, rng)
+    asked = simulated_effects(settings.closed_loop.effects, vehicle)
+    simulated = (model or SimulatedModel()).with_effects(asked)
+    motion = fly(time, planned, vehicle, settings.closed_loop, simulated, progress)
+    signals, noise_std = _logged(time, motion, vehicle, settings, simulated.effects, rng)
     return MeasuredFlight(
         signals,
         noise_std,
         violations(motion.demand, vehicle.rotor_speed_max_rad_s),
-        flown.effects,
+        simulated.effects,
         motion.state[:, POSITION] - planned["position"],
         motion.state[:, ATTITUDE] - planned["attitude"],
     )
+
+
+def _logged(
+    time: Array,
+    motion: SimulatedMotion,
+    vehicle: VehicleSettings,
+    settings: SimulationSettings,
+    effects: SimulatedEffects,
+    rng: np.random.Generator,
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Log a flight: signals, and the standard deviation of the noise of those that have some.
+
+    Torques are those that the model gives the logged rotor speeds, or the logged commands where the speeds are
+    hidden.
+    """
+    exact = {**_motion(motion), **_actuation(motion, effects)}
+    signals, noise_std = noisy(_as_logged(exact, time, motion, effects), settings, rng)
+    speed = signals["rotor_command" if effects.hides_rotor_speed else "rotor_speed"]
+    torque = rotations.generalised_torque(signals["attitude"], body_wrench(vehicle, speed).body_torque)
+    stated, stated_std = noisy({"torque": torque}, settings, rng)
+    signals |= {**stated, "body_torque": rotations.body_torque(signals["attitude"], stated["torque"])}
+    return signals, noise_std | stated_std
+
+
+def _motion(motion: SimulatedMotion) -> dict[str, Array]:
+    attitude, body_rate = motion.state[:, ATTITUDE], motion.state[:, BODY_RATE]
+    rate = rotations.attitude_rate(attitude, body_rate)
+    turning = rotations.multiply(rotations.euler_rate_matrix_derivative(attitude, rate), rate)
+    return {
+        "attitude": attitude,
+        "attitude_rate": rate,
+        "attitude_acceleration": rotations.attitude_rate(attitude, motion.change[:, BODY_RATE] - turning),
+        "position": motion.state[:, POSITION],
+        "velocity": motion.state[:, VELOCITY],
+        "acceleration": motion.change[:, VELOCITY],
+        "body_rate": body_rate,
+    }
+
+
+def _actuation(motion: SimulatedMotion, effects: SimulatedEffects) -> dict[str, Array]:
+    """Log rotor speeds, or the command where effects hide them.
+
+    Where no effect replaces the lag of the rotors, a hidden flight logs the command after it, so that the effects are
+    all that is left between log and rotors.
+    """
+    acting = [one.effect.actuation for one in effects.listed if one.effect.actuation is not None]
+    if not acting:
+        return {"rotor_speed": motion.speed, "rotor_command": motion.command}
+    voltage = {"voltage": motion.voltage} if any(each.supply is not None for each in acting) else {}
+    lag = any(each.lag is not None for each in acting)
+    return {"rotor_command": motion.command if lag else motion.lagged, **voltage}
+
+
+def _as_logged(
+    signals: dict[str, Array], time: Array, motion: SimulatedMotion, effects: SimulatedEffects
+) -> dict[str, Array]:
+    """Apply the effects on the log, the last of the catalogue first."""
+    truth = TrueMotion(
+        time,
+        rotations.rotation_matrix(motion.state[:, ATTITUDE]),
+        motion.state[:, BODY_RATE],
+        motion.change[:, BODY_RATE],
+    )
+    for one in reversed(effects.ordered):
+        if one.effect.log is not None:
+            signals = signals | one.effect.log.change(signals, truth, one.values)
+    return signals
+
+
+def noise_std(name: str, values: Array, settings: SimulationSettings) -> Array:
+    """Combine the noise of each channel: absolute and relative noise are independent of each other.
+
+    Parameters
+    ----------
+    name : str
+        Name of the signal.
+    values : array, shape (time, ...)
+    settings : SimulationSettings
+
+    Returns
+    -------
+    array, shape (...)
+        Standard deviation of each channel.
+    """
+    absolute = {str(key): value for key, value in settings.noise.items()}.get(name, 0.0)
+    relative = {str(key): value for key, value in settings.relative_noise.items()}.get(name, 0.0)
+    if relative == 0.0:
+        return np.full(values.shape[1:], absolute)
+    spread = [_spread(channel) for channel in values.reshape(len(values), -1).T]
+    return np.hypot(absolute, relative * np.array(spread).reshape(values.shape[1:]))
+
+
+def noisy(
+    exact: Mapping[str, Array], settings: SimulationSettings, rng: np.random.Generator
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Add white noise to signals.
+
+    Parameters
+    ----------
+    exact : mapping of str to array
+        By name; time is the first axis.
+    settings : SimulationSettings
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    signals : dict of str to array
+    std : dict of str to array
+        Standard deviation of each channel, of the signals that have noise.
+    """
+    std = {name: deviation for name in exact if np.any(deviation := noise_std(name, exact[name], settings))}
+    signals = {
+        name: values + std[name] * rng.standard_normal(values.shape) if name in std else values
+        for name, values in exact.items()
+    }
+    return signals, std
+
+
+def _spread(channel: Array) -> float:
+    known = channel[np.isfinite(channel)]
+    return float(np.std(known)) if len(known) else 0.0

@@ -1,25 +1,111 @@
-"""The flown vehicle: rigid body, rotors, and what its model lacks."""
+"""The simulated vehicle: rigid body, rotors, the wrench of its effects, and bodies that it carries."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import TurningLaw
+from cpfls_cli.effects.effect import Columns, Effect
+from cpfls_cli.effects.hooks import CarriedBody, Carrier
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.simulation.actuators import Rotors
-from cpfls_cli.simulation.missing_wrench import MissingWrench
-from cpfls_cli.simulation.payload import Carrier, Payload
+from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 POSITION, VELOCITY, ATTITUDE, BODY_RATE = (slice(3 * n, 3 * n + 3) for n in range(4))
-CABLE, CABLE_RATE = slice(12, 15), slice(15, 18)
-STATES = 18
-"""Places in the state: position and velocity in the world, attitude as roll, pitch and yaw, body rate;
-direction of the cable of a load in the world, and its rate."""
+VEHICLE_STATES = 12
+"""Places in the state: position and velocity in the world, attitude as roll, pitch and yaw, body rate; the states of
+carried bodies follow."""
+
+
+@dataclass(frozen=True)
+class EffectWrench:
+    """Columns of effects times their coefficients, ``direct + d/dt momentum``.
+
+    The momentum of the catalogue's effects is linear in body rates and rotor speeds, so that its derivative adds to
+    the inertia and couples the body to the acceleration of the rotors.
+
+    Attributes
+    ----------
+    effects : tuple of SimulatedEffect
+    added_inertia : array, shape (3, 3), kg m^2
+        Minus the momentum by body rate.
+    rotor_coupling : array, shape (3, rotor), kg m^2
+        Momentum by rotor speed.
+    """
+
+    effects: tuple[SimulatedEffect, ...]
+    added_inertia: Array
+    rotor_coupling: Array
+
+    def direct(self, signals: Signals) -> Array:
+        """Evaluate the direct part of the wrench.
+
+        Parameters
+        ----------
+        signals : Signals
+            Of one instant.
+
+        Returns
+        -------
+        array, shape (6,), N m and N, body frame
+        """
+        total = np.zeros(6)
+        # What has a lever for all forces comes last.
+        for one in sorted(self.effects, key=lambda each: each.effect.of_all_forces):
+            felt = _with_force(signals, total[3:]) if one.effect.of_all_forces else signals
+            total += _columns(one, felt).direct[0] @ one.acting
+        return total
+
+
+def effect_wrench(chosen: SimulatedEffects, hover: Signals) -> EffectWrench:
+    """Prepare the effects that are simulated by their columns; actuators and carried bodies have a state of their own.
+
+    Parameters
+    ----------
+    chosen : SimulatedEffects
+    hover : Signals
+        One instant, of any motion.
+    """
+    effects = tuple(one for one in chosen.listed if _by_columns(one.effect))
+    rates = [replace(hover, body_rate=rate[None]) for rate in np.eye(3)]
+    by_rate = _slopes(effects, rates, replace(hover, body_rate=np.zeros((1, 3))))
+    speeds = np.eye(len(hover.vehicle.rotors))
+    by_speed = _slopes(
+        effects, [hover.with_rotor_speed(speed[None]) for speed in speeds], hover.with_rotor_speed(0 * speeds[:1])
+    )
+    return EffectWrench(effects, -by_rate, by_speed)
+
+
+def _by_columns(effect: Effect) -> bool:
+    return effect.columns is not None and effect.kind != "actuator" and effect.carried is None
+
+
+def _slopes(effects: tuple[SimulatedEffect, ...], moved: list[Signals], still: Signals) -> Array:
+    """Change of the angular momentum with each unit step, shape (3, step)."""
+    return np.stack([_momentum(effects, signals) - _momentum(effects, still) for signals in moved], axis=1)
+
+
+def _momentum(effects: tuple[SimulatedEffect, ...], signals: Signals) -> Array:
+    total = np.zeros(3)
+    for one in effects:
+        momentum = _columns(one, signals).momentum
+        if momentum is not None:
+            total += momentum[0, :3] @ one.acting
+    return total
+
+
+def _with_force(signals: Signals, force: Array) -> Signals:
+    return replace(signals, specific_force=(signals.wrench[:, 3:] + force) / signals.vehicle.mass_kg)
+
+
+def _columns(one: SimulatedEffect, signals: Signals) -> Columns:
+    assert one.effect.columns is not None, "chosen so"
+    return one.effect.columns(signals, one.shape)
 
 
 @dataclass(frozen=True)
@@ -31,43 +117,44 @@ class Plant:
     vehicle : VehicleSettings
     turning : callable
         Of the model.
-    missing : MissingWrench
-    payload : Payload or None
+    wrench : EffectWrench
+    carried : tuple of CarriedBody
     """
 
     vehicle: VehicleSettings
     turning: TurningLaw
-    missing: MissingWrench
-    payload: Payload | None
+    wrench: EffectWrench
+    carried: tuple[CarriedBody, ...]
 
     def derivative(self, state: Array, rotors: Rotors) -> Array:
         """Differentiate the state.
 
         Parameters
         ----------
-        state : array, shape (18,)
+        state : array, shape (state,)
         rotors : Rotors
 
         Returns
         -------
-        array, shape (18,)
+        array, shape (state,)
         """
         body_rate = state[BODY_RATE]
         signals = instant(self.vehicle, state, rotors.speed)
-        wrench = signals.wrench[0] + self.missing.direct(signals)
-        own = self.turning(state[ATTITUDE], body_rate)
-        torque = wrench[:3] - own.direct + self.missing.rotor_coupling @ rotors.acceleration
+        wrench = signals.wrench[0] + self.wrench.direct(signals)
+        inertial = self.turning(state[ATTITUDE], body_rate)
+        torque = wrench[:3] - inertial.direct + self.wrench.rotor_coupling @ rotors.acceleration
         acceleration = signals.rotation[0] @ wrench[3:] / self.vehicle.mass_kg
         acceleration[2] -= self.vehicle.gravity_m_s2
-        inertia = own.inertia + self.missing.added_inertia
+        inertia = inertial.inertia + self.wrench.added_inertia
         turning = np.linalg.solve(inertia, torque)
-        change = np.zeros(STATES)
-        if self.payload is not None:
-            cable, rate = state[CABLE] / np.linalg.norm(state[CABLE]), state[CABLE_RATE]
-            carrier = Carrier(self.vehicle.mass_kg, inertia, signals.rotation[0], body_rate)
-            pull = self.payload.pull(carrier, acceleration, turning, cable, rate)
+        change = np.zeros(len(state))
+        first = VEHICLE_STATES
+        for body in self.carried:
+            states = slice(first, first + len(body.start))
+            carrier = Carrier(self.vehicle.mass_kg, inertia, signals.rotation[0], body_rate, acceleration, turning)
+            pull = body.pull(carrier, state[states])
             acceleration, turning = acceleration + pull.acceleration, turning + pull.turning
-            change[CABLE], change[CABLE_RATE] = rate, pull.swing
+            change[states], first = pull.change, states.stop
         change[POSITION], change[VELOCITY] = state[VELOCITY], acceleration
         change[ATTITUDE] = rotations.attitude_rate(state[None, ATTITUDE], body_rate[None])[0]
         change[BODY_RATE] = turning
@@ -75,12 +162,12 @@ class Plant:
 
 
 def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signals:
-    """Show one instant as a flight of one sample.
+    """Build the signals of one instant.
 
     Parameters
     ----------
     vehicle : VehicleSettings
-    state : array, shape (18,)
+    state : array, shape (state,)
     rotor_speed : array, shape (rotor,), rad/s
     """
     row = state[None]

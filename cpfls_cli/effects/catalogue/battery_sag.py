@@ -1,4 +1,4 @@
-"""Battery sag: a motor that is told a speed turns slower on an empty battery."""
+"""Battery sag: a motor turns slower than commanded on an empty battery."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from collections.abc import Mapping
 
 from cpfls_cli.effects.actuation import wrench_change
 from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.hooks import Actuation
 from cpfls_cli.effects.signals import Signals
 
 
+# Thrust and drag torque go with the square of the speed.
 def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
     assert signals.voltage is not None, "declared among the needs"
-    # Thrust and drag torque go with the square of the speed.
     return signals.with_rotor_speed(signals.speed * signals.voltage[:, None] ** (shape["exponent"] / 2))
 
 
@@ -21,6 +22,7 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="battery_sag",
+    order=170,
     title="battery sag",
     kind="actuator",
     formula="T_i = k w_i,commanded^2 (V/V_0)^n, drag torque alike;  M = M_rot(T) - M_rot(commanded)",
@@ -38,4 +40,6 @@ EFFECT = Effect(
     shapes=(Shape("exponent", "1", (0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0), "power of the voltage"),),
     unit_coefficient=True,
     apply=_apply,
+    actuation=Actuation(supply=lambda values, voltage: float(voltage ** (values["exponent"] / 2))),
+    accounts=lambda _number, _values: 0.05,
 )

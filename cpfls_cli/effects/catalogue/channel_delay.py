@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.effects.actuation import delayed, with_actuation, wrench_change
 from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.hooks import ReadingError, SensorLog, SensorTest, TrueMotion
 from cpfls_cli.effects.signals import Signals
 
 
@@ -17,8 +19,13 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     return wrench_change(signals, _apply(signals, shape))
 
 
+def _log(signals: Mapping[str, Array], motion: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:
+    return {"rotor_speed": delayed(signals["rotor_speed"], motion.time, -values["delay_s"])}
+
+
 EFFECT = Effect(
     name="channel_delay",
+    order=270,
     title="time shift between rotor and gyro channels",
     kind="actuator",
     formula="w(t) = w_logged(t - d);  M = M_rot(w) - M_rot(w_logged)",
@@ -42,4 +49,15 @@ EFFECT = Effect(
     ),
     unit_coefficient=True,
     apply=_apply,
+    log=SensorLog(change=_log, does="shifts measured rotor speeds"),
+    test=SensorTest(
+        estimate="delay",
+        labels=("delay",),
+        smallest=0.002,
+        smallest_samples=0.2,
+        number=lambda _, value: f"{1000 * abs(value):.3g} ms {'behind' if value > 0 else 'ahead of'}",
+        found="The gyroscope runs {} the attitude.",
+        nothing="Gyroscope and attitude keep the same time.",
+        error=lambda values: ReadingError(delay=float(values[0])),
+    ),
 )

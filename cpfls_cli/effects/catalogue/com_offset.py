@@ -19,6 +19,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="com_offset",
+    order=180,
     title="offset of the centre of mass",
     kind="wrench",
     formula="M = -c x F,  F the force without weight, as measured, or else the thrust",
@@ -36,4 +37,6 @@ EFFECT = Effect(
     },
     source="geometry; RotorPy (hub positions relative to the centre of mass)",
     columns=_columns,
+    of_all_forces=True,
+    accounts=lambda _number, _values: 0.05,
 )

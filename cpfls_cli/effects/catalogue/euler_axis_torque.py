@@ -17,6 +17,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="euler_axis_torque",
+    order=230,
     title="torque about Euler instead of body axes",
     kind="wrench",
     formula="M = (W^-T - 1) M_rot",

@@ -18,6 +18,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="flapping_moment",
+    order=50,
     title="flapping hub moment",
     kind="wrench",
     formula="M = -k_f sum w_i (u_iy, -u_ix, 0)",

@@ -22,6 +22,7 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="ground_effect",
+    order=100,
     title="ground effect",
     kind="wrench",
     formula="dT_i = T_i (1 / (1 - G (R/4z_i)^2) - 1),  M = sum r_i x dT_i z",
@@ -37,6 +38,7 @@ EFFECT = Effect(
     },
     source="Cheeseman and Bennett, R&M 3021 (G = 1); gym-pybullet-drones (G = 11.4 for a Crazyflie)",
     columns=_columns,
+    accounts=lambda _number, _values: 0.05,
     shapes=(Shape("G", "1", (0.25, 0.5, 1.0, 2.0, 4.0, 7.0, 11.0, 16.0), "strength; 1 is a single rotor"),),
     unit_coefficient=True,
 )

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.effects.hooks import ReadingError, SensorLog, SensorTest, TrueMotion
+
+
+def _log(signals: Mapping[str, Array], _motion: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:
+    rate = signals["body_rate"]
+    return {"body_rate": np.asarray(rate - np.cross(np.array(list(values.values())), rate))}
+
 
 EFFECT = Effect(
     name="imu_misalignment",
+    order=260,
     title="misaligned IMU",
     kind="sensor",
     formula="gyro = omega - delta x omega",
@@ -22,4 +36,15 @@ EFFECT = Effect(
     },
     source="definition; comparison of the gyro with the derivative of the attitude",
     columns=None,
+    log=SensorLog(change=_log),
+    test=SensorTest(
+        estimate="misalignment",
+        labels=("x", "y", "z"),
+        smallest=0.0025,
+        number=lambda axis, value: f"{np.degrees(value):+.2f} deg about {axis}",
+        found="The gyroscope sits turned against the attitude: {}.",
+        nothing="The gyroscope sits straight against the attitude.",
+        error=lambda values: ReadingError(matrix=Rotation.from_rotvec(-values).as_matrix()),
+        integrated=True,
+    ),
 )

@@ -15,6 +15,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="inflow",
+    order=70,
     title="inflow (thrust falls with axial speed)",
     kind="wrench",
     formula="dT_i = -k_z w_i u_iz,  M = sum r_i x dT_i z",

@@ -24,6 +24,7 @@ def _damping(axis: int) -> Coefficient:
 
 EFFECT = Effect(
     name="linear_damping",
+    order=10,
     title="linear rotational damping",
     kind="wrench",
     formula="M = -(d_x p, d_y q, d_z r)",

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from cpfls_cli.effects.actuation import lagged, with_actuation, wrench_change
 from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.hooks import Actuation
 from cpfls_cli.effects.signals import Signals
 
 
@@ -19,6 +20,7 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="motor_lag",
+    order=150,
     title="motor lag",
     kind="actuator",
     formula="tau w_i' + w_i = w_i,commanded;  M = M_rot(w) - M_rot(w_commanded)",
@@ -44,4 +46,5 @@ EFFECT = Effect(
     ),
     unit_coefficient=True,
     apply=_apply,
+    actuation=Actuation(lag=lambda values: values["time_constant_s"]),
 )

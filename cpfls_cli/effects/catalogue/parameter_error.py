@@ -6,10 +6,72 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
+from cpfls_cli.effects.hooks import SensorLog, TrueMotion
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_COUPLING = slice(3, 6)
+_MEASURING_POINT = ("reference_x", "reference_y", "reference_z")
+
+NUMBERS = {
+    "inertia_x": "the inertia about x",
+    "inertia_y": "the inertia about y",
+    "inertia_z": "the inertia about z",
+    "thrust_scale": "the thrust",
+}
+"""Coefficients that are numbers of the config, in words."""
+
+
+def inertia_correction(values: Array, vehicle: VehicleSettings) -> Array:
+    """Compute what relative errors add to the inertia tensor.
+
+    Parameters
+    ----------
+    values : array, shape (10,)
+        The coefficients.
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    array, shape (3, 3), kg m^2
+    """
+    return np.diag(values[:3] * np.array(vehicle.inertia_kg_m2[:3]))
+
+
+def coupling(values: Array) -> Array:
+    """Keep the coupling of the rates, which no inertia holds, and set the other coefficients to 0.
+
+    Parameters
+    ----------
+    values : array, shape (10,)
+
+    Returns
+    -------
+    array, shape (10,)
+    """
+    kept = np.zeros_like(values)
+    kept[_COUPLING] = values[_COUPLING]
+    return kept
+
+
+def shown(turns: BoolArray) -> Array:
+    """Mark the coefficients that a flight can show: inertia and coupling only about axes that turn.
+
+    Parameters
+    ----------
+    turns : array of bool, shape (3,)
+        Whether the vehicle turns about x, y, z.
+
+    Returns
+    -------
+    array, shape (10,)
+        1 or 0.
+    """
+    return np.concatenate([turns, turns, np.ones(4)]).astype(float)
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
@@ -29,14 +91,24 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 
 def _coupling(body_rate: Array, moments: Array) -> Array:
-    """Products of the two other rates times the mean of their moments of inertia, shape (time, 3), N m."""
+    """Multiply the two other rates by the mean of their moments of inertia, shape (time, 3), N m."""
     after, later = (1, 2, 0), (2, 0, 1)
     mean = 0.5 * (moments[list(after)] + moments[list(later)])
     return np.asarray(mean * body_rate[:, after] * body_rate[:, later])
 
 
+def _log(signals: Mapping[str, Array], motion: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:
+    """Log position, velocity and acceleration of a point of the body, ``v + omega x r`` and so on."""
+    point = np.array([values.get(name, 0.0) for name in _MEASURING_POINT])
+    moving = np.cross(motion.body_rate, point)
+    turning = np.cross(motion.body_acceleration, point) + np.cross(motion.body_rate, moving)
+    beside = {"position": np.tile(point, (len(moving), 1)), "velocity": moving, "acceleration": turning}
+    return {name: signals[name] + rotations.multiply(motion.rotation, more) for name, more in beside.items()}
+
+
 EFFECT = Effect(
     name="parameter_error",
+    order=280,
     title="wrong inertia or thrust scale",
     kind="parameter",
     formula="M = -(d/dt (dI omega) + omega x dI omega) - g_i I omega_j omega_k,  dI = diag(e_i I_ii);  F_z = e_T T",
@@ -67,6 +139,7 @@ EFFECT = Effect(
                 1.0,
                 "where acceleration or velocity is measured, relative to the centre of mass; seen in force only",
                 scales.arm,
+                of_log=True,
             )
             for axis in "xyz"
         ),
@@ -82,4 +155,5 @@ EFFECT = Effect(
     },
     source="Newton-Euler equations",
     columns=_columns,
+    log=SensorLog(change=_log),
 )

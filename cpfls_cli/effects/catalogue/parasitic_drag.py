@@ -32,6 +32,7 @@ def _torque(letter: str) -> Coefficient:
 
 EFFECT = Effect(
     name="parasitic_drag",
+    order=90,
     title="parasitic drag of the fuselage",
     kind="wrench",
     formula="F = -|v| (c_x v_x, c_y v_y, c_z v_z),  M = cr x (-|v| v)",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -11,17 +12,21 @@ from scipy.signal import savgol_filter
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, stack, wrench
-from cpfls_cli.effects.pendulum import integrate
+from cpfls_cli.effects.hooks import Carrier, Pull
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 _STEP_S = 0.04
 _SMOOTHING_S = 0.1
 _LARGEST_START = 0.5
 _LARGEST_ACROSS = 0.97
 
+_Vector = Sequence[float]
+_State = tuple[float, float, float, float, float, float]
+
 
 def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
-    """Swing a load on a cable under a moving hook.
+    """Integrate the swing of a load on a cable under a moving hook.
 
     ``n'' = -(a + g z)_across / L - |n'|^2 n - c n'`` for the direction n of the cable, with the part of the
     acceleration across it; integrated by the classical Runge-Kutta method. Large swings are slower than small ones,
@@ -75,7 +80,7 @@ def _smooth_derivative(signals: Signals, values: Array) -> Array:
 
 
 def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
-    """Add to the driven swing the one that a flight starts with, as its force balance shows it.
+    """Add the free swing at the start, estimated from the force balance, to the driven swing.
 
     The horizontal pull on the vehicle is ``m_p g`` times the whole swing. Where forces are known, least squares find
     ``m_p`` and the two free swings of each direction; else the cable starts at rest.
@@ -106,8 +111,8 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
             np.column_stack([driven[:, 1], nothing, free, nothing[:, 0], np.ones(len(free))]),
         ]
     )
-    found = np.linalg.lstsq(columns, pull.T.reshape(-1), rcond=None)[0]
-    start = found[1:5] / found[0] if found[0] > 0 else np.zeros(4)
+    solution = np.linalg.lstsq(columns, pull.T.reshape(-1), rcond=None)[0]
+    start = solution[1:5] / solution[0] if solution[0] > 0 else np.zeros(4)
     if np.abs(start).max() > _LARGEST_START:
         return driven
     return np.asarray(driven + np.column_stack([free @ start[:2], free @ start[2:]]))
@@ -132,8 +137,131 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     return Columns(stack(*levers, wrench(force=pull)))
 
 
+def integrate(
+    nodes: Sequence[_Vector], middles: Sequence[_Vector], step: float, length: float, damping: float
+) -> Array:
+    """Integrate direction and rate of a cable from rest by the classical Runge-Kutta method.
+
+    In plain numbers: arrays of three would cost ten times as much.
+
+    Parameters
+    ----------
+    nodes : sequence of three numbers, m/s^2
+        Acceleration of the hook plus gravity at each step, world frame.
+    middles : sequence of three numbers, m/s^2
+        Half a step later; one fewer.
+    step : float, s
+    length : float, m
+    damping : float, 1/s
+
+    Returns
+    -------
+    array, shape (step, 6)
+        Direction, then rate in 1/s.
+    """
+    state: _State = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+    states = [state]
+    for number, middle in enumerate(middles):
+        half = 0.5 * step
+        first = _rate(state, nodes[number], length, damping)
+        second = _rate(_moved(state, first, half), middle, length, damping)
+        third = _rate(_moved(state, second, half), middle, length, damping)
+        fourth = _rate(_moved(state, third, step), nodes[number + 1], length, damping)
+        mean = tuple((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(first, second, third, fourth, strict=True))
+        state = _unit(_moved(state, mean, step))
+        states.append(state)
+    return np.array(states)
+
+
+def _rate(state: Sequence[float], felt: _Vector, length: float, damping: float) -> _State:
+    x, y, z, u, v, w = state
+    a, b, c = felt
+    along = a * x + b * y + c * z
+    centripetal = u * u + v * v + w * w
+    return (
+        u,
+        v,
+        w,
+        -(a - x * along) / length - centripetal * x - damping * u,
+        -(b - y * along) / length - centripetal * y - damping * v,
+        -(c - z * along) / length - centripetal * z - damping * w,
+    )
+
+
+def _moved(state: Sequence[float], rate: Sequence[float], step: float) -> tuple[float, ...]:
+    return tuple(value + step * change for value, change in zip(state, rate, strict=True))
+
+
+def _unit(state: Sequence[float]) -> _State:
+    """Normalise the direction and project its rate onto the plane across it, against rounding."""
+    x, y, z, u, v, w = state
+    scale = 1.0 / (x * x + y * y + z * z) ** 0.5
+    x, y, z = x * scale, y * scale, z * scale
+    along = u * x + v * y + w * z
+    return x, y, z, u - along * x, v - along * y, w - along * z
+
+
+@dataclass(frozen=True)
+class _Load:
+    """The load in the closed loop, with mass and ``mass times hook`` as lever of its pull ``m_p t n``.
+
+    State: direction n of the cable and its rate, ``n'' = -(a + g z)_across / L - |n'|^2 n - c n'`` with a the
+    acceleration of the hook, and the tension per mass ``t = L |n'|^2 - (a + g z) . n``.
+    """
+
+    mass: float
+    mass_times_hook: Array
+    depth: float
+    length: float
+    damping: float
+    gravity: float
+    start: Array = field(default_factory=lambda: np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
+
+    def pull(self, carrier: Carrier, state: Array) -> Pull:
+        """Pull at a carrier whose acceleration depends on the pull; both are linear in the tension."""
+        cable, rate = state[:3] / np.linalg.norm(state[:3]), state[3:]
+        hook = np.array([0.0, 0.0, -self.depth])
+        pulled = self.mass / carrier.mass * cable
+        turned = np.linalg.solve(carrier.inertia, np.cross(self.mass_times_hook, carrier.rotation.T @ cable))
+        bent = np.cross(carrier.turning, hook) + np.cross(carrier.body_rate, np.cross(carrier.body_rate, hook))
+        felt = carrier.acceleration + carrier.rotation @ bent
+        felt[2] += self.gravity
+        response = pulled + carrier.rotation @ np.cross(turned, hook)
+        tension = (self.length * rate @ rate - felt @ cable) / (1 + response @ cable)
+        felt = felt + tension * response
+        across = felt - (felt @ cable) * cable
+        swing = -across / self.length - (rate @ rate) * cable - self.damping * rate
+        return Pull(tension * pulled, tension * turned, np.concatenate([rate, swing]))
+
+
+def _carried(vehicle: VehicleSettings, values: Mapping[str, float]) -> _Load:
+    lever = sum((value * np.array(_HOOK[name]) for name, value in values.items() if name in _HOOK), np.zeros(3))
+    return _Load(
+        values["mass"],
+        lever,
+        values.get("depth_m", 0.0),
+        values["length_m"],
+        values["damping_1_s"],
+        vehicle.gravity_m_s2,
+    )
+
+
+# Where the coefficients have the hook.
+_HOOK = {
+    "mass_times_depth": (0.0, 0.0, -1.0),
+    "mass_times_right": (0.0, -1.0, 0.0),
+    "mass_times_behind": (-1.0, 0.0, 0.0),
+}
+
+
+def _accounts(number: str, _values: Mapping[str, float]) -> float:
+    """Account for any error of the thrust: the load is carried."""
+    return np.inf if number == "thrust_scale" else 0.05
+
+
 EFFECT = Effect(
     name="payload",
+    order=220,
     title="load on a cable",
     kind="wrench",
     formula="M = m_p r_a x R^T t,  F = m_p R^T t,  t = (g + a_z) (e_x, e_y, -1)/|.|,  e'' + c e' + g/L e = -a/L",
@@ -163,4 +291,6 @@ EFFECT = Effect(
         Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing", first=0.2),
         Shape("depth_m", "m", (0.0, 0.1, 0.3), "depth of the hook below the centre of mass", first=0.0),
     ),
+    carried=_carried,
+    accounts=_accounts,
 )

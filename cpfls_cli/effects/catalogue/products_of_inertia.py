@@ -21,6 +21,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="products_of_inertia",
+    order=190,
     title="products of inertia",
     kind="wrench",
     formula="M = -(d/dt (dI omega) + omega x dI omega),  dI off the diagonal",

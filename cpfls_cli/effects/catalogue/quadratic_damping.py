@@ -26,6 +26,7 @@ def _damping(axis: int) -> Coefficient:
 
 EFFECT = Effect(
     name="quadratic_damping",
+    order=20,
     title="quadratic rotational damping",
     kind="wrench",
     formula="M = -(d_x |p| p, d_y |q| q, d_z |r| r)",

@@ -16,6 +16,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="rolling_moment",
+    order=60,
     title="rolling moment of the rotors",
     kind="wrench",
     formula="M = -mu sum s_i w_i (u_ix, u_iy, 0)",

@@ -19,6 +19,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="rotor_acceleration",
+    order=140,
     title="reaction to rotor acceleration",
     kind="wrench",
     formula="M_z = -d/dt (J_r S),  S = sum s_i w_i",

@@ -16,6 +16,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="rotor_drag",
+    order=40,
     title="rotor drag (H-force)",
     kind="wrench",
     formula="F_i = -k_d w_i (u_ix, u_iy, 0) at hub i,  M = sum r_i x F_i",

@@ -19,6 +19,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="rotor_gyroscopic",
+    order=130,
     title="gyroscopic torque of the rotors",
     kind="wrench",
     formula="M = -omega x J_r S z = J_r S (-q, p, 0),  S = sum s_i w_i",

@@ -30,7 +30,7 @@ def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
 
 
 def gain_modes(vehicle: VehicleSettings) -> Array:
-    """Choose two patterns of thrust gain that no wrong inertia can stand in for.
+    """Construct two patterns of thrust gain that no wrong inertia can mimic.
 
     For a quadrotor they are the differences of its two opposite pairs. For other vehicles they grow along x and y.
     What all rotors, or all rotors of one spin, have in common is taken out: it trades with Ixx and Iyy.
@@ -47,7 +47,7 @@ def gain_modes(vehicle: VehicleSettings) -> Array:
 
 
 def gains(vehicle: VehicleSettings, differences: Array) -> Array:
-    """Blame each difference on the weaker rotor of its pair.
+    """Assign each difference to the weaker rotor of its pair.
 
     Parameters
     ----------
@@ -70,11 +70,11 @@ def gains(vehicle: VehicleSettings, differences: Array) -> Array:
     return loss
 
 
-def _told(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
-    """Say which rotor is weak; that its opposite is strong instead looks the same."""
+def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
+    """Name the weak rotor; a strong opposite one looks the same."""
     differences = np.array([values.get(f"difference_{mode}", 0.0) for mode in (1, 2)])
     loss = gains(vehicle, differences).tolist()
-    other = {place: pair[1 - pair.index(place)] for pair in opposite_pairs(vehicle) for place in pair}
+    other = {rotor: pair[1 - pair.index(rotor)] for pair in opposite_pairs(vehicle) for rotor in pair}
     if len(other) != len(loss):
         weak = loss.index(min(loss))
         return f"Rotor {weak + 1} pulls least, {-100 * loss[weak]:.2g} % less than modelled." if any(loss) else ""
@@ -107,8 +107,13 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     return Columns(stack(*levers, wrench(drag), wrench(force=lift)))
 
 
+def _accounts(_number: str, values: Mapping[str, float]) -> float:
+    return sum(abs(value) for name, value in values.items() if name.startswith("difference"))
+
+
 EFFECT = Effect(
     name="rotor_mismatch",
+    order=200,
     title="rotors that differ",
     kind="wrench",
     formula="dT_i = kappa_i T_i,  M = sum r_i x dT_i z;  M_z += delta sum b_i w_i^2",
@@ -136,5 +141,6 @@ EFFECT = Effect(
     },
     source="rotor by rotor thrust factors in quad_race_env (tudelft) and SkyFlow",
     columns=_columns,
-    told=_told,
+    describe=_describe,
+    accounts=_accounts,
 )

@@ -25,6 +25,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="rotor_plane_damping",
+    order=30,
     title="rotor-plane damping",
     kind="wrench",
     formula="M = -k_w sum(w_i) (p, q, 0),  F_i = k_F w_i (-q, p, 0)",

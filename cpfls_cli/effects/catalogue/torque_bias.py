@@ -17,6 +17,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="torque_bias",
+    order=210,
     title="constant torque",
     kind="wrench",
     formula="M = (M_x, M_y, M_z)",

@@ -15,6 +15,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
 
 EFFECT = Effect(
     name="translational_lift",
+    order=80,
     title="translational lift",
     kind="wrench",
     formula="dT_i = k_h (u_ix^2 + u_iy^2),  M = sum r_i x dT_i z",

@@ -103,7 +103,7 @@ def _name(knot: float) -> str:
     return f"f_{knot:g}".replace(".", "_")
 
 
-def _told(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
+def _describe(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     """Name the state in which the thrust changes most."""
     changes = {knot: values[_name(knot)] for knot in _KNOTS[1:] if _name(knot) in values}
     if not changes:
@@ -115,6 +115,7 @@ def _told(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
 
 EFFECT = Effect(
     name="vertical_descent",
+    order=110,
     title="vertical descent (vortex ring to windmill brake)",
     kind="wrench",
     formula="dT_i = T_i exp(-(u_xy/(s v_h))^2) f(x_i),  f linear between knots, f(0) = 0,  x_i = max(-u_iz/v_h, 0)",
@@ -131,7 +132,8 @@ EFFECT = Effect(
     },
     source="Bauersfeld et al. 2021, NeuroBEM, eq. 19; Bangura and Mahony (0.5 < x < 2); the sources disagree in sign",
     columns=_columns,
+    accounts=lambda _number, _values: 0.05,
     shapes=(Shape("sideways", "1", (0.4, 0.7, 1.0, 1.5), "sideways speed over v_h that blows the effect away"),),
     scatter=_scatter,
-    told=_told,
+    describe=_describe,
 )

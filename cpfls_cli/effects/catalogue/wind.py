@@ -33,6 +33,7 @@ def _linear(physical: Array) -> Array:
 
 EFFECT = Effect(
     name="wind",
+    order=120,
     title="steady wind",
     kind="wrench",
     formula="F_i = -k_d w_i (u_i - R^T W) in the rotor plane,  M = sum r_i x F_i",

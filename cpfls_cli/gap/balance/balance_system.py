@@ -1,4 +1,4 @@
-"""All flights as one linear system: what is left, what stays free, and what each candidate would explain."""
+"""All flights as one linear system: residual, free columns, columns of candidates, and noise."""
 
 from __future__ import annotations
 
@@ -9,8 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, actuated, nuisance
+from cpfls_cli.gap.balance.noise_floor import noise_floor
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, actuated, columns_of, nuisance
+
+NEGLIGIBLE = 0.003
+"""Share of the torque or force below which nobody could use a correction; sampling alone leaves about as much."""
+_LEAST_RATIO = 1.5
+"""Mean square inside the scattering stretches over that outside from which scatter is believed."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +56,11 @@ class System:
     def residual(self) -> Array:
         """What inertia and rotors leave, without the effects of unit coefficient; shape (window, 6)."""
         pairs = zip(self.flights, self.signals, strict=True)
-        left = np.concatenate([flight.averaged(flight.residual(signals)) for flight, signals in pairs])
+        residual = np.concatenate([flight.averaged(flight.residual(signals)) for flight, signals in pairs])
         for candidate in self.chosen:
             if candidate.effect.kind == "wrench" and candidate.effect.unit_coefficient:
-                left = left - self.columns(candidate)[..., 0]
-        return left
+                residual = residual - self.columns(candidate)[..., 0]
+        return residual
 
     @cached_property
     def base(self) -> Array:
@@ -103,3 +110,119 @@ def system(flights: Sequence[WeakFlight], chosen: Sequence[Candidate] = ()) -> S
 def is_free(candidate: Candidate) -> bool:
     """Tell whether an effect has columns with free coefficients."""
     return candidate.effect.kind == "wrench" and not candidate.effect.unit_coefficient
+
+
+def floors(hypothesis: System, coefficients: Array) -> Array:
+    """Estimate the noise floor of each channel over all flights.
+
+    Parameters
+    ----------
+    hypothesis : System
+    coefficients : array, shape (column,)
+        Of `hypothesis.base`.
+
+    Returns
+    -------
+    array, shape (6,), N m and N
+        1 for channels that no flight has.
+    """
+    square, count = np.zeros(6), np.zeros(6)
+    for number, flight in enumerate(hypothesis.flights):
+        floor = noise_floor(left_over(hypothesis, number, coefficients), flight.windows)
+        square += len(flight) * flight.known * floor**2
+        count += len(flight) * flight.known
+    noise = np.sqrt(square / np.maximum(count, 1))
+    return np.where(count > 0, np.maximum(noise, NEGLIGIBLE * _activity(hypothesis)), 1.0)
+
+
+def left_over(hypothesis: System, number: int, coefficients: Array) -> Columns:
+    """Compute the residual of a fitted hypothesis along one flight, sample by sample.
+
+    Parameters
+    ----------
+    hypothesis : System
+    number : int
+        Of the flight.
+    coefficients : array, shape (column,)
+
+    Returns
+    -------
+    Columns
+        Of shape (time, 6).
+    """
+    flight, signals = hypothesis.flights[number], hypothesis.signals[number]
+    residual = flight.residual(signals)
+    direct, momentum = residual.direct, residual.momentum
+    assert momentum is not None
+    used = 0
+    for candidate in hypothesis.free:
+        width = hypothesis.columns(candidate).shape[2]
+        linear = coefficients[used : used + width]
+        used += width
+        direct, momentum = _less(direct, momentum, candidate, linear, signals)
+    for candidate in hypothesis.chosen:
+        if candidate.effect.kind == "wrench" and candidate.effect.unit_coefficient:
+            direct, momentum = _less(direct, momentum, candidate, np.ones(1), signals)
+    return Columns(direct * flight.known, momentum * flight.known)
+
+
+def _less(direct: Array, momentum: Array, candidate: Candidate, linear: Array, signals: Signals) -> tuple[Array, Array]:
+    """Subtract what a candidate does with its coefficients."""
+    if candidate.effect.missing(signals):
+        return direct, momentum
+    columns = columns_of(candidate, signals)
+    if columns.momentum is not None:
+        momentum = momentum - columns.momentum @ linear
+    return direct - columns.direct @ linear, momentum
+
+
+def _activity(hypothesis: System) -> Array:
+    """Compute the root mean square of the inertial torque and force of each channel about its mean."""
+    rows = np.concatenate([flight.averaged(flight.inertial) for flight in hypothesis.flights])
+    torque = np.sqrt(np.mean(rows[:, :3] ** 2, axis=0))
+    weight = np.sqrt(np.mean(rows[:, 3:] ** 2))
+    return np.array([*np.maximum(torque, 0.3 * torque.max()), *[weight] * 3])
+
+
+def scatter_variance(hypothesis: System) -> Array:
+    """Average over windows the variance of the random part of the chosen effects, for a unit of relative scatter.
+
+    Returns
+    -------
+    array, shape (window, 6)
+        Zero where no effect scatters.
+    """
+    parts = []
+    for flight, signals in zip(hypothesis.flights, hypothesis.signals, strict=True):
+        total = np.zeros((len(flight), 6))
+        for candidate in hypothesis.chosen:
+            if candidate.effect.scatter is not None and not candidate.effect.missing(signals):
+                total += flight.windows.average(candidate.effect.scatter(signals, candidate.shape))
+        parts.append(total * flight.known)
+    return np.concatenate(parts)
+
+
+def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
+    """Estimate the relative scatter, one number for all channels, from the residual.
+
+    Parameters
+    ----------
+    variance : array, shape (window, 6)
+        For a unit of scatter.
+    residual : array, shape (window, 6)
+    floor : array, shape (6,)
+
+    Returns
+    -------
+    float
+        Mean square of the relative scatter over a window; 0 where stretches that should scatter do not stand out.
+    """
+    expected = variance / floor**2
+    if not expected.any():
+        return 0.0
+    square = (residual / floor) ** 2
+    inside = expected > 0.2 * expected.max(axis=0, initial=0.0, keepdims=True) * np.sign(expected.max(axis=0))
+    inside &= expected > 0
+    if not inside.any() or square[inside].mean() < _LEAST_RATIO * max(1.0, square[~inside].mean()):
+        return 0.0
+    return float(max(0.0, (square[inside] - 1).sum() / expected[inside].sum()))

@@ -1,4 +1,4 @@
-"""The inertial side of the balance in momentum form, so that no rate has to be differentiated."""
+"""Inertial torque and force in momentum form, so that no rate has to be differentiated."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Balance:
 
 
 def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Balance:
-    """Write the inertial body torque in momentum form.
+    """Compute the inertial body torque in momentum form.
 
     A rigid body: momentum ``I omega``, direct ``omega x I omega``. A model in Euler coordinates: ``W^-T (d/dt (J qd) -
     1/2 grad (qd^T J qd))``, with W^-T taken under the derivative.
@@ -62,7 +62,7 @@ def _euler_balance(signals: Signals, model: InertiaModel) -> Balance:
 
 
 def translation_balance(signals: Signals) -> Balance:
-    """Write mass times specific force in momentum form, body axes.
+    """Compute mass times specific force in momentum form, body axes.
 
     From the accelerometer, else from the acceleration, else from the velocity: ``d/dt (m v_b) + m omega x v_b +
     m g R^T e_z``.

@@ -1,4 +1,4 @@
-"""The noise floor of each channel, from the flight itself: what is left at frequencies where nothing moves."""
+"""The noise floor of each channel, from the residual at frequencies above the motion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MEDIAN_OF_EXPONENTIAL = float(np.log(2))
 
 
 def noise_floor(residual: Columns, windows: Windows) -> Array:
-    """Estimate the standard deviation that noise gives a window.
+    """Estimate the standard deviation of the window averages that noise causes.
 
     The power of the residual is taken at frequencies above the motion. Spectra that noise can have are fitted to it:
     flat ones, as of rotors and angles; growing with the square, as of a gyroscope, whose derivative is taken; and both
@@ -45,12 +45,12 @@ def noise_floor(residual: Columns, windows: Windows) -> Array:
     frequencies = np.linspace(lowest, max(_HIGHEST_OF_RATE / windows.period, 1.5 * lowest), _FREQUENCIES)
     power = np.array([_power(residual, longer, frequency) for frequency in frequencies]) / _energy(longer)
     terms = np.array([_terms(longer, frequency) for frequency in frequencies])
-    own = _terms(windows, 0.0) * _energy(windows)
-    return np.array([_extrapolated(terms, channel, own) for channel in power.T])
+    window_terms = _terms(windows, 0.0) * _energy(windows)
+    return np.array([_extrapolated(terms, channel, window_terms) for channel in power.T])
 
 
 def _terms(windows: Windows, centre: float) -> Array:
-    """Average the spectra that noise can have over what a window at a frequency lets through."""
+    """Average the model spectra of noise over the passband of a window at a frequency."""
     length = len(windows.weight)
     through = np.abs(np.fft.rfft(windows.weight, _PADDED * length)) ** 2
     offset = np.fft.rfftfreq(_PADDED * length, windows.period)
@@ -71,8 +71,8 @@ def _energy(windows: Windows) -> float:
     return float((windows.weight**2).sum())
 
 
-def _extrapolated(terms: Array, power: Array, own: Array) -> float:
-    """Fit a flat and a rising spectrum, each of one colour; white ones unless others fit clearly better."""
+def _extrapolated(terms: Array, power: Array, window_terms: Array) -> float:
+    """Fit a flat and a rising spectrum, white unless coloured ones fit clearly better; evaluate them for a window."""
     if not power.min() > 0:
         return 0.0
     # Dividing by the power makes relative errors of equal weight.
@@ -81,7 +81,7 @@ def _extrapolated(terms: Array, power: Array, own: Array) -> float:
     fits = [nnls(relative[:, pair], np.ones(len(power))) for pair in pairs]
     best = int(np.argmin([misfit for _, misfit in fits]))
     chosen = 0 if fits[0][1] ** 2 <= _CLEARLY_BETTER * fits[best][1] ** 2 else best
-    return float(np.sqrt(fits[chosen][0] @ own[list(pairs[chosen])]))
+    return float(np.sqrt(fits[chosen][0] @ window_terms[list(pairs[chosen])]))
 
 
 def _power(residual: Columns, windows: Windows, frequency: float) -> Array:

@@ -1,4 +1,4 @@
-"""Shapes between the points of their grids: the best value, all other coefficients following."""
+"""Fits of a hypothesis: linear coefficients, derivatives by shapes, and refinement of the shapes."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from scipy.optimize import least_squares, minimize_scalar
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Shape
 from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.told_torque import compensation
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 
 _EVALUATIONS = 14
 _JOINT_EVALUATIONS = 8
+_STEP = 1e-3
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
-    """Improve the shapes of the chosen effects by the error of the fit.
+    """Refine the shapes of the chosen effects by minimising the squared residual.
 
     The newest shapes first, one by one between the points of their grids; then, where there are several, all together,
     because a lag and a delay, say, trade with each other.
@@ -30,17 +30,17 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     floor : array, shape (6,)
     """
     best = list(chosen)
-    told = system(flights).rotor_wrench
-    shapes = [(place, shape) for place, candidate in enumerate(best) for shape in candidate.effect.shapes]
-    newest = [(place, shape) for place, shape in shapes if place == len(best) - 1]
+    rotor_wrench = system(flights).rotor_wrench
+    shapes = [(index, shape) for index, candidate in enumerate(best) for shape in candidate.effect.shapes]
+    newest = [(index, shape) for index, shape in shapes if index == len(best) - 1]
     # A second round where there are several: the best length of a cable depends on its damping.
-    for place, shape in newest * min(len(newest), 2):
-        best[place] = _improved(flights, best, place, shape, floor, told)
-    return system(flights, _together(flights, best, shapes, floor, told) if len(shapes) > 1 else best)
+    for index, shape in newest * min(len(newest), 2):
+        best[index] = _improved(flights, best, index, shape, floor, rotor_wrench)
+    return system(flights, _together(flights, best, shapes, floor, rotor_wrench) if len(shapes) > 1 else best)
 
 
 def fit(hypothesis: System, floor: Array) -> Array:
-    """Fit all free columns.
+    """Fit all free columns by weighted least squares.
 
     Parameters
     ----------
@@ -58,52 +58,52 @@ def fit(hypothesis: System, floor: Array) -> Array:
     return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale)
 
 
-def left(hypothesis: System, floor: Array, told: Array) -> Array:
-    """Compute what a hypothesis leaves after its fit, in floors, as if its rotors gave as much torque as told.
+def weighted_residual(hypothesis: System, floor: Array, rotor_wrench: Array) -> Array:
+    """Compute the residual of a fit in floors, compensated for a change of the rotor torque.
 
     Parameters
     ----------
     hypothesis : System
     floor : array, shape (6,)
-    told : array, shape (window, 6), N m and N
+    rotor_wrench : array, shape (window, 6), N m and N
         Wrench of the rotors without effects on the actuation.
 
     Returns
     -------
     array, shape (window, 6)
     """
-    weight = compensation(told, hypothesis.rotor_wrench) / floor
+    weight = compensation(rotor_wrench, hypothesis.rotor_wrench) / floor
     return np.asarray((hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)) * weight)
 
 
 def _improved(
     flights: Sequence[WeakFlight],
     chosen: Sequence[Candidate],
-    place: int,
+    index: int,
     shape: Shape,
     floor: Array,
-    told: Array,
+    rotor_wrench: Array,
 ) -> Candidate:
-    candidate = chosen[place]
+    candidate = chosen[index]
 
     def moved(value: float) -> Candidate:
         return Candidate(candidate.effect, {**candidate.shape, shape.name: float(value)})
 
     def error(value: float) -> float:
-        hypothesis = system(flights, [*chosen[:place], moved(value), *chosen[place + 1 :]])
-        return float((left(hypothesis, floor, told) ** 2).sum())
+        hypothesis = system(flights, [*chosen[:index], moved(value), *chosen[index + 1 :]])
+        return float((weighted_residual(hypothesis, floor, rotor_wrench) ** 2).sum())
 
     bracket = _bracket(shape.grid, candidate.shape[shape.name])
-    found = minimize_scalar(
+    optimum = minimize_scalar(
         error, bounds=bracket, method="bounded", options={"maxiter": _EVALUATIONS, "xatol": 1e-3 * np.ptp(bracket)}
     )
-    return moved(found.x)
+    return moved(optimum.x)
 
 
 def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
     """Find the neighbours of a value on its grid."""
-    place = int(np.argmin(np.abs(np.asarray(grid) - value)))
-    return float(grid[max(0, place - 1)]), float(grid[min(len(grid) - 1, place + 1)])
+    nearest = int(np.argmin(np.abs(np.asarray(grid) - value)))
+    return float(grid[max(0, nearest - 1)]), float(grid[min(len(grid) - 1, nearest + 1)])
 
 
 def _together(
@@ -111,22 +111,22 @@ def _together(
     chosen: list[Candidate],
     shapes: list[tuple[int, Shape]],
     floor: Array,
-    told: Array,
+    rotor_wrench: Array,
 ) -> list[Candidate]:
     low = np.array([shape.grid[0] for _, shape in shapes])
     high = np.array([shape.grid[-1] for _, shape in shapes])
-    start = np.array([chosen[place].shape[shape.name] for place, shape in shapes])
+    start = np.array([chosen[index].shape[shape.name] for index, shape in shapes])
 
     def moved(values: Array) -> list[Candidate]:
         there = list(chosen)
-        for (place, shape), value in zip(shapes, low + values * (high - low), strict=True):
-            there[place] = Candidate(there[place].effect, {**there[place].shape, shape.name: float(value)})
+        for (index, shape), value in zip(shapes, low + values * (high - low), strict=True):
+            there[index] = Candidate(there[index].effect, {**there[index].shape, shape.name: float(value)})
         return there
 
     def error(values: Array) -> Array:
-        return left(system(flights, moved(values)), floor, told).reshape(-1)
+        return weighted_residual(system(flights, moved(values)), floor, rotor_wrench).reshape(-1)
 
-    found = least_squares(
+    optimum = least_squares(
         error,
         np.clip((start - low) / (high - low), 1e-6, 1 - 1e-6),
         bounds=(0.0, 1.0),
@@ -135,4 +135,67 @@ def _together(
         xtol=1e-4,
         ftol=1e-5,
     )
-    return moved(found.x)
+    return moved(optimum.x)
+
+
+def free_shapes(hypothesis: System) -> list[tuple[Candidate, str]]:
+    """List the shapes of a hypothesis in the order of its effects.
+
+    Returns
+    -------
+    list of (Candidate, str)
+    """
+    return [(candidate, shape.name) for candidate in hypothesis.chosen for shape in candidate.effect.shapes]
+
+
+def shape_columns(hypothesis: System, linear: Array) -> Array:
+    """Differentiate what the hypothesis explains by each of its shapes, by central differences.
+
+    Parameters
+    ----------
+    hypothesis : System
+    linear : array, shape (column,)
+        Coefficients of the base, held.
+
+    Returns
+    -------
+    array, shape (window, 6, shape)
+    """
+    shapes = free_shapes(hypothesis)
+    columns = np.zeros((*hypothesis.residual.shape, len(shapes)))
+    for number, (candidate, name) in enumerate(shapes):
+        value = candidate.shape[name]
+        step = _STEP * (abs(value) or 1.0)
+        ahead, behind = (_residual_at(hypothesis, linear, candidate, name, value + s) for s in (step, -step))
+        columns[..., number] = (behind - ahead) / (2 * step)
+    return columns
+
+
+def _residual_at(hypothesis: System, linear: Array, moved: Candidate, name: str, value: float) -> Array:
+    chosen = [Candidate(c.effect, {**c.shape, name: value}) if c is moved else c for c in hypothesis.chosen]
+    there = system(hypothesis.flights, chosen)
+    return np.asarray(there.residual - there.base @ linear)
+
+
+def compensation(before: Array, after: Array) -> Array:
+    """Weigh the channels by how much an actuator effect reduces their rotor torque.
+
+    Inertia is free in every fit. Where motion follows the torque only in part, a torque half as large with half the
+    inertia leaves half of the residual and explains nothing: a lag would look better the longer it is. With residuals
+    times this factor, what counts is the share of the torque that the motion does not follow.
+
+    Parameters
+    ----------
+    before, after : array, shape (window, 6), N m and N
+        Wrench of the rotors without and with the effect.
+
+    Returns
+    -------
+    array, shape (6,)
+        Ratio of the standard deviations; 1 for the forces, where weight and mass hold the scale.
+    """
+    factor = np.ones(before.shape[1])
+    spread, shrunk = before[:, :3].std(axis=0), after[:, :3].std(axis=0)
+    moving = (spread > 0) & (shrunk > 0)
+    factor[:3][moving] = spread[moving] / shrunk[moving]
+    return factor

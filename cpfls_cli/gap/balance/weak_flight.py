@@ -1,4 +1,4 @@
-"""A flight as rows of the balance: one window, three torques and three forces."""
+"""A flight as rows of the torque and force balance, six for each window."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.effects.catalogue.parameter_error import shown
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.inertial import Balance, rotation_balance, translation_balance
 from cpfls_cli.gap.balance.noise_floor import noise_floor
@@ -35,7 +36,7 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True)
 class WeakFlight:
-    """A flight with the inertial side of its balance.
+    """A flight with its inertial torque and force.
 
     Attributes
     ----------
@@ -104,7 +105,7 @@ class WeakFlight:
         return rows * self.turns if candidate.effect.kind == "parameter" else rows
 
     def without_force(self) -> WeakFlight:
-        """Leave the force balance out."""
+        """Drop the force balance."""
         known = self.known & (np.arange(6) < 3)
         seen = {key: rows * known[:, None] for key, rows in self.seen.items()}
         return replace(self, known=known, seen=seen)
@@ -130,7 +131,7 @@ def weak_flight(
     force: bool,
     axes: Sequence[str] = _AXES,
 ) -> WeakFlight:
-    """Write down the inertial side of a flight.
+    """Compute the inertial torque and force of a flight.
 
     Parameters
     ----------
@@ -157,7 +158,7 @@ def weak_flight(
 
 
 def _turns(flight: WeakFlight) -> Array:
-    """Find what the flight shows of the vehicle's own numbers.
+    """Mark the vehicle's own numbers that the flight can show.
 
     Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to be rid of the noise
     of the gyroscope, which is not what anybody asked.
@@ -165,9 +166,7 @@ def _turns(flight: WeakFlight) -> Array:
     left = flight.residual(flight.signals)
     floor = noise_floor(left, flight.windows)[:3]
     moved = flight.averaged(flight.inertial)[:, :3].std(axis=0) > _TURNING * floor
-    names = [coefficient.name for coefficient in nuisance().effect.coefficients]
-    about = {f"{kind}_{axis}": moved[n] for kind in ("inertia", "coupling") for n, axis in enumerate("xyz")}
-    return np.array([float(about.get(name, True)) for name in names])
+    return shown(moved)
 
 
 def columns_of(candidate: Candidate, signals: Signals) -> Columns:
@@ -190,7 +189,7 @@ def columns_of(candidate: Candidate, signals: Signals) -> Columns:
 
 def nuisance() -> Candidate:
     """Give the parameters of the vehicle that stay free in every fit."""
-    return Candidate(CATALOGUE["parameter_error"], {})
+    return Candidate(VEHICLE_NUMBERS, {})
 
 
 def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:

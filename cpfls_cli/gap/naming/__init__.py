@@ -1,1 +1,1 @@
-"""From a gap to names: search, estimates, rivals, verdict."""
+"""Naming the causes of a gap: search, estimates, rivals, verdict."""

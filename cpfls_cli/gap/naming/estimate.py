@@ -1,4 +1,4 @@
-"""Coefficients with confidence intervals: all of them fitted together, scattered by leaving out blocks of time."""
+"""Coefficients with confidence intervals by the jackknife over blocks of time, and their sentence."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from scipy.stats import t as student
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free
-from cpfls_cli.gap.balance.refine import fit
-from cpfls_cli.gap.balance.shape_columns import free_shapes, shape_columns
+from cpfls_cli.gap.balance.refine import fit, free_shapes, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Estimates:
 
 
 def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
-    """Fit a hypothesis and scatter its numbers.
+    """Fit a hypothesis and compute confidence intervals of its numbers by the jackknife.
 
     The jackknife leaves out one block after another, so it holds for residuals that are correlated within blocks and
     for noise of unequal size. Shapes take part by their derivatives.
@@ -63,21 +63,22 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     jacobian = np.concatenate([hypothesis.base, shape_columns(hypothesis, linear)], axis=2)
     rows = (jacobian / weight[:, None], (hypothesis.residual - hypothesis.base @ linear) / weight)
     left_out = values + _one_step(*rows, block)
-    found, own_linear, first = [], [], hypothesis.columns(hypothesis.free[0]).shape[2]
+    by_effect, linear_by_effect, first = [], [], hypothesis.columns(hypothesis.free[0]).shape[2]
     parameters = _of(hypothesis.free[0], hypothesis, values[:first], left_out[:, :first], np.zeros(0), left_out[:, :0])
-    place, shape_place = first, len(linear)
+    column, shape_column = first, len(linear)
     for candidate in hypothesis.chosen:
         width = hypothesis.columns(candidate).shape[2] if is_free(candidate) else 0
         depth = len(candidate.effect.shapes)
-        own, shaped = slice(place, place + width), slice(shape_place, shape_place + depth)
-        found.append(_of(candidate, hypothesis, values[own], left_out[:, own], values[shaped], left_out[:, shaped]))
-        own_linear.append(linear[own])
-        place, shape_place = place + width, shape_place + depth
-    return Estimates(linear, tuple(found), parameters, tuple(own_linear))
+        linear_at, shape_at = slice(column, column + width), slice(shape_column, shape_column + depth)
+        numbers = (values[linear_at], left_out[:, linear_at], values[shape_at], left_out[:, shape_at])
+        by_effect.append(_of(candidate, hypothesis, *numbers))
+        linear_by_effect.append(linear[linear_at])
+        column, shape_column = column + width, shape_column + depth
+    return Estimates(linear, tuple(by_effect), parameters, tuple(linear_by_effect))
 
 
 def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
-    """Fit once with the floors as weights, then with what is left, which is more where something is unexplained.
+    """Fit with the floors as weights, then with the larger of floor and residual.
 
     Parameters
     ----------
@@ -85,12 +86,12 @@ def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Est
     floor : array, shape (6,)
     block : array of int, shape (window,)
     """
-    left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-    return estimates(hypothesis, np.maximum(floor, np.sqrt(np.mean(left**2, axis=0))), block)
+    residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+    return estimates(hypothesis, np.maximum(floor, np.sqrt(np.mean(residual**2, axis=0))), block)
 
 
 def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
-    """Tell whether any number that gives an effect its size is surely not zero.
+    """Tell whether any number that sets the size of an effect differs significantly from zero.
 
     Parameters
     ----------
@@ -130,7 +131,7 @@ def _of(
 
 
 def _interval(value: Array, left_out: Array) -> Array:
-    """Half the width of the 95 % interval by the jackknife."""
+    """Compute half the width of the 95 % confidence interval by the jackknife."""
     blocks = len(left_out)
     if blocks < 2:
         return np.full(len(value), np.inf)
@@ -139,7 +140,7 @@ def _interval(value: Array, left_out: Array) -> Array:
 
 
 def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:
-    """Change of all numbers where a block is left out, one Gauss-Newton step; shape (block, number)."""
+    """Compute the change of all numbers without each block by one Gauss-Newton step, shape (block, number)."""
     scale = np.sqrt((jacobian**2).sum(axis=(0, 1)))
     scaled = jacobian / np.where(scale > 0, scale, 1.0)
     parts = [
@@ -150,3 +151,23 @@ def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:
     ridge = 1e-9 * np.eye(gram.shape[1])
     change = -np.linalg.solve(gram.sum(axis=0) - gram + ridge, moment[..., None])[..., 0]
     return np.asarray(change / np.where(scale > 0, scale, 1.0))
+
+
+def effect_sentence(effect: Effect, numbers: Sequence[Estimate], vehicle: VehicleSettings) -> str:
+    """Compose the sentence on an effect and its significant numbers.
+
+    Parameters
+    ----------
+    effect : Effect
+    numbers : sequence of Estimate
+        Coefficients, then shapes.
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    str
+        The sentence of the catalogue, and what the numbers that are surely not zero add to it.
+    """
+    sure = {number.name: number.value for number in numbers if number.low > 0 or number.high < 0}
+    more = "" if effect.describe is None else effect.describe(vehicle, sure)
+    return f"{effect.sentence} {more}".rstrip()

@@ -1,4 +1,4 @@
-"""The gap on flights that no fit has seen: how large it was, how large it is with the effects."""
+"""The gap on held-out flights, of the model as given and of the model with effects."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.floor import floors
-from cpfls_cli.gap.balance.recording import Recording
+from cpfls_cli.gap.balance.balance_system import System, floors, scatter_variance, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.naming.results import GapSize
-from cpfls_cli.gap.naming.scatter import scatter_variance
-from cpfls_cli.gap.sensors.preparation import Preparation
+from cpfls_cli.gap.sensors.audit import Preparation
 
 _MARGIN = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
@@ -57,7 +55,7 @@ class HeldOut:
     noise: Array
 
     def size(self, residual: Array) -> GapSize:
-        """Measure a residual.
+        """Compute the root mean square of a residual by channel.
 
         Parameters
         ----------
@@ -70,7 +68,7 @@ class HeldOut:
         return GapSize(value, np.sqrt(np.where(count > 0, in_floors / np.maximum(count, 1), np.nan)))
 
     def share(self) -> float:
-        """Give the share of the gap above the floor that the effects take off.
+        """Compute the share of the gap above the noise floor that the effects remove.
 
         Of torque or force whichever is less, where each is a part of the gap that counts.
         """
@@ -86,7 +84,7 @@ class HeldOut:
         return min(clear) if clear else max(each)
 
     def explained_by_parameters(self) -> float:
-        """Give the share of the gap that refitted numbers of the vehicle take off; 0 where nobody would see it."""
+        """Compute the share of the gap that refitted numbers of the vehicle remove; 0 below visibility."""
         before, after = self.before / self.noise, self.parameters / self.noise
         rows = np.maximum(self.known.sum(axis=0), 1)
         gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
@@ -100,7 +98,7 @@ def _largest(residual: Array) -> float:
 def judged_unseen(
     held: Sequence[Recording], prepared: Preparation, fitted: System, linear: Array, scatter: float
 ) -> HeldOut:
-    """Judge a fitted hypothesis on recordings that it has not seen, beside the model with its own numbers refitted.
+    """Evaluate a fitted hypothesis on held-out recordings, beside the model with its own numbers refitted.
 
     Parameters
     ----------
@@ -119,7 +117,7 @@ def judged_unseen(
 
 
 def share_removed(before: Array, after: Array, known: Array) -> float:
-    """Give the share of a gap above the floor that is gone.
+    """Compute the share of a gap above the noise floor that was removed.
 
     Parameters
     ----------
@@ -132,12 +130,12 @@ def share_removed(before: Array, after: Array, known: Array) -> float:
         0 where nothing is gained.
     """
     gone = float(((before**2 - after**2) * known).sum())
-    left = _above(after, known)
-    return max(0.0, gone / (gone + left)) if gone > 0 else 0.0
+    remaining = _above(after, known)
+    return max(0.0, gone / (gone + remaining)) if gone > 0 else 0.0
 
 
 def _above(residual: Array, known: Array) -> float:
-    """Sum what channels have above the floor, in squared floors."""
+    """Sum the mean squares of the channels above the floor, in squared floors."""
     return float(np.maximum((residual**2 * known).sum(axis=0) - _MARGIN * known.sum(axis=0), 0.0).sum())
 
 
@@ -149,7 +147,7 @@ def held_out(
     parameters: Array,
     scatter: float,
 ) -> HeldOut:
-    """Apply a fitted hypothesis to flights that it has not seen.
+    """Apply a fitted hypothesis to held-out flights.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the catalogue does not explain: on which axis, with which signal or frequency, and how surely."""
+"""Open questions of a diagnosis: unexplained residuals, and effects that the flights could not show."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.gap.balance.balance_system import System
-from cpfls_cli.gap.balance.floor import left_over
-from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.naming.energy import energy_words
-from cpfls_cli.gap.naming.results import Unexplained
-from cpfls_cli.gap.naming.scatter import scatter_size, scatter_variance
-from cpfls_cli.gap.residual.dependence import Dependence, rank_dependence
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.balance.balance_system import System, left_over, scatter_size, scatter_variance
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
+from cpfls_cli.gap.naming.results import NamedEffect, NotExcited, Unexplained
+from cpfls_cli.gap.residual.dependence import (
+    Dependence,
+    joined_states,
+    rank_dependence,
+    state_signals,
+    without_actuation,
+)
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
-from cpfls_cli.gap.residual.state_signals import joined_states, state_signals, without_actuation
 from cpfls_cli.gap.settings import GapSettings
 
 _LARGE = 1.5
@@ -29,11 +33,18 @@ _PER_WINDOW = 6
 
 _TELLS = 0.05
 """Share that a signal or a band has to explain to be named."""
+_SURE = 3.0
+_FEWEST_BLOCKS = 4
+_USUAL_OF_BOUND = 0.2
+"""A coefficient that is large but not unheard of, as a share of its bound."""
+
+_VISIBLE = 0.2
+"""Root mean square in floors from which an effect is seen."""
 
 
 @dataclass(frozen=True)
 class Leftover:
-    """What is left of a fit.
+    """The residual of a fit and what it follows.
 
     Attributes
     ----------
@@ -60,7 +71,7 @@ def leftover(
     settings: GapSettings,
     rng: np.random.Generator,
 ) -> Leftover:
-    """Look at what a fit leaves.
+    """Analyse the residual of a fit: size, dependence on signals, narrow band, energy.
 
     Parameters
     ----------
@@ -72,10 +83,10 @@ def leftover(
     settings : GapSettings
     rng : numpy.random.Generator
     """
-    left = hypothesis.residual - hypothesis.base @ linear
+    residual = hypothesis.residual - hypothesis.base @ linear
     variance = scatter_variance(hypothesis)
-    scatter = scatter_size(variance, left, floor)
-    in_floors = left / np.sqrt(floor**2 + scatter * variance)
+    scatter = scatter_size(variance, residual, floor)
+    in_floors = residual / np.sqrt(floor**2 + scatter * variance)
     sizes = np.sqrt(np.mean(in_floors**2, axis=0))
     states = joined_states([state_signals(f, s) for f, s in zip(hypothesis.flights, hypothesis.signals, strict=True)])
     dependence = rank_dependence(
@@ -84,24 +95,24 @@ def leftover(
     band = _band(hypothesis, linear, settings, rng)
     rates = np.concatenate([flight.windows.average(flight.signals.body_rate) for flight in hypothesis.flights])
     # A force turns nothing.
-    energy = [*energy_words(left[:, :3], rates, block), *["neither"] * 3]
+    directions = [*energy_directions(residual[:, :3], rates, block), *["neither"] * 3]
     unexplained = [
-        _unexplained(channel, float(size), dependence, band, own, settings)
-        for channel, size, own in zip(CHANNELS, sizes, energy, strict=True)
+        _unexplained(channel, float(size), dependence, band, direction, settings)
+        for channel, size, direction in zip(CHANNELS, sizes, directions, strict=True)
         if size > _SMALL
     ]
-    return Leftover(sizes, dependence, scatter, tuple(found for found in unexplained if found is not None))
+    return Leftover(sizes, dependence, scatter, tuple(entry for entry in unexplained if entry is not None))
 
 
 def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:
-    """Look for a narrow band, with windows close enough that none is mistaken for another."""
+    """Search for a narrow band with windows dense enough to exclude aliases."""
     rows, rates = [], []
     for number, flight in enumerate(hypothesis.flights):
-        own = flight.windows
-        dense = replace(own, hop=max(1, len(own.weight) // _PER_WINDOW))
-        left = left_over(hypothesis, number, linear)
-        direct = dense.average(left.direct)
-        rows.append(direct if left.momentum is None else direct + dense.derivative(left.momentum))
+        windows = flight.windows
+        dense = replace(windows, hop=max(1, len(windows.weight) // _PER_WINDOW))
+        remainder = left_over(hypothesis, number, linear)
+        direct = dense.average(remainder.direct)
+        rows.append(direct if remainder.momentum is None else direct + dense.derivative(remainder.momentum))
         rates.append(dense.average(flight.signals.body_rate))
     hop = max(1, len(hypothesis.flights[0].windows.weight) // _PER_WINDOW) * hypothesis.flights[0].windows.period
     return narrow_band(rows, rates, hop, settings.shifts, rng)
@@ -130,3 +141,101 @@ def _unexplained(
         band.frequency_hz if rings and band else None,
         band.energy if rings and band else energy,
     )
+
+
+def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:
+    """Test the sign of the mean power ``M omega`` about each axis against its scatter over blocks.
+
+    Parameters
+    ----------
+    torque : array, shape (window, 3), N m or floors
+    body_rate : array, shape (window, 3), rad/s
+    block : array of int, shape (window,)
+
+    Returns
+    -------
+    list of str
+        ``feeds``, ``drains`` or ``neither`` by axis.
+    """
+    numbers = np.unique(block)
+    if len(numbers) < _FEWEST_BLOCKS:
+        return ["neither"] * torque.shape[1]
+    power = (torque - torque.mean(axis=0)) * (body_rate - body_rate.mean(axis=0))
+    means = np.array([power[block == number].mean(axis=0) for number in numbers])
+    mean, error = means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(len(numbers))
+    sure = np.abs(mean) > _SURE * error
+    return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
+
+
+def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> tuple[NotExcited, ...]:
+    """List the effects that could be present unseen, with the reason.
+
+    Parameters
+    ----------
+    hypothesis : System
+    effects : sequence of Effect
+    floor : array, shape (6,)
+    """
+    # The vehicle's own numbers are free in every fit, so beyond themselves they never show.
+    names = {candidate.effect.name for candidate in hypothesis.free} | {c.effect.name for c in hypothesis.chosen}
+    reasons = ((effect.name, _reason(hypothesis, effect, floor)) for effect in effects if effect.name not in names)
+    return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
+
+
+def look_alikes(hypothesis: System, named: Sequence[NamedEffect]) -> tuple[str, ...]:
+    """List the rivals of named effects that cannot be ruled out because the flights lack their signals.
+
+    Returns
+    -------
+    tuple of str
+        Sentences.
+    """
+    sentences = []
+    for effect in named:
+        if CATALOGUE[effect.name].kind in ("parameter", "sensor"):
+            continue
+        unseen = {}
+        for name in CATALOGUE[effect.name].rivals:
+            missing = [CATALOGUE[name].missing(signals) for signals in hypothesis.signals]
+            if all(missing) and not {"command", "measured_rotor_speed"} & set(missing[0]):
+                unseen[name] = missing[0]
+        if unseen:
+            lacking = sorted({signal.replace("_", " ") for signals in unseen.values() for signal in signals})
+            sentences.append(
+                f"{effect.name}: {', '.join(unseen)} would look alike and cannot be ruled out; log {', '.join(lacking)}"
+            )
+    return tuple(sentences)
+
+
+def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
+    missing = [effect.missing(signals) for signals in hypothesis.signals]
+    if all(missing):
+        if "command" in missing[0]:
+            return "rotor speeds are measured, so what lies between command and speed does not show"
+        return f"the flights lack {', '.join(name.replace('_', ' ') for name in missing[0])}"
+    if effect.columns is None:
+        return ""
+    shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
+    columns = hypothesis.columns(Candidate(effect, shape)) / floor[:, None]
+    new = _beyond_base(hypothesis.base / floor[:, None], columns) * _usual(hypothesis, effect, columns.shape[2])
+    # The best channel of the best coefficient decides.
+    if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= _VISIBLE:
+        return ""
+    return f"it would not show; {effect.excitation}"
+
+
+def _usual(hypothesis: System, effect: Effect, width: int) -> Array:
+    vehicle = hypothesis.flights[0].signals.vehicle
+    bounds = [max(abs(bound) for bound in c.bounds(vehicle)) for c in effect.coefficients]
+    if effect.unit_coefficient or not bounds:
+        return np.ones(width)
+    if effect.linear is not None:
+        return np.abs(effect.linear(_USUAL_OF_BOUND * np.array(bounds)))
+    return _USUAL_OF_BOUND * np.array(bounds)[:width]
+
+
+def _beyond_base(base: Array, columns: Array) -> Array:
+    flat, tested = base.reshape(-1, base.shape[2]), columns.reshape(-1, columns.shape[2])
+    length = np.linalg.norm(flat, axis=0)
+    scaled = flat / np.where(length > 0, length, 1.0)
+    return np.asarray((tested - scaled @ np.linalg.lstsq(scaled, tested, rcond=1e-9)[0]).reshape(columns.shape))

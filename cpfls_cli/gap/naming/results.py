@@ -1,17 +1,35 @@
-"""What a diagnosis says, as typed objects."""
+"""Results of a diagnosis as typed objects, and the verdict that follows from them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from cpfls_cli.arrays import Array
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.settings import GapSettings
+
+_SECOND_CAUSE = 0.03
+"""Share of the gap, in squared floors, from which on what is left is a cause of its own."""
+
+_CLEAR = 1.5
+_PART = 0.05
+_STAYS = 0.7
+"""Root mean square that is left of a clear gap about an axis, as a share, from which on nothing explained it."""
+
+_LARGE = 3.0
+_REST = 0.1
+"""Root mean square that is left, in floors and as a share of the gap, that no name for the gap may leave behind."""
+
+_MAIN = 0.1
+"""Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
 
 
-class Verdict(StrEnum):
-    """What is known of a gap."""
+class GapVerdict(StrEnum):
+    """Verdict on a gap."""
 
     NAMED = "NAMED"
     PARTIAL = "PARTIAL"
@@ -23,7 +41,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Estimate:
-    """A coefficient as found.
+    """An estimated coefficient with its confidence interval.
 
     Attributes
     ----------
@@ -147,11 +165,11 @@ class GapSize:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What is missing in a model.
+    """Result of a diagnosis: the effects that a model misses.
 
     Attributes
     ----------
-    verdict : Verdict
+    verdict : GapVerdict
     effects : tuple of NamedEffect
     closest : tuple of NamedEffect
         What explained most where the verdict names nothing.
@@ -175,7 +193,7 @@ class Diagnosis:
         Numbers of the vehicle that would have to be what no vehicle has, in sentences: the log is wrong.
     """
 
-    verdict: Verdict
+    verdict: GapVerdict
     effects: tuple[NamedEffect, ...]
     closest: tuple[NamedEffect, ...]
     alternatives: tuple[Alternative, ...]
@@ -190,3 +208,72 @@ class Diagnosis:
     notes: tuple[str, ...]
     look_alikes: tuple[str, ...] = ()
     impossible: tuple[str, ...] = ()
+
+
+def verdict_of(
+    effects: Sequence[NamedEffect],
+    alternatives: Sequence[Alternative],
+    unexplained: Sequence[Unexplained],
+    share: float,
+    stays: bool,
+    excited: bool,
+    settings: GapSettings,
+) -> GapVerdict:
+    """Derive the verdict from named effects, rivals and unexplained residuals.
+
+    Parameters
+    ----------
+    effects : sequence of NamedEffect
+    alternatives : sequence of Alternative
+    unexplained : sequence of Unexplained
+        Where effects were found: of those, the ones that matter.
+    share : float
+        Of the gap above the floor that the effects take off flights not seen.
+    stays : bool
+        Whether an axis keeps a clear gap.
+    excited : bool
+        Whether anything moved enough to show a gap.
+    settings : GapSettings
+    """
+    if not effects:
+        if unexplained:
+            return GapVerdict.UNEXPLAINED
+        return GapVerdict.NO_GAP if excited else GapVerdict.NOT_EXCITED
+    if share < settings.partial_share:
+        return GapVerdict.UNEXPLAINED
+    if share < settings.named_share or unexplained or stays:
+        return GapVerdict.PARTIAL
+    main = {effect.name for effect in effects if effect.share >= _MAIN}
+    return GapVerdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else GapVerdict.NAMED
+
+
+def gap_stays(before: Array, after: Array) -> bool:
+    """Tell whether a relevant gap about or along an axis is not reduced.
+
+    Parameters
+    ----------
+    before, after : array, shape (6,), floors
+        Of the held-out flights, with the vehicle's own numbers refitted.
+    """
+    return any(_stays(before[kind], after[kind]) for kind in (slice(0, 3), slice(3, 6)))
+
+
+def _stays(before: Array, after: Array) -> bool:
+    clear = (before > _CLEAR) & (before**2 > _PART * np.nanmax(before, initial=0.0) ** 2)
+    large = (after > _LARGE) & (after > _REST * before)
+    return bool((clear & ((after > _STAYS * before) | large)).any())
+
+
+def matters(unexplained: Unexplained, before: Array) -> bool:
+    """Tell whether an unexplained residual beside named effects shows a second cause of relevant size.
+
+    Parameters
+    ----------
+    unexplained : Unexplained
+    before : array, shape (6,), floors
+        The gap of each channel without effects.
+    """
+    follows = unexplained.signal is not None or unexplained.frequency_hz is not None
+    kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)
+    largest = float(np.nanmax(before[kind] ** 2, initial=1.0))
+    return follows and unexplained.share * unexplained.floors**2 > _SECOND_CAUSE * largest

@@ -1,4 +1,4 @@
-"""What each candidate explains of blocks that its fit did not see, and what chance explains as well."""
+"""Cross-validated gain of each candidate within physical bounds, and the gain of chance."""
 
 from __future__ import annotations
 
@@ -9,23 +9,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System
-from cpfls_cli.gap.balance.folds import Folds, folds
-from cpfls_cli.gap.balance.refine import fit
-from cpfls_cli.gap.balance.shape_columns import free_shapes, shape_columns
-from cpfls_cli.gap.balance.told_torque import compensation
+from cpfls_cli.gap.balance.refine import compensation, fit, free_shapes, shape_columns
+from cpfls_cli.gap.balance.resampling import Folds, folds
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.bounds import information, within_bounds
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 REFUSED = -np.inf
+_ERRORS = 2.0
 
 
 @dataclass(frozen=True)
 class Scored:
-    """A candidate and what it explains.
+    """A candidate with its cross-validated gain.
 
     Attributes
     ----------
@@ -47,7 +45,7 @@ class Scored:
     coefficients: Array
 
 
-class Place(NamedTuple):
+class PlacedCandidate(NamedTuple):
     """Where a candidate stands in a layout.
 
     Attributes
@@ -72,14 +70,14 @@ class Layout:
     matrix : array, shape (window, 6, column)
         Weighted.
     base : array of int
-    candidates : tuple of Place
+    candidates : tuple of PlacedCandidate
     prior : array, shape (column,)
         What bounds say of the coefficients before any data.
     """
 
     matrix: Array
     base: IntArray
-    candidates: tuple[Place, ...]
+    candidates: tuple[PlacedCandidate, ...]
     prior: Array
 
 
@@ -106,22 +104,23 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
     """
     moving = shape_columns(hypothesis, fit(hypothesis, floor))
     parts: list[Array] = [hypothesis.base, moving]
-    places: list[Place] = []
+    placed: list[PlacedCandidate] = []
     first = hypothesis.base.shape[2] + moving.shape[2]
     base = np.arange(first)
     for candidate in candidates:
         columns = primary(candidate, hypothesis.columns(candidate))
         parts.append(columns)
-        places.append(Place(candidate, np.arange(first, first + columns.shape[2]), _weight(hypothesis, candidate)))
+        indices = np.arange(first, first + columns.shape[2])
+        placed.append(PlacedCandidate(candidate, indices, _weight(hypothesis, candidate)))
         first += columns.shape[2]
     widths = [(each, hypothesis.columns(each).shape[2]) for each in hypothesis.free]
-    widths += [(place.candidate, len(place.columns)) for place in places]
+    widths += [(one.candidate, len(one.columns)) for one in placed]
     vehicle = hypothesis.flights[0].signals.vehicle
     known = [information(each.effect, width, vehicle) for each, width in widths]
     free, offered = known[: len(hypothesis.free)], known[len(hypothesis.free) :]
     shapes = np.array([1.0 / np.ptp(_grid(each, name)) ** 2 for each, name in free_shapes(hypothesis)])
     prior = np.concatenate([*free, shapes, *offered])
-    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(places), prior)
+    return Layout(np.concatenate(parts, axis=2) / floor[:, None], base, tuple(placed), prior)
 
 
 def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
@@ -129,7 +128,7 @@ def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
 
 
 def primary(candidate: Candidate, columns: Array) -> Array:
-    """Leave out the columns that come in only once an effect is chosen.
+    """Drop the columns of secondary coefficients.
 
     Parameters
     ----------
@@ -161,12 +160,12 @@ def score(arranged: Layout, normal: Folds, hypothesis: System) -> list[Scored]:
     """
     _, before = normal.solve(arranged.base)
     vehicle = hypothesis.flights[0].signals.vehicle
-    scored = [_scored(place, arranged.base, normal, before[:, 0], vehicle) for place in arranged.candidates]
-    return sorted(scored, key=lambda found: -found.gain)
+    scored = [_scored(placed, arranged.base, normal, before[:, 0], vehicle) for placed in arranged.candidates]
+    return sorted(scored, key=lambda candidate: -candidate.gain)
 
 
 def chance(arranged: Layout, normal: Folds) -> Array:
-    """Find what the best candidate explains of each draw of shifted residuals.
+    """Compute the gain of the best candidate on each draw of shifted residuals.
 
     Signs and bounds are not used, so chance is given more than its due.
 
@@ -182,8 +181,8 @@ def chance(arranged: Layout, normal: Folds) -> Array:
     """
     _, before = normal.solve(arranged.base)
     best = np.full(before.shape[1], -np.inf)
-    for place in arranged.candidates:
-        best = np.maximum(best, (before - _error(place, place.columns, arranged.base, normal)).sum(axis=0))
+    for placed in arranged.candidates:
+        best = np.maximum(best, (before - _error(placed, placed.columns, arranged.base, normal)).sum(axis=0))
     return best
 
 
@@ -204,22 +203,22 @@ def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArr
 def _weight(hypothesis: System, candidate: Candidate) -> Array:
     if candidate.effect.kind != "actuator":
         return np.ones(6)
-    told = hypothesis.rotor_wrench
-    return compensation(told, told + hypothesis.columns(candidate)[..., 0])
+    rotor_wrench = hypothesis.rotor_wrench
+    return compensation(rotor_wrench, rotor_wrench + hypothesis.columns(candidate)[..., 0])
 
 
-def _error(place: Place, columns: IntArray, base: IntArray, normal: Folds) -> Array:
-    if place.candidate.effect.unit_coefficient:
-        return normal.subtracted(int(columns[0]), base, place.weight).solve(np.arange(len(base)))[1]
+def _error(placed: PlacedCandidate, columns: IntArray, base: IntArray, normal: Folds) -> Array:
+    if placed.candidate.effect.unit_coefficient:
+        return normal.subtracted(int(columns[0]), base, placed.weight).solve(np.arange(len(base)))[1]
     return normal.solve(np.concatenate([base, columns]))[1]
 
 
-def _scored(place: Place, base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings) -> Scored:
-    candidate, columns, _ = place
+def _scored(placed: PlacedCandidate, base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings) -> Scored:
+    candidate, columns, _ = placed
     if len(columns) == 0:
         return Scored(candidate, columns, REFUSED, before, np.zeros(0))
     if candidate.effect.unit_coefficient:
-        error = _error(place, columns, base, normal)[:, 0]
+        error = _error(placed, columns, base, normal)[:, 0]
         return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
     for _ in range(len(columns)):
@@ -233,5 +232,65 @@ def _scored(place: Place, base: IntArray, normal: Folds, before: Array, vehicle:
             break
         kept &= keep
     used = columns[kept]
-    error = _error(place, used, base, normal)[:, 0]
+    error = _error(placed, used, base, normal)[:, 0]
     return Scored(candidate, used, float((before - error).sum()), error, fitted)
+
+
+def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:
+    """Check coefficients against the bounds of their effect.
+
+    What the data leave open is no reason to refuse: a coefficient counts as beyond a bound only by more than its
+    uncertainty.
+
+    Parameters
+    ----------
+    effect : Effect
+    linear : array, shape (coefficient,)
+        Linear coefficients of a fit.
+    error : array, shape (coefficient,)
+        Their standard errors.
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    keep : array of bool, shape (coefficient,)
+        False where a coefficient lies beyond a bound at 0, so that 0 is the best that is possible.
+    admissible : bool
+        False where one lies beyond another bound.
+    """
+    keep = np.ones(len(linear), dtype=bool)
+    listed = [each for each in effect.coefficients if len(linear) == len(effect.coefficients) or not each.secondary]
+    if effect.physical is not None:
+        ends = np.array([effect.physical(linear + way * _ERRORS * error) for way in (-1, 1)])
+        physical = effect.physical(linear)
+        low, high = np.array([each.bounds(vehicle) for each in listed])[: len(physical)].T
+        unsure = np.isnan(ends).any(axis=0) | np.isnan(physical)
+        return keep, bool(np.all(unsure | ((ends.max(axis=0) >= low) & (ends.min(axis=0) <= high))))
+    low, high = np.array([each.bounds(vehicle) for each in listed]).T
+    at_zero = ((linear < low) & (low == 0)) | ((linear > high) & (high == 0))
+    beyond = (linear + _ERRORS * error < low) | (linear - _ERRORS * error > high)
+    return ~at_zero, bool(not np.any(beyond & ~at_zero))
+
+
+def information(effect: Effect, columns: int, vehicle: VehicleSettings) -> Array:
+    """Compute the prior information of linear coefficients from their bounds.
+
+    A coefficient that only one block of a flight determines would be anything where that block is left out; with its
+    bound as the standard deviation of a normal prior it is small there.
+
+    Parameters
+    ----------
+    effect : Effect
+    columns : int
+        Linear coefficients in use.
+    vehicle : VehicleSettings
+
+    Returns
+    -------
+    array, shape (coefficient,)
+        One over the variance; 0 where the physical coefficients are not linear.
+    """
+    listed = [each for each in effect.coefficients if columns == len(effect.coefficients) or not each.secondary]
+    if effect.physical is not None or len(listed) != columns:
+        return np.zeros(columns)
+    return np.array([1.0 / max(abs(bound) for bound in each.bounds(vehicle)) ** 2 for each in listed])

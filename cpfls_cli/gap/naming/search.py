@@ -1,4 +1,4 @@
-"""The search for the effects that explain a gap: one at a time, against chance, with exchange and dropping."""
+"""Forward selection of the effects that explain a gap, tested against chance, with exchange and rivals."""
 
 from __future__ import annotations
 
@@ -6,17 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import gumbel_r
+from scipy.stats import gumbel_r, wilcoxon
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.floor import floors
-from cpfls_cli.gap.balance.folds import blocks_of
-from cpfls_cli.gap.balance.mirrored import mirror_shifted
+from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import fit, refined
-from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.ambiguity import simplest, unbeaten
+from cpfls_cli.gap.balance.resampling import blocks_of, mirror_shifted
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
+from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import (
     REFUSED,
     Layout,
@@ -34,11 +32,16 @@ _LEAST_SHARE = 0.05
 
 _LEAST_IN_FLOORS = 0.3
 """Root mean square that an effect has to explain of one channel, in floors."""
+_CLOSE = 0.01
+_VISIBLE = 0.25
+_ERRORS = 2.0
+_CHANCE = 0.02
+_NEAR = 0.6
 
 
 @dataclass(frozen=True)
-class Step:
-    """One look at all candidates beside a hypothesis.
+class SearchStep:
+    """All candidates ranked beside a hypothesis.
 
     Attributes
     ----------
@@ -74,14 +77,14 @@ class Step:
         return float(min(reached, gumbel_r.sf(gain, np.mean(self.chance) - np.euler_gamma * scale, scale)))
 
 
-def look(
+def rank_effects(
     flights: Sequence[WeakFlight],
     chosen: Sequence[Candidate],
     effects: Sequence[Effect],
     settings: GapSettings,
     rng: np.random.Generator | None,
     also: Sequence[Candidate] = (),
-) -> Step:
+) -> SearchStep:
     """Score all effects beside those chosen.
 
     Parameters
@@ -105,26 +108,26 @@ def look(
     block = block_index(hypothesis, settings)
     normal = normal_equations(arranged, hypothesis.residual, floor, block)
     ranking = _each_once(score(arranged, normal, hypothesis))
-    left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+    residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
     before = normal.solve(arranged.base)[1][:, 0]
-    return Step(
+    return SearchStep(
         hypothesis,
         floor,
         ranking,
-        _chance(arranged, left, hypothesis, floor, block, settings, rng),
+        _chance(arranged, residual, hypothesis, floor, block, settings, rng),
         float(max(before.sum() - _rows(hypothesis), 1e-9)),
         before,
     )
 
 
-def forward(
+def forward_selection(
     flights: Sequence[WeakFlight],
     effects: Sequence[Effect],
     settings: GapSettings,
     rng: np.random.Generator,
     progress: Callable[[int], None] = lambda _: None,
-) -> tuple[tuple[Candidate, ...], list[Step]]:
-    """Add effects one at a time while each explains more than chance and enough of what is left.
+) -> tuple[tuple[Candidate, ...], list[SearchStep]]:
+    """Add effects one at a time while each explains more than chance and a relevant part of the residual.
 
     Parameters
     ----------
@@ -138,46 +141,46 @@ def forward(
     Returns
     -------
     chosen : tuple of Candidate
-    steps : list of Step
+    steps : list of SearchStep
         The last one has nothing to add.
     """
     chosen: tuple[Candidate, ...] = ()
-    steps: list[Step] = []
+    steps: list[SearchStep] = []
     tried: set[frozenset[str]] = {frozenset()}
     while True:
-        step = look(flights, chosen, effects, settings, rng)
+        step = rank_effects(flights, chosen, effects, settings, rng)
         steps.append(step)
         progress(len(steps))
         if len(chosen) >= settings.effects_max or not acceptable(step, settings):
             return chosen, steps
         best = simplest(step.ranking, step.above_floor)
-        found = refined(flights, [*chosen, best.candidate], step.floor)
-        if not quiet_enough(best.gain, step, found):
+        refitted = refined(flights, [*chosen, best.candidate], step.floor)
+        if not quiet_enough(best.gain, step, refitted):
             return chosen, steps
-        grown = exchanged(flights, found.chosen, effects, settings) if len(found.chosen) > 1 else found.chosen
-        names = frozenset(candidate.effect.name for candidate in grown)
+        kept = exchanged(flights, refitted.chosen, effects, settings) if len(refitted.chosen) > 1 else refitted.chosen
+        names = frozenset(candidate.effect.name for candidate in kept)
         # An exchange can undo what was added; a set that was there before would come round again for ever.
         if names in tried:
             return chosen, steps
         tried.add(names)
-        chosen = grown
+        chosen = kept
         step.hypothesis.cache.clear()
 
 
-def acceptable(step: Step, settings: GapSettings) -> bool:
-    """Tell whether the best candidate of a look is more than chance and enough."""
+def acceptable(step: SearchStep, settings: GapSettings) -> bool:
+    """Tell whether the best candidate explains more than chance and a relevant part of the residual."""
     if not step.ranking or step.ranking[0].gain == REFUSED:
         return False
     best = step.ranking[0]
     return best.gain >= _enough(step) and step.p_value(best.gain) <= settings.significance
 
 
-def _enough(step: Step) -> float:
-    """Give what an effect has to explain to be worth a name, in squared floors."""
+def _enough(step: SearchStep) -> float:
+    """Compute the least gain of an effect that is named, in squared floors."""
     return max(_LEAST_SHARE * step.above_floor, _LEAST_IN_FLOORS**2 * len(step.hypothesis.residual))
 
 
-def quiet_enough(gain: float, step: Step, found: System) -> bool:
+def quiet_enough(gain: float, step: SearchStep, refitted: System) -> bool:
     """Tell whether an effect explains motion, not noise.
 
     Columns of rates hold the noise of the gyroscope, and so does the inertial torque: where rates about two axes go
@@ -188,15 +191,15 @@ def quiet_enough(gain: float, step: Step, found: System) -> bool:
     ----------
     gain : float
         What it explains, in squared floors.
-    step : Step
+    step : SearchStep
         The look that chose it.
-    found : System
+    refitted : System
         With the effect.
     """
-    if not found.chosen[-1].effect.rate_derivative:
+    if not refitted.chosen[-1].effect.rate_derivative:
         return True
-    after = floors(found, fit(found, step.floor))
-    rows = np.sum([len(flight) * flight.known for flight in found.flights], axis=0)
+    after = floors(refitted, fit(refitted, step.floor))
+    rows = np.sum([len(flight) * flight.known for flight in refitted.flights], axis=0)
     noise = float((rows * np.maximum(1 - (after / step.floor) ** 2, 0.0)).sum())
     return gain - noise >= _enough(step)
 
@@ -204,28 +207,28 @@ def quiet_enough(gain: float, step: Step, found: System) -> bool:
 def exchanged(
     flights: Sequence[WeakFlight], chosen: Sequence[Candidate], effects: Sequence[Effect], settings: GapSettings
 ) -> tuple[Candidate, ...]:
-    """Drop effects that later ones made needless, and replace those that another serves better beside the rest."""
+    """Drop effects that later ones made needless, and exchange those that another beats beside the rest."""
     kept = list(chosen)
     for candidate in list(chosen):
         others = [other for other in kept if other is not candidate]
-        step = look(flights, others, effects, settings, None, also=(candidate,))
-        own = next((s for s in step.ranking if s.candidate.effect.name == candidate.effect.name), None)
-        if own is None or own.gain < _LEAST_SHARE * step.above_floor:
+        step = rank_effects(flights, others, effects, settings, None, also=(candidate,))
+        scored = next((each for each in step.ranking if each.candidate.effect.name == candidate.effect.name), None)
+        if scored is None or scored.gain < _LEAST_SHARE * step.above_floor:
             kept = others
             continue
         best = step.ranking[0]
-        worse = best.candidate.effect.name != candidate.effect.name and own not in unbeaten(
+        worse = best.candidate.effect.name != candidate.effect.name and scored not in unbeaten(
             best, step.ranking, step.above_floor
         )
         # Beside other effects its own shape may be another one: a delay that is dropped leaves its time to a lag.
-        better = best.candidate if worse else own.candidate
+        better = best.candidate if worse else scored.candidate
         if better is not candidate:
             kept = list(refined(flights, [*others, better], step.floor).chosen)
     return tuple(kept)
 
 
 def best_floor(hypothesis: System) -> Array:
-    """Estimate the floors from what a hypothesis leaves.
+    """Estimate the noise floors from the residual of a hypothesis.
 
     The fit and the floors depend on each other; starting from equal weights, a second round changes nothing any more.
 
@@ -241,7 +244,7 @@ def best_floor(hypothesis: System) -> Array:
 
 
 def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
-    """Give each window the number of its cross-validation block.
+    """Assign each window to a block of the cross-validation.
 
     Returns
     -------
@@ -253,7 +256,7 @@ def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
 
 def _chance(
     arranged: Layout,
-    left: Array,
+    residual: Array,
     hypothesis: System,
     floor: Array,
     block: IntArray,
@@ -262,7 +265,7 @@ def _chance(
 ) -> Array:
     if rng is None:
         return np.zeros(0)
-    draws = mirror_shifted(left, hypothesis.flight_index, settings.shifts, rng)
+    draws = mirror_shifted(residual, hypothesis.flight_index, settings.shifts, rng)
     return chance(arranged, normal_equations(arranged, draws, floor, block))
 
 
@@ -275,3 +278,62 @@ def _each_once(ranking: Sequence[Scored]) -> tuple[Scored, ...]:
 
 def _rows(hypothesis: System) -> int:
     return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)
+
+
+def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
+    """List the candidates that the chosen one does not beat.
+
+    Beaten is what leaves more by more than the scatter over blocks and by more than a few hundredths of the gap.
+    """
+    return [
+        other
+        for other in ranking
+        if other.candidate.effect.name != chosen.candidate.effect.name
+        and other.gain > _NEAR * chosen.gain
+        and not _beats(chosen, other, above_floor)
+    ]
+
+
+def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
+    """Choose among the best candidates the one with the fewest free numbers.
+
+    Parameters
+    ----------
+    ranking : sequence of Scored
+        Best first.
+    above_floor : float
+    """
+    best = ranking[0]
+    rivals = [other for other in unbeaten(best, ranking, above_floor) if other.gain > (1 - _CLOSE) * best.gain]
+    return min([best, *rivals], key=lambda scored: (_numbers(scored), -scored.gain))
+
+
+def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Alternative]:
+    """List the rivals of a chosen effect, without effects that hold it as a special case."""
+    effect = chosen.candidate.effect
+    return [
+        Alternative(
+            other.name,
+            effect.name,
+            float(scored.gain / chosen.gain),
+            effect.rivals.get(other.name) or other.rivals.get(effect.name) or effect.excitation,
+        )
+        for scored in unbeaten(chosen, ranking, above_floor)
+        if effect.name not in (other := scored.candidate.effect).holds
+    ]
+
+
+def _beats(chosen: Scored, other: Scored, above_floor: float) -> bool:
+    margin = other.block_error - chosen.block_error
+    # Close is what leaves next to nothing of a large gap, or next to nothing beside what the chosen one leaves itself.
+    close = min(_CLOSE * above_floor, _VISIBLE * chosen.block_error.sum() / len(CHANNELS))
+    if margin.sum() <= close or len(margin) < 2:
+        return False
+    spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin)))
+    # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
+    return bool(margin.sum() > _ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
+
+
+def _numbers(scored: Scored) -> int:
+    effect = scored.candidate.effect
+    return len(effect.shapes) + (0 if effect.unit_coefficient else len(scored.coefficients))

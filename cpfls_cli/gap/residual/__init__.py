@@ -1,1 +1,1 @@
-"""Where a residual lives: signals, frequencies, stretches of time."""
+"""Analysis of a residual by signals, frequencies and time."""

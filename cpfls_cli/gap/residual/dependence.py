@@ -1,27 +1,30 @@
-"""Which signal a residual follows: a smooth curve per signal, judged on unseen blocks and against shifted residuals."""
+"""Which signal of the flight a residual follows, judged on unseen blocks and against shifted residuals."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.gap.balance.folds import folds
-from cpfls_cli.gap.balance.mirrored import about_flight_mean, mirror_shifted
-from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.residual.state_signals import ANGLES
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.resampling import about_flight_mean, folds, mirror_shifted
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 
 _DEGREE = 4
 _HARMONICS = (1, 2, 3)
 _OUTER_PERCENT = 0.5
 _FEWEST_BLOCKS = 3
+ANGLES = ("roll", "yaw")
+"""Signals that come back after a full turn."""
+
+_ACTUATION = ("rotor torque", "rotor speed", "thrust")
 
 
 class Dependence(NamedTuple):
-    """How well one signal alone tells a channel of the residual.
+    """Share of a channel of the residual that one signal alone explains.
 
     Attributes
     ----------
@@ -81,35 +84,35 @@ def rank_dependence(
     """
     shifted = mirror_shifted(residual, flight_index, shifts, rng)
     draws = np.concatenate([about_flight_mean(residual, flight_index)[..., None], shifted], axis=2)
-    judged: list[tuple[int, str, Array]] = []
+    shares: list[tuple[int, str, Array]] = []
     for name, signal in state.items():
         for channels, rows in _where_known(residual, flight_index, np.isfinite(signal)):
             curve = _curve(name, signal[rows])
             if curve.size and len(np.unique(block[rows])) >= _FEWEST_BLOCKS:
                 curve = about_flight_mean(curve, flight_index[rows])
                 share = _share(curve, draws[np.ix_(rows, channels)], block[rows])
-                judged += [(int(channel), name, own) for channel, own in zip(channels, share, strict=True)]
-    return _ranked(judged, shifts)
+                shares += [(int(channel), name, by_draw) for channel, by_draw in zip(channels, share, strict=True)]
+    return _ranked(shares, shifts)
 
 
-def _ranked(judged: list[tuple[int, str, Array]], shifts: int) -> tuple[Dependence, ...]:
-    if not judged:
+def _ranked(shares: list[tuple[int, str, Array]], shifts: int) -> tuple[Dependence, ...]:
+    if not shares:
         return ()
-    chance = np.max([share[1:] for _, _, share in judged], axis=0)
-    found = [
+    chance = np.max([share[1:] for _, _, share in shares], axis=0)
+    ranked = [
         Dependence(CHANNELS[channel], name, float(share[0]), float((1 + (chance >= share[0]).sum()) / (1 + shifts)))
-        for channel, name, share in judged
+        for channel, name, share in shares
     ]
-    return tuple(sorted(found, key=lambda one: -one.r2))
+    return tuple(sorted(ranked, key=lambda one: -one.r2))
 
 
 def _where_known(residual: Array, flight_index: IntArray, finite: BoolArray) -> Iterator[tuple[IntArray, IntArray]]:
     """Group channels by the flights that have them: channels, and windows with both channel and signal."""
-    flights, own = np.unique(flight_index, return_inverse=True)
-    present = np.array([(residual[own == f] != 0).any(axis=0) for f in range(len(flights))])
+    flights, number = np.unique(flight_index, return_inverse=True)
+    present = np.array([(residual[number == f] != 0).any(axis=0) for f in range(len(flights))])
     for pattern in np.unique(present, axis=1).T:
         channels = np.flatnonzero((present == pattern[:, None]).all(axis=0))
-        rows = np.flatnonzero(pattern[own] & finite)
+        rows = np.flatnonzero(pattern[number] & finite)
         if len(rows):
             yield channels, rows
 
@@ -132,3 +135,100 @@ def _share(curve: Array, draws: Array, block: IntArray) -> Array:
     _, error = normal.solve(np.arange(curve.shape[1]))
     total = np.maximum(normal.square.sum(axis=0), np.finfo(float).tiny)
     return np.asarray((1 - error.sum(axis=0) / total).reshape(draws.shape[1:]))
+
+
+def state_signals(flight: WeakFlight, signals: Signals) -> dict[str, Array]:
+    """Average the signals of motion and actuation over the windows of a flight.
+
+    Parameters
+    ----------
+    flight : WeakFlight
+    signals : Signals
+        Of the flight, as measured or with actuator effects applied.
+
+    Returns
+    -------
+    dict of str to array, shape (window,)
+        SI units; velocities through the air in the body frame, angles within half a turn.
+    """
+    averaged = {"time": flight.windows.centres(signals.time) - signals.time[0]}
+    for name, values in _instantaneous(signals):
+        averaged[name] = flight.windows.average(values)
+    return averaged | {name: _within_half_turn(averaged[name]) for name in ANGLES if name in averaged}
+
+
+def joined_states(states: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    """Concatenate the states of several flights, NaN where a flight lacks a signal.
+
+    Parameters
+    ----------
+    states : sequence of mapping of str to array, shape (window,)
+        Of each flight.
+
+    Returns
+    -------
+    dict of str to array, shape (window,)
+    """
+    names = dict.fromkeys(name for state in states for name in state)
+    return {
+        name: np.concatenate([state.get(name, np.full(len(state["time"]), np.nan)) for state in states])
+        for name in names
+    }
+
+
+def without_actuation(state: Mapping[str, Array]) -> dict[str, Array]:
+    """Drop the signals of the rotors.
+
+    The controller answers every disturbance with the rotors, and their noise is noise of the residual, so that a
+    residual nearly always follows their torque, whatever causes it. Causes are looked for among the other signals.
+
+    Parameters
+    ----------
+    state : mapping of str to array, shape (window,)
+
+    Returns
+    -------
+    dict of str to array, shape (window,)
+    """
+    return {name: values for name, values in state.items() if not name.startswith(_ACTUATION)}
+
+
+def _instantaneous(signals: Signals) -> Iterator[tuple[str, Array]]:
+    yield from _axes("body rate", signals.body_rate)
+    if signals.attitude is not None:
+        # A turn through half a turn must not average to zero.
+        yield from zip(("roll", "pitch", "yaw"), np.unwrap(signals.attitude, axis=0).T, strict=True)
+    yield from _translation(signals)
+    yield from _actuation(signals)
+
+
+def _translation(signals: Signals) -> Iterator[tuple[str, Array]]:
+    if signals.velocity is not None:
+        if signals.attitude is not None:
+            yield from _axes("air velocity", signals.air_velocity)
+        yield "speed", np.linalg.norm(signals.velocity, axis=1)
+        yield "horizontal speed", np.linalg.norm(signals.velocity[:, :2], axis=1)
+        yield "vertical speed", signals.velocity[:, 2]
+    if signals.position is not None:
+        yield "height", signals.position[:, 2] - signals.ground_height_m
+
+
+def _actuation(signals: Signals) -> Iterator[tuple[str, Array]]:
+    if signals.rotor_speed is not None:
+        for number, speed in enumerate(signals.rotor_speed.T, start=1):
+            yield f"rotor speed {number}", speed
+    if signals.thrust is not None:
+        yield "thrust", signals.thrust
+    if signals.torque is not None:
+        yield from _axes("rotor torque", signals.torque)
+    if signals.voltage is not None:
+        yield "voltage", signals.voltage
+
+
+def _axes(name: str, values: Array) -> Iterator[tuple[str, Array]]:
+    for axis, column in zip("xyz", values.T, strict=True):
+        yield f"{name} {axis}", column
+
+
+def _within_half_turn(angle: Array) -> Array:
+    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)

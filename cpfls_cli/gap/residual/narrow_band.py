@@ -1,4 +1,4 @@
-"""A narrow band that stands out of a residual: its frequency, how sure it is, and whether it feeds the motion."""
+"""A narrow band that stands out of the smooth spectrum of a residual, and whether it feeds the motion."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.residual.spectrum import Grid, background, grid, noise_like, pooled_power
 
 Energy = Literal["feeds", "drains", "neither"]
 
@@ -18,6 +19,10 @@ _FEWEST_ROWS = 64
 _LOBE_CYCLES = 2
 _PERIODS_PER_SEGMENT = 4
 _SURE = 2.0
+_FINER = 4
+_LOWEST_CYCLES = 2
+_MEDIAN_CYCLES = 24
+_STRONGEST_CORRELATION = 0.95
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,7 @@ class NarrowBand:
 def narrow_band(
     residual: Sequence[Array], body_rate: Sequence[Array], hop_s: float, draws: int, rng: np.random.Generator
 ) -> NarrowBand | None:
-    """Look for one narrow band that stands out of the smooth spectrum of the residual.
+    """Search for one narrow band that stands out of the smooth spectrum of the residual.
 
     The periodogram over all flights is divided by its background; the largest ratio of all frequencies and channels is
     compared with that of noise drawn from the background. Rows from windows of 0.4 s at a hop of 0.2 s show lines up
@@ -88,14 +93,14 @@ def narrow_band(
     power = pooled_power([rows[:, channels].T for rows in flights], on)
     smooth = background(power, on)
     prominence = _prominence(power, on)
-    place, peak = (int(i) for i in np.unravel_index(prominence.argmax(), prominence.shape))
+    strongest, peak = (int(i) for i in np.unravel_index(prominence.argmax(), prominence.shape))
     noise = [_prominence(noise_like(smooth, lengths, present[:, channels], on, rng), on).max() for _ in range(draws)]
-    channel, frequency = int(channels[place]), _between_bins(power[place], peak, on)
+    channel, frequency = int(channels[strongest]), _between_bins(power[strongest], peak, on)
     mean, error = _mean_power(channel, frequency, hop_s, flights, rates)
     return NarrowBand(
         channel=CHANNELS[channel],
         frequency_hz=frequency,
-        share=_share(power[place], smooth[place], peak, on),
+        share=_share(power[strongest], smooth[strongest], peak, on),
         p_value=float((1 + (np.array(noise) >= prominence.max()).sum()) / (1 + draws)),
         energy=_energy(mean, error),
         power=mean,
@@ -156,3 +161,127 @@ def _energy(mean: float, error: float) -> Energy:
     if not abs(mean) > _SURE * error:
         return "neither"
     return "feeds" if mean > 0 else "drains"
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Frequencies of the periodograms, four to each reciprocal of the longest flight.
+
+    Attributes
+    ----------
+    samples : int
+        To which series are filled up with zeros.
+    frequency : array, shape (frequency,), Hz
+    resolution : int
+        Bins in the reciprocal of the longest flight.
+    lowest : int
+        First bin that is no part of the mean.
+    """
+
+    samples: int
+    frequency: Array
+    resolution: int = _FINER
+    lowest: int = _FINER * _LOWEST_CYCLES
+
+
+def grid(lengths: Sequence[int], period: float) -> Grid:
+    """Choose the frequencies for series of different lengths.
+
+    Parameters
+    ----------
+    lengths : sequence of int
+    period : float
+        From one row to the next, s.
+    """
+    samples = next_fast_len(_FINER * max(lengths), real=True)
+    return Grid(samples, rfftfreq(samples, period))
+
+
+def pooled_power(series: Sequence[Array], on: Grid) -> Array:
+    """Sum the periodograms of flights under a Hann taper.
+
+    Parameters
+    ----------
+    series : sequence of array, shape (..., time)
+    on : Grid
+
+    Returns
+    -------
+    array, shape (..., frequency)
+    """
+    return np.asarray(sum(_power(values, on) for values in series))
+
+
+def _power(values: Array, on: Grid) -> Array:
+    taper = np.hanning(values.shape[-1] + 2)[1:-1]
+    tapered = (values - values.mean(axis=-1, keepdims=True)) * taper
+    return np.asarray(np.abs(rfft(tapered, on.samples)) ** 2 / (taper**2).sum())
+
+
+def background(power: Array, on: Grid) -> Array:
+    """Estimate the smooth spectrum under possible lines.
+
+    The shape of a first-order autoregression times a running median over 24 reciprocals of the flight: the median does
+    not see a line, and the shape keeps its edges straight.
+
+    Parameters
+    ----------
+    power : array, shape (..., frequency)
+    on : Grid
+
+    Returns
+    -------
+    array, shape (..., frequency)
+        Of the median of the power, not of its mean.
+
+    References
+    ----------
+    Mann and Lees 1996, robust estimation of background noise and signal detection.
+    """
+    turn = np.pi * on.frequency / on.frequency[-1]
+    correlation = (power @ np.cos(turn) / power.sum(axis=-1))[..., None]
+    correlation = np.clip(correlation, -_STRONGEST_CORRELATION, _STRONGEST_CORRELATION)
+    shape = 1 / (1 - 2 * correlation * np.cos(turn) + correlation**2)
+    return np.asarray(shape * _running_median(power / shape, on))
+
+
+def _running_median(power: Array, on: Grid) -> Array:
+    used = power[..., on.lowest :]
+    half = min(_MEDIAN_CYCLES * on.resolution // 2, used.shape[-1] - 1)
+    padded = np.pad(used, [(0, 0)] * (used.ndim - 1) + [(half, half)], mode="reflect")
+    # Neighbouring bins are alike, and so are neighbouring medians: a part of them is enough.
+    step = 2 * on.resolution
+    views = sliding_window_view(padded, 2 * half + 1, axis=-1)[..., ::step, ::2]
+    return _between(np.median(views, axis=-1), (np.arange(power.shape[-1]) - on.lowest) / step)
+
+
+def _between(values: Array, position: Array) -> Array:
+    """Interpolate along the last axis at fractional places, constant beyond the ends."""
+    inside = np.clip(position, 0, values.shape[-1] - 1)
+    left = np.minimum(inside.astype(int), max(0, values.shape[-1] - 2))
+    right = np.minimum(left + 1, values.shape[-1] - 1)
+    share = inside - left
+    return np.asarray(values[..., left] * (1 - share) + values[..., right] * share)
+
+
+def noise_like(smooth: Array, lengths: Sequence[int], present: BoolArray, on: Grid, rng: np.random.Generator) -> Array:
+    """Draw noise with a background and no line, and pool its periodogram.
+
+    Parameters
+    ----------
+    smooth : array, shape (channel, frequency)
+    lengths : sequence of int
+        Of the flights.
+    present : array of bool, shape (flight, channel)
+    on : Grid
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array, shape (channel, frequency)
+    """
+    series = []
+    for length, there in zip(lengths, present, strict=True):
+        white = rfft(rng.standard_normal((len(smooth), on.samples)))
+        series.append(irfft(white * np.sqrt(smooth), on.samples)[:, :length] * there[:, None])
+    return pooled_power(series, on)

@@ -1,1 +1,1 @@
-"""What the sensors of a flight say of each other, before any torque is looked at."""
+"""Checks of the sensors of a flight against each other, without any torque."""

@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from math import comb
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.effects.hooks import FaultFit, ReadingError, SensorTest
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.windows import Windows
-from cpfls_cli.gap.sensors.audit_actuation import ActuationDelay, actuation_delay
-from cpfls_cli.gap.sensors.audit_channels import channel_warnings
-from cpfls_cli.gap.sensors.audit_consistency import ChannelMatch, consistency, frame_warnings
-from cpfls_cli.gap.sensors.audit_findings import AuditFinding, FaultName, findings
-from cpfls_cli.gap.sensors.audit_gyro import GyroFit, fit_gyro, scan
-from cpfls_cli.gap.sensors.audit_kinematics import kinematics
+from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
+from cpfls_cli.gap.balance.windows import Recording, Windows
+from cpfls_cli.gap.sensors.channels import (
+    ActuationDelay,
+    ChannelMatch,
+    actuation_delay,
+    channel_warnings,
+    consistency,
+    frame_warnings,
+)
+from cpfls_cli.gap.sensors.findings import AuditFinding, CheckedFault, findings
+from cpfls_cli.gap.sensors.gyro import GyroFit, fit_gyro, kinematics, scan
+from cpfls_cli.gap.settings import GapSettings
 
-_ALL: tuple[FaultName, ...] = ("gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay")
 # Agreement that no independent attitude reaches, rad/s in a window; every fault of practical size is larger.
 _ROUNDING = 1e-4
 # An independent attitude leaves at least the gyroscope's own noise; this share of it is left by one that contains it.
@@ -34,7 +43,7 @@ _SIGMAS_APART = 4.0
 
 @dataclass(frozen=True)
 class Audit:
-    """What the sensors say about each other.
+    """Result of the sensor audit.
 
     Attributes
     ----------
@@ -66,30 +75,33 @@ class Audit:
         return tuple(finding for finding in self.findings if finding.named)
 
     def repaired(self, signals: Signals) -> Signals:
-        """Remove the named faults from the gyroscope, ``omega = ((1 + scale) C)^-1 (omega_gyro(t + delay) - bias)``.
+        """Remove the named faults from the sensors, ``truth = matrix^-1 (reading(t + delay) - offset)``.
 
-        Coefficients that are not named count as 0. The length stays: the end of a flight that is shifted holds its
-        last value.
+        Numbers that are not named count as 0. The length stays: the end of a flight that is shifted holds its last
+        value.
         """
-        if not self.named:
-            return signals
-        axes = ("x", "y", "z")
-        delay = self._values("channel_delay", ("delay",))[0]
-        rate = _shifted(signals, float(delay)) - self._values("gyro_bias", axes)
-        scale = np.diag(1.0 + self._values("gyro_scale", axes))
-        turned = Rotation.from_rotvec(-self._values("imu_misalignment", axes)).as_matrix()
-        return replace(signals, body_rate=rate @ np.linalg.inv(scale @ turned).T)
-
-    def _values(self, name: FaultName, labels: tuple[str, ...]) -> Array:
-        found = [finding.named_values(labels) for finding in self.findings if finding.name == name]
-        return found[0] if found else np.zeros(len(labels))
+        faults = [(test, finding) for finding in self.named if (test := CATALOGUE[finding.name].test) is not None]
+        truth: dict[str, Any] = {}
+        for signal in dict.fromkeys(test.signal for test, _ in faults):
+            errors = [
+                test.error(finding.named_values(test.labels)) for test, finding in faults if test.signal == signal
+            ]
+            if getattr(signals, signal) is not None:
+                truth[signal] = _corrected(getattr(signals, signal), signals.time, errors)
+        return replace(signals, **truth) if truth else signals
 
 
-def _shifted(signals: Signals, delay: float) -> Array:
+def _corrected(reading: Array, time: Array, errors: Sequence[ReadingError]) -> Array:
+    delay = sum(error.delay for error in errors)
+    offset = np.sum([error.offset for error in errors], axis=0)
+    matrix = reduce(np.matmul, [error.matrix for error in errors])
+    return np.asarray((_shifted(reading, time, delay) - offset) @ np.linalg.inv(matrix).T)
+
+
+def _shifted(reading: Array, time: Array, delay: float) -> Array:
     if delay == 0:
-        return signals.body_rate
-    later = np.clip(signals.time + delay, signals.time[0], signals.time[-1])
-    return np.asarray(CubicSpline(signals.time, signals.body_rate)(later))
+        return reading
+    return np.asarray(CubicSpline(time, reading)(np.clip(time + delay, time[0], time[-1])))
 
 
 def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
@@ -105,59 +117,78 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
     ----------
     Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
     """
-    tested, untested, fit, frames = _gyro(flights, windows)
+    faults, untested, fit, frames = _gyroscope(flights, windows)
     matches, disagreements = consistency(flights, windows)
     actuation = actuation_delay(flights)
-    told = () if actuation is None else (actuation.sentence,)
+    delay_note = () if actuation is None else (actuation.sentence,)
     return Audit(
-        findings=tested,
+        findings=findings([*faults, *_others(flights)], windows.period),
         untested=untested,
         warnings=(*frames, *disagreements, *channel_warnings(flights)),
-        notes=(*told, *(_gyro_notes(fit) if fit is not None else ())),
+        notes=(*delay_note, *(_gyro_notes(fit) if fit is not None else ())),
         gyro=fit,
         matches=matches,
         actuation=actuation,
     )
 
 
-_Outcome = tuple[tuple[AuditFinding, ...], Mapping[str, str], GyroFit | None, tuple[str, ...]]
+_Outcome = tuple[Sequence[CheckedFault], Mapping[str, str], GyroFit | None, tuple[str, ...]]
 
 
-def _gyro(flights: Sequence[Signals], windows: Windows) -> _Outcome:
+def _of_gyroscope() -> dict[str, SensorTest]:
+    """List the effects whose numbers are those of the regression of the gyroscope."""
+    return {
+        name: effect.test
+        for name, effect in CATALOGUE.items()
+        if effect.test is not None and isinstance(effect.test.estimate, str)
+    }
+
+
+def _others(flights: Sequence[Signals]) -> Iterator[CheckedFault]:
+    """Estimate the faults that have an estimator of their own."""
+    for effect in CATALOGUE.values():
+        if effect.test is not None and callable(effect.test.estimate):
+            fit = effect.test.estimate(flights)
+            if fit is not None:
+                yield CheckedFault(effect, fit)
+
+
+def _gyroscope(flights: Sequence[Signals], windows: Windows) -> _Outcome:
     if all(signals.attitude is None for signals in flights):
         return _none("there is no attitude to judge the gyroscope by")
-    cut = [found for signals in flights if (found := kinematics(signals, windows)) is not None]
+    cut = [motion for signals in flights if (motion := kinematics(signals, windows)) is not None]
     if not cut:
         return _none("the flights are too short")
     scanned = scan(cut)
     frames = frame_warnings("the rate by the attitude and the gyroscope", scanned.seen, scanned.read, _TURNING)
     if frames:
-        return (), dict.fromkeys(_ALL, "the axes of gyroscope and attitude do not belong together"), None, tuple(frames)
+        reason = "the axes of gyroscope and attitude do not belong together"
+        return (), dict.fromkeys(_of_gyroscope(), reason), None, tuple(frames)
     raw = scanned.seen - np.concatenate([flight.gyro_rate(0.0) for flight in cut])
     if np.sqrt((raw**2).mean()) < _ROUNDING:
         return _none("the attitude agrees with the gyroscope to rounding, as if it were integrated from it")
     fit = fit_gyro(cut, scanned)
     if fit is None:
         return _none("the flights are too short")
-    untested = _untestable(flights, fit, windows)
-    tested = [name for name in _ALL if name not in untested]
-    return findings(fit, tested, windows.period), untested, fit, ()
+    fits = {name: fit.of(str(test.estimate)) for name, test in _of_gyroscope().items()}
+    untested = _untestable(fits, fit, flights, windows)
+    faults = [CheckedFault(CATALOGUE[name], numbers) for name, numbers in fits.items() if name not in untested]
+    return faults, untested, fit, ()
 
 
 def _none(reason: str) -> _Outcome:
-    return (), dict.fromkeys(_ALL, reason), None, ()
+    return (), dict.fromkeys(_of_gyroscope(), reason), None, ()
 
 
-def _untestable(flights: Sequence[Signals], fit: GyroFit, windows: Windows) -> Mapping[str, str]:
+def _untestable(
+    fits: Mapping[str, FaultFit], fit: GyroFit, flights: Sequence[Signals], windows: Windows
+) -> Mapping[str, str]:
     still = "the flights hardly turn, so it would not show"
-    untested = {name: still for name, own in _PLACES.items() if not fit.known[own].any()}
+    untested = {name: still for name, numbers in fits.items() if not numbers.known.any()}
     if np.sqrt(fit.variance.max()) < _SHARE_OF_NOISE * _gyro_noise(flights, windows):
         derived = "the attitude contains the gyroscope's own noise, so it is integrated from it and would not show it"
-        untested |= dict.fromkeys(("gyro_scale", "imu_misalignment"), derived)
+        untested |= {name: derived for name, test in _of_gyroscope().items() if test.integrated}
     return untested
-
-
-_PLACES = {"gyro_scale": slice(3, 6), "imu_misalignment": slice(6, 9), "channel_delay": slice(12, 13)}
 
 
 def _gyro_noise(flights: Sequence[Signals], windows: Windows) -> float:
@@ -169,11 +200,42 @@ def _gyro_noise(flights: Sequence[Signals], windows: Windows) -> float:
 def _gyro_notes(fit: GyroFit) -> tuple[str, ...]:
     apart = np.abs(fit.flight_bias) > np.maximum(_BIAS_APART, _SIGMAS_APART * fit.flight_bias_error)
     cross = fit.known[9:12] & (np.abs(fit.value[9:12]) > np.maximum(_CROSS, _SIGMAS_APART * fit.error[9:12]))
-    said = []
+    notes = []
     if apart.any():
         between = np.ptp(fit.flight_bias, axis=0).max()
-        said.append(f"The gyroscope's constant error differs between flights by {between:.4f} rad/s.")
+        notes.append(f"The gyroscope's constant error differs between flights by {between:.4f} rad/s.")
     if cross.any():
         square = np.abs(fit.value[9:12])[cross].max()
-        said.append(f"The axes of gyroscope or attitude are not square to each other, by {square:.3f}.")
-    return tuple(said)
+        notes.append(f"The axes of gyroscope or attitude are not square to each other, by {square:.3f}.")
+    return tuple(notes)
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """Windows, model, settings and sensor repair that all flights of a diagnosis share.
+
+    Attributes
+    ----------
+    windows : Windows
+    model : InertiaModel or None
+        None for the rigid body of the vehicle.
+    settings : GapSettings
+    audit : Audit
+        Faults that are repaired.
+    """
+
+    windows: Windows
+    model: InertiaModel | None
+    settings: GapSettings
+    audit: Audit
+
+    def logged(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
+        """Prepare flights as they were logged."""
+        return [self._weak(recording.name, recording.signals) for recording in recordings]
+
+    def repaired(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
+        """Prepare flights with the named faults of their sensors repaired."""
+        return [self._weak(recording.name, self.audit.repaired(recording.signals)) for recording in recordings]
+
+    def _weak(self, name: str, signals: Signals) -> WeakFlight:
+        return weak_flight(name, signals, self.windows, self.model, self.settings.force, self.settings.axes)

@@ -10,7 +10,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of
-from cpfls_cli.gap.naming.search import block_index, look
+from cpfls_cli.gap.naming.search import block_index, rank_effects
 from cpfls_cli.gap.settings import GapSettings
 from tests.unit.gap.synthetic_flights import candidate, fly, weak
 
@@ -18,7 +18,7 @@ SETTINGS = GapSettings()
 
 
 def scored(flights, effect):
-    (only,) = look(flights, (), [effect], SETTINGS, None).ranking
+    (only,) = rank_effects(flights, (), [effect], SETTINGS, None).ranking
     return only
 
 
@@ -73,7 +73,7 @@ def test_gain_is_what_fits_without_each_block_take_off_it():
     """The whole of it by hand: least squares on the other blocks with and without the effect."""
     known = flights((candidate("com_offset"), [0.01, 0.0]))
     hypothesis = system(known)
-    step = look(known, (), [CATALOGUE["com_offset"]], SETTINGS, None)
+    step = rank_effects(known, (), [CATALOGUE["com_offset"]], SETTINGS, None)
     block = block_index(hypothesis, SETTINGS)
     columns = hypothesis.columns(candidate("com_offset"))
     right = hypothesis.residual / step.floor

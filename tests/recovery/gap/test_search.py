@@ -9,7 +9,7 @@ from scipy.stats import gumbel_r
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
-from cpfls_cli.gap.naming.search import Step, acceptable, exchanged, forward, look
+from cpfls_cli.gap.naming.search import SearchStep, acceptable, exchanged, forward_selection, rank_effects
 from cpfls_cli.gap.settings import GapSettings
 from tests.unit.gap.synthetic_flights import candidate, fly, weak
 
@@ -40,7 +40,7 @@ def names(chosen):
 )
 def test_forward_finds_one_effect_and_stops(name, coefficients):
     looks = []
-    chosen, steps = forward(
+    chosen, steps = forward_selection(
         flights((candidate(name), coefficients)), TRIED, SETTINGS, np.random.default_rng(0), looks.append
     )
     assert names(chosen) == [name]
@@ -52,7 +52,7 @@ def test_forward_finds_one_effect_and_stops(name, coefficients):
 
 def test_two_effects_are_both_found():
     truth = [(candidate("com_offset"), [0.004, 0.0]), (candidate("linear_damping"), [0.1, 0.1, 0.05])]
-    chosen, _ = forward(flights(*truth), TRIED, SETTINGS, np.random.default_rng(0))
+    chosen, _ = forward_selection(flights(*truth), TRIED, SETTINGS, np.random.default_rng(0))
     assert sorted(names(chosen)) == ["com_offset", "linear_damping"]
 
 
@@ -60,13 +60,15 @@ def test_noise_alone_has_no_name():
     named = 0
     for seed in range(5):
         known = flights(seeds=(10 + 2 * seed, 11 + 2 * seed), seconds=16.0, tilt=0.1)
-        named += len(forward(known, TRIED, SETTINGS, np.random.default_rng(seed))[0])
+        named += len(forward_selection(known, TRIED, SETTINGS, np.random.default_rng(seed))[0])
     assert named == 0
 
 
 def test_as_many_effects_as_the_settings_allow():
     truth = [(candidate("com_offset"), [0.004, 0.0]), (candidate("linear_damping"), [0.1, 0.1, 0.05])]
-    chosen, steps = forward(flights(*truth), TRIED, replace(SETTINGS, effects_max=1), np.random.default_rng(0))
+    chosen, steps = forward_selection(
+        flights(*truth), TRIED, replace(SETTINGS, effects_max=1), np.random.default_rng(0)
+    )
     assert (len(chosen), len(steps)) == (1, 2)
 
 
@@ -84,7 +86,7 @@ def test_a_needless_effect_is_dropped():
 
 def test_what_is_chosen_is_not_looked_at_again_and_each_effect_is_listed_once():
     known = flights((candidate("com_offset"), [0.004, -0.003]))
-    step = look(known, [candidate("com_offset")], [*TRIED, CATALOGUE["channel_delay"]], SETTINGS, None)
+    step = rank_effects(known, [candidate("com_offset")], [*TRIED, CATALOGUE["channel_delay"]], SETTINGS, None)
     listed = names([scored.candidate for scored in step.ranking])
     assert sorted(listed) == sorted([*(effect.name for effect in TRIED[1:]), "channel_delay"])
     gains = [scored.gain for scored in step.ranking]
@@ -92,7 +94,7 @@ def test_what_is_chosen_is_not_looked_at_again_and_each_effect_is_listed_once():
 
 
 def step_of(chance):
-    return Step(system([]), np.ones(6), (), chance, 1.0, np.zeros(0))
+    return SearchStep(system([]), np.ones(6), (), chance, 1.0, np.zeros(0))
 
 
 def test_p_value_is_the_share_of_shifts_that_do_as_well():

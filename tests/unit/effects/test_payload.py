@@ -9,8 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
-from cpfls_cli.effects.catalogue.payload import settled_swing, swing
-from cpfls_cli.effects.pendulum import integrate
+from cpfls_cli.effects.catalogue.payload import integrate, settled_swing, swing
 from cpfls_cli.effects.signals import Signals
 
 GRAVITY = np.array([0.0, 0.0, 9.81])

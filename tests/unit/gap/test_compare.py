@@ -9,12 +9,11 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.gap.balance.recording import Recording
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.balance.windows import Recording
+from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.compare import compare
-from cpfls_cli.gap.evidence import evidence
-from cpfls_cli.gap.extend import extend
-from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, extend, plain
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -167,7 +166,7 @@ def test_extension_refits_and_shrinks_the_unseen_gap():
     before, after = (found.unseen.size(each).floors[:3] for each in (found.unseen.before, found.unseen.after))
     assert (before > 3).all()
     assert (after < 1.4).all()
-    shown = evidence(held, found.unseen, found.model, SETTINGS)
+    shown = before_after(held, found.unseen, found.model, SETTINGS)
     assert shown.picture.flight == 0
     error = {name: np.ptp(getattr(shown.picture, name) - shown.picture.measured) for name in ("before", "after")}
     assert error["after"] < 0.3 * error["before"]

@@ -13,13 +13,9 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.balance.windows import windows
-from cpfls_cli.simulation import ClosedLoopSettings, SimulationSettings, measure
-from cpfls_cli.trajectory.attitude import flat_attitude
-from cpfls_cli.vehicle import RotorSettings, VehicleSettings
-
-HUBS = (((0.3, 0.0, 0.05), 1), ((0.0, -0.3, 0.05), -1), ((-0.3, 0.0, 0.05), 1), ((0.0, 0.3, 0.05), -1))
-VEHICLE = VehicleSettings(rotors=tuple(RotorSettings(position_m=hub, spin=spin, radius_m=0.2) for hub, spin in HUBS))
-PERIOD = 0.01
+from cpfls_cli.simulation import SimulationSettings, measure
+from cpfls_cli.vehicle import RotorSettings
+from tests.unit.simulation.closed_loop_flights import PERIOD, VEHICLE, flown, planned, signals_of
 
 
 def typical(name):
@@ -33,43 +29,6 @@ def typical(name):
 
 # The catalogue estimates the swing of a load from the flight; it is compared with an integrator below.
 SEEN_BY_BALANCE = [name for name, effect in CATALOGUE.items() if effect.columns and name != "payload"]
-
-
-def planned(duration=3.0):
-    """Swings along all axes that a multirotor can fly exactly, 1.5 m above the ground."""
-    time = PERIOD * np.arange(round(duration / PERIOD) + 1)
-    size, pulsation, phase = np.array([0.35, 0.25, 0.2]), np.array([2.4, 2.9, 1.7]), np.array([0.3, 1.0, 2.0])
-    angle = np.outer(time, pulsation) + phase
-    motion = [size * pulsation**n * np.sin(angle + n * np.pi / 2) for n in range(5)]
-    heading = np.stack([0.15 * 1.5**n * np.sin(1.5 * time + n * np.pi / 2) for n in range(3)])
-    flat = flat_attitude(time, np.stack(motion[2:]), heading, 9.81)
-    path = {"position": motion[0] + [0, 0, 1.5], "velocity": motion[1], "acceleration": motion[2]}
-    return time, {**path, **vars(flat)}
-
-
-def flown(duration=3.0, seed=1, vehicle=VEHICLE, noise=None, relative_noise=None, **closed_loop):
-    time, plan = planned(duration)
-    settings = SimulationSettings(
-        mode="closed-loop",
-        noise=noise or {},
-        relative_noise=relative_noise or {},
-        closed_loop=ClosedLoopSettings(**closed_loop),
-    )
-    return measure(time, plan, vehicle, settings, np.random.default_rng(seed))
-
-
-def signals_of(flight):
-    logged = flight.signals
-    hidden = "rotor_speed" not in logged
-    names = ("attitude", "body_rate", "position", "velocity", "acceleration")
-    return Signals(
-        time=PERIOD * np.arange(len(logged["attitude"])),
-        vehicle=VEHICLE,
-        rotor_speed=logged["rotor_command" if hidden else "rotor_speed"],
-        commanded=hidden,
-        voltage=logged.get("voltage"),
-        **{name: logged[name] for name in names},
-    )
 
 
 def balance(signals):
@@ -109,7 +68,7 @@ def test_path_is_followed_and_no_rotor_is_clipped(plain):
 @pytest.mark.parametrize("name", SEEN_BY_BALANCE)
 def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
     flight = flown(effects={name: typical(name)})
-    (one,) = flight.effects.flown
+    (one,) = flight.effects.listed
     signals = signals_of(flight)
     weak, left = balance(signals)
     if one.effect.kind == "actuator":
@@ -230,7 +189,7 @@ def test_effects_add_up():
     flight = flown(effects={name: typical(name) for name in names})
     signals = signals_of(flight)
     weak, left = balance(signals)
-    expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in flight.effects.flown)
+    expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in flight.effects.listed)
     np.testing.assert_array_less(rms(left - expected), [3e-5] * 3 + [2e-4] * 3)
 
 

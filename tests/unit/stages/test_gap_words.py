@@ -10,8 +10,16 @@ from cpfls_cli.commands.extend import require_named
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.extend import worse_axes
-from cpfls_cli.gap.naming.results import Alternative, Diagnosis, Estimate, GapSize, NamedEffect, Unexplained, Verdict
+from cpfls_cli.gap.extended import worse_axes
+from cpfls_cli.gap.naming.results import (
+    Alternative,
+    Diagnosis,
+    Estimate,
+    GapSize,
+    GapVerdict,
+    NamedEffect,
+    Unexplained,
+)
 from cpfls_cli.gap.replay import Replayed
 from cpfls_cli.pages.diagnosis_words import diagnosis_lines, effect_line, headline
 from cpfls_cli.pages.disagreement_words import replay_lines
@@ -29,7 +37,7 @@ OFFSET = NamedEffect(
 GAP = GapSize(np.ones(6), np.ones(6))
 NO_FORCE = GapSize(np.array([1.0, 1, 1, np.nan, np.nan, np.nan]), np.array([1.0, 1, 1, np.nan, np.nan, np.nan]))
 DIAGNOSIS = Diagnosis(
-    Verdict.NAMED, (OFFSET,), (), (), (), (), {}, 1.0, GAP, GAP, np.ones(6), (("linear_damping", 0.99),), ()
+    GapVerdict.NAMED, (OFFSET,), (), (), (), (), {}, 1.0, GAP, GAP, np.ones(6), (("linear_damping", 0.99),), ()
 )
 
 
@@ -53,7 +61,7 @@ def test_ends_of_an_interval_can_be_told_apart_and_rounding_makes_no_certainty()
 
 def test_what_hangs_on_another_flight_says_so_first():
     rival = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")
-    ambiguous = list(headline(replace(DIAGNOSIS, verdict=Verdict.AMBIGUOUS, alternatives=(rival,))))
+    ambiguous = list(headline(replace(DIAGNOSIS, verdict=GapVerdict.AMBIGUOUS, alternatives=(rival,))))
     assert ambiguous[1] == "could be torque_bias instead of com_offset; to tell: change the thrust"
     named = list(headline(replace(DIAGNOSIS, alternatives=(rival,))))
     assert named[1].startswith("com_offset: ")
@@ -85,7 +93,7 @@ def test_two_names_are_explained_where_forces_are_known():
     ],
 )
 def test_what_is_left_has_an_axis_a_cause_and_a_way_of_energy(left, said):
-    assert said in lines(verdict=Verdict.UNEXPLAINED, unexplained=(left,))
+    assert said in lines(verdict=GapVerdict.UNEXPLAINED, unexplained=(left,))
 
 
 def test_flights_without_rates_are_not_simulated():
@@ -94,13 +102,13 @@ def test_flights_without_rates_are_not_simulated():
     assert len(list(replay_lines("simulated", HELD, HELD))) == 1
 
 
-@pytest.mark.parametrize("verdict", [Verdict.UNEXPLAINED, Verdict.NO_GAP, Verdict.NOT_EXCITED])
+@pytest.mark.parametrize("verdict", [GapVerdict.UNEXPLAINED, GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED])
 def test_only_names_are_added(verdict):
     with pytest.raises(ComputationError, match=f"the diagnosis is {verdict} and names no effect"):
         require_named(verdict, [OFFSET])
     with pytest.raises(ComputationError, match="names no effect"):
-        require_named(Verdict.NAMED, [])
-    for good in (Verdict.NAMED, Verdict.PARTIAL, Verdict.AMBIGUOUS):
+        require_named(GapVerdict.NAMED, [])
+    for good in (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS):
         require_named(good, [OFFSET])
 
 

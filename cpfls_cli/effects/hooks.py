@@ -1,0 +1,206 @@
+"""Hooks of an effect beside its columns: its place in the closed loop, and its test by the sensor audit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.effects.signals import Signals
+
+
+class RotorMotion(NamedTuple):
+    """Rotors in the middle of a step.
+
+    Attributes
+    ----------
+    speed : array, shape (rotor,), rad/s
+    acceleration : array, shape (rotor,), rad/s^2
+    """
+
+    speed: Array
+    acceleration: Array
+
+
+Link = Callable[[RotorMotion], RotorMotion]
+"""A link of the actuator chain; called once in each step, it may keep a state."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Actuation:
+    """Where an effect acts between the command and the rotors; a flight with it logs commands, not rotor speeds.
+
+    Attributes
+    ----------
+    lag : callable or None
+        ``lag(values) -> float``: time constant in s that replaces that of the rotors.
+    link : callable or None
+        ``link(values, step) -> Link`` after the lag, for steps of `step` seconds; made anew for each flight.
+    supply : callable or None
+        ``supply(values, voltage) -> float``: factor on the rotor speed at a share of the full voltage, which is logged.
+    """
+
+    lag: Callable[[Mapping[str, float]], float] | None = None
+    link: Callable[[Mapping[str, float], float], Link] | None = None
+    supply: Callable[[Mapping[str, float], float], float] | None = None
+
+
+class Carrier(NamedTuple):
+    """The vehicle that carries a body.
+
+    Attributes
+    ----------
+    mass : float, kg
+    inertia : array, shape (3, 3), kg m^2, body frame
+    rotation : array, shape (3, 3)
+        Body to world.
+    body_rate : array, shape (3,), rad/s, body frame
+    acceleration : array, shape (3,), m/s^2, world frame
+        Without the carried body.
+    turning : array, shape (3,), rad/s^2, body frame
+        The same.
+    """
+
+    mass: float
+    inertia: Array
+    rotation: Array
+    body_rate: Array
+    acceleration: Array
+    turning: Array
+
+
+class Pull(NamedTuple):
+    """Acceleration of the carrier by a carried body, and the derivative of its state.
+
+    Attributes
+    ----------
+    acceleration : array, shape (3,), m/s^2, world frame
+    turning : array, shape (3,), rad/s^2, body frame
+    change : array, shape (state,)
+        Derivative of the state of the body.
+    """
+
+    acceleration: Array
+    turning: Array
+    change: Array
+
+
+class CarriedBody(Protocol):
+    """A body with a state of its own on the vehicle."""
+
+    @property
+    def start(self) -> Array:
+        """State at the start, shape (state,)."""
+        ...
+
+    def pull(self, carrier: Carrier, state: Array) -> Pull:
+        """Compute the pull on a carrier."""
+        ...
+
+
+class TrueMotion(NamedTuple):
+    """True motion at the samples of a simulated flight.
+
+    Attributes
+    ----------
+    time : array, shape (time,), s
+    rotation : array, shape (time, 3, 3)
+        Body to world.
+    body_rate : array, shape (time, 3), rad/s, body frame
+    body_acceleration : array, shape (time, 3), rad/s^2, body frame
+    """
+
+    time: Array
+    rotation: Array
+    body_rate: Array
+    body_acceleration: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorLog:
+    """How the log of a sensor differs from the truth.
+
+    Attributes
+    ----------
+    change : callable
+        ``change(signals, motion, values) -> dict``: the signals that are logged differently, by name, without noise.
+    does : str
+        The same in words, for refusals.
+    """
+
+    change: Callable[[Mapping[str, Array], TrueMotion, Mapping[str, float]], dict[str, Array]]
+    does: str = "needs measured rotor speeds"
+
+
+class ReadingError(NamedTuple):
+    """Error of a sensor of three axes, ``reading(t) = matrix @ truth(t - delay) + offset``."""
+
+    delay: float = 0.0
+    offset: Array = np.zeros(3)
+    matrix: Array = np.eye(3)
+
+
+class FaultFit(NamedTuple):
+    """Estimated numbers of a fault.
+
+    Attributes
+    ----------
+    value, error : array, shape (number,)
+        With standard errors.
+    pull : array, shape (number,)
+        How far noise of the sensor can have pulled the value at most.
+    known : array of bool, shape (number,)
+        What the motion could tell.
+    blocks : int
+        Of time that scattered the values.
+    """
+
+    value: Array
+    error: Array
+    pull: Array
+    known: BoolArray
+    blocks: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorTest:
+    """How the sensor audit tests a fault, says what it found, and repairs it.
+
+    Attributes
+    ----------
+    estimate : str or callable
+        Numbers of the regression of the gyroscope on the attitude: ``bias``, ``scale``, ``misalignment`` or ``delay``;
+        else ``estimate(flights) -> FaultFit``, None where the flights do not tell.
+    labels : tuple of str
+        Names of the numbers in findings, in the order of the effect's coefficients, then shapes.
+    smallest : float
+        Size below which a fault moves no torque by more than the noise of a window, so that nothing is to repair.
+    smallest_samples : float
+        The same in sampling periods, for a time.
+    number : callable
+        ``number(label, value) -> str``: a number in words.
+    found : str
+        Sentence with ``{}`` for the numbers.
+    nothing : str
+        Sentence where no number is named.
+    error : callable
+        ``error(values) -> ReadingError`` that is taken out of `signal`; values in the order of `labels`.
+    signal : str
+        Field of `Signals`, shape (time, 3).
+    integrated : bool
+        Whether an attitude that is integrated from the gyroscope would not show the fault.
+    """
+
+    estimate: str | Callable[[Sequence[Signals]], FaultFit | None]
+    labels: tuple[str, ...]
+    smallest: float
+    number: Callable[[str, float], str]
+    found: str
+    nothing: str
+    error: Callable[[Array], ReadingError]
+    smallest_samples: float = 0.0
+    signal: str = "body_rate"
+    integrated: bool = False

@@ -1,0 +1,152 @@
+"""A model before and after its effects, on held-out flights: replay errors, whiteness, and the worst stretches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
+from cpfls_cli.gap.balance.windows import Recording, Windows, common_windows
+from cpfls_cli.gap.extended import ExtendedModel, plain
+from cpfls_cli.gap.naming.held_out import HeldOut
+from cpfls_cli.gap.replay import Replayed, WorstStretch, replayed, worst_stretch
+from cpfls_cli.gap.residual.views import Whiteness, stretches, whiteness
+from cpfls_cli.gap.settings import GapSettings
+
+_SHORTEST_S = 4.0
+_PER_WINDOW = 16
+
+
+@dataclass(frozen=True)
+class StretchCurves:
+    """Measured and simulated torque or force over the stretch of the largest gap.
+
+    Attributes
+    ----------
+    flight : int
+        Number of the held-out flight.
+    channel : str
+    time : array, shape (moment,), s
+    measured : array, shape (moment,), N m or N
+        What the measured motion takes.
+    before, after : array, shape (moment,), N m or N
+        Simulated by the model as given and with effects.
+    """
+
+    flight: int
+    channel: str
+    time: Array
+    measured: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True)
+class BeforeAfter:
+    """Errors of the model as given and of the model with effects on held-out flights.
+
+    Attributes
+    ----------
+    centres : array, shape (window,), s
+    flight_index : array of int, shape (window,)
+    before, after, held : Replayed
+        Of the model as given, with effects, and of rates that stay what they are.
+    white_before, white_after : Whiteness
+    lag_s : float
+        Between windows without common samples.
+    picture : StretchCurves
+    run_flight : int
+        Number of the flight of `run`.
+    run : WorstStretch
+        Free runs over the stretch in which the model as given was worst.
+    """
+
+    centres: Array
+    flight_index: IntArray
+    before: Replayed
+    after: Replayed
+    held: Replayed
+    white_before: Whiteness
+    white_after: Whiteness
+    lag_s: float
+    picture: StretchCurves
+    run_flight: int
+    run: WorstStretch
+
+
+def before_after(
+    held: Sequence[Recording], unseen: HeldOut, model: ExtendedModel, settings: GapSettings
+) -> BeforeAfter:
+    """Compare a model with effects with the model as given on held-out flights.
+
+    Parameters
+    ----------
+    held : sequence of Recording
+        Held-out flights.
+    unseen : HeldOut
+        Their residuals.
+    model : ExtendedModel
+    settings : GapSettings
+    """
+    windows = common_windows(held, settings)
+    signals = [recording.signals for recording in held]
+    centres = [windows.centres(each.time) for each in signals]
+    index = np.repeat(np.arange(len(held)), [len(each) for each in centres])
+    given = plain(model.base)
+    stride = -(-len(windows.weight) // windows.hop)
+    runs = [_run(each, given, model) for each in signals]
+    worst = int(np.argmax([_size(run) for run in runs]))
+    return BeforeAfter(
+        np.concatenate(centres),
+        index,
+        replayed(signals, given, settings.horizon),
+        replayed(signals, model, settings.horizon),
+        replayed(signals, None, settings.horizon),
+        whiteness(unseen.before * unseen.known, index, stride),
+        whiteness(unseen.after * unseen.known, index, stride),
+        stride * windows.hop * windows.period,
+        _picture(held, unseen, np.concatenate(centres), index, windows, model, settings),
+        worst,
+        runs[worst],
+    )
+
+
+def _run(signals: Signals, given: ExtendedModel, model: ExtendedModel) -> WorstStretch:
+    # The model as given knows of no fault of the sensors and takes the log as it is, so that a fault shows.
+    repaired = model.repaired(signals)
+    return worst_stretch(repaired, given.replay_model(signals), model.replay_model(repaired), signals)
+
+
+def _size(run: WorstStretch) -> float:
+    return float(np.mean((run.before - run.measured) ** 2))
+
+
+def _picture(
+    held: Sequence[Recording],
+    unseen: HeldOut,
+    centres: Array,
+    index: IntArray,
+    windows: Windows,
+    model: ExtendedModel,
+    settings: GapSettings,
+) -> StretchCurves:
+    in_floors = unseen.before * unseen.known / unseen.floor
+    stretch = stretches(in_floors, centres, index, level=0.0, most=1)[0]
+    channel = CHANNELS.index(stretch.channel)
+    dense = replace(windows, hop=max(1, len(windows.weight) // _PER_WINDOW))
+    recording = held[stretch.flight]
+    raw = weak_flight(recording.name, recording.signals, dense, model.base, settings.force, settings.axes)
+    repaired = weak_flight(
+        recording.name, model.repaired(recording.signals), dense, model.base, settings.force, settings.axes
+    )
+    time = dense.centres(recording.signals.time)
+    middle, half = 0.5 * (stretch.start_s + stretch.end_s), 0.5 * max(_SHORTEST_S, stretch.end_s - stretch.start_s)
+    shown = np.abs(time - middle) <= half
+    measured = repaired.averaged(repaired.inertial)[shown, channel]
+    logged = dense.average(raw.signals.wrench)[shown, channel]
+    after = measured - model.residual([repaired])[shown, channel]
+    return StretchCurves(stretch.flight, stretch.channel, time[shown], measured, logged, after)

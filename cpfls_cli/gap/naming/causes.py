@@ -1,0 +1,227 @@
+"""Causes of a gap: each chosen effect judged beside the others, faults of the sensors, wrong numbers of the vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
+from cpfls_cli.gap.balance.balance_system import is_free, system
+from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
+from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
+from cpfls_cli.gap.naming.scoring import Scored
+from cpfls_cli.gap.naming.search import SearchStep, alternatives, rank_effects
+from cpfls_cli.gap.sensors.findings import AuditFinding
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_MATTERS = 0.02
+"""Relative error of a moment of inertia or of the thrust from which on it is told."""
+
+_LEAST_SHARE = 0.05
+
+_PULLS = 2.0
+"""Multiple of the pull of noise that an error has to exceed."""
+
+
+@dataclass(frozen=True)
+class JudgedEffect:
+    """A chosen effect and its rivals."""
+
+    effect: NamedEffect
+    alternatives: tuple[Alternative, ...]
+
+
+def judge_effect(
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    index: int,
+    estimates: Estimates,
+    share: float,
+    effects: Sequence[Effect],
+    settings: GapSettings,
+    rng: np.random.Generator,
+) -> JudgedEffect:
+    """Judge a chosen effect as if it were the last one to be found.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    index : int
+        Of the effect among them.
+    estimates : Estimates
+    share : float
+        Of what all effects explain.
+    effects : sequence of Effect
+    settings : GapSettings
+    rng : numpy.random.Generator
+    """
+    candidate = chosen[index]
+    others = [other for other in chosen if other is not candidate]
+    step = rank_effects(flights, others, effects, settings, rng, also=(candidate,))
+    scored = next(scored for scored in step.ranking if scored.candidate.effect.name == candidate.effect.name)
+    effect = NamedEffect(
+        candidate.effect.name,
+        candidate,
+        estimates.of_effect[index],
+        estimates.effects[index],
+        step.p_value(scored.gain),
+        share,
+        _frequency(scored, step),
+        effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
+    )
+    return JudgedEffect(effect, tuple(alternatives(scored, step.ranking, step.above_floor)))
+
+
+def _frequency(chosen: Scored, step: SearchStep) -> float:
+    """Compute the share of blocks whose omission leaves the effect the best candidate."""
+    total = np.array([scored.block_error.sum() - scored.block_error for scored in step.ranking if _real(scored)])
+    names = [scored.candidate.effect.name for scored in step.ranking if _real(scored)]
+    if chosen.candidate.effect.name not in names:
+        return 0.0
+    return float(np.mean(np.argmin(total, axis=0) == names.index(chosen.candidate.effect.name)))
+
+
+def _real(scored: Scored) -> bool:
+    return bool(np.isfinite(scored.gain))
+
+
+def shares(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, floor: Array) -> Array:
+    """Split the explained part of the residual among the effects.
+
+    The share of an effect is the part of the explained residual that points its way, in floors; the shares add up to
+    1. Effects that work against each other can have more than 1, or less than 0.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    estimates : Estimates
+        Of the hypothesis with all of them.
+    floor : array, shape (6,)
+
+    Returns
+    -------
+    array, shape (effect,)
+    """
+    everything = _remaining(flights, chosen, estimates, range(len(chosen)))
+    total = (_remaining(flights, chosen, estimates, ()) - everything) / floor
+    parts = [
+        (_remaining(flights, chosen, estimates, [p for p in range(len(chosen)) if p != index]) - everything) / floor
+        for index in range(len(chosen))
+    ]
+    along = np.array([(part * total).sum() for part in parts])
+    return np.asarray(along / max(abs(along.sum()), 1e-12) if len(along) else along)
+
+
+def _remaining(
+    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], estimates: Estimates, kept: Sequence[int] | range
+) -> Array:
+    """Compute the residual with some of the effects only, at the coefficients of all of them."""
+    hypothesis = system(flights, [chosen[index] for index in kept])
+    parameters = estimates.linear[: len(estimates.linear) - sum(len(linear) for linear in estimates.of_effect)]
+    linear = [estimates.of_effect[index] for index in kept if is_free(chosen[index])]
+    return np.asarray(hypothesis.residual - hypothesis.base @ np.concatenate([parameters, *linear]))
+
+
+def wrong_numbers(
+    estimates: Estimates, effects: Sequence[NamedEffect], share: float, pull: Array
+) -> NamedEffect | None:
+    """Name the numbers of the vehicle that are significantly wrong, relevant, and not explained by a named effect.
+
+    Parameters
+    ----------
+    estimates : Estimates
+    effects : sequence of NamedEffect
+        Already named.
+    share : float
+        Part of the gap of the model as given that refitting its numbers takes off.
+    pull : array, shape (parameter,)
+        Error of each number that noise in the motion can make: a noisy acceleration asks for less inertia.
+    """
+    pairs = zip(estimates.parameters, pull, strict=True)
+    wrong = [number for number, drawn in pairs if abs(number.value) > _PULLS * drawn and _is_wrong(number, effects)]
+    if not wrong or share < _LEAST_SHARE:
+        return None
+    p_value = min(2 * float(norm.sf(3.92 * abs(n.value) / (n.high - n.low))) if n.high > n.low else 0.0 for n in wrong)
+    name, sentence = VEHICLE_NUMBERS.name, VEHICLE_NUMBERS.sentence
+    return NamedEffect(name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, sentence)
+
+
+def impossible(numbers: Sequence[Estimate]) -> tuple[str, ...]:
+    """List the numbers of the vehicle with impossible estimates: then the log is wrong, not the vehicle.
+
+    Parameters
+    ----------
+    numbers : sequence of Estimate
+        Relative errors.
+
+    Returns
+    -------
+    tuple of str
+        Sentences.
+    """
+    return tuple(
+        f"{NUMBERS[number.name]} would have to be {1 + number.value:.3g} times that of the config, which no vehicle"
+        " has: check signs, units and order of the gyroscope's and the rotors' columns"
+        for number in numbers
+        if number.name in NUMBERS and (number.high < number.plausible[0] or number.low > number.plausible[1])
+    )
+
+
+def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:
+    if number.name not in NUMBERS:
+        return False
+    half = 0.5 * (number.high - number.low)
+    sure = abs(number.value) > 1.5 * half and abs(number.value) > _MATTERS
+    return sure and abs(number.value) > _accounted(number.name, effects)
+
+
+def _accounted(name: str, effects: Sequence[NamedEffect]) -> float:
+    """Sum the relative error of a number that named effects account for."""
+    accounted = 0.0
+    for effect in effects:
+        accounts = CATALOGUE[effect.name].accounts
+        if accounts is not None:
+            accounted += accounts(name, {c.name: c.value for c in effect.coefficients})
+    return accounted
+
+
+def sensor_fault(
+    finding: AuditFinding, as_logged: Sequence[WeakFlight], as_repaired: Sequence[WeakFlight]
+) -> NamedEffect:
+    """Name a fault of the sensors with the share of the gap that its repair removes.
+
+    Parameters
+    ----------
+    finding : AuditFinding
+    as_logged, as_repaired : sequence of WeakFlight
+        The training flights without and with the repair.
+    """
+    logged, repaired = system(as_logged), system(as_repaired)
+    weight = np.sqrt(np.mean(repaired.residual**2, axis=0)) + 1e-12
+    before, after = ((s.residual - s.base @ fit(s, weight)) / weight for s in (logged, repaired))
+    share = float(np.clip(1 - (after**2).sum() / max((before**2).sum(), 1e-12), 0, 1))
+    coefficients = _sensor_estimates(finding, as_repaired[0].signals.vehicle)
+    return NamedEffect(finding.name, None, np.zeros(0), coefficients, finding.p_value, share, 1.0, finding.sentence)
+
+
+def _sensor_estimates(finding: AuditFinding, vehicle: VehicleSettings) -> tuple[Estimate, ...]:
+    """Convert the named numbers of a sensor fault to estimates."""
+    effect = CATALOGUE[finding.name]
+    assert effect.test is not None, "the audit tests what has a test"
+    by_label = dict(zip(effect.test.labels, effect.numbers, strict=True))
+    return tuple(
+        Estimate(known.name, known.unit, number.value, number.low, number.high, known.bounds(vehicle))
+        for number in finding.coefficients
+        if number.named and (known := by_label[number.name])
+    )

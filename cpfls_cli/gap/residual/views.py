@@ -1,0 +1,217 @@
+"""Views of a residual: its worst stretches of time, its mean over two signals, and its correlation over lags."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import binary_closing, find_objects, label, uniform_filter1d
+from scipy.stats import chi2
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.gap.balance.resampling import about_flight_mean
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
+
+_AVERAGED_WINDOWS = 5
+_OUTSTANDING_SHARE = 0.1
+_LONGEST_PAUSE_S = 1.0
+_OUTER_PERCENT = 1.0
+_FEWEST_PER_LAG = 4
+
+
+class Stretch(NamedTuple):
+    """A stretch of a flight with a large gap.
+
+    Attributes
+    ----------
+    flight : int
+        Number of the flight.
+    start_s, end_s : float
+        On the clock of the flight, s.
+    channel : str
+        One of `CHANNELS`.
+    rms_floors : float
+        Root mean square of the residual, in floors.
+    """
+
+    flight: int
+    start_s: float
+    end_s: float
+    channel: str
+    rms_floors: float
+
+
+def stretches(
+    residual: Array, centres: Array, flight_index: IntArray, level: float = 2.0, most: int = 5
+) -> tuple[Stretch, ...]:
+    """Find the stretches of time in which the gap is largest.
+
+    Windows whose root mean square over their neighbours is above the level and among the largest tenth of the channel;
+    runs with short pauses between them are one stretch.
+
+    Parameters
+    ----------
+    residual : array, shape (window, 6), floors
+    centres : array, shape (window,), s
+        Middle of each window.
+    flight_index : array of int, shape (window,)
+    level : float
+        Least root mean square, in floors.
+    most : int
+        Largest number per channel.
+
+    Returns
+    -------
+    tuple of Stretch
+        Largest first.
+    """
+    largest = []
+    for channel in range(residual.shape[1]):
+        of_channel = list(_of_channel(channel, residual[:, channel], centres, flight_index, level))
+        largest += sorted(of_channel, key=_size)[:most]
+    return tuple(sorted(largest, key=_size))
+
+
+def _size(stretch: Stretch) -> float:
+    return -stretch.rms_floors
+
+
+def _of_channel(
+    channel: int, residual: Array, centres: Array, flight_index: IntArray, level: float
+) -> Iterator[Stretch]:
+    flights = [np.flatnonzero(flight_index == flight) for flight in np.unique(flight_index)]
+    size = [_local_rms(residual[rows]) for rows in flights]
+    least = max(level, float(np.quantile(np.concatenate(size), 1 - _OUTSTANDING_SHARE)))
+    for rows, local in zip(flights, size, strict=True):
+        hop = float(centres[rows[1]] - centres[rows[0]]) if len(rows) > 1 else 0.0
+        for run in _runs(local >= least, round(_LONGEST_PAUSE_S / hop) if hop else 0):
+            inside = rows[run]
+            rms = float(np.sqrt(np.mean(residual[inside] ** 2)))
+            start, end = float(centres[inside[0]]) - hop / 2, float(centres[inside[-1]]) + hop / 2
+            yield Stretch(int(flight_index[rows[0]]), start, end, CHANNELS[channel], rms)
+
+
+def _local_rms(residual: Array) -> Array:
+    """Compute the root mean square over neighbouring windows, which a zero crossing does not make small."""
+    # The filter is a running sum, whose rounding can end below 0.
+    return np.asarray(np.sqrt(np.maximum(uniform_filter1d(residual**2, _AVERAGED_WINDOWS, mode="nearest"), 0.0)))
+
+
+def _runs(above: BoolArray, pause: int) -> list[slice]:
+    padded = np.pad(above, pause)
+    joined = above | binary_closing(padded, np.ones(pause + 1, dtype=bool))[pause : pause + len(above)]
+    return [run[0] for run in find_objects(label(joined)[0])]
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """Mean residual in the cells of a grid over two signals.
+
+    Attributes
+    ----------
+    edges : tuple of array, shape (bins + 1,)
+        Of the first and the second signal.
+    mean : array, shape (bins, bins)
+        In the unit of the residual; not a number in empty cells.
+    count : array, shape (bins, bins)
+        Windows in each cell.
+    """
+
+    edges: tuple[Array, Array]
+    mean: Array
+    count: Array
+
+
+def heat_map(residual: Array, first: Array, second: Array, bins: int = 12) -> HeatMap:
+    """Average a residual over the cells of two signals.
+
+    The outer cells also take the one per cent of windows beyond each end of the grid, so that a few windows do not
+    stretch it.
+
+    Parameters
+    ----------
+    residual : array, shape (window,)
+    first, second : array, shape (window,)
+        Windows where one is not a number are left out.
+    bins : int
+        Cells along each signal.
+    """
+    known = np.isfinite(residual) & np.isfinite(first) & np.isfinite(second)
+    signals = [first[known], second[known]]
+    edges = [_edges(signal, bins) for signal in signals]
+    cells = [np.clip(np.searchsorted(e, s, side="right") - 1, 0, bins - 1) for e, s in zip(edges, signals, strict=True)]
+    flat = cells[0] * bins + cells[1]
+    count = np.bincount(flat, minlength=bins**2).astype(float)
+    total = np.bincount(flat, weights=residual[known], minlength=bins**2)
+    mean = np.divide(total, count, out=np.full(bins**2, np.nan), where=count > 0)
+    return HeatMap((edges[0], edges[1]), mean.reshape(bins, bins), count.reshape(bins, bins))
+
+
+def _edges(signal: Array, bins: int) -> Array:
+    if not len(signal):
+        return np.linspace(0.0, 1.0, bins + 1)
+    low, high = np.percentile(signal, [_OUTER_PERCENT, 100 - _OUTER_PERCENT])
+    # A signal that stands still still needs cells of some width.
+    return np.linspace(low, high if high > low else low + max(1e-9, 1e-9 * abs(low)), bins + 1)
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Autocorrelation of a residual, and the test whether it is that of noise.
+
+    Attributes
+    ----------
+    autocorrelation : array, shape (lag, channel)
+        At lags of 1, 2, ... windows without common samples.
+    statistic : array, shape (channel,)
+        Of Ljung and Box; about the number of lags for noise.
+    p_value : array, shape (channel,)
+        Small where the residual is not noise; 1 for channels that are 0.
+    windows : int
+        Used, over all flights.
+    """
+
+    autocorrelation: Array
+    statistic: Array
+    p_value: Array
+    windows: int
+
+
+def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: int = 10) -> Whiteness:
+    """Test whether a residual is noise, flight by flight about its mean.
+
+    ``Q = n (n + 2) sum_k r_k^2 / n_k`` with n_k pairs of windows at lag k, against chi square with as many degrees of
+    freedom as lags.
+
+    Parameters
+    ----------
+    residual : array, shape (window, channel)
+    flight_index : array of int, shape (window,)
+    stride : int
+        Windows from one to the next without common samples; 2 at an overlap of a half.
+    lags : int
+        Largest lag; fewer where flights are short.
+
+    References
+    ----------
+    Ljung and Box 1978, equation 1.4.
+    """
+    flights = [residual[flight_index == number][::stride] for number in np.unique(flight_index)]
+    longest = max((len(centred) for centred in flights), default=0)
+    lags = min(lags, longest // _FEWEST_PER_LAG)
+    centred = [about_flight_mean(flight, np.zeros(len(flight), dtype=int)) for flight in flights]
+    used = sum(len(flight) for flight in centred)
+    square = np.sum([(flight**2).sum(axis=0) for flight in centred], axis=0)
+    products = np.array([_product(centred, lag) for lag in range(1, lags + 1)]).reshape(lags, residual.shape[1])
+    pairs = np.array([sum(max(0, len(flight) - lag) for flight in centred) for lag in range(1, lags + 1)])
+    correlation = np.divide(products, square, out=np.zeros_like(products), where=square > 0)
+    statistic = used * (used + 2) * (correlation**2 / pairs[:, None]).sum(axis=0)
+    return Whiteness(correlation, statistic, chi2.sf(statistic, lags) if lags else np.ones_like(statistic), used)
+
+
+def _product(rows: list[Array], lag: int) -> Array:
+    return np.asarray(
+        np.sum([(flight[lag:] * flight[: max(0, len(flight) - lag)]).sum(axis=0) for flight in rows], axis=0)
+    )

@@ -1,0 +1,353 @@
+"""The gyroscope judged by the attitude: bias, scale, misalignment and delay, by kinematics in weak form."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.interpolate import CubicSpline
+from scipy.linalg import polar
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.effects.hooks import FaultFit
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.resampling import blocks_of, folds
+from cpfls_cli.gap.balance.windows import Windows
+
+FEWEST_BLOCKS = 7
+"""Blocks below which a jackknife says too little about significance of one in a thousand."""
+_BLOCK_S = 4.0
+_SHORTEST_BLOCK_S = 1.5
+_WANTED_BLOCKS = 8
+_SCAN_STEP_S = 0.005
+_ROUNDS = 4
+# A rate about an axis counts as excited from this multiple of the variance of what is left; below it, noise of the
+# gyroscope would pull its scale by more than a tenth.
+_EXCITED = 10.0
+
+
+_NUMBERS = {"bias": slice(0, 3), "scale": slice(3, 6), "misalignment": slice(6, 9), "delay": slice(12, 13)}
+LONGEST_DELAY_S = 0.1
+"""Longest shift between gyroscope and attitude that is looked for, s; a log beyond that is broken, not late."""
+
+
+@dataclass(frozen=True)
+class DelayScan:
+    """The delay at which the readings as they are fit best.
+
+    Attributes
+    ----------
+    delay : float
+        s, on a coarse grid.
+    variance : array, shape (3,), rad^2/s^2
+        Left about each axis.
+    excited : array of bool, shape (3,)
+        Axes that turn enough to tell a scale.
+    seen, read : array, shape (window, 3), rad/s
+        Averages of the rate by the attitude, and by the gyroscope at that delay.
+    """
+
+    delay: float
+    variance: Array
+    excited: BoolArray
+    seen: Array
+    read: Array
+
+
+@dataclass(frozen=True)
+class GyroFit:
+    """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated.
+
+    Attributes
+    ----------
+    value : array, shape (13,)
+        Bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s). The
+        misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
+    error : array, shape (13,)
+        Standard errors by the jackknife over blocks.
+    pull : array, shape (13,)
+        How far noise of the gyroscope can have pulled the value at most.
+    known : array of bool, shape (13,)
+        What the motion could tell.
+    blocks : int
+    variance : array, shape (3,), rad^2/s^2
+        Left about each axis.
+    flight_bias : array, shape (flight, 3), rad/s
+        Bias of each flight less that of all.
+    flight_bias_error : array, shape (flight, 3), rad/s
+    """
+
+    value: Array
+    error: Array
+    pull: Array
+    known: BoolArray
+    blocks: int
+    variance: Array
+    flight_bias: Array
+    flight_bias_error: Array
+
+    def of(self, name: str) -> FaultFit:
+        """Select the numbers of one kind of fault.
+
+        Parameters
+        ----------
+        name : {"bias", "scale", "misalignment", "delay"}
+        """
+        numbers = _NUMBERS[name]
+        return FaultFit(self.value[numbers], self.error[numbers], self.pull[numbers], self.known[numbers], self.blocks)
+
+
+def scan(flights: Sequence[Kinematics]) -> DelayScan:
+    """Scan the delay between gyroscope and attitude, positive where the gyroscope is late."""
+    step = max(float(flights[0].time[0, 1] - flights[0].time[0, 0]), _SCAN_STEP_S)
+    half = int(LONGEST_DELAY_S / step)
+    delays = step * np.arange(-half, half + 1)
+    seen = np.concatenate([flight.rate for flight in flights])
+    delay = float(delays[np.argmin([_unexplained(seen, _read(flights, delay)) for delay in delays])])
+    read = _read(flights, delay)
+    variance = np.maximum((seen - read).var(axis=0), np.finfo(float).tiny)
+    return DelayScan(delay, variance, _alone(read) > _EXCITED * variance, seen, read)
+
+
+def _read(flights: Sequence[Kinematics], delay: float) -> Array:
+    return np.concatenate([flight.gyro_rate(delay) for flight in flights])
+
+
+def _unexplained(seen: Array, read: Array) -> float:
+    """Compute the log variance left by any matrix on the readings, so that a swapped axis does not shift the delay."""
+    right, left = seen - seen.mean(axis=0), read - read.mean(axis=0)
+    rest = right - left @ np.linalg.lstsq(left, right, rcond=None)[0]
+    return float(np.log(np.maximum((rest**2).mean(axis=0), np.finfo(float).tiny)).sum())
+
+
+def _alone(read: Array) -> Array:
+    """Give the variance of each rate that the other two do not share."""
+    covariance = np.cov(read.T) + 1e-12 * np.eye(3)
+    return np.asarray(1.0 / np.diag(np.linalg.inv(covariance)))
+
+
+def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | None:
+    """Regress the rate by the attitude on the gyroscope, and invert the result.
+
+    The gyroscope is the cleaner side, hence the reverse regression ``omega(t) = M omega_gyro(t + delay) - c``; its
+    noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
+    with the derivative of the reading, refined by Gauss-Newton steps.
+
+    Returns
+    -------
+    GyroFit or None
+        None where there are too few blocks.
+
+    References
+    ----------
+    Frisch 1934 (bounds of regression with noise on both sides); Kunsch 1989 (jackknife over blocks).
+    """
+    index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])
+    block = _blocks(index, np.concatenate([flight.centres for flight in flights]))
+    if block.max() + 1 < FEWEST_BLOCKS:
+        return None
+    columns = _columns(scanned.excited)
+    matrix, delay, variance = np.eye(3), scanned.delay, scanned.variance
+    for _ in range(_ROUNDS):
+        design, right = _design(flights, matrix, delay), scanned.seen - _read(flights, delay)
+        normal = folds(design / np.sqrt(variance)[:, None], right / np.sqrt(variance), block)
+        solution = _padded(normal.fit(columns)[0][None, :, 0], columns)[0]
+        rest = right - design @ solution
+        base, variance = delay, np.maximum(rest.var(axis=0), np.finfo(float).tiny)
+        matrix = np.eye(3) + solution[:9].reshape(3, 3)
+        delay = float(np.clip(base + solution[12], -LONGEST_DELAY_S, LONGEST_DELAY_S))
+    left_out = _padded(normal.solve(columns)[0][..., 0], columns)
+    draws = np.array([_faults(each, base) for each in left_out])
+    spread = ((draws - draws.mean(axis=0)) ** 2).sum(axis=0) * (len(draws) - 1) / len(draws)
+    bias, error = _flight_bias(rest, index, block)
+    return GyroFit(
+        value=_faults(solution, base),
+        error=np.sqrt(spread),
+        pull=_pull(scanned.read, variance),
+        known=_known(scanned.excited),
+        blocks=len(draws),
+        variance=variance,
+        flight_bias=bias,
+        flight_bias_error=error,
+    )
+
+
+def _blocks(index: IntArray, centres: Array) -> IntArray:
+    whole = sum(float(np.ptp(centres[index == flight])) for flight in np.unique(index))
+    return blocks_of(index, centres, min(_BLOCK_S, max(_SHORTEST_BLOCK_S, whole / _WANTED_BLOCKS)))
+
+
+def _columns(excited: BoolArray) -> IntArray:
+    """Select the columns that the motion excites: axes that turn, and the delay if any does."""
+    used = np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), [excited.any()]])
+    return np.flatnonzero(used)
+
+
+def _design(flights: Sequence[Kinematics], matrix: Array, delay: float) -> Array:
+    parts = []
+    for flight in flights:
+        later = np.einsum("waij,ij->wa", flight.products(delay, 1), matrix)
+        products = flight.products(delay).reshape(-1, 3, 9)
+        parts.append(np.concatenate([products, -flight.constants(), later[..., None]], axis=2))
+    return np.concatenate(parts)
+
+
+def _padded(solutions: Array, columns: IntArray) -> Array:
+    whole = np.zeros((len(solutions), 13))
+    whole[:, columns] = solutions
+    return whole
+
+
+def _faults(solution: Array, base: float) -> Array:
+    """Invert ``M, c`` to faults; the left polar form separates scale and cross-axis from rotation exactly."""
+    inverse = np.linalg.inv(np.eye(3) + solution[:9].reshape(3, 3))
+    turned, stretched = polar(inverse, side="left")
+    misalignment = -Rotation.from_matrix(turned).as_rotvec()
+    cross = [stretched[1, 2], stretched[2, 0], stretched[0, 1]]
+    bias, scale = inverse @ solution[9:12], np.diag(stretched) - 1
+    return np.concatenate([bias, scale, misalignment, cross, [base + solution[12]]])
+
+
+def _pull(read: Array, variance: Array) -> Array:
+    inverse = np.abs(np.linalg.inv(np.cov(read.T) + 1e-12 * np.eye(3)))
+    pull = variance[:, None] * inverse
+    both = 0.5 * (pull + pull.T)
+    across = np.array([both[1, 2], both[2, 0], both[0, 1]])
+    return np.concatenate([np.zeros(3), np.diag(pull), across, across, [0.0]])
+
+
+def _known(excited: BoolArray) -> BoolArray:
+    across = np.array([excited[1] & excited[2], excited[2] & excited[0], excited[0] & excited[1]])
+    return np.concatenate([np.ones(3, dtype=bool), excited, across, across, [excited.any()]])
+
+
+def _flight_bias(rest: Array, index: IntArray, block: IntArray) -> tuple[Array, Array]:
+    means = np.array([-rest[block == b].mean(axis=0) for b in range(block.max() + 1)])
+    owner = np.array([index[block == b][0] for b in range(block.max() + 1)])
+    flight_mean = np.array([means[owner == flight].mean(axis=0) for flight in np.unique(owner)])
+    count = np.array([np.sum(owner == flight) for flight in np.unique(owner)])
+    spread = np.sqrt(((means - flight_mean[np.searchsorted(np.unique(owner), owner)]) ** 2).sum(axis=0))
+    error = spread / np.sqrt(max(1, len(means) - len(flight_mean))) / np.sqrt(count)[:, None]
+    return flight_mean, error
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """Windows of one flight, ``d/dt r = 1/2 (r0 omega + r x omega)`` with r relative to the middle of the window.
+
+    The equation keeps its form under any fixed rotation of r, so noise of the middle sample does not enter.
+
+    Attributes
+    ----------
+    rate : array, shape (window, 3), rad/s
+        Averages of the rate that the attitude shows, body axes at the middle of the window; nothing is differentiated.
+    turning : array, shape (window, sample, 3, 3)
+        ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those axes.
+    time : array, shape (window, sample), s
+    gyro : CubicSpline
+        Body rate over time; through smooth windows its interpolation error is nothing.
+    """
+
+    rate: Array
+    turning: Array
+    time: Array
+    gyro: CubicSpline
+
+    @property
+    def centres(self) -> Array:
+        """Middle of each window, shape (window,), s."""
+        return np.asarray(self.time.mean(axis=1))
+
+    def gyro_rate(self, delay: float) -> Array:
+        """Average the rate of a gyroscope that is late.
+
+        Parameters
+        ----------
+        delay : float
+            s.
+
+        Returns
+        -------
+        array, shape (window, 3), rad/s
+        """
+        return np.asarray(np.einsum("wsai,wsi->wa", self.turning, self.gyro(self.time + delay)))
+
+    def products(self, delay: float, order: int = 0) -> Array:
+        """Average each reading, put on each axis; the columns of a matrix on the gyroscope.
+
+        Parameters
+        ----------
+        delay : float
+            s.
+        order : int
+            1 for the derivative of the reading.
+
+        Returns
+        -------
+        array, shape (window, 3, to, from), rad/s or rad/s^2
+        """
+        turning = np.moveaxis(self.turning, 1, 3)
+        averages = turning.reshape(len(turning), 9, -1) @ self.gyro(self.time + delay, order)
+        return np.asarray(averages.reshape(-1, 3, 3, 3))
+
+    def constants(self) -> Array:
+        """Average a constant about each axis.
+
+        Returns
+        -------
+        array, shape (window, 3, 3)
+        """
+        return np.asarray(self.turning.sum(axis=1))
+
+
+def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
+    """Cut a flight into windows, clear of its ends by the longest delay.
+
+    Parameters
+    ----------
+    signals : Signals
+        With attitude.
+    windows : Windows
+
+    Returns
+    -------
+    Kinematics or None
+        None where the flight is shorter than a window.
+    """
+    margin = int(np.ceil(LONGEST_DELAY_S / windows.period))
+    inside = slice(margin, len(signals) - margin)
+    length = len(windows.weight)
+    if len(signals) - 2 * margin < length or signals.attitude is None:
+        return None
+    # At an overlap of three quarters the windows add up to a constant, so attitude noise cancels between neighbours.
+    hop = max(1, length // 4)
+    turned = _continuous(Rotation.from_euler("ZYX", signals.attitude[inside, ::-1]).as_quat())
+    relative = _relative(np.moveaxis(sliding_window_view(turned, length, axis=0)[::hop], 1, 2))
+    time = sliding_window_view(signals.time[inside], length)[::hop]
+    rate = -2 * np.einsum("wsi,s->wi", relative[..., :3], windows.slope)
+    turning = _turning_matrix(relative) * windows.weight[:, None, None]
+    return Kinematics(rate, turning, np.asarray(time), CubicSpline(signals.time, signals.body_rate))
+
+
+def _continuous(turned: Array) -> Array:
+    """Choose of each quaternion and its negative the one near the sample before."""
+    flips = np.where((turned[1:] * turned[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    return np.asarray(turned * np.concatenate([[1.0], np.cumprod(flips)])[:, None])
+
+
+def _relative(turned: Array) -> Array:
+    """Take quaternions (x, y, z, scalar) relative to the middle of their window."""
+    vector, scalar = turned[..., :3], turned[..., 3:]
+    middle = turned[:, [turned.shape[1] // 2]]
+    conjugate, known = -middle[..., :3], middle[..., 3:]
+    product = known * vector + scalar * conjugate + np.cross(conjugate, vector)
+    rest = known * scalar - (conjugate * vector).sum(axis=-1, keepdims=True)
+    return np.concatenate([product, rest], axis=-1)
+
+
+def _turning_matrix(relative: Array) -> Array:
+    x, y, z, scalar = np.moveaxis(relative, -1, 0)
+    return np.stack([scalar, -z, y, z, scalar, -x, -y, x, scalar], axis=-1).reshape(*relative.shape[:-1], 3, 3)

@@ -1,0 +1,217 @@
+"""The model that is simulated: how it turns, and effects of the catalogue with values, checked against their bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.effects.effect import Coefficient, Effect, Shape
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import effect as find
+from cpfls_cli.errors import SettingError
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+@dataclass(frozen=True)
+class SimulatedEffect:
+    """An effect with a value for each of its coefficients and shapes.
+
+    Attributes
+    ----------
+    effect : Effect
+    values : mapping of str to float
+        Coefficients, then shapes, in the units of the catalogue.
+    """
+
+    effect: Effect
+    values: Mapping[str, float]
+
+    @property
+    def linear(self) -> Array:
+        """Coefficients of the columns; 1 where everything is in the shape."""
+        if self.effect.unit_coefficient:
+            return np.ones(1)
+        physical = np.array([self.values[coefficient.name] for coefficient in self.effect.coefficients])
+        return physical if self.effect.linear is None else self.effect.linear(physical)
+
+    @property
+    def acting(self) -> Array:
+        """The same with 0 for coefficients that act on the log alone."""
+        of_log = [coefficient.of_log for coefficient in self.effect.coefficients]
+        return np.where(of_log, 0.0, self.linear) if any(of_log) else self.linear
+
+    @property
+    def shape(self) -> Mapping[str, float]:
+        """Values of the shapes."""
+        return {shape.name: self.values[shape.name] for shape in self.effect.shapes}
+
+
+@dataclass(frozen=True)
+class SimulatedEffects:
+    """All effects of a flight."""
+
+    listed: tuple[SimulatedEffect, ...] = ()
+
+    @property
+    def ordered(self) -> list[SimulatedEffect]:
+        """In the order of the catalogue, which is that of the actuator chain."""
+        return sorted(self.listed, key=lambda one: (one.effect.order, one.effect.name))
+
+    def values(self, name: str) -> Mapping[str, float] | None:
+        """Give the values of an effect, None where it is not flown.
+
+        Returns
+        -------
+        mapping of str to float, or None
+        """
+        return next((one.values for one in self.listed if one.effect.name == name), None)
+
+    @property
+    def hides_rotor_speed(self) -> bool:
+        """Whether the flight logs commands in place of rotor speeds."""
+        return any(one.effect.actuation is not None for one in self.listed)
+
+
+def simulated_effects(
+    asked: Mapping[str, Sequence[float] | Mapping[str, float]], vehicle: VehicleSettings
+) -> SimulatedEffects:
+    """Look up effects in the catalogue and check their values.
+
+    Parameters
+    ----------
+    asked : mapping
+        By name of the effect: values in the order of the catalogue, coefficients before shapes, or by their names;
+        coefficients without a value are 0.
+    vehicle : VehicleSettings
+
+    Raises
+    ------
+    InputError
+        If there is no such effect.
+    SettingError
+        If values are missing, too many or physically impossible, or effects do not go together.
+    """
+    chosen = SimulatedEffects(tuple(_checked(name, given, vehicle) for name, given in asked.items()))
+    _refuse_conflict(chosen)
+    return chosen
+
+
+@dataclass(frozen=True)
+class SimulatedModel:
+    """A vehicle as described by a model with effects.
+
+    Attributes
+    ----------
+    base : InertiaModel or None
+        None for the rigid body of the vehicle.
+    effects : SimulatedEffects
+    """
+
+    base: InertiaModel | None = None
+    effects: SimulatedEffects = field(default_factory=SimulatedEffects)
+
+    def with_effects(self, asked: SimulatedEffects) -> SimulatedModel:
+        """Add effects to those of the model; errors of the vehicle's own numbers add up.
+
+        Raises
+        ------
+        SettingError
+            If the model has one of them already, or two of them do not go together.
+        """
+        by_name = {one.effect.name: one for one in self.effects.listed}
+        for one in asked.listed:
+            name = one.effect.name
+            by_name[name] = _added(by_name[name], one) if name in by_name else one
+        effects = SimulatedEffects(tuple(by_name.values()))
+        _refuse_conflict(effects)
+        return SimulatedModel(self.base, effects)
+
+
+def simulated_model(
+    base: InertiaModel | None, fitted: Mapping[str, Mapping[str, float]], vehicle: VehicleSettings
+) -> SimulatedModel:
+    """Build a model with its effects for the simulation.
+
+    Parameters
+    ----------
+    base : InertiaModel or None
+        None for the rigid body of the vehicle.
+    fitted : mapping
+        By name of the effect: its values by name.
+    vehicle : VehicleSettings
+
+    Raises
+    ------
+    InputError
+        If there is no such effect.
+    SettingError
+        If a value is missing or impossible, or effects do not go together.
+    """
+    return SimulatedModel(base, simulated_effects(fitted, vehicle))
+
+
+def _refuse_conflict(chosen: SimulatedEffects) -> None:
+    needing = [one.effect for one in chosen.listed if "measured_rotor_speed" in one.effect.needs]
+    if not (chosen.hides_rotor_speed and needing):
+        return
+    *others, last = (name for name, effect in CATALOGUE.items() if effect.actuation is not None)
+    does = needing[0].log.does if needing[0].log is not None else "needs measured rotor speeds"
+    raise SettingError(_key(needing[0].name), f"{does}, which a flight with {', '.join(others)} or {last} does not log")
+
+
+def _checked(name: str, given: Sequence[float] | Mapping[str, float], vehicle: VehicleSettings) -> SimulatedEffect:
+    effect = find(name)
+    if "rotor_radius" in effect.needs and any(rotor.radius_m is None for rotor in vehicle.rotors):
+        raise SettingError(_key(name), "needs vehicle.rotors.radius_m of every rotor")
+    values = _by_name(effect, given)
+    for number in effect.numbers:
+        _refuse_outside(effect, number, values[number.name], number.bounds(vehicle))
+    return SimulatedEffect(effect, values)
+
+
+def _by_name(effect: Effect, given: Sequence[float] | Mapping[str, float]) -> dict[str, float]:
+    names = [number.name for number in effect.numbers]
+    if not isinstance(given, Mapping):
+        if len(given) != len(names):
+            raise SettingError(_key(effect.name), f"takes {_wanted(effect)}; {len(given)} given")
+        return dict(zip(names, given, strict=True))
+    unknown = [name for name in given if name not in names]
+    unset = [shape.name for shape in effect.shapes if shape.name not in given]
+    if unknown or unset:
+        problem = f"has no {', '.join(unknown)}" if unknown else f"needs {', '.join(unset)}"
+        raise SettingError(_key(effect.name), f"{problem}; takes {_wanted(effect)}")
+    return {name: given.get(name, 0.0) for name in names}
+
+
+def _wanted(effect: Effect) -> str:
+    numbers = effect.numbers
+    if not numbers:
+        return "no values"
+    listed = ", ".join(f"{number.name} ({number.unit})" for number in numbers)
+    return f"{len(numbers)} value{'s' if len(numbers) > 1 else ''}: {listed}"
+
+
+def _refuse_outside(effect: Effect, number: Coefficient | Shape, value: float, bounds: tuple[float, float]) -> None:
+    low, high = bounds
+    # A bound that is printed with a few digits and typed back is inside.
+    margin = 1e-3 * (high - low)
+    if not low - margin <= value <= high + margin:
+        unit = "" if number.unit == "1" else f" {number.unit}"
+        message = f"{number.name} = {value:g} is not possible on this vehicle: {low:.4g} to {high:.4g}{unit}"
+        raise SettingError(_key(effect.name), f"{message} ({number.meaning})")
+
+
+def _key(name: str) -> str:
+    return f"closed_loop.effects.{name}"
+
+
+def _added(known: SimulatedEffect, asked: SimulatedEffect) -> SimulatedEffect:
+    name = known.effect.name
+    if known.effect.kind != "parameter":
+        has = ", ".join(f"{key} = {value:.4g}" for key, value in known.values.items())
+        raise SettingError(f"closed_loop.effects.{name}", f"the model has it already{': ' + has if has else ''}")
+    return SimulatedEffect(known.effect, {key: value + asked.values[key] for key, value in known.values.items()})

@@ -1,0 +1,81 @@
+"""Wrong numbers of the vehicle are told where they are sure, matter, and nothing named accounts for them."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from cpfls_cli.gap.naming.causes import wrong_numbers
+from cpfls_cli.gap.naming.estimate import Estimates
+from cpfls_cli.gap.naming.results import Estimate, NamedEffect
+
+
+def number(name, value, half):
+    return Estimate(name, "1", value, value - half, value + half, (-0.9, 3.0))
+
+
+def found(*numbers):
+    return Estimates(np.zeros(0), (), numbers, ())
+
+
+def named(name, *coefficients):
+    return NamedEffect(name, None, np.zeros(0), coefficients, 0.001, 0.9, 1.0, "")
+
+
+SURE = number("inertia_x", 0.15, 0.02)
+
+
+def told(*numbers, effects=(), share=0.5, pull=0.001):
+    effect = wrong_numbers(found(*numbers), effects, share, np.full(len(numbers), pull))
+    return () if effect is None else tuple(each.name for each in effect.coefficients)
+
+
+def test_sure_numbers_that_matter_are_told():
+    assert told(SURE, number("inertia_y", -0.1, 0.02)) == ("inertia_x", "inertia_y")
+
+
+@pytest.mark.parametrize(
+    "quiet",
+    [
+        number("inertia_x", 0.15, 0.11),
+        number("inertia_x", 0.015, 0.001),
+        number("inertia_x", 0.3, np.inf),
+        number("coupling_x", 0.5, 0.01),
+    ],
+    ids=["not sure", "does not matter", "not seen", "coupling"],
+)
+def test_others_are_not(quiet):
+    assert told(quiet) == ()
+
+
+def test_a_refit_that_takes_nothing_off_the_gap_tells_nothing():
+    assert told(SURE, share=0.04) == ()
+
+
+def test_an_error_that_noise_in_the_motion_can_make_is_not_told():
+    assert told(SURE, pull=0.1) == ()
+    assert told(SURE, pull=0.05) == ("inertia_x",)
+
+
+def test_probability_is_that_of_a_normal_error_of_the_surest_number():
+    effect = wrong_numbers(found(SURE, number("inertia_y", 0.05, 0.02)), (), 0.5, np.zeros(2))
+    assert effect.p_value == pytest.approx(2 * norm.sf(1.96 * 0.15 / 0.02))
+    assert (effect.name, effect.share) == ("parameter_error", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("effects", "expected"),
+    [
+        ([named("com_offset")], ("inertia_x",)),
+        ([named("com_offset"), named("battery_sag"), named("ground_effect")], ()),
+        ([named("rotor_mismatch", number("difference_1", -0.2, 0.01))], ()),
+        ([named("rotor_mismatch", number("drag_imbalance", 0.2, 0.01))], ("inertia_x",)),
+        ([named("payload")], ("inertia_x",)),
+    ],
+    ids=["offset", "three small ones", "weak rotor", "drag only", "load"],
+)
+def test_effects_that_change_the_number_account_for_it(effects, expected):
+    assert told(SURE, effects=effects) == expected
+
+
+def test_a_load_accounts_for_any_thrust():
+    assert told(number("thrust_scale", 0.5, 0.01), effects=[named("payload")]) == ()

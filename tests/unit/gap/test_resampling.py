@@ -1,0 +1,113 @@
+"""Normal equations of blocks against least squares on the rows that are left, block by block."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cpfls_cli.gap.balance.resampling import blocks_of, folds
+
+WINDOWS, CHANNELS, COLUMNS, BLOCKS = 60, 6, 5, 4
+
+
+def problem(seed=0, draws=None):
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((WINDOWS, CHANNELS, COLUMNS)) * [1.0, 1e3, 1e-3, 1.0, 1.0]
+    shape = (WINDOWS, CHANNELS) if draws is None else (WINDOWS, CHANNELS, draws)
+    return columns, rng.standard_normal(shape), np.arange(WINDOWS) * BLOCKS // WINDOWS
+
+
+def least_squares(columns, right):
+    return np.linalg.lstsq(columns.reshape(-1, columns.shape[2]), right.reshape(-1), rcond=None)[0]
+
+
+@pytest.mark.parametrize("chosen", [[0], [1, 3], [0, 1, 2, 3, 4]])
+def test_each_block_is_judged_by_a_fit_to_the_others(chosen):
+    columns, right, block = problem()
+    coefficients, error = folds(columns, right, block).solve(np.array(chosen))
+    for b in range(BLOCKS):
+        seen, unseen = block != b, block == b
+        expected = least_squares(columns[seen][..., chosen], right[seen])
+        left = right[unseen] - columns[unseen][..., chosen] @ expected
+        np.testing.assert_allclose(coefficients[b, :, 0], expected, rtol=1e-6)
+        assert error[b, 0] == pytest.approx((left**2).sum())
+
+
+def test_fit_uses_all_blocks_and_its_errors_are_those_of_textbooks():
+    columns, right, block = problem(1)
+    right = 3 * right
+    chosen = np.array([0, 1, 4])
+    normal = folds(columns, right, block)
+    coefficients, error = normal.fit(chosen)
+    flat = columns[..., chosen].reshape(-1, 3)
+    expected = least_squares(columns[..., chosen], right)
+    left = right.reshape(-1) - flat @ expected
+    np.testing.assert_allclose(coefficients[:, 0], expected, rtol=1e-6)
+    assert error.sum() == pytest.approx(left @ left)
+    covariance = np.linalg.inv(flat.T @ flat) * (left @ left) / len(left)
+    np.testing.assert_allclose(normal.errors(chosen), np.sqrt(np.diag(covariance)), rtol=1e-6)
+
+
+def test_errors_never_fall_below_those_of_unit_noise():
+    columns, right, block = problem(2)
+    flat = columns.reshape(-1, COLUMNS)
+    expected = np.sqrt(np.diag(np.linalg.inv(flat.T @ flat)))
+    np.testing.assert_allclose(folds(columns, 0.1 * right, block).errors(np.arange(5)), expected, rtol=1e-6)
+
+
+def test_draws_are_right_sides_of_their_own():
+    columns, right, block = problem(3, draws=3)
+    chosen = np.array([0, 2])
+    together = folds(columns, right, block).solve(chosen)
+    for draw in range(3):
+        alone = folds(columns, right[..., draw], block).solve(chosen)
+        np.testing.assert_allclose(together[0][..., draw], alone[0][..., 0], rtol=1e-9)
+        np.testing.assert_allclose(together[1][:, draw], alone[1][:, 0], rtol=1e-9)
+
+
+def test_a_subtracted_column_is_gone_from_the_right_side_and_channels_weigh_what_they_are_told():
+    columns, right, block = problem(4)
+    columns[..., 1] *= 1e-3
+    kept, weight = np.array([0, 4]), np.array([1.0, 2.0, 0.5, 1.0, 1.0, 3.0])
+    found = folds(columns, right, block).subtracted(1, kept, weight).solve(np.arange(2))
+    by_hand = weight[:, None] * columns[..., kept], weight * (right - columns[..., 1])
+    expected = folds(*by_hand, block).solve(np.arange(2))
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+def test_a_column_that_a_fit_never_sees_gets_nothing():
+    """An effect that acts in one block only cannot be judged on it."""
+    columns, right, block = problem(5)
+    columns[block != 2, :, 3] = 0.0
+    coefficients, error = folds(columns, right, block).solve(np.array([0, 3]))
+    without = folds(columns, right, block).solve(np.array([0]))[1]
+    assert coefficients[2, 1, 0] == 0.0
+    assert error[2] == pytest.approx(without[2])
+
+
+def test_a_column_of_zeros_does_no_harm():
+    columns, right, block = problem(6)
+    columns[..., 3] = 0.0
+    coefficients, error = folds(columns, right, block).solve(np.array([0, 3]))
+    np.testing.assert_allclose(error, folds(columns, right, block).solve(np.array([0]))[1])
+    assert not coefficients[:, 1].any()
+
+
+@given(
+    st.lists(st.integers(1, 400), min_size=1, max_size=5),
+    st.floats(0.5, 20),
+)
+def test_blocks_are_contiguous_within_flights_and_numbered_without_gaps(lengths, block_s):
+    flight = np.repeat(np.arange(len(lengths)), lengths)
+    centres = np.concatenate([0.2 * np.arange(length) for length in lengths])
+    block = blocks_of(flight, centres, block_s)
+    assert set(np.diff(block)) <= {0, 1}
+    assert (np.diff(block)[np.diff(flight) > 0] == 1).all()
+    assert block[0] == 0
+    assert block.max() < 24 + len(lengths)
+
+
+def test_blocks_have_about_the_wanted_length():
+    flight, centres = np.repeat([0, 1], 100), np.tile(0.2 * np.arange(100), 2)
+    assert np.bincount(blocks_of(flight, centres, 4.0)).tolist() == [20] * 10

@@ -1,0 +1,90 @@
+"""The table of verdicts, and which leftovers are causes of their own."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.gap.naming.results import (
+    Alternative,
+    GapVerdict,
+    NamedEffect,
+    Unexplained,
+    gap_stays,
+    matters,
+    verdict_of,
+)
+from cpfls_cli.gap.settings import GapSettings
+
+RIVAL = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")
+LEFT = Unexplained("torque y", 4.0, "yaw rate", 0.8, None, "neither")
+
+
+def effect(name="com_offset", share=0.9):
+    return NamedEffect(name, None, np.zeros(0), (), 0.001, share, 1.0, "")
+
+
+BIG, SMALL = effect(), effect("com_offset", 0.05)
+
+CASES = {
+    "nothing moved": ([], [], [], 1.0, False, GapVerdict.NOT_EXCITED),
+    "nothing wrong": ([], [], [], 1.0, True, GapVerdict.NO_GAP),
+    "a gap without a name": ([], [], [LEFT], 1.0, True, GapVerdict.UNEXPLAINED),
+    "a gap without a name in a still flight": ([], [], [LEFT], 1.0, False, GapVerdict.UNEXPLAINED),
+    "all": ([BIG], [], [], 0.95, True, GapVerdict.NAMED),
+    "exactly enough": ([BIG], [], [], 0.9, True, GapVerdict.NAMED),
+    "not all": ([BIG], [], [], 0.89, True, GapVerdict.PARTIAL),
+    "exactly partly": ([BIG], [], [], 0.5, True, GapVerdict.PARTIAL),
+    "too little": ([BIG], [], [], 0.49, True, GapVerdict.UNEXPLAINED),
+    "a second cause": ([BIG], [], [LEFT], 0.97, True, GapVerdict.PARTIAL),
+    "a rival": ([BIG], [RIVAL], [], 0.95, True, GapVerdict.AMBIGUOUS),
+    "a rival of a small part": ([effect("rotor_drag"), SMALL], [RIVAL], [], 0.95, True, GapVerdict.NAMED),
+    "a rival, but not all": ([BIG], [RIVAL], [], 0.7, True, GapVerdict.PARTIAL),
+}
+
+
+@pytest.mark.parametrize(("effects", "rivals", "left", "share", "excited", "expected"), CASES.values(), ids=CASES)
+def test_verdicts(effects, rivals, left, share, excited, expected):
+    assert verdict_of(effects, rivals, left, share, False, excited, GapSettings()) is expected
+
+
+def test_shares_of_the_settings_decide():
+    strict = GapSettings(named_share=0.99, partial_share=0.97)
+    assert verdict_of([BIG], [], [], 0.98, False, True, strict) is GapVerdict.PARTIAL
+    assert verdict_of([BIG], [], [], 0.96, False, True, strict) is GapVerdict.UNEXPLAINED
+
+
+GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("left", "expected"),
+    [
+        (LEFT, True),
+        (Unexplained("torque y", 3.0, "yaw rate", 0.8, None, "neither"), False),
+        (Unexplained("torque y", 4.0, None, 0.0, None, "neither"), False),
+        (Unexplained("torque y", 4.0, None, 0.8, 0.9, "feeds"), True),
+        (Unexplained("torque y", 4.0, "yaw rate", 0.5, None, "neither"), False),
+    ],
+    ids=["3.2 % of the gap", "1.8 % of the gap", "follows nothing", "narrow band", "half of it follows"],
+)
+def test_what_is_left_matters_where_it_follows_something_and_is_not_small(left, expected):
+    assert matters(left, GAP) is expected
+
+
+def test_an_axis_that_keeps_its_gap_is_not_all_explained():
+    assert verdict_of([BIG], [], [], 0.99, True, True, GapSettings()) is GapVerdict.PARTIAL
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "stays"),
+    [
+        ([20.0, 8.0, 1.0], [1.0, 7.0, 1.0], True),
+        ([20.0, 8.0, 1.0], [1.0, 2.0, 1.0], False),
+        ([20.0, 2.0, 1.0], [1.0, 2.0, 1.0], False),
+        ([1.2, 1.1, 1.0], [1.2, 1.1, 1.0], False),
+        ([1500.0, 9.0, 1.0], [250.0, 2.0, 1.0], True),
+    ],
+    ids=["one axis stays", "all shrink", "a small part of the whole", "no clear gap", "a large rest"],
+)
+def test_a_gap_stays_where_an_axis_is_clear_and_counts(before, after, stays):
+    assert gap_stays(np.array(before + [1.0] * 3), np.array(after + [1.0] * 3)) == stays
+    assert gap_stays(np.array([9.0] * 3 + before), np.array([1.0] * 3 + after)) == stays

@@ -1,0 +1,49 @@
+"""Flights in closed loop that a multirotor can fly exactly, for the tests of this package."""
+
+import numpy as np
+
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.simulation import ClosedLoopSettings, SimulationSettings, measure
+from cpfls_cli.trajectory.attitude import flat_attitude
+from cpfls_cli.vehicle import RotorSettings, VehicleSettings
+
+HUBS = (((0.3, 0.0, 0.05), 1), ((0.0, -0.3, 0.05), -1), ((-0.3, 0.0, 0.05), 1), ((0.0, 0.3, 0.05), -1))
+VEHICLE = VehicleSettings(rotors=tuple(RotorSettings(position_m=hub, spin=spin, radius_m=0.2) for hub, spin in HUBS))
+PERIOD = 0.01
+
+
+def planned(duration=3.0):
+    """Swings along all axes that a multirotor can fly exactly, 1.5 m above the ground."""
+    time = PERIOD * np.arange(round(duration / PERIOD) + 1)
+    size, pulsation, phase = np.array([0.35, 0.25, 0.2]), np.array([2.4, 2.9, 1.7]), np.array([0.3, 1.0, 2.0])
+    angle = np.outer(time, pulsation) + phase
+    motion = [size * pulsation**n * np.sin(angle + n * np.pi / 2) for n in range(5)]
+    heading = np.stack([0.15 * 1.5**n * np.sin(1.5 * time + n * np.pi / 2) for n in range(3)])
+    flat = flat_attitude(time, np.stack(motion[2:]), heading, 9.81)
+    path = {"position": motion[0] + [0, 0, 1.5], "velocity": motion[1], "acceleration": motion[2]}
+    return time, {**path, **vars(flat)}
+
+
+def flown(duration=3.0, seed=1, vehicle=VEHICLE, noise=None, relative_noise=None, **closed_loop):
+    time, plan = planned(duration)
+    settings = SimulationSettings(
+        mode="closed-loop",
+        noise=noise or {},
+        relative_noise=relative_noise or {},
+        closed_loop=ClosedLoopSettings(**closed_loop),
+    )
+    return measure(time, plan, vehicle, settings, np.random.default_rng(seed))
+
+
+def signals_of(flight):
+    logged = flight.signals
+    hidden = "rotor_speed" not in logged
+    names = ("attitude", "body_rate", "position", "velocity", "acceleration")
+    return Signals(
+        time=PERIOD * np.arange(len(logged["attitude"])),
+        vehicle=VEHICLE,
+        rotor_speed=logged["rotor_command" if hidden else "rotor_speed"],
+        commanded=hidden,
+        voltage=logged.get("voltage"),
+        **{name: logged[name] for name in names},
+    )
