@@ -60,6 +60,20 @@ def test_the_verdict_is_printed_with_its_reasons(validated):
         assert f"\n  {SIGNS[reason['speaks']]}: {sentence(reason['text'])}\n" in text
 
 
+def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls, study, tmp_path):
+    model, text, _ = validated
+    page = tmp_path / "report.json"
+    assert cpfls("report", study, model, "-o", page).exit_code == 0
+    sections = json.loads(page.read_text(encoding="utf-8"))["sections"]
+    blocks = {block.get("name", block["kind"]): block for section in sections for block in section["blocks"]}
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    for row in blocks["headline-1"]["rows"]:
+        assert " ".join(" ".join(row).split()) in lines
+    box = blocks["box"]
+    assert f"{box['label']}: {box['title']}" in lines
+    assert all(sentence in lines for sentence in box["sentences"])
+
+
 def test_bands_go_with_a_prediction_and_hold_the_model(validated, cpfls, study, pipeline, tmp_path):
     output = tmp_path / "prediction.h5"
     assert cpfls("predict", study, validated[0], pipeline.flight, "-o", output).exit_code == 0
