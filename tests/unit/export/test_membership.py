@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.export import c_source, python_source, reference_points
-from cpfls_cli.export.json_words import HOW_TO_EVALUATE
+from cpfls_cli.export.json_form import HOW_TO_EVALUATE
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
 from cpfls_cli.regressor import Motion, Regressor, kernels
 from cpfls_cli.regressor.table import padded_breakpoints, structure_table
