@@ -120,7 +120,9 @@ class StepsGroup:
     samples: IntArray = dataset("samples", "samples replayed", "horizon")
     horizon: Array = dataset("horizon", "the same as time", "horizon", units="s")
     windows: int = dataset("windows", "windows replayed")
-    lost: IntArray = dataset("lost", "windows in which a predictor ran away", "predictor", "horizon")
+    lost: IntArray | None = dataset(
+        "lost", "windows in which a predictor ran away", "predictor", "horizon", default=None
+    )
     attitude: Array = dataset(
         "attitude", "root mean square error", "predictor", "horizon", "axis", units="rad", frame=BODY, gaps=True
     )

@@ -13,10 +13,10 @@ from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.state_file import StoppedSearch
 from cpfls_cli.artifacts.sweep_rows import RUN, Rows, run_row, sweep_data, with_row
-from cpfls_cli.commands.identify import input_roles
 from cpfls_cli.commands.stopped import stopped
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.judging import input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.results import Identification

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from cpfls_cli.artifacts.formats import MODEL
-from cpfls_cli.pages.evidence import known_everywhere
 from cpfls_cli.pages.figures.inertia import inertia_figure
 from cpfls_cli.pages.figures.prediction import error_figure, torques_figure
 from cpfls_cli.pages.sections.each import section_of_each
@@ -43,7 +42,7 @@ def _prediction(prediction: Source, index: int, sources: Sources) -> Iterator[Bl
     if outside:
         visited = f"{outside} of {samples} samples lie outside the attitudes that training visited"
         model = sources.by_hash(prediction.made_from("model"))
-        if model is not None and model.artifact.spec == MODEL and known_everywhere(model):
+        if model is not None and model.artifact.spec == MODEL and model.record.known_everywhere:
             known = "one rule holds everywhere and all its coefficients are known"
             yield Text(f"{visited}: {known}, so it holds there too, if the structure does.", "note")
         else:
