@@ -118,6 +118,11 @@ class JudgedGroup:
         axis = int(np.nanargmax(values))
         return float(values[axis]), AXES[axis]
 
+    def worst_r2(self, model: str, part: str) -> float:
+        """Get the smallest R2 of the axes whose torque varies; NaN where none does."""
+        values = self.of_axes("r2", model, part)
+        return float("nan") if np.isnan(values).all() else float(np.nanmin(values))
+
     def winner(self, part: str, axis: int) -> Winner:
         """Tell whether the model or the rigid body has the smaller mean squared error about an axis.
 

@@ -210,8 +210,7 @@ def _bodies(part: JudgedOn) -> list[tuple[str, _Model, str]]:
 def _worst(model: _Model, kind: str, part: str) -> tuple[tuple[float, ...], tuple[str, ...]]:
     """Gather what is compared over all axes; R² as what it lacks, so that the least is the best of every column."""
     judged = model.record.judged
-    shares = judged.of_axes("r2", kind, part)
-    r2 = float(np.nanmin(shares)) if np.isfinite(shares).any() else float("nan")
+    r2 = judged.worst_r2(kind, part)
     largest, relative = float(np.max(judged.of_axes("max_error", kind, part))), judged.worst(kind, part)[0]
     return (largest, relative, 1.0 - r2), (number(largest, 3), percent(relative), r_squared(r2))
 
