@@ -8,13 +8,11 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.artifacts.checkpoint import StoppedSearch
 from cpfls_cli.artifacts.job import Interrupted, Job, header_of, take_inputs
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.state_file import StoppedSearch
-from cpfls_cli.artifacts.store import format_name, read_artifact
-from cpfls_cli.errors import ComputationError, InputError, OutputError
+from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.identification.search_run import SearchRun, SearchStep, Stop, StopReason, is_end
 from cpfls_cli.search.checkpoint import Checkpoint
@@ -139,15 +137,9 @@ class Resumable:
             should_stop=watch.should_stop,
         )
 
-    @contextmanager
-    def kept(self) -> Iterator[None]:
-        """Say of whatever fails inside that the search can go on nevertheless."""
-        try:
-            yield
-        except (ComputationError, OutputError) as error:
-            if self.checkpoint.path.exists():
-                error.add_note(f"{self.checkpoint.path}: is intact; the same command with --resume goes on")
-            raise
+    def kept(self) -> AbstractContextManager[None]:
+        """Add to whatever fails inside that the search can go on nevertheless."""
+        return self.checkpoint.kept()
 
     def end(self, reason: StopReason) -> None:
         """Remove the checkpoint of a search that came to its end, after what it found is written.
@@ -180,7 +172,7 @@ def begin_search(
     files = take_inputs(job, inputs)
     header = header_of(job.study, files)
     search = resumable(job.output, header, resume=options.resume, force=job.force)
-    check_output(job.output, job.force or (options.resume and _may_be_replaced(job.output, header)))
+    check_output(job.output, job.force or (options.resume and search.checkpoint.output_may_be_replaced()))
     return files, search
 
 
@@ -204,17 +196,5 @@ def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Res
     checkpoint = Checkpoint.beside(output, header)
     if resume:
         return Resumable(checkpoint, checkpoint.read())
-    if checkpoint.path.exists() and not force:
-        raise InputError(
-            f"{checkpoint.path}: a search for {output} was stopped here; --resume continues it, --force starts again"
-        )
+    checkpoint.require_permission(force=force)
     return Resumable(checkpoint, None)
-
-
-def _may_be_replaced(output: Path, header: Header) -> bool:
-    """Tell whether an output is what a stopped search left: incomplete, or complete with its checkpoint still there."""
-    if not output.is_file() or format_name(output) != MODEL.format:
-        return False
-    model = read_artifact(output, MODEL)
-    complete = "search/complete" not in model.data or bool(model.data["search/complete"])
-    return not complete or model.header == header
