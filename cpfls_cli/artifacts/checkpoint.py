@@ -190,9 +190,9 @@ class CheckpointRecord(Record):
 
     def _seal(self) -> str:
         """Hash the datasets in the order of the format."""
-        digest, own = hashlib.sha256(), self.path("sha256")
+        digest, seal = hashlib.sha256(), self.path("sha256")
         for path, value in self.data.items():
-            if path != own:
+            if path != seal:
                 digest.update(str(value).encode() if value.ndim == 0 else value.tobytes())
         return digest.hexdigest()
 

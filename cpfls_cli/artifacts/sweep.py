@@ -232,7 +232,7 @@ class SweepRecord(Record):
 
     def _setting(self, index: int) -> SettingRuns:
         setting, run = self.setting, self.run
-        own = run.setting == index
+        chosen = run.setting == index
         return SettingRuns(
             setting.name[index],
             setting.structure[index],
@@ -240,12 +240,12 @@ class SweepRecord(Record):
             int(setting.samples[index]),
             int(setting.population[index]),
             int(setting.generations[index]),
-            run.seed[own],
-            run.evaluations[own],
-            run.mse[own],
-            run.max_error[own],
-            run.relative_error[own],
-            run.condition_number[own],
+            run.seed[chosen],
+            run.evaluations[chosen],
+            run.mse[chosen],
+            run.max_error[chosen],
+            run.relative_error[chosen],
+            run.condition_number[chosen],
         )
 
     def differing_settings(self, other: SweepRecord) -> list[str]:
@@ -286,5 +286,5 @@ class SweepRecord(Record):
             "seeds": setting.seeds.tolist(),
             **setting.spreads(0),
             "condition_number": _spread(setting.condition_number),
-            "held_out": {part: setting.spreads(place) for place, part in enumerate(self.part) if place},
+            "held_out": {part: setting.spreads(number) for number, part in enumerate(self.part) if number},
         }

@@ -199,18 +199,18 @@ def _both(values: Array) -> str:
 
 def _held_out(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
     """Show how good the models are on what they were not learned from."""
-    for place, part in enumerate(sweep.record.part[1:], start=1):
+    for number_of, part in enumerate(sweep.record.part[1:], start=1):
         rows = [
             [
                 setting.name,
                 str(setting.runs),
-                *(_both(values[:, place]) for values in (setting.mse, setting.max_error, setting.relative_error)),
+                *(_both(values[:, number_of]) for values in (setting.mse, setting.max_error, setting.relative_error)),
             ]
             for setting in sweep.record.settings
         ]
         header = ("Setting", "Runs", f"MSE, {SQUARED_TORQUE}", f"Largest error, {TORQUE}", "Relative error")
         caption = f"Models of {sweep.label} on {part}: mean ± standard deviation over the seeds."
-        yield Table(f"held-out-{index}-{place}", caption, header, rows)
+        yield Table(f"held-out-{index}-{number_of}", caption, header, rows)
 
 
 def printed_beside(settings: Sequence[SettingRuns]) -> list[PrintedColumn | None]:

@@ -43,12 +43,12 @@ class SearchOptions:
     scheduler: str | None = None
 
     @property
-    def place(self) -> str:
-        """The option that says who evaluates."""
+    def workers_option(self) -> str:
+        """The option that names the workers, as it is typed."""
         return f"--workers {self.workers}" if self.scheduler is None else f"--scheduler {self.scheduler}"
 
     def employed(self, evaluate: Evaluate) -> AbstractContextManager[Workforce]:
-        """Employ who evaluates."""
+        """Employ the workers that evaluate."""
         return employ(evaluate, count=self.workers, scheduler=self.scheduler)
 
     def require_one_place(self) -> None:
@@ -63,7 +63,7 @@ class SearchOptions:
 
 
 class Watch:
-    """Knows when a search has to stop: at an interrupt, or when its time is over.
+    """Decides when a search has to stop: at an interrupt, or at its time limit.
 
     Parameters
     ----------
@@ -83,12 +83,12 @@ class Watch:
 
     @contextmanager
     def deferring(self) -> Iterator[None]:
-        """Take an interrupt for a wish to stop, as long as the work inside looks at this watch."""
+        """Turn an interrupt into a request to stop, for work inside that asks this watch."""
         with self._job.deferred_interrupts() as self._interrupted:
             yield
 
     def should_stop(self) -> Stop | None:
-        """Tell why to stop, or None."""
+        """Give the reason to stop now, or None."""
         if self.signal is not None:
             return "interrupted"
         return "time-limit" if self._end is not None and time.monotonic() >= self._end else None
@@ -108,7 +108,7 @@ class Resumable:
     stopped: StoppedSearch | None
 
     def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
-        """Say how the search is run; from here on a checkpoint that is not resumed is given up.
+        """Arrange how the search is run; from here on a checkpoint that is not resumed is given up.
 
         Returns
         -------
@@ -125,7 +125,7 @@ class Resumable:
                 with watch.deferring(), options.employed(evaluate) as workforce:
                     yield workforce
             except WorkerError as error:
-                raise WorkerError(f"{options.place}: {error}") from None
+                raise WorkerError(f"{options.workers_option}: {error}") from None
 
         return SearchRun(
             resumed=self.stopped.state if self.stopped else None,
@@ -166,7 +166,7 @@ def begin_search(
     Raises
     ------
     InputError
-        As `begin`; also if there is a checkpoint that nothing is said of, or none that can be resumed.
+        As `begin`; also if there is a checkpoint and neither --resume nor --force, or none that can be resumed.
     """
     options.require_one_place()
     files = take_inputs(job, inputs)
@@ -191,7 +191,7 @@ def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Res
     Raises
     ------
     InputError
-        If there is a checkpoint and neither is said, or none that can be resumed.
+        If there is a checkpoint and neither is asked for, or none that can be resumed.
     """
     checkpoint = Checkpoint.beside(output, header)
     if resume:

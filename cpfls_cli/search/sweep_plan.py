@@ -183,7 +183,7 @@ class SweepPlan:
 
     @contextmanager
     def naming(self, run: int) -> Iterator[None]:
-        """Say in which run something failed."""
+        """Name the run in which something failed."""
         with naming(f"sweep setting '{self.setting(run).variant.name}', seed {self.seed(run)}"):
             yield
 
@@ -228,15 +228,15 @@ def sweep_plan(
 
 def _kept(variant: Variant, kept: TorqueSource | None) -> TorqueSource | None:
     choice = variant.study.identification.choice
-    own = kept if choice == "held-out" else None
+    chosen_on = kept if choice == "held-out" else None
     with settings_of("identification", variant.study):
-        require_flights(choice, given=own is not None)
-    return own
+        require_flights(choice, given=chosen_on is not None)
+    return chosen_on
 
 
 @contextmanager
 def naming(what: str) -> Iterator[None]:
-    """Say where something failed."""
+    """Name the part of a sweep in which something failed."""
     try:
         yield
     except (ComputationError, ConfigError) as error:

@@ -173,12 +173,12 @@ def _identified(
 
 def _shown(job: Job, plan: SweepPlan, number: int) -> Callable[[SearchStep], None]:
     """Show the progress of a run on that of the sweep, by the work that each takes."""
-    before, own, total = plan.work(number), plan.setting(number).work, plan.work(plan.runs)
+    before, work, total = plan.work(number), plan.setting(number).work, plan.work(plan.runs)
     name = f"run {number + 1} of {plan.runs}: {plan.setting(number).variant.name}, seed {plan.seed(number)}"
 
     def show(step: SearchStep) -> None:
         share = (step.generation + step.share) / (step.generations + 1)
         best = "" if step.best is None else f"  best error {step.best[0]:.3g}"
-        job.progress(before + own * share, total, f"{name}, generation {step.generation} of {step.generations}{best}")
+        job.progress(before + work * share, total, f"{name}, generation {step.generation} of {step.generations}{best}")
 
     return show
