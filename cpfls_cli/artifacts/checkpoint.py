@@ -5,16 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
-from cpfls_cli.evolution.archive import Archive, Evaluation
-from cpfls_cli.evolution.history import History
-from cpfls_cli.evolution.state import EvolutionState
-from cpfls_cli.identification.search_run import Unfinished
+
+if TYPE_CHECKING:
+    # What searches loads compiled kernels, which nobody waits for who only reads an artifact.
+    from cpfls_cli.evolution.archive import Evaluation
+    from cpfls_cli.evolution.state import EvolutionState
+    from cpfls_cli.identification.search_run import Unfinished
 
 _BEFORE_ALL = -1
 _NO_GENERATOR = "null"
@@ -125,14 +127,14 @@ class CheckpointRecord(Record):
         population = PopulationGroup(
             genes=state.genes.astype(np.uint16), objectives=state.objectives, subpopulation=state.subpopulations
         )
-        results = state.archive.results
+        none, submitted, results = state.genes[:0], state.archive.submitted, state.archive.results
         unsealed = cls(
             generation=state.index,
             generator=json.dumps(state.rng.bit_generator.state),
             population=population,
-            archive=ArchiveGroup(**_stored(state.archive.submitted, results)),
+            archive=ArchiveGroup(**_stored(submitted, results.genes, results.objectives)),
             history=HistoryGroup(**vars(state.history)),
-            unfinished=UnfinishedGroup(**_stored(state.genes[:0], Evaluation(state.genes[:0], state.objectives[:0]))),
+            unfinished=UnfinishedGroup(**_stored(none, none, state.objectives[:0])),
             sha256="",
         )
         return unsealed._sealed()
@@ -140,23 +142,24 @@ class CheckpointRecord(Record):
     @classmethod
     def of_nothing(cls, unfinished: Unfinished) -> Self:
         """Arrange a search that has not evaluated its whole initial population, only this part of it."""
-        genes, objectives = unfinished.submitted[:0], unfinished.evaluation.objectives[:0]
-        unsealed = cls(
+        from cpfls_cli.evolution.history import History
+
+        none, objectives = unfinished.submitted[:0], unfinished.evaluation.objectives[:0]
+        empty = cls(
             generation=_BEFORE_ALL,
             generator=_NO_GENERATOR,
-            population=PopulationGroup(
-                genes=genes.astype(np.uint16), objectives=objectives, subpopulation=np.arange(0)
-            ),
-            archive=ArchiveGroup(**_stored(genes, Evaluation(genes, objectives))),
+            population=PopulationGroup(genes=none.astype(np.uint16), objectives=objectives, subpopulation=np.arange(0)),
+            archive=ArchiveGroup(**_stored(none, none, objectives)),
             history=HistoryGroup(**vars(History.empty(objectives.shape[1]))),
-            unfinished=UnfinishedGroup(**_stored(unfinished.submitted, unfinished.evaluation)),
+            unfinished=UnfinishedGroup(**_stored(none, none, objectives)),
             sha256="",
         )
-        return unsealed._sealed()
+        return empty.with_unfinished(unfinished)
 
     def with_unfinished(self, unfinished: Unfinished) -> Self:
         """Replace what was evaluated of the next generation."""
-        stored = _stored(unfinished.submitted, unfinished.evaluation)
+        evaluation = unfinished.evaluation
+        stored = _stored(unfinished.submitted, evaluation.genes, evaluation.objectives)
         return replace(self, unfinished=UnfinishedGroup(**stored))._sealed()
 
     def stopped_search(self) -> StoppedSearch:
@@ -169,10 +172,16 @@ class CheckpointRecord(Record):
         """
         if self.sha256 != self._seal():
             raise ValueError("its datasets were changed after it was written (sha256 differs)")
+        from cpfls_cli.identification.search_run import Unfinished
+
         unfinished = Unfinished(*_evaluated(self.unfinished))
         return StoppedSearch(self._state() if self.generation > _BEFORE_ALL else None, unfinished)
 
     def _state(self) -> EvolutionState:
+        from cpfls_cli.evolution.archive import Archive
+        from cpfls_cli.evolution.history import History
+        from cpfls_cli.evolution.state import EvolutionState
+
         rng = np.random.default_rng()
         rng.bit_generator.state = json.loads(self.generator)
         return EvolutionState(
@@ -197,15 +206,13 @@ class CheckpointRecord(Record):
         return digest.hexdigest()
 
 
-def _stored(submitted: IntArray, evaluation: Evaluation) -> dict[str, Any]:
-    return {
-        "submitted": submitted.astype(np.uint16),
-        "genes": evaluation.genes.astype(np.uint16),
-        "objectives": evaluation.objectives,
-    }
+def _stored(submitted: IntArray, genes: IntArray, objectives: Array) -> dict[str, Any]:
+    return {"submitted": submitted.astype(np.uint16), "genes": genes.astype(np.uint16), "objectives": objectives}
 
 
 def _evaluated(stored: ArchiveGroup | UnfinishedGroup) -> tuple[IntArray, Evaluation]:
+    from cpfls_cli.evolution.archive import Evaluation
+
     return _genes(stored.submitted), Evaluation(_genes(stored.genes), stored.objectives)
 
 

@@ -6,15 +6,16 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
-from cpfls_cli.identification.results import Identification
-from cpfls_cli.identification.spread import spread
+
+if TYPE_CHECKING:
+    from cpfls_cli.identification.results import Identification
 
 ALL_SAMPLES = "all"
 """The criterion of a setting that learns from all samples."""
@@ -139,6 +140,44 @@ def _scores(result: Identification | None, part: str) -> tuple[float, float, flo
         return np.nan, np.nan, np.nan
     score = result.scores[part]["model"]
     return float(np.mean(score.mse)), float(np.max(score.max_error)), score.worst_relative_error
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A measure over replicates.
+
+    Attributes
+    ----------
+    count : int
+        Replicates that have a value.
+    mean : float
+        NaN without any.
+    variance : float
+        Unbiased; NaN for fewer than two.
+    """
+
+    count: int
+    mean: float
+    variance: float
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation."""
+        return float(np.sqrt(self.variance))
+
+
+def spread(values: Array) -> Spread:
+    """Measure how far replicates lie apart: ``s^2 = sum (x - mean x)^2 / (n - 1)``.
+
+    Parameters
+    ----------
+    values : array, shape (replicates,)
+        Not finite where a replicate found nothing.
+    """
+    known = values[np.isfinite(values)]
+    mean = float(np.mean(known)) if len(known) else float("nan")
+    variance = float(np.var(known, ddof=1)) if len(known) > 1 else float("nan")
+    return Spread(len(known), mean, variance)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.sweep import SettingRuns, SweepRecord
-from cpfls_cli.identification.spread import spread
+from cpfls_cli.artifacts.sweep import SettingRuns, SweepRecord, spread
 from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.printed import RELATIVE_ERROR, TABLE_5, PrintedColumn
 from cpfls_cli.pages.source import Source, Sources

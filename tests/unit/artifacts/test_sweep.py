@@ -5,7 +5,7 @@ import statistics
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.spread import spread
+from cpfls_cli.artifacts.sweep import spread
 
 VALUES = [0.0012, 0.0009, 0.0031, 0.0010]
 
