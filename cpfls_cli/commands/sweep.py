@@ -9,7 +9,7 @@ from pathlib import Path
 from cpfls_cli.artifacts.job import Job, finish, header_of, take_inputs
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.commands.stopped import stopped
-from cpfls_cli.flights.judging import input_roles
+from cpfls_cli.flights.inputs import input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.identification.search_run import is_end
 from cpfls_cli.pages.source import source_of

@@ -19,8 +19,7 @@ from cpfls_cli.artifacts.sweep import ALL_SAMPLES, RunGroup, SettingGroup, Sweep
 from cpfls_cli.config.overrides import Variant, variants
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
-from cpfls_cli.flights.choosing import choosing_source
-from cpfls_cli.flights.judging import held_out_parts
+from cpfls_cli.flights.inputs import choosing_source, held_out_parts
 from cpfls_cli.flights.training import SplitFlights, TrainingData, split_training, uniform_regressor
 from cpfls_cli.identification.choice import require_flights
 from cpfls_cli.identification.data import TorqueSource, gathered
