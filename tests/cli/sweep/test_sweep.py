@@ -73,7 +73,7 @@ def test_printed_means_and_variances_are_those_of_the_runs(cpfls, words, whole, 
         assert said["seeds"] == [5, 6]
     table = cpfls(*words, "-o", tmp_path / "table.h5").stdout.splitlines()
     assert table[0] == "6 of 6 runs, 3 settings; mean and standard deviation of the training part"
-    assert [line.split("  ")[0] for line in table[1:]] == ["setting", *(s["name"] for s in summary["settings"])]
+    assert [line.split("  ")[0] for line in table[1:]] == ["Setting", *(s["name"] for s in summary["settings"])]
 
 
 def test_without_settings_the_study_itself_is_repeated(cpfls, words, tmp_path):
@@ -113,10 +113,10 @@ def test_workers_find_the_same(cpfls, words, tmp_path):
 
 
 def test_run_that_finds_nothing_is_told_and_counts_for_no_mean(cpfls, words, tmp_path, monkeypatch):
-    from cpfls_cli.commands import sweep as stage
     from cpfls_cli.identification.search import NothingFoundError
+    from cpfls_cli.search import sweep_runs
 
-    calls, identify = [], stage.identify
+    calls, identify = [], sweep_runs.identify
 
     def sometimes(*arguments):
         calls.append(arguments)
@@ -124,7 +124,7 @@ def test_run_that_finds_nothing_is_told_and_counts_for_no_mean(cpfls, words, tmp
             raise NothingFoundError("generations")
         return identify(*arguments)
 
-    monkeypatch.setattr(stage, "identify", sometimes)
+    monkeypatch.setattr(sweep_runs, "identify", sometimes)
     result = cpfls(*words, "-o", tmp_path / "sweep.h5", "--json")
     assert result.exit_code == 0
     assert result.stderr == "cpfls: note: 1 of 6 runs found no finite model; they count for no mean\n"

@@ -1,6 +1,4 @@
-"""Scores worked by hand, baselines, and the spread of replicates beside the standard library's."""
-
-import statistics
+"""Scores worked by hand, and baselines."""
 
 import numpy as np
 import pytest
@@ -8,7 +6,7 @@ import pytest
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification import TorqueData
-from cpfls_cli.identification.judge import constant_inertia_columns, fit_baselines, score, score_of, spread
+from cpfls_cli.identification.judge import constant_inertia_columns, fit_baselines, score, score_of
 from cpfls_cli.regressor import Motion
 
 
@@ -141,21 +139,3 @@ def test_rows_are_weighted_by_axis():
 
 
 VALUES = [0.0012, 0.0009, 0.0031, 0.0010]
-
-
-def test_mean_and_variance():
-    found = spread(np.array(VALUES))
-    assert found.count == len(VALUES)
-    assert found.mean == pytest.approx(statistics.mean(VALUES))
-    assert found.variance == pytest.approx(statistics.variance(VALUES))
-    assert found.deviation == pytest.approx(statistics.stdev(VALUES))
-
-
-def test_what_is_not_known_does_not_count():
-    assert spread(np.array([*VALUES, np.nan, np.inf])) == spread(np.array(VALUES))
-
-
-def test_too_few():
-    one, none = spread(np.array([3.0])), spread(np.array([]))
-    assert (one.count, one.mean) == (1, 3.0)
-    assert np.isnan([one.variance, one.deviation, none.mean, none.variance]).all()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.formats import CHECKPOINT
+from cpfls_cli.artifacts.checkpoint import CheckpointRecord
 from cpfls_cli.artifacts.job import header_of
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
@@ -92,7 +92,7 @@ def test_what_was_evaluated_of_the_next_generation_comes_back(checkpoint, finish
     if not finished:
         checkpoint.remove()
     checkpoint.add(unfinished())
-    assert check_artifact(read_artifact(checkpoint.path, CHECKPOINT)) == []
+    assert check_artifact(read_artifact(checkpoint.path, CheckpointRecord.spec())) == []
     stopped = checkpoint.read()
     for stored, kept in (
         (stopped.unfinished.submitted, unfinished().submitted),
@@ -109,7 +109,7 @@ def test_what_was_evaluated_of_the_next_generation_comes_back(checkpoint, finish
 
 
 def test_it_is_a_good_artifact_and_equal_states_are_equal_files(checkpoint, tmp_path):
-    assert check_artifact(read_artifact(checkpoint.path, CHECKPOINT)) == []
+    assert check_artifact(read_artifact(checkpoint.path, CheckpointRecord.spec())) == []
     other = Checkpoint.beside(tmp_path / "other.h5", header())
     other.write(checkpoint.read().state)
     assert other.path.read_bytes() == checkpoint.path.read_bytes()
@@ -159,7 +159,7 @@ def test_what_does_not_change_the_search_may_change(checkpoint, now):
 
 def test_every_bit_of_the_datasets_counts(checkpoint):
     checkpoint.add(unfinished())
-    artifact = read_artifact(checkpoint.path, CHECKPOINT)
+    artifact = read_artifact(checkpoint.path, CheckpointRecord.spec())
     for name, value in artifact.data.items():
         if np.asarray(value).dtype.kind == "U":
             continue

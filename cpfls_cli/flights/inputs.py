@@ -1,4 +1,4 @@
-"""Flights that a model is judged on, beside those that it learns from: their roles, and what of them is held out."""
+"""Inputs of an identification: flights that train, flights that a model is chosen on, and what judges it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from cpfls_cli.artifacts.scores import TRAINING
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ConfigError, InputError
-from cpfls_cli.flights.choosing import choosing_roles
 from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.flights.training import flight_roles
-from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.data import TorqueSource, joined
 
 
 def input_roles(
@@ -30,8 +29,47 @@ def input_roles(
     choose_on : sequence of Path
         That the model is chosen on.
     """
-    roles = flight_roles(flights) | ({"selection": selection} if selection else {}) | choosing_roles(choose_on)
-    return roles | {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
+    roles = flight_roles(flights) | ({"selection": selection} if selection else {})
+    return roles | _numbered("choose-on", choose_on) | _numbered("validate", validate)
+
+
+def _numbered(role: str, flights: Sequence[Path]) -> dict[str, Path]:
+    """Give flights of one role numbers: ``choose-on-1``, ``choose-on-2`` and so on."""
+    return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}
+
+
+def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> TorqueSource | None:
+    """Open the flights to choose on.
+
+    Parameters
+    ----------
+    inputs : mapping of str to InputFile
+        All inputs of the command by role.
+
+    Returns
+    -------
+    TorqueSource or None
+        None where there are none.
+
+    Raises
+    ------
+    InputError
+        If one of them is another input too: what was chosen on a flight has been fitted to it.
+    """
+    for role, path in _numbered("choose-on", flights).items():
+        others = {other: file for other, file in inputs.items() if other != role}
+        same = next((other for other, file in others.items() if file.sha256 == inputs[role].sha256), None)
+        if same is not None:
+            raise InputError(f"--choose-on {path}: {_USED[same.partition('-')[0]]}; choose on another flight")
+    return joined([flight_source(path) for path in flights]) if flights else None
+
+
+_USED = {
+    "flight": "is a flight that trains",
+    "selection": "is the selection, no flight",
+    "validate": "judges (--validate)",
+    "choose": "is given twice",
+}
 
 
 def held_out_parts(
@@ -62,8 +100,8 @@ def held_out_parts(
         )
     parts = dict(rests)
     learned = {file.sha256 for role, file in inputs.items() if role.startswith("flight")}
-    for number, path in enumerate(validate, start=1):
-        if inputs[f"validate-{number}"].sha256 in learned:
+    for role, path in _numbered("validate", validate).items():
+        if inputs[role].sha256 in learned:
             raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
         parts[_free_name(path.name, {TRAINING, *parts})] = flight_source(path)
     return parts
