@@ -12,7 +12,6 @@ from cpfls_cli.pages.sections.extension import extension_section
 from cpfls_cli.pages.sections.flight import flight_section
 from cpfls_cli.pages.sections.identification import identification_section
 from cpfls_cli.pages.sections.partitions import partitions_section
-from cpfls_cli.pages.sections.path import path_section
 from cpfls_cli.pages.sections.prediction import prediction_section
 from cpfls_cli.pages.sections.provenance import provenance_section
 from cpfls_cli.pages.sections.replicates import replicates_section
@@ -30,6 +29,7 @@ from cpfls_cli.pages.sections.validation import validation_section
 from cpfls_cli.pages.sections.vehicle import vehicle_section
 from cpfls_cli.pages.selection import reduction_section
 from cpfls_cli.pages.source import Sources
+from cpfls_cli.pages.trajectory import path_section
 from cpfls_cli.report.content import Document
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from cpfls_cli.pages.claims.claim import Claim
-from cpfls_cli.pages.leg import first_leg
 from cpfls_cli.pages.printed import PRINTED_JERK_INTEGRAL, PRINTED_MOVE_S, PRINTED_PEAKS
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.numbers import number, percent
@@ -27,7 +26,7 @@ _CLAIM = Claim(
 
 def move_claim(trajectories: Sequence[Source]) -> Claim:
     """Hold the first move of a path against the numbers that the paper prints."""
-    along = [trajectory for trajectory in trajectories if "position" in trajectory.artifact.data]
+    along = [trajectory for trajectory in trajectories if not trajectory.record.held]
     if not along:
         return _CLAIM.lacks("a trajectory", "cpfls trajectory CONFIG -o trajectory.h5")
     # Where several paths are shown, the first one is that of training.
@@ -40,7 +39,7 @@ def move_claim(trajectories: Sequence[Source]) -> Claim:
 
 def move_numbers(trajectory: Source) -> dict[str, float]:
     """Measure the first move of a path: its peaks by derivative, its time and its integral of absolute jerk."""
-    leg = first_leg(trajectory.artifact)
+    leg = trajectory.record.first_leg()
     peaks = {name: float(np.max(np.abs(leg.curves[name]))) for name in PRINTED_PEAKS}
     taken = float(leg.time[-1] - leg.time[0])
     return peaks | {"time": taken, "integral of jerk": float(trapezoid(np.abs(leg.curves["jerk"]), leg.time))}
