@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
-from cpfls_cli.control import Plan, Scores
-from cpfls_cli.flightlog.results import ImportedFlight
-from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.physics import not_positive_definite
-from cpfls_cli.simulation import FlownEffects
+
+if TYPE_CHECKING:
+    from cpfls_cli.control import Plan, Scores
+    from cpfls_cli.flightlog.results import ImportedFlight
+    from cpfls_cli.identification.model import Model
+    from cpfls_cli.simulation import FlownEffects
 
 
 @record
@@ -159,6 +160,8 @@ class TrackingGroup:
         attitude : array, shape (time, 3), rad
             Of the flight under the model's controller.
         """
+        from cpfls_cli.identification.physics import not_positive_definite
+
         return cls(
             controller=tuple(controllers),
             time=plan.time[:: plan.parts],

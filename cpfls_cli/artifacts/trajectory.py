@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
-from cpfls_cli.trajectory.legs import Leg
-from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
+
+if TYPE_CHECKING:
+    from cpfls_cli.trajectory.legs import Leg
+    from cpfls_cli.trajectory.planning import PlannedRotation
 
 DERIVATIVES = ("pop", "crackle", "snap", "jerk", "acceleration", "velocity", "displacement")
 """Derivatives of the displacement, from the sixth down to itself."""
@@ -102,7 +104,7 @@ class TrajectoryRecord(Record):
         """Arrange a plan."""
         sampled = vars(planned)
         signals = {name: sampled[name] for name in cls.__dataclass_fields__ if name in sampled}
-        return cls(**signals, leg=LegGroup.of(planned.legs) if isinstance(planned, Trajectory) else None)
+        return cls(**signals, leg=LegGroup.of(sampled["legs"]) if "legs" in sampled else None)
 
     @property
     def held(self) -> bool:

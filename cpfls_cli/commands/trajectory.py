@@ -116,9 +116,8 @@ def _rotation(job: Job, settings: TrajectorySettings) -> tuple[RotationPath, Exc
     if settings.path == "full-rotation":
         return full_rotation(settings.rotation, settings.duration_s, rng, vehicle.inertia_kg_m2), None
     structure = job.study.identification
-<<<<<<< HEAD
-    found = optimised_rotation(settings.rotation, settings.duration_s, structure, vehicle, rng, job.progress)
-    return found.path, found
+    excitation = optimised_rotation(settings.rotation, settings.duration_s, structure, vehicle, rng, job.progress)
+    return excitation.path, excitation
 
 
 def _read_waypoints(path: Path, paused: bool) -> tuple[WaypointSettings, ...]:
@@ -177,9 +176,6 @@ def _line_and_column(key: str, lines: list[int]) -> str:
         return ""
     column = {"position_m": ", ".join(_POSITION_COLUMNS)}.get(parts[2], parts[2])
     return f":{lines[int(parts[1])]}: {column}"
-=======
-    excitation = optimised_rotation(settings.rotation, settings.duration_s, structure, vehicle, rng, job.progress)
-    return excitation.path, excitation
 
 
 def _demand(
@@ -286,4 +282,3 @@ def _leg_summary(leg: Leg) -> dict[str, Any]:
         "limited_by": list(leg.limited_by),
         "jerk_integral_m_s2": absolute_jerk(leg),
     }
->>>>>>> c7b286b (WIP trajectory record and page)

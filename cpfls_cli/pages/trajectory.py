@@ -18,7 +18,7 @@ from cpfls_cli.report.numbers import number, plain
 from cpfls_cli.simulation.flyable import Flyability, TooMuch
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
-from cpfls_cli.vehicle.violations import RotorViolation
+from cpfls_cli.vehicle.rotors import RotorViolation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
