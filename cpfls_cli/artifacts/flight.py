@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -14,7 +15,11 @@ if TYPE_CHECKING:
     from cpfls_cli.control import Plan, Scores
     from cpfls_cli.flightlog.results import ImportedFlight
     from cpfls_cli.identification.model import Model
+    from cpfls_cli.regressor.motion import Motion
     from cpfls_cli.simulation import FlownEffects
+
+MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
+"""Fields of trajectories and flights that hold Euler angles and their derivatives."""
 
 
 @record
@@ -160,7 +165,7 @@ class TrackingGroup:
         attitude : array, shape (time, 3), rad
             Of the flight under the model's controller.
         """
-        from cpfls_cli.identification.physics import not_positive_definite
+        from cpfls_cli.dynamics.rigid_body import not_positive_definite
 
         return cls(
             controller=tuple(controllers),
@@ -337,6 +342,13 @@ class FlightRecord(Record):
             ),
         )
 
+    def with_warnings(self, warnings: Sequence[str]) -> Self:
+        """Add to what is to be known about the log."""
+        if not warnings:
+            return self
+        quality = self.quality or QualityGroup()
+        return replace(self, quality=replace(quality, warning=(*(quality.warning or ()), *warnings)))
+
     @classmethod
     def _signal_names(cls) -> list[str]:
         return [spec.path for spec in cls.spec().datasets if "/" not in spec.path]
@@ -345,6 +357,16 @@ class FlightRecord(Record):
     def signals(self) -> dict[str, Array]:
         """Time and the signals that it holds, by the names of the fields."""
         return {name: values for name in self._signal_names() if (values := getattr(self, name)) is not None}
+
+    @property
+    def motion(self) -> Motion:
+        """Euler angles and their derivatives, of a flight that was read with all of `MOTION`."""
+        from cpfls_cli.regressor.motion import Motion
+
+        assert self.attitude is not None, "the flight has no attitude"
+        assert self.attitude_rate is not None, "the flight has no Euler rates"
+        assert self.attitude_acceleration is not None, "the flight has no Euler accelerations"
+        return Motion(self.attitude, self.attitude_rate, self.attitude_acceleration)
 
     @property
     def largest_torque(self) -> list[float]:

@@ -204,9 +204,9 @@ def simulate(
 ) -> None:
     """Fly a trajectory: exactly, in closed loop with effects that a model lacks, or with a model that controls it."""
     with messages_for_errors():
-        from cpfls_cli.commands.effect_options import simulation_overrides
+        from cpfls_cli.commands.simulate import option_overrides
 
-        common = replace(common, overrides=[*(common.overrides or []), *simulation_overrides(mode, effect or [])])
+        common = replace(common, overrides=[*(common.overrides or []), *option_overrides(mode, effect or [])])
 
     def call(job: Job) -> Outcome:
         from cpfls_cli.commands import simulate as stage

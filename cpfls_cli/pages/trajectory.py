@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.trajectory import DERIVATIVES, LegGroup, TrajectoryRecord
 from cpfls_cli.pages.printed import PRINTED_PEAKS
-from cpfls_cli.pages.sections.each import section_of_each
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import number, plain
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cpfls_cli.excitation import Excitation
-
-AXES = ("roll", "pitch", "yaw")
-"""Names of the Euler angles, in their order."""
 
 _UNITS = ("m/s⁶", "m/s⁵", "m/s⁴", "m/s³", "m/s²", "m/s", "m")
 _MOVES_SHOWN = 20
@@ -127,9 +124,7 @@ def path_section(sources: Sources) -> Section | None:
     )
 
 
-def _path(
-    trajectory: Source[TrajectoryRecord], index: int, printed: Mapping[str, float] | None
-) -> Iterator[Block]:
+def _path(trajectory: Source[TrajectoryRecord], index: int, printed: Mapping[str, float] | None) -> Iterator[Block]:
     record = trajectory.record
     if record.held:
         yield from _turns(f"turns-{index}", trajectory)
