@@ -1,4 +1,4 @@
-"""The page of a flight: what was recorded or flown, what was repaired, what it lacks; its vehicle; Figure 4, Table 3."""
+"""The page of a flight: what was flown, what was repaired, what it lacks; and of its vehicle; Figure 4, Table 3."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a prediction: how well a model explains a flight, and where it cannot be trusted; Figure 7 of the paper."""
+"""The page of a prediction: how well a model explains a flight, where not to trust it; Figure 7 of the paper."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def answer(prediction: PredictionRecord, model: Record | None) -> Iterator[Text]
 
 
 def trust_along(outside: int, not_positive_definite: int, samples: int, model: Record | None) -> Iterator[Text]:
-    """Say what a model is worth along a flight: at attitudes that training did not visit, and where no body has its D(q).
+    """Say what a model is worth at attitudes that training did not visit, and where no body has its D(q).
 
     Parameters
     ----------

@@ -79,10 +79,9 @@ def _table(flight: Source[FlightRecord], index: int) -> Table:
     since = number(tracking.settled_from, 3)
     caption = f"Attitude errors of {flight.label} after {since} s, when an initial error has died down."
     if flight.config["simulation"]["computed_torque"]["torque_max_n_m"] is not None:
-        shares = zip(tracking.controller, tracking.clipped, strict=True)
-        caption += (
-            f" Commands clipped: {', '.join(f'{_CONTROLLERS[name]} {percent(share)}' for name, share in shares)}."
-        )
+        clipped = zip(tracking.controller, tracking.clipped, strict=True)
+        shares = ", ".join(f"{_CONTROLLERS[name]} {percent(share)}" for name, share in clipped)
+        caption += f" Commands clipped: {shares}."
     return Table(f"tracking-{index}", caption, _HEADER, [_row(tracking, name) for name in tracking.controller])
 
 
