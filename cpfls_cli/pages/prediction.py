@@ -73,7 +73,7 @@ def _outside_words(model: Record | None) -> str:
             "the same coefficients hold there, if the structure does: one rule holds everywhere and all its "
             f"coefficients are known (condition number {condition})"
         )
-    return "do not trust the model there: the model extrapolates"
+    return "do not trust it there, the model extrapolates"
 
 
 def prediction_section(sources: Sources) -> Section | None:
