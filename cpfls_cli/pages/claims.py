@@ -13,7 +13,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.scores import MODEL, TRAINING
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.pages.leg import first_leg
 from cpfls_cli.pages.printed import (
     PRINTED_CONTRIBUTION,
     PRINTED_JERK_INTEGRAL,
@@ -319,7 +318,7 @@ def _move(sources: Sources) -> Measurement:
 
 def _move_numbers(trajectory: Source[TrajectoryRecord]) -> dict[str, float]:
     """Measure the first move of a path: its peaks by derivative, its time and its integral of absolute jerk."""
-    leg = first_leg(trajectory.artifact)
+    leg = trajectory.record.first_leg()
     peaks = {name: float(np.max(np.abs(leg.curves[name]))) for name in PRINTED_PEAKS}
     taken = float(leg.time[-1] - leg.time[0])
     return peaks | {"time": taken, "integral of jerk": float(trapezoid(np.abs(leg.curves["jerk"]), leg.time))}

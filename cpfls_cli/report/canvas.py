@@ -199,7 +199,7 @@ def evenly_spread(samples: int, rows: int = _ROWS) -> IntArray:
     return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, rows)).round().astype(int))
 
 
-def runs(marked: Array) -> list[tuple[int, int]]:
+def runs(marked: Array | BoolArray) -> list[tuple[int, int]]:
     """Find stretches of marked samples.
 
     Parameters

@@ -10,7 +10,6 @@ import pytest
 
 from cpfls_cli.artifacts.formats import RECORDS, record_of_format
 from cpfls_cli.artifacts.store import file_sha256, read_any
-from cpfls_cli.commands.plain_json import plain
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import ReportSettings, resolved
 from cpfls_cli.pages.page import report_page
@@ -21,6 +20,7 @@ from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
 from cpfls_cli.report.markdown import markdown_page
+from cpfls_cli.report.outcome import plain
 from cpfls_cli.report.terminal import terminal_lines, warnings_of
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.cli.report import gap_artifacts

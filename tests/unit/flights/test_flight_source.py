@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.formats import FLIGHT
+from cpfls_cli.artifacts.flight import MOTION, FlightRecord
 from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.store import Artifact, write_artifact
+from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights import flight_source as sources
@@ -18,10 +18,9 @@ SAMPLES = 30
 
 def write(path, samples):
     rng = np.random.default_rng(2)
-    data = {name: rng.normal(size=(samples, 3)) for name in (*sources.MOTION, "torque")}
-    write_artifact(
-        path, Artifact(FLIGHT, Header("1", 1, resolved_yaml(Study())), data | {"time": np.arange(samples) / 10})
-    )
+    signals = {name: rng.normal(size=(samples, 3)) for name in (*MOTION, "torque")}
+    header = Header("1", 1, resolved_yaml(Study()))
+    write_record(path, FlightRecord(header=header, time=np.arange(samples) / 10, **signals))
 
 
 @pytest.fixture

@@ -3,18 +3,25 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.formats import FLIGHT
+from cpfls_cli.artifacts.flight import FlightRecord, TrackingGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.study import ReportSettings
-from cpfls_cli.pages.sections.tracking import tracking_section
 from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.tracking import tracking_section
 from cpfls_cli.report.content import Cell, Plot, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 SETTINGS = {"plant": "vehicle", "natural_frequency_hz": [1.2, 1.2, 0.5], "damping": 1.0, "torque_max_n_m": None}
-NAMES = ["model", "rigid-body", "pd", "vehicle"]
+NAMES = ("model", "rigid-body", "pd", "vehicle")
+
+
+def page(flight, settings=SETTINGS):
+    inputs = {role: InputFile(f"{role}.h5", "0" * 64, "cpfls/x") for role in ("model", "trajectory")}
+    config = {"simulation": {"computed_torque": settings}}
+    record = flight.with_header(Header("0", 1, "", inputs))
+    source = Source.of("tracked.h5", "1" * 64, record, config, VehicleSettings(), 0)
+    return tracking_section(Sources([source], VehicleSettings(), ReportSettings()))
 
 
 def sections(shares, settings=SETTINGS, **changed):
@@ -22,26 +29,25 @@ def sections(shares, settings=SETTINGS, **changed):
     time = np.arange(301) / 100
     size = np.radians(np.array(shares, dtype=float))
     by_axis = np.tile(size[:, None], (1, 3))
-    data = {
+    comparison = {
+        "controller": NAMES,
         "time": time,
-        "tracking/controller": np.array(NAMES),
-        "tracking/time": time,
-        "tracking/error": np.tile(size[:, None, None], (1, len(time), 3)),
-        "tracking/settled_from": 1.0,
-        "tracking/settled_rms": by_axis,
-        "tracking/settled_max": by_axis,
-        "tracking/torque_rms": 0.5 + 0 * by_axis,
-        "tracking/clipped": np.array([0.25, 0.0, 0.0, 0.0]),
-        "tracking/lost_at": np.where(np.isfinite(size), np.nan, 2.0),
-        "tracking/control_rate": 100.0,
-        "tracking/outside": 0 * time,
-        "tracking/not_positive_definite": 0,
+        "error": np.tile(size[:, None, None], (1, len(time), 3)),
+        "settled_from": 1.0,
+        "rms": by_axis,
+        "settled_rms": by_axis,
+        "max_error": by_axis,
+        "settled_max": by_axis,
+        "torque_rms": 0.5 + 0 * by_axis,
+        "clipped": np.array([0.25, 0.0, 0.0, 0.0]),
+        "lost_at": np.where(np.isfinite(size), np.nan, 2.0),
+        "control_rate": 100.0,
+        "outside": np.zeros(len(time), dtype=bool),
+        "not_positive_definite": 0,
         **changed,
     }
-    inputs = {role: InputFile(f"{role}.h5", "0" * 64, "cpfls/x") for role in ("model", "trajectory")}
-    config = {"simulation": {"computed_torque": settings}}
-    source = Source("tracked.h5", "1" * 64, Artifact(FLIGHT, Header("0", 1, "", inputs), data), config, None, 0)
-    return tracking_section(Sources([source], VehicleSettings(), ReportSettings()))
+    rotors = np.ones((len(time), 4))
+    return page(FlightRecord(time=time, rotor_speed=rotors, tracking=TrackingGroup(**comparison)), settings)
 
 
 def texts(section):
@@ -49,8 +55,7 @@ def texts(section):
 
 
 def test_a_flight_without_controllers_has_no_section():
-    flight = Source("f.h5", "1" * 64, Artifact(FLIGHT, Header("0", 1, ""), {"time": np.zeros(2)}), {}, None, 0)
-    assert tracking_section(Sources([flight], VehicleSettings(), ReportSettings())) is None
+    assert page(FlightRecord(time=np.zeros(2))) is None
 
 
 @pytest.mark.parametrize(
@@ -75,22 +80,21 @@ def test_a_lost_vehicle_is_told_in_its_row():
     (table,) = (block for block in section.blocks if isinstance(block, Table))
     assert table.rows[0][1] == Cell("lost at 2.00 s", "warning")
     assert len(table.rows[0]) == len(table.header)
-    assert texts(section)["The controller with the identified model lost the vehicle."] == "warning"
+    ends = "the flight ends after 301 samples, where the controller with the model lost the vehicle"
+    assert texts(section)[ends] == "warning"
     assert not any("times that" in text for text in texts(section))
 
 
 def test_clipping_extrapolation_and_impossible_inertia_are_told():
     limited = {**SETTINGS, "torque_max_n_m": [1.0, 1.0, 1.0]}
-    outside = np.concatenate([np.ones(7), np.zeros(294)])
-    section = sections(
-        [0.5, 1.0, 8.0, 0.4], limited, **{"tracking/outside": outside, "tracking/not_positive_definite": 3}
-    )
+    outside = np.arange(301) < 7
+    section = sections([0.5, 1.0, 8.0, 0.4], limited, outside=outside, not_positive_definite=3)
     (table,) = (block for block in section.blocks if isinstance(block, Table))
     assert "Commands clipped: identified model 25.0 %, rigid body 0 %" in table.caption
     assert [text for text, tone in texts(section).items() if tone == "warning"] == [
-        "7 of 301 samples of this flight lie outside the attitudes that training visited: the model extrapolates "
-        "there.",
-        "D(q) is not positive definite at 3 of 301 samples: no body moves like that.",
+        "7 of 301 samples lie outside the attitudes that training visited: do not trust it there, the model "
+        "extrapolates",
+        "D(q) is not positive definite at 3 of 301 samples: no body moves like that",
     ]
 
 
