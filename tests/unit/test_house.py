@@ -11,6 +11,7 @@ import pytest
 import cpfls_cli
 
 PACKAGE = Path(cpfls_cli.__file__).parent
+TESTS = Path(__file__).parents[1]
 MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 60
 
@@ -105,3 +106,28 @@ def test_docstrings_do_not_repeat_signatures():
 def test_package_files_only_re_export(path):
     allowed = (ast.Expr, ast.Import, ast.ImportFrom, ast.Assign)
     assert all(isinstance(node, allowed) for node in ast.parse(path.read_text(encoding="utf-8")).body)
+
+
+def imported_tests(path):
+    """Names below `tests` that a module imports, wherever in it the import stands."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            yield from ["relative import"] * (node.level > 0)
+            if node.module == "tests":
+                yield from (f"tests.{alias.name}" for alias in node.names)
+            elif (node.module or "").startswith("tests."):
+                yield node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.partition(".")[0] == "tests")
+
+
+def test_tests_import_from_shared_builders_alone():
+    """What tests of several packages build stands in `tests/builders`, which holds no tests."""
+    wrong = [
+        f"{path.relative_to(TESTS)}: {name}"
+        for path in sorted(TESTS.rglob("*.py"))
+        for name in imported_tests(path)
+        if not f"{name}.".startswith("tests.builders.")
+    ]
+    assert wrong == []
+    assert [path.name for path in TESTS.glob("builders/test_*.py")] == []

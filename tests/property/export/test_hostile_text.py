@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from cpfls_cli.export import Verdict, c_source, json_text, python_source, reference_points
 from cpfls_cli.export.tables import number
 from cpfls_cli.export.text import checked_identifier, comment_text, identifier
-from tests.unit.export.cases import CASES, model_of, sheet_of
+from tests.builders.exported_models import CASES, model_of, sheet_of
 
 MODEL = model_of(CASES["seesaw, one function"])
 POINTS = reference_points(MODEL, np.random.default_rng(1))
