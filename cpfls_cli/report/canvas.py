@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.numbers import plain
 

@@ -12,6 +12,7 @@ import cpfls_cli
 from cpfls_cli.artifacts.formats import RECORDS
 
 PACKAGE = Path(cpfls_cli.__file__).parent
+TESTS = Path(__file__).parents[1]
 MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 60
 
@@ -143,3 +144,28 @@ def test_a_dataset_is_looked_up_by_its_path_in_artifacts_only():
             nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
             lookups[name] = [text for node in nodes if (text := looked_up(node)) is not None]
     assert {name: texts for name, texts in lookups.items() if texts} == {}
+
+
+def imported_tests(path):
+    """Names below `tests` that a module imports, wherever in it the import stands."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            yield from ["relative import"] * (node.level > 0)
+            if node.module == "tests":
+                yield from (f"tests.{alias.name}" for alias in node.names)
+            elif (node.module or "").startswith("tests."):
+                yield node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.partition(".")[0] == "tests")
+
+
+def test_tests_import_from_shared_builders_alone():
+    """What tests of several packages build stands in `tests/builders`, which holds no tests."""
+    wrong = [
+        f"{path.relative_to(TESTS)}: {name}"
+        for path in sorted(TESTS.rglob("*.py"))
+        for name in imported_tests(path)
+        if not f"{name}.".startswith("tests.builders.")
+    ]
+    assert wrong == []
+    assert [path.name for path in TESTS.glob("builders/test_*.py")] == []

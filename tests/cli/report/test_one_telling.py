@@ -23,7 +23,7 @@ from cpfls_cli.report.markdown import markdown_page
 from cpfls_cli.report.outcome import plain
 from cpfls_cli.report.terminal import terminal_lines, warnings_of
 from cpfls_cli.vehicle.settings import VehicleSettings
-from tests.cli.report import gap_artifacts
+from tests.builders import gap_artifacts
 
 FROM_PIPELINE = ("trajectory", "flight", "selection", "model", "prediction")
 FROM_NUMBERS = ("disagreement", "diagnosis", "extended")

@@ -13,7 +13,7 @@ from cpfls_cli.gap.balance.inertial import rotation_balance, translation_balance
 from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.vehicle.settings import VehicleSettings
-from tests.unit.gap.synthetic_flights import sines
+from tests.builders.gap_flights import sines
 
 TENSOR = np.array([[0.6, 0.03, -0.02], [0.03, 0.7, 0.04], [-0.02, 0.04, 1.2]])
 VEHICLE = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.03, -0.02, 0.04))

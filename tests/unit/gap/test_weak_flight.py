@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import actuated, columns_of
-from tests.unit.gap.synthetic_flights import THROUGH, VEHICLE, candidate, effect_wrench, fly, weak
+from tests.builders.gap_flights import THROUGH, VEHICLE, candidate, effect_wrench, fly, weak
 
 EFFECTS = [
     (candidate("products_of_inertia"), [0.03, -0.02, 0.01]),

@@ -50,7 +50,9 @@ def noise(rng, shape, size, coloured):
     return size * (lfilter([np.sqrt(1 - 0.81)], [1, -0.9], white, axis=0) if coloured else white)
 
 
-def flight(rng, faults, level=(0.0, 0.0), *, coloured=False, amplitude=(0.14, 0.14, 0.3), duration=30.0, period=0.01):
+def faulty_flight(
+    rng, faults, level=(0.0, 0.0), *, coloured=False, amplitude=(0.14, 0.14, 0.3), duration=30.0, period=0.01
+):
     attitude, rate = motion(rng, amplitude)
     time = np.arange(round(duration / period)) * period
     turned = Rotation.from_rotvec(-faults.misalignment).as_matrix()
@@ -61,5 +63,5 @@ def flight(rng, faults, level=(0.0, 0.0), *, coloured=False, amplitude=(0.14, 0.
     return Signals(time=time, body_rate=gyro, vehicle=VehicleSettings(), attitude=seen)
 
 
-def flights(rng, faults, number=3, **options):
-    return [flight(rng, faults, **options) for _ in range(number)]
+def faulty_flights(rng, faults, number=3, **options):
+    return [faulty_flight(rng, faults, **options) for _ in range(number)]
