@@ -7,6 +7,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.inertia import body_torque_columns, symmetric
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 VERTICAL = 0.1
@@ -217,3 +218,13 @@ def why_unphysical(inertia: Array) -> str | None:
     if largest > 1.1 * (smallest + middle):
         return f"breaks the triangle inequality ({moments})"
     return None
+
+
+def rigid_columns(motion: Motion) -> Array:
+    """Build the columns of the six inertia parameters Ixx, Iyy, Izz, Ixy, Ixz, Iyz in the generalised torque.
+
+    Returns
+    -------
+    array, shape (samples, 3, 6)
+    """
+    return rigid_body_regressor(motion.attitude, motion.rate, motion.acceleration)

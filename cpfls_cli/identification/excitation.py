@@ -9,14 +9,14 @@ import numpy as np
 from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.dynamics.rigid_body import vertical
+from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical
 from cpfls_cli.fuzzy.inputs import wrap
 from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale
 from cpfls_cli.identification.judge import Explained
 from cpfls_cli.identification.least_squares import Triangle
 from cpfls_cli.identification.samples import Samples
 from cpfls_cli.identification.solver import regressor_blocks
-from cpfls_cli.regressor.motion import RIGID, rigid_columns
+from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.rotations import body_acceleration, body_torque, euler_rate_matrix
 

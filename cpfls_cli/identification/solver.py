@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification.cross_validation import RidgeChoice, RidgeCurve, ridge_curve
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.least_squares import LeastSquares, NormalEquations, Project, Triangle, solve_normal
 from cpfls_cli.identification.samples import Products, Samples
-from cpfls_cli.regressor.motion import RIGID, rigid_columns
+from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Breakpoints, Regressor
 
 # Samples written out at a time: some 10 MB for 113 parameters.

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray, require_columns
-from cpfls_cli.dynamics.rigid_body import rigid_body_regressor
 from cpfls_cli.regressor.structure import InertiaFunction
 
 RIGID = 6
@@ -79,13 +78,3 @@ def carrier(function: InertiaFunction, motion: Motion) -> Carrier:
     places[function.row, function.column] = places[function.column, function.row] = 1.0
     rate = motion.rate @ places
     return Carrier(motion.acceleration @ places, rate, 0.5 * np.sum(motion.rate * rate, axis=1))
-
-
-def rigid_columns(motion: Motion) -> Array:
-    """Build the columns of the six inertia parameters Ixx, Iyy, Izz, Ixy, Ixz, Iyz in the generalised torque.
-
-    Returns
-    -------
-    array, shape (samples, 3, 6)
-    """
-    return rigid_body_regressor(motion.attitude, motion.rate, motion.acceleration)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import IdentificationSettings, data
 from cpfls_cli.identification.cross_validation import contiguous_blocks, with_folds
 from cpfls_cli.identification.evaluator import decode
@@ -14,7 +15,7 @@ from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import RidgeSettings
 from cpfls_cli.regressor import Regressor, data_ranges, model_structure, torque_sensitivity
-from cpfls_cli.regressor.motion import RIGID, rigid_columns
+from cpfls_cli.regressor.motion import RIGID
 from tests.builders.flights import no_torque, random_flight
 
 SETTINGS = IdentificationSettings(consequents="seesaw", products="additive", membership_functions=(1, 2, 3, 4, 3, 2))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data, identify, samples, solver
 from cpfls_cli.identification.data import Flights, gathered, joined, sample_times
 from cpfls_cli.identification.evaluator import decode
@@ -11,7 +12,6 @@ from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score, score_of
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges
-from cpfls_cli.regressor.motion import rigid_columns
 from tests.builders.flights import random_flight, rigid_torque
 
 SETTINGS = {

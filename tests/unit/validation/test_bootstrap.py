@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
+from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import IdentificationSettings, data
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.evaluator import decode, uniform_chromosome
@@ -14,7 +15,7 @@ from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Regressor
-from cpfls_cli.regressor.motion import RIGID, rigid_columns
+from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.validation.bootstrap import bootstrap
 from tests.builders.flights import bent_torque, random_flight
 
