@@ -15,7 +15,7 @@ def regressor(seed):
     return rng.standard_normal((20, 3, 5)) * rng.uniform(0.2, 2.0, (20, 1, 1))
 
 
-@settings(max_examples=40)
+@settings(deadline=None, max_examples=40)
 @given(seeds, criteria, st.integers(2, 20))
 def test_singular_values_only_grow_and_no_sample_repeats(seed, criterion, size):
     selection = reduce(regressor(seed), ReductionSettings(criterion=criterion, size=size))
@@ -24,7 +24,7 @@ def test_singular_values_only_grow_and_no_sample_repeats(seed, criterion, size):
         assert np.all(np.diff(trace) >= -1e-12 * np.max(trace))
 
 
-@settings(max_examples=40)
+@settings(deadline=None, max_examples=40)
 @given(seeds, criteria, st.integers(-20, 20))
 def test_units_and_orthogonal_coordinates_do_not_matter(seed, criterion, exponent):
     Q, rotation = regressor(seed), np.linalg.qr(np.random.default_rng(seed).standard_normal((5, 5)))[0]
@@ -34,7 +34,7 @@ def test_units_and_orthogonal_coordinates_do_not_matter(seed, criterion, exponen
     assert np.isclose(chosen.condition_number, moved.condition_number, rtol=1e-9)
 
 
-@settings(max_examples=30)
+@settings(deadline=None, max_examples=30)
 @given(seeds, criteria)
 def test_order_of_samples_does_not_matter(seed, criterion):
     Q, order = regressor(seed), np.random.default_rng(seed).permutation(20)

@@ -78,7 +78,7 @@ class Crossing:
 
 @pytest.mark.parametrize("structure", HARMONIC, ids=lambda s: f"{s.parameters} parameters")
 @pytest.mark.parametrize("place", PLACES)
-@settings(max_examples=15)
+@settings(deadline=None, max_examples=15)
 @given(weights, angles, elsewhere, seeds)
 def test_harmonic_torque_jumps_nowhere(structure, place, genes, angle, other, seed):
     crossing = Crossing(structure, genes, angle, place, other, seed)
@@ -86,7 +86,7 @@ def test_harmonic_torque_jumps_nowhere(structure, place, genes, angle, other, se
 
 
 @pytest.mark.parametrize("place", PLACES)
-@settings(max_examples=40)
+@settings(deadline=None, max_examples=40)
 @given(weights, angles, elsewhere, seeds)
 def test_seesaw_torque_jumps_where_it_folds_by_what_its_slope_changes(place, genes, angle, other, seed):
     crossing = Crossing(SEESAW, genes, angle, place, other, seed)
@@ -95,7 +95,7 @@ def test_seesaw_torque_jumps_where_it_folds_by_what_its_slope_changes(place, gen
     assert np.max(np.abs(crossing.jump() - expected)) <= crossing.explained()
 
 
-@settings(max_examples=20)
+@settings(deadline=None, max_examples=20)
 @given(weights, angles, elsewhere, seeds)
 def test_the_jump_at_the_fold_is_more_than_the_derivative_explains(genes, angle, other, seed):
     """Without this, what is explained could be so generous that the tests above would pass on anything."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli.config.load import validate
@@ -55,12 +55,13 @@ def test_the_page_names_every_key_of_the_paper():
     assert set(PAGE) == set(PRESETS["paper"])
 
 
+@settings(deadline=None)
 @given(st.sets(st.sampled_from(sorted(OTHER))))
 def test_a_preset_fills_in_only_what_is_not_given(keys):
     chosen = {key: OTHER[key] for key in keys}
-    settings = asdict(identification(preset="paper", **chosen))
+    filled = asdict(identification(preset="paper", **chosen))
     untouched = asdict(identification(**chosen))
-    for key, value in settings.items():
+    for key, value in filled.items():
         if key in chosen:
             assert value == chosen[key]
         elif key in PAGE:
