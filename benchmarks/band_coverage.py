@@ -34,6 +34,7 @@ from scipy import signal
 from benchmarks.shared.full_circle import INERTIA, random_flight
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque
 from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueData, axis_scale
@@ -41,21 +42,17 @@ from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.samples import Ready
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.inertia import INERTIA_PLACES, symmetric
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor import Motion
 from cpfls_cli.validation.bands import band, inertia_band
-from cpfls_cli.validation.blocks import time_blocks
-from cpfls_cli.validation.bootstrap import bootstrap
-from cpfls_cli.validation.scores import POWER, BlockScores
-from cpfls_cli.validation.simulated import Missed
-from cpfls_cli.vehicle import newton_euler_torque
-from cpfls_cli.vehicle.rigid_body import inertia_matrix
+from cpfls_cli.validation.bootstrap import POWER, BlockScores, MissedTorque, bootstrap
+from cpfls_cli.validation.timeline import time_blocks
 
 NOISE, TIME_CONSTANT, ATTITUDES = 0.05, 5.0, 100
 BENT = 0.3
 NOWHERE = np.zeros((72, 72), dtype=bool)
 POWERS = {"no correction": 0.0, "CR2": 0.5, "ours": POWER, "CR3, jackknife": 1.0}
-ROWS = tuple("".join(str(place + 1) for place in places) for places in INERTIA_PLACES)
+ROWS = tuple("".join(str(place + 1) for place in places) for places in INERTIA_ENTRIES)
 
 
 @dataclass(frozen=True)
@@ -188,7 +185,9 @@ def coverage(case: Case, coloured: bool, runs: int, seed: int) -> tuple:
         held.append((low <= best_truth) & (best_truth <= high))
         weights.append(fit.ridge_weight)
     by_entry = np.mean(inside, axis=(0, 1))
-    entries = np.array([by_entry[place] for place in INERTIA_PLACES if np.any(truth[:, *place] != 0) or not free(case)])
+    entries = np.array(
+        [by_entry[place] for place in INERTIA_ENTRIES if np.any(truth[:, *place] != 0) or not free(case)]
+    )
     return entries, np.mean(held, axis=0), np.min(np.mean(inside, axis=0)), np.median(weights)
 
 
@@ -201,7 +200,7 @@ def compared(case: Case, coloured: bool, runs: int, seed: int) -> dict[str, Arra
     """Count for other ways to draw blocks: coverage by attitude of all D_ij(q), without a ridge."""
     rng, truth = np.random.default_rng(seed), case.inertia()
     strength, counts = NOISE * axis_scale(case.flight), {name: [] for name in ("pairs, percentiles", *POWERS)}
-    some = [place for place in INERTIA_PLACES if np.any(truth[:, *place] != 0)]
+    some = [place for place in INERTIA_ENTRIES if np.any(truth[:, *place] != 0)]
     linear = unit_inertias(case.fitted(case.flight.torque)[2], case.attitude)
     for _ in range(runs):
         torque = case.flight.torque + strength * noise(rng, len(case.flight), coloured)
@@ -225,7 +224,7 @@ def block_scores(evaluator, training: TorqueData, model: Model) -> BlockScores:
     """Sum by block, without a ridge and without a rigid body."""
     learned = evaluator.solver.learned
     label = time_blocks(training, None).labels(learned.ready.source)
-    ready = Ready(Missed(learned.ready.source, model), rigid=False)
+    ready = Ready(MissedTorque(learned.ready.source, model), rigid=False)
     products = replace(learned, ready=ready, label=label, labels=int(label[-1]) + 1).products(model.partitions)
     return BlockScores(products.gram, products.moment, np.zeros(len(model.coefficients)), model.coefficients)
 

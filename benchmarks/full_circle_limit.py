@@ -33,11 +33,11 @@ from benchmarks.shared.full_circle import (
 )
 from benchmarks.shared.studies import paper_flight
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.identification.data import joined
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor.structure import INERTIA_FUNCTIONS
-from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient
 
 ERRORS = ("uniform", "searched", "rms, uniform", "rms, searched")
 SEARCH = {"base": "none", "population": 20, "generations": 6}

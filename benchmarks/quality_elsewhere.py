@@ -22,14 +22,13 @@ import numpy as np
 from benchmarks.shared.searches import Search, searches, spent
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import Study
+from cpfls_cli.dynamics.rigid_body import inertia_tensor, newton_euler_torque
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion
 from cpfls_cli.trajectory import plan
-from cpfls_cli.vehicle import newton_euler_torque
-from cpfls_cli.vehicle.rigid_body import inertia_tensor
 
 CONFIG = Path(__file__).resolve().parents[1] / "configs" / "quick.yaml"
 CHANGES = (

@@ -1,4 +1,4 @@
-"""The six numbers of a symmetric matrix of inertia: their names, their places, and what they multiply in a torque."""
+"""The six parameters of an inertia tensor: their names, their entries, and what they multiply in a torque."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from cpfls_cli.arrays import Array
 INERTIA_PARAMETERS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 """Names in the order of every array of six; the last three are entries of the tensor, not products of inertia."""
 
-INERTIA_PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+INERTIA_ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Row and column of each of the six."""
 
 
 def symmetric(parameters: Sequence[float] | Array) -> Array:
-    """Arrange six parameters as a symmetric matrix.
+    """Build a symmetric matrix from its six parameters.
 
     Parameters
     ----------
@@ -28,13 +28,13 @@ def symmetric(parameters: Sequence[float] | Array) -> Array:
     array, shape (3, 3)
     """
     matrix = np.zeros((3, 3))
-    rows, columns = np.array(INERTIA_PLACES[: len(parameters)]).T
+    rows, columns = np.array(INERTIA_ENTRIES[: len(parameters)]).T
     matrix[rows, columns] = matrix[columns, rows] = parameters
     return matrix
 
 
 def six_parameters(inertia: Sequence[float] | Array) -> Array:
-    """Fill three moments of inertia up to six parameters.
+    """Extend three moments of inertia to six parameters.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def symmetric_columns(vectors: Array) -> Array:
     array, shape (time, 3, 6)
         Multiplies the elements in the order of `INERTIA_PARAMETERS`.
     """
-    columns = np.zeros((len(vectors), 3, len(INERTIA_PLACES)))
-    for parameter, (row, column) in enumerate(INERTIA_PLACES):
+    columns = np.zeros((len(vectors), 3, len(INERTIA_ENTRIES)))
+    for parameter, (row, column) in enumerate(INERTIA_ENTRIES):
         columns[:, row, parameter] = vectors[:, column]
         columns[:, column, parameter] = vectors[:, row]
     return columns

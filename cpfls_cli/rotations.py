@@ -29,8 +29,25 @@ def rotation_matrix(attitude: Array) -> Array:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
+def euler_angles(rotation: Array) -> Array:
+    """Extract roll, pitch and yaw from rotation matrices.
+
+    Parameters
+    ----------
+    rotation : array, shape (time, 3, 3)
+        Body to world, ``Rz(yaw) Ry(pitch) Rx(roll)``.
+
+    Returns
+    -------
+    array, shape (time, 3), rad
+    """
+    roll = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
+    pitch = np.arctan2(-rotation[:, 2, 0], np.hypot(rotation[:, 2, 1], rotation[:, 2, 2]))
+    return np.stack([roll, pitch, np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])], axis=1)
+
+
 def euler_rate_matrix(attitude: Array) -> Array:
-    """Map Euler rates to body rates, ``omega = W(q) qd``.
+    """Build the matrix that maps Euler rates to body rates, ``omega = W(q) qd``.
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.excitation import optimised_rotation
 from cpfls_cli.identification.choice import choose
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
@@ -23,7 +24,7 @@ from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion, StructureSettings
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.vehicle import VehicleSettings, newton_euler_torque
+from cpfls_cli.vehicle import VehicleSettings
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "full-circle.yaml"
 PAPER = StructureSettings(consequents="seesaw", products="additive", membership_functions=5)

@@ -16,7 +16,7 @@ from cpfls_cli.gap.before_after import BeforeAfter
 from cpfls_cli.gap.diagnose import DiagnosisRun
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.results import Diagnosis, GapSize
-from cpfls_cli.gap.replayed import Replayed
+from cpfls_cli.gap.replay import Replayed
 
 
 def diagnosis_data(found: DiagnosisRun, shown: BeforeAfter, model: ExtendedModel, split: Split) -> dict[str, Any]:

@@ -11,8 +11,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.audit_file import audit_of
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.tables import rows_of, table
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, effect
-from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
 from cpfls_cli.gap.naming.results import Estimate, NamedEffect

@@ -11,8 +11,8 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.config.study import Study
 from cpfls_cli.control import Plan, Scores
+from cpfls_cli.dynamics.rigid_body import not_positive_definite
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.physics import not_positive_definite
 from cpfls_cli.simulation.measured import noisy
 from cpfls_cli.vehicle.rotors import rotor_demand
 

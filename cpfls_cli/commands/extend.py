@@ -25,7 +25,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import Refit, extend, plain, worse_axes
 from cpfls_cli.gap.naming.results import GapSize, GapVerdict, NamedEffect
-from cpfls_cli.gap.replayed import Replayed, replayed
+from cpfls_cli.gap.replay import Replayed, replayed
 from cpfls_cli.gap.sensors.audit import Audit
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.diagnosis_words import effect_line, effect_summary, gap_lines

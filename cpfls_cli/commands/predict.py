@@ -16,13 +16,13 @@ from cpfls_cli.artifacts.model_file import read_model
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.validation_file import read_draws
 from cpfls_cli.commands.predict_extended import extended_prediction
+from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
 from cpfls_cli.flights.flight_source import MOTION, flight_motion
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.flights.sources import read_good, read_with
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import score
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.physics import not_positive_definite, vertical
 from cpfls_cli.pages.trust import trust_notes
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.report.outcome import Outcome, nothing_written

@@ -11,14 +11,14 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.extended_file import read_extended
 from cpfls_cli.config.study import Study
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import read_flights
-from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.identification.model import Model, coriolis_matrix
+from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor.regressor import InertiaValues
-from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient
 
 
 def extended_prediction(model: Path, flight: Path, study: Study) -> dict[str, Any]:

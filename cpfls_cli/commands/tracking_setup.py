@@ -6,22 +6,19 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.control import (
-    Actuators,
+    AttitudeLoop,
     Controller,
-    Loop,
     Plan,
-    RigidBody,
     Sensing,
-    TorqueModel,
+    TorqueActuators,
     computed_torque,
     gains,
-    model_plant,
     proportional_derivative,
-    rigid_plant,
 )
+from cpfls_cli.dynamics.equations_of_motion import RigidBody, TorqueModel, model_plant, rigid_plant
+from cpfls_cli.dynamics.rigid_body import body_torque, inertia_matrix, inertia_tensor
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.simulation import ComputedTorqueSettings
-from cpfls_cli.vehicle.rigid_body import body_torque, inertia_matrix, inertia_tensor
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -52,7 +49,7 @@ def loop_of(
     model: TorqueModel,
     vehicle: VehicleSettings,
     rng: np.random.Generator,
-) -> Loop:
+) -> AttitudeLoop:
     """Arrange what closes the loop.
 
     Parameters
@@ -64,10 +61,10 @@ def loop_of(
     """
     limit, noise = settings.torque_max_n_m, (settings.attitude_noise_rad, settings.body_rate_noise_rad_s)
     measured = (std * rng.standard_normal(plan.attitude.shape) for std in noise)
-    return Loop(
+    return AttitudeLoop(
         plant=model_plant(model) if settings.plant == "model" else rigid_plant(inertia_tensor(vehicle)),
         gains=gains(settings.natural_frequency_hz, settings.damping),
-        actuators=Actuators(settings.rotor_time_constant_s, None if limit is None else np.array(limit)),
+        actuators=TorqueActuators(settings.rotor_time_constant_s, None if limit is None else np.array(limit)),
         sensing=Sensing(*measured) if any(noise) else None,
         integration_rate=settings.integration_rate_hz,
     )

@@ -1,22 +1,23 @@
-"""Let several controllers follow one plan, each with its own vehicle."""
+"""Several controllers that follow one plan, each with its own vehicle: their motion, its signals and its scores."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import ceil
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.control.integrate import Actuators, advance, steps_of
-from cpfls_cli.control.laws import Controller, Gains
-from cpfls_cli.control.plan import Plan
-from cpfls_cli.control.plants import Plant
+from cpfls_cli.control.controllers import Controller, Gains, Plan, TorqueActuators
+from cpfls_cli.dynamics.equations_of_motion import RotationalPlant
+from cpfls_cli.dynamics.integration import advance
 from cpfls_cli.errors import SettingError
 
 _STEPS_BETWEEN_REPORTS = 100
+_ROUNDING = 1e-6
 # Seen from the side of the plan: a vehicle that leapt over the vertical has a cosine below zero.
 _VERTICAL = 0.02
 
@@ -36,7 +37,7 @@ class Sensing:
 
 @dataclass(frozen=True)
 class Tracked:
-    """What the vehicles did, at the instants of control; NaN where one was lost.
+    """Motion and torques of the vehicles at the instants of control; NaN where one was lost.
 
     Attributes
     ----------
@@ -55,22 +56,22 @@ class Tracked:
 
 
 @dataclass(frozen=True)
-class Loop:
-    """What closes the loop between controllers and vehicles.
+class AttitudeLoop:
+    """Plant, gains, actuators and sensors of the control loop.
 
     Attributes
     ----------
     plant : callable
     gains : Gains
-    actuators : Actuators
+    actuators : TorqueActuators
     sensing : Sensing or None
         None for exact measurements.
     integration_rate : float, Hz
     """
 
-    plant: Plant
+    plant: RotationalPlant
     gains: Gains
-    actuators: Actuators
+    actuators: TorqueActuators
     sensing: Sensing | None
     integration_rate: float
 
@@ -78,12 +79,12 @@ class Loop:
 def track(
     plan: Plan,
     controllers: Sequence[Controller],
-    loop: Loop,
+    loop: AttitudeLoop,
     initial_error: Array,
     initial_torque: Array,
     progress: Callable[[float, int], None] = lambda _done, _total: None,
 ) -> Tracked:
-    """Fly all controllers along a plan.
+    """Simulate all controllers along a plan.
 
     A vehicle is lost where an angle is off by more than 90 degrees, its pitch reaches the vertical, or its state is not
     finite; the others go on.
@@ -92,7 +93,7 @@ def track(
     ----------
     plan : Plan
     controllers : sequence of Controller
-    loop : Loop
+    loop : AttitudeLoop
     initial_error : array, shape (3,), rad
         Planned less flown angles at the start; the Euler rates are those of the plan.
     initial_torque : array, shape (3,), N m, body frame
@@ -108,23 +109,23 @@ def track(
     vehicles, instants = len(controllers), len(plan)
     state = np.tile(start_of(plan, initial_error), (vehicles, 1))
     torque = np.tile(initial_torque, (vehicles, 1))
-    steps = steps_of(plan.period, loop.integration_rate, loop.actuators.time_constant)
+    steps = _steps(plan.period, loop.integration_rate, loop.actuators.time_constant)
     record = np.full((instants, vehicles, 12), np.nan)
     clipped = np.zeros((instants, vehicles), dtype=bool)
-    # A vehicle that is lost may reach infinity before the next instant, where it is told.
+    # A vehicle that is lost may reach infinity before the next instant, where it is noticed.
     with np.errstate(all="ignore"):
         for instant in range(instants):
             state[_lost(state, plan.attitude[instant])] = np.nan
             flown = np.flatnonzero(~np.isnan(state[:, 0]))
             if not flown.size:
                 break
-            own, before = state[flown], torque[flown]
-            asked = _commands(plan, instant, [controllers[index].law for index in flown.tolist()], loop, own)
+            alive, before = state[flown], torque[flown]
+            asked = _commands(plan, instant, [controllers[index].law for index in flown.tolist()], loop, alive)
             command = loop.actuators.clipped(asked)
             clipped[instant, flown] = (command != asked).any(axis=1)
             acting = partial(loop.actuators.torque, before, command)
-            record[instant, flown] = np.concatenate([own, acting(0.0), before], axis=1)
-            state[flown] = advance(loop.plant, own, acting, plan.period, steps)
+            record[instant, flown] = np.concatenate([alive, acting(0.0), before], axis=1)
+            state[flown] = advance(loop.plant, alive, acting, plan.period, steps)
             torque[flown] = acting(plan.period)
             if instant % _STEPS_BETWEEN_REPORTS == 0:
                 progress(instant, instants)
@@ -133,7 +134,7 @@ def track(
 
 
 def start_of(plan: Plan, initial_error: Array) -> Array:
-    """Find the state in which a flight begins, with the Euler rates of the plan.
+    """Compute the state in which a flight begins, with the Euler rates of the plan.
 
     Parameters
     ----------
@@ -161,35 +162,139 @@ def start_of(plan: Plan, initial_error: Array) -> Array:
     return np.asarray(state)
 
 
-def wrapped(angle: Array) -> Array:
-    """Wrap angles to [-pi, pi).
-
-    Parameters
-    ----------
-    angle : array, rad
-
-    Returns
-    -------
-    array, rad
-    """
+def _wrapped(angle: Array) -> Array:
+    """Wrap angles to [-pi, pi)."""
     return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
+
+
+def _steps(period: float, rate: float, time_constant: float) -> int:
+    """Count the steps of integration in one period of control, two or more in the time constant of a lag."""
+    fastest = max(rate, 2 / time_constant if time_constant > 0 else 0.0)
+    return max(ceil(period * fastest - _ROUNDING), 1)
 
 
 def _lost(state: Array, planned: Array) -> BoolArray:
     attitude = state[:, :3]
-    off = ~(np.abs(wrapped(planned - attitude)) < 0.5 * np.pi).all(axis=1)
+    off = ~(np.abs(_wrapped(planned - attitude)) < 0.5 * np.pi).all(axis=1)
     upright = np.cos(attitude[:, 1]) * np.sign(np.cos(planned[1]))
     return np.asarray(off | ~(upright > _VERTICAL) | ~np.isfinite(state).all(axis=1))
 
 
-def _commands(plan: Plan, instant: int, laws: Sequence[Callable[..., Array]], loop: Loop, state: Array) -> Array:
-    """Body torques that the controllers command for what they measure, shape (vehicle, 3)."""
+def _commands(
+    plan: Plan, instant: int, laws: Sequence[Callable[..., Array]], loop: AttitudeLoop, state: Array
+) -> Array:
+    """Compute the body torques that the controllers command for what they measure, shape (vehicle, 3)."""
     attitude, body_rate = state[:, :3], state[:, 3:]
     if loop.sensing is not None:
         attitude = attitude + loop.sensing.attitude[instant]
         body_rate = body_rate + loop.sensing.body_rate[instant]
     rate = rotations.attitude_rate(attitude, body_rate)
-    feedback = loop.gains.feedback(wrapped(plan.attitude[instant] - attitude), plan.rate[instant] - rate)
+    feedback = loop.gains.feedback(_wrapped(plan.attitude[instant] - attitude), plan.rate[instant] - rate)
     wanted = plan.acceleration[instant]
     torque = [law(*measured, wanted) for law, *measured in zip(laws, attitude, rate, feedback, strict=True)]
     return rotations.body_torque(attitude, np.array(torque).reshape(-1, 3))
+
+
+def flown_signals(plan: Plan, tracked: Tracked, controller: int, plant: RotationalPlant) -> dict[str, Array]:
+    """Extract the signals of one vehicle at the samples of the plan, up to where it was lost.
+
+    Torques are the mean of what acts before and after each command, and accelerations what they do to the vehicle: on
+    straight lines between samples they push as the torques do that are held from command to command.
+
+    Parameters
+    ----------
+    plan : Plan
+    tracked : Tracked
+    controller : int
+        Index.
+    plant : callable
+
+    Returns
+    -------
+    dict of str to array
+        `time`, `attitude`, `attitude_rate`, `attitude_acceleration`, `body_rate`, `torque`, `body_torque`.
+    """
+    known = np.isfinite(tracked.attitude[controller, :: plan.parts]).all(axis=1)
+    kept = slice(0, int(np.sum(known)) * plan.parts, plan.parts)
+    attitude, body_rate = tracked.attitude[controller, kept], tracked.body_rate[controller, kept]
+    body_torque = 0.5 * (tracked.body_torque + tracked.torque_before)[controller, kept]
+    # Nothing is known of what acted before the flight.
+    body_torque[0] = tracked.body_torque[controller, 0]
+    rate = rotations.attitude_rate(attitude, body_rate)
+    turning = rotations.multiply(rotations.euler_rate_matrix_derivative(attitude, rate), rate)
+    return {
+        "time": plan.time[kept],
+        "attitude": attitude,
+        "attitude_rate": rate,
+        "attitude_acceleration": rotations.attitude_rate(attitude, plant(attitude, body_rate, body_torque) - turning),
+        "body_rate": body_rate,
+        "torque": rotations.generalised_torque(attitude, body_torque),
+        "body_torque": body_torque,
+    }
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Tracking errors at the samples of the plan; NaN for a controller that lost its vehicle.
+
+    Attributes
+    ----------
+    error : array, shape (controller, samples, 3), rad
+        Planned less flown angles; NaN only from the loss on.
+    settled_from : float, s
+        Since the first sample: when the initial error has died down, at the latest half-way.
+    rms, largest : array, shape (controller, 3), rad
+        Root mean square and largest size of all samples.
+    settled_rms, settled_largest : array, shape (controller, 3), rad
+        Of those after that time.
+    effort : array, shape (controller, 3), N m, body frame
+        Root mean square of the torque.
+    clipped : array, shape (controller,)
+        Share of the commands that the actuators could not follow.
+    lost : array, shape (controller,), s
+        Time of the loss; NaN where none.
+    """
+
+    error: Array
+    settled_from: float
+    rms: Array
+    largest: Array
+    settled_rms: Array
+    settled_largest: Array
+    effort: Array
+    clipped: Array
+    lost: Array
+
+
+def scores(plan: Plan, tracked: Tracked, settling_time: float) -> Scores:
+    """Compute the tracking errors and the effort of controllers.
+
+    Parameters
+    ----------
+    plan : Plan
+    tracked : Tracked
+    settling_time : float, s
+        In which a perfect controller forgets an initial error.
+    """
+    error = _wrapped(plan.attitude - tracked.attitude)
+    alive = np.all(np.isfinite(error), axis=2)
+    lost = np.where(alive.all(axis=1), np.nan, plan.time[np.argmin(alive, axis=1)])
+    sampled = error[:, :: plan.parts]
+    since = plan.time[:: plan.parts] - plan.time[0]
+    settled_from = min(settling_time, 0.5 * float(since[-1]))
+    settled = sampled[:, since >= settled_from]
+    return Scores(
+        error=sampled,
+        settled_from=settled_from,
+        rms=_rms(sampled),
+        largest=np.max(np.abs(sampled), axis=1),
+        settled_rms=_rms(settled),
+        settled_largest=np.max(np.abs(settled), axis=1),
+        effort=_rms(tracked.body_torque),
+        clipped=np.sum(tracked.clipped, axis=1) / np.maximum(np.sum(alive, axis=1), 1),
+        lost=lost,
+    )
+
+
+def _rms(values: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(values**2, axis=1)))

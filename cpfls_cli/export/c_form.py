@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.export.points import Expected
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.source import common_words, fill
 from cpfls_cli.export.tables import c_row, c_rows, filled, rule_labels
 from cpfls_cli.export.text import comment_text
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.physics import vertical
 from cpfls_cli.inertia import symmetric
 
 _OUTSIDE, _VERTICAL = 1, 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
-from cpfls_cli.identification.physics import VERTICAL
+from cpfls_cli.dynamics.rigid_body import VERTICAL
 
 CONVENTIONS = {
     "q": f"roll, pitch, yaw in rad; {EULER}: R = Rz(yaw) Ry(pitch) Rx(roll) turns body vectors into the world frame",

@@ -6,12 +6,12 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from cpfls_cli.dynamics.rigid_body import VERTICAL
 from cpfls_cli.export.facts import banner, facts
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.tables import number, rules_along
 from cpfls_cli.export.text import comment_lines, literal_text
 from cpfls_cli.identification.excitation import CELLS
-from cpfls_cli.identification.physics import VERTICAL
 from cpfls_cli.regressor.structure import ModelStructure
 
 

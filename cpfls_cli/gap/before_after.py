@@ -13,8 +13,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.balance.windows import Recording, Windows, common_windows
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
-from cpfls_cli.gap.replay.worst_stretch import WorstStretch, worst_stretch
-from cpfls_cli.gap.replayed import Replayed, replayed
+from cpfls_cli.gap.replay import Replayed, WorstStretch, replayed, worst_stretch
 from cpfls_cli.gap.residual.views import Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 

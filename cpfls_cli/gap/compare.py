@@ -16,7 +16,7 @@ from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.results import NotExcited
 from cpfls_cli.gap.naming.search import best_floor, block_index
-from cpfls_cli.gap.replayed import Replayed, replayed
+from cpfls_cli.gap.replay import Replayed, replayed
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
 from cpfls_cli.gap.residual.views import HeatMap, Stretch, heat_map, stretches
 from cpfls_cli.gap.sensors.audit import Audit, audit

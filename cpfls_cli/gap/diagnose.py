@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.balance.windows import Recording, common_windows

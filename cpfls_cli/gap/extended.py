@@ -10,24 +10,32 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics.integration import ReplayModel
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 from cpfls_cli.effects.catalogue.parameter_error import coupling, inertia_correction
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, scatter_size, scatter_variance, system
-from cpfls_cli.gap.balance.inertial import InertiaModel, rotation_balance
 from cpfls_cli.gap.balance.refine import refined
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.gap.balance.weak_flight import (
+    CHANNELS,
+    Candidate,
+    WeakFlight,
+    actuated,
+    columns_of,
+    nuisance,
+    rotation_balance,
+)
 from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.naming.search import best_floor, block_index
-from cpfls_cli.gap.replay.rate_equation import ReplayModel
 from cpfls_cli.gap.sensors.audit import Audit, Preparation
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.regressor.regressor import InertiaValues
-from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 
 _TOUCHED = 0.2
 """Root mean square in floors by which effects and refit move a channel, from which on it has to get better."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale
 from cpfls_cli.identification.judge import Explained
 from cpfls_cli.identification.least_squares import Triangle
-from cpfls_cli.identification.physics import vertical
 from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.rotations import body_acceleration, body_torque, euler_rate_matrix
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import VERTICAL, why_unphysical
 from cpfls_cli.identification.axes import AxisEvidence
 from cpfls_cli.identification.excitation import RuleExcitation
 from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.least_squares import LeastSquares
-from cpfls_cli.identification.physics import VERTICAL, why_unphysical
 
 AXES = ("roll", "pitch", "yaw")
 BADLY_EXPLAINED_R2 = 0.5

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.axes import axis_evidence
 from cpfls_cli.identification.baselines import Baseline, fit_baselines
@@ -21,7 +22,6 @@ from cpfls_cli.identification.folds import with_folds
 from cpfls_cli.identification.judge import Score, score_of
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.physics import not_positive_definite, vertical
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import search

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.identification.data import TorqueData, TorqueSource
-from cpfls_cli.identification.physics import vertical
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.rotations import body_torque
 

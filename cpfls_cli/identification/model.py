@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.excitation import outside_visited
 from cpfls_cli.identification.rigid_columns import rigid_columns
@@ -14,7 +16,6 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor
 from cpfls_cli.regressor.structure import ModelStructure
-from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient
 
 _BATCH = 8192
 
@@ -104,26 +105,3 @@ class Model:
     def _torque(self, motion: Motion) -> Array:
         fuzzy = Regressor(self.structure, motion, self.ranges).torque(self.partitions, self.coefficients)
         return np.asarray(fuzzy + rigid_columns(motion) @ self.rigid_body)
-
-
-def coriolis_matrix(inertia: InertiaValues, rate: Array) -> Array:
-    """Build C(q, qd) from the gradient of the inertia matrix.
-
-    ``C_ij = 1/2 sum_k (dJ_ij/dq_k + dJ_ik/dq_j - dJ_jk/dq_i) qd_k``
-
-    Parameters
-    ----------
-    inertia : InertiaValues
-    rate : array, shape (samples, 3), rad/s
-
-    Returns
-    -------
-    array, shape (samples, 3, 3), kg m^2/s
-
-    References
-    ----------
-    Equation (4).
-    """
-    along = np.einsum("nkij,nk->nij", inertia.gradient, rate)
-    towards = np.einsum("njik,nk->nij", inertia.gradient, rate)
-    return np.asarray(0.5 * (along + towards - towards.swapaxes(1, 2)))

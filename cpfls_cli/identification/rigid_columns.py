@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import rigid_body_regressor
 from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.vehicle.rigid_body import rigid_body_regressor
 
 RIGID = 6
 """Inertia parameters of a rigid body."""

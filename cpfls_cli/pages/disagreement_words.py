@@ -11,7 +11,7 @@ from cpfls_cli.artifacts.audit_file import audit_lines, audit_summary
 from cpfls_cli.flights.recordings import Flights
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import Disagreement
-from cpfls_cli.gap.replayed import Replayed
+from cpfls_cli.gap.replay import Replayed
 from cpfls_cli.pages.gap_words import whole_percent
 
 _STRETCHES = 3

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.vehicle.rigid_body import inertia_tensor
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import identified_turning, rigid_turning
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.hooks import CarriedBody
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.simulation.actuators import Actuators, Mixer, Rotors, actuators, mixer
@@ -26,8 +28,6 @@ from cpfls_cli.simulation.plant import (
     instant,
 )
 from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.simulation.turning import identified_turning, rigid_turning
-from cpfls_cli.vehicle.rigid_body import inertia_tensor
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _ROUNDING = 1e-6

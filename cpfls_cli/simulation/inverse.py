@@ -9,10 +9,10 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor, torque
 from cpfls_cli.errors import SettingError
 from cpfls_cli.simulation.measured import noisy
 from cpfls_cli.simulation.settings import SimulationSettings
-from cpfls_cli.vehicle.rigid_body import body_torque, inertia_tensor, torque
 from cpfls_cli.vehicle.rotors import RotorViolation, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import SettingError
-from cpfls_cli.simulation.turning import InertiaModel
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 

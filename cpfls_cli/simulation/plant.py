@@ -8,12 +8,12 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import TurningLaw
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.hooks import CarriedBody, Carrier
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.simulation.actuators import Rotors
 from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
-from cpfls_cli.simulation.turning import TurningLaw
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 POSITION, VELOCITY, ATTITUDE, BODY_RATE = (slice(3 * n, 3 * n + 3) for n in range(4))

@@ -7,17 +7,22 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import stats
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
-from cpfls_cli.inertia import INERTIA_PLACES, symmetric
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import Regressor
 from cpfls_cli.validation.bootstrap import Draws
-from cpfls_cli.vehicle.rigid_body import inertia_matrix
+from cpfls_cli.validation.physical import cell_centres
+from cpfls_cli.validation.replay import CLEAR
 
 COVERAGE = 0.95
 _BATCH = 1024
+
+# Cells times draws at a time: 50 MB for the six entries.
+_AT_ONCE = 1_000_000
 
 
 def band(estimate: Array, drawn: Array, blocks: int) -> tuple[Array, Array]:
@@ -78,28 +83,28 @@ def torque_band(model: Model, draws: Draws, motion: Motion) -> tuple[Array, Arra
     half = np.zeros((len(motion), 3))
     deviations = _deviations(model, draws)
     for part in _batches(len(motion)):
-        own = motion[part]
-        matrix = Regressor(model.structure, own, model.ranges).matrix(model.partitions)
-        half[part] = _spread(np.concatenate([rigid_columns(own), matrix], axis=2), deviations)
+        some = motion[part]
+        matrix = Regressor(model.structure, some, model.ranges).matrix(model.partitions)
+        half[part] = _spread(np.concatenate([rigid_columns(some), matrix], axis=2), deviations)
     half *= _quantile(draws.blocks)
     value = model.torque(motion)
     return value - half, value + half
 
 
 def _inertia_rows(model: Model, attitude: Array) -> Iterator[tuple[tuple[int, int], Array, IntArray]]:
-    """Yield each entry of the inertia matrix: its place, its basis, shape (samples, columns), and their numbers."""
+    """Yield the entries of the inertia matrix: row and column, basis, shape (samples, columns), and which columns."""
     still = Motion(attitude, np.zeros_like(attitude), np.zeros_like(attitude))
     regressor = Regressor(model.structure, still, model.ranges)
     rigid = np.stack([inertia_matrix(attitude, symmetric(unit)) for unit in np.eye(RIGID)], axis=-1)
-    places = {(block.function.row, block.function.column): i for i, block in enumerate(model.structure.blocks)}
-    for place in INERTIA_PLACES:
-        rows, columns = rigid[:, *place], np.arange(RIGID, dtype=np.int64)
-        if place in places:
-            index = places[place]
+    blocks = {(block.function.row, block.function.column): i for i, block in enumerate(model.structure.blocks)}
+    for entry in INERTIA_ENTRIES:
+        rows, columns = rigid[:, *entry], np.arange(RIGID, dtype=np.int64)
+        if entry in blocks:
+            index = blocks[entry]
             fuzzy = model.structure.blocks[index].columns
             rows = np.hstack([rows, regressor.basis(index, model.partitions).value])
             columns = np.append(columns, RIGID + np.arange(fuzzy.start, fuzzy.stop))
-        yield place, rows, columns
+        yield entry, rows, columns
 
 
 def _deviations(model: Model, draws: Draws) -> Array:
@@ -117,3 +122,33 @@ def _quantile(blocks: int) -> float:
 
 def _batches(samples: int) -> Iterator[slice]:
     return (slice(start, start + _BATCH) for start in range(0, samples, _BATCH))
+
+
+def definite_share(model: Model, draws: Draws) -> float | None:
+    """Compute the share of draws whose D(q) is positive definite at the centres of all cells that training visited.
+
+    Cells within 17 degrees of a vertical pitch are left out, as they are from the windows replayed: there the smallest
+    eigenvalue of every body falls with the square of cos(pitch), and all noise is larger.
+
+    Returns
+    -------
+    float or None
+        Share of all draws; None where no such cell was visited.
+    """
+    attitude = cell_centres(model.visited)
+    attitude = attitude[np.abs(np.cos(attitude[:, 1])) >= CLEAR]
+    if len(attitude) == 0:
+        return None
+    parameters = np.hstack([draws.rigid_body, draws.coefficients]).T
+    basis, batch = list(_inertia_rows(model, attitude)), max(_AT_ONCE // len(attitude), 1)
+    starts = range(0, parameters.shape[1], batch)
+    definite = [_definite([rows @ parameters[columns, s : s + batch] for _, rows, columns in basis]) for s in starts]
+    return float(np.mean(np.concatenate(definite)))
+
+
+def _definite(entries: list[Array]) -> BoolArray:
+    """Flag draws, shape (draws,), by the leading minors (Sylvester) of entries in the order of `INERTIA_ENTRIES`."""
+    d11, d22, d33, d12, d13, d23 = entries
+    minor = d11 * d22 - d12**2
+    determinant = d33 * minor - d11 * d23**2 + 2 * d12 * d13 * d23 - d22 * d13**2
+    return np.asarray(np.all((d11 > 0) & (minor > 0) & (determinant > 0), axis=0))

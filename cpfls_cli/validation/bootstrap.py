@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.fit import Fit
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.normal_equations import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.rigid_columns import RIGID
 from cpfls_cli.identification.samples import Products, Ready
 from cpfls_cli.identification.settings import ValidationSettings
-from cpfls_cli.validation.blocks import time_blocks
-from cpfls_cli.validation.scores import BlockScores
-from cpfls_cli.validation.simulated import Missed
+from cpfls_cli.validation.timeline import time_blocks
+
+POWER = 0.75
+"""Of the correction for leverage: between 1/2, CR2, and 1, CR3; benchmarks/band_coverage.py measures all three."""
+
+# A direction that one block alone determines leaves it no residual: there the correction would find rounding.
+_SMALLEST_REST = 1e-3
 
 # A band of two standard deviations then holds a truth shifted by any number of them in 94 of 100 flights.
 _BIAS_DEVIATION = 0.75
@@ -26,8 +32,111 @@ _MOST_PRODUCTS = 20_000_000
 
 
 @dataclass(frozen=True)
+class BlockScores:
+    """Least squares ``(A^T A + P) x = A^T tau`` by block.
+
+    Attributes
+    ----------
+    gram : array, shape (blocks, parameters, parameters)
+        ``A_b^T A_b`` of each block.
+    score : array, shape (blocks, parameters)
+        ``A_b^T r_b`` of its residuals.
+    penalty : array, shape (parameters,)
+        Diagonal of P.
+    parameters : array, shape (parameters,)
+        x.
+    power : float, optional
+        Of the correction for what the fit has followed of the noise.
+    """
+
+    gram: Array
+    score: Array
+    penalty: Array
+    parameters: Array
+    power: float = POWER
+
+    def draws(self, weights: Array, rank_tolerance: float) -> Array:
+        """Draw deviations from the parameters by weighting the blocks.
+
+        Parameters
+        ----------
+        weights : array, shape (draws, blocks)
+        rank_tolerance : float
+            Singular values below this share of the largest count as zero.
+
+        Returns
+        -------
+        array, shape (draws, parameters)
+            Deviations from x.
+        """
+        half = self._half_inverse(rank_tolerance)
+        values, vectors = np.linalg.eigh(half.T @ self.gram @ half)
+        along = np.einsum("bij,bi->bj", vectors, self.score @ half)
+        along *= np.maximum(1.0 - values, _SMALLEST_REST) ** -self.power
+        return np.asarray(weights @ np.einsum("bij,bj->bi", vectors, along) @ half.T)
+
+    def with_penalty(self, penalty: Array, rank_tolerance: float) -> BlockScores:
+        """Solve the same least squares with another penalty.
+
+        Parameters
+        ----------
+        penalty : array, shape (parameters,)
+        rank_tolerance : float
+        """
+        half = replace(self, penalty=penalty)._half_inverse(rank_tolerance)
+        # The scores add up to P x: taken from there, parameters without a penalty do not move by rounding.
+        step = half @ (half.T @ ((self.penalty - penalty) * self.parameters))
+        return replace(self, score=self.score - self.gram @ step, penalty=penalty, parameters=self.parameters + step)
+
+    def undetermined(self, values: Array, rank_tolerance: float) -> Array:
+        """Project parameters onto what the samples do not determine, ``(A^T A + P)^-1 P z``.
+
+        Parameters
+        ----------
+        values : array, shape (draws, parameters)
+            z.
+        rank_tolerance : float
+
+        Returns
+        -------
+        array, shape (draws, parameters)
+        """
+        half = self._half_inverse(rank_tolerance)
+        kept = half / np.linalg.norm(half, axis=0)
+        return np.asarray((values * self.penalty) @ half @ half.T + values - values @ kept @ kept.T)
+
+    def solution(self, rank_tolerance: float) -> Array:
+        """Solve for the parameters of smallest norm, with the scores taken as ``A_b^T tau_b``."""
+        half = self._half_inverse(rank_tolerance)
+        return np.asarray(half @ (half.T @ np.sum(self.score, axis=0)))
+
+    def _half_inverse(self, rank_tolerance: float) -> Array:
+        """V with ``V V^T = (A^T A + P)^-1`` over what the samples determine, shape (parameters, rank)."""
+        values, vectors = np.linalg.eigh(np.sum(self.gram, axis=0) + np.diag(self.penalty))
+        kept = values > max(rank_tolerance, SMALLEST_SINGULAR_SHARE) ** 2 * max(values[-1], 0.0)
+        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
+
+
+@dataclass(frozen=True)
+class MissedTorque:
+    """The motion of a source with the torque that a model misses: measured minus predicted."""
+
+    source: TorqueSource
+    model: Model
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        return len(self.source)
+
+    def chunks(self) -> Iterator[TorqueData]:
+        """Yield the samples, chunk by chunk."""
+        for data in self.source.chunks():
+            yield replace(data, torque=data.torque - self.model.torque(data.motion))
+
+
+@dataclass(frozen=True)
 class Draws:
-    """Parameters of a model as other flights of the same noise might give them.
+    """Bootstrap draws of the parameters of a model: what other flights with the same noise might give.
 
     They scatter about the model's own. A band is wider than their spread by a factor that the number of blocks gives:
     see `cpfls_cli.validation.bands.band`.
@@ -111,23 +220,23 @@ def bootstrap(
     learned, tolerance = evaluator.solver.learned, evaluator.solver.rank_tolerance
     label = blocks.labels(learned.ready.source)
     count = int(label[-1]) + 1
-    missed = Ready(Missed(learned.ready.source, model), rigid=True)
+    missed = Ready(MissedTorque(learned.ready.source, model), rigid=True)
     products = replace(learned, ready=missed, label=label, labels=count).products(model.partitions)
     weights = rng.standard_normal((settings.draws, count))
     hidden = _BIAS_DEVIATION * rng.standard_normal((settings.draws, 1))
     scores, parameters = _model_scores(products, model, fit, over_rigid_body=learned.ready.rigid)
     held = scores.penalty > 0
-    weakest = scores.under(np.where(held, _mean_square(products), 0.0), tolerance)
+    weakest = scores.with_penalty(np.where(held, _mean_square(products), 0.0), tolerance)
     prior = np.zeros((settings.draws, len(held)))
     prior[:, held] = rng.standard_normal((settings.draws, np.count_nonzero(held)))
-    found = np.zeros((settings.draws, columns))
-    found[:, parameters] = weakest.draws(weights, tolerance) + weakest.left(prior, tolerance)
-    found[:, parameters] += hidden * (weakest.parameters - scores.parameters)
-    found *= _divide(fit)
+    deviations = np.zeros((settings.draws, columns))
+    deviations[:, parameters] = weakest.draws(weights, tolerance) + weakest.undetermined(prior, tolerance)
+    deviations[:, parameters] += hidden * (weakest.parameters - scores.parameters)
+    deviations *= _divide(fit)
     best, best_rigid_body = _rigid_scores(products, model, tolerance)
     return Draws(
-        coefficients=model.coefficients + found[:, RIGID:],
-        rigid_body=model.rigid_body + found[:, :RIGID],
+        coefficients=model.coefficients + deviations[:, RIGID:],
+        rigid_body=model.rigid_body + deviations[:, :RIGID],
         best_rigid_body=best_rigid_body + best.draws(weights, tolerance),
         blocks=count,
         block_duration=blocks.duration,
@@ -135,7 +244,7 @@ def bootstrap(
 
 
 def _model_scores(products: Products, model: Model, fit: Fit, *, over_rigid_body: bool) -> tuple[BlockScores, slice]:
-    """Take the columns that the model has, in the size that the ridge holds them in; tell which they are."""
+    """Select the columns that the model has, scaled as the ridge holds them, and return which they are."""
     off = np.isinf(fit.ridge_weight)
     parameters = slice(0 if over_rigid_body else RIGID, RIGID if off else None)
     divide = _divide(fit)
@@ -148,7 +257,7 @@ def _model_scores(products: Products, model: Model, fit: Fit, *, over_rigid_body
 
 
 def _rigid_scores(products: Products, model: Model, rank_tolerance: float) -> tuple[BlockScores, Array]:
-    """Fit a rigid body in place of the model; the torque that the model misses is what the products know."""
+    """Fit a rigid body in place of the model, from products with the torque that the model misses."""
     rigid, x = slice(0, RIGID), np.concatenate([model.rigid_body, model.coefficients])
     gram = products.gram[:, rigid, rigid]
     torque = products.moment[:, rigid] + products.gram[:, rigid] @ x
@@ -163,5 +272,5 @@ def _mean_square(products: Products) -> float:
 
 
 def _divide(fit: Fit) -> Array:
-    """Give what turns parameters that the ridge holds into those of the model."""
+    """Compute the factors from the parameters that the ridge holds to those of the model."""
     return np.concatenate([np.ones(RIGID), 1.0 / fit.column_size])

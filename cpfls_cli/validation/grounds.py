@@ -1,4 +1,4 @@
-"""What a verdict on a model rests on, and what follows from it without any judgement."""
+"""Evidence that the verdict on a model rests on, and the facts that follow from it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.findings import HARDLY_EXCITED_SHARE
 from cpfls_cli.identification.results import Identification
-from cpfls_cli.validation.memory import BLOCKS
-from cpfls_cli.validation.paired import Comparison
-from cpfls_cli.validation.paired_windows import apart, compare_windows
+from cpfls_cli.validation.paired import BLOCKS, Comparison, compare_windows, non_overlapping
 from cpfls_cli.validation.physical import Physics
+from cpfls_cli.validation.replay import NOTHING_MOVES, StepErrors
 from cpfls_cli.validation.residuals import ResidualAnalysis
-from cpfls_cli.validation.steps import NOTHING_MOVES, StepErrors
 
 MODEL, RIGID_BODY = "model", "rigid-body"
 
@@ -26,7 +24,7 @@ _MANY_LOST = 0.05
 
 @dataclass(frozen=True)
 class Grounds:
-    """Evidence on a model.
+    """Evidence that the verdict on a model rests on.
 
     Attributes
     ----------
@@ -81,7 +79,7 @@ class Grounds:
 
     @property
     def everywhere(self) -> bool:
-        """Whether what was learned holds at every attitude: one rule, seen all round, determined, a body anywhere."""
+        """Whether the model holds at every attitude: one rule, trained all round, determined, definite everywhere."""
         return self.one_rule and self.physics.indefinite_anywhere == 0
 
     @property
@@ -91,24 +89,24 @@ class Grounds:
 
     @property
     def hardly_excited(self) -> BoolArray:
-        """Body axes, shape (3,), that move so little that their torque is mostly not inertia's."""
+        """Body axes, shape (3,), that accelerate so little that their torque is mostly not inertial."""
         acceleration = self.identification.axes.acceleration
         return np.asarray(acceleration < HARDLY_EXCITED_SHARE * np.max(acceleration))
 
     def r2(self, predictor: str) -> Array:
-        """Give the worst R2 of body torque over the judged parts, shape (3,)."""
+        """Find the worst R2 of body torque over the judged parts, shape (3,)."""
         scores = [self.identification.scores[part][predictor].r2_body for part in self.judged]
         return np.asarray(np.fmin.reduce(scores))
 
     def rate_error(self, predictor: str) -> Array:
-        """Give the root mean square error of the body rate over a window, worst judged part, shape (3,), rad/s."""
+        """Compute the root mean square error of the body rate over a window, worst judged part, shape (3,), rad/s."""
         errors = [steps.window_error[steps.model.index(predictor)] for steps in self.replayed.values()]
-        return np.asarray(np.max([np.sqrt(_mean(own)) for own in errors], axis=0))
+        return np.asarray(np.max([np.sqrt(_mean(squares)) for squares in errors], axis=0))
 
     def replay_beside(self, part: str, predictor: str, rival: str, axes: Sequence[int] = (0, 1, 2)) -> Comparison:
         """Compare the errors of the body rate of two predictors in windows of a part that do not overlap."""
         steps, samples = self.replayed[part], self.identification.samples[part]
-        kept = apart(steps.start, len(steps.samples))
+        kept = non_overlapping(steps.start, len(steps.samples))
         summed = np.sum(steps.window_error[:, kept][:, :, list(axes)], axis=2)
         error = dict(zip(steps.model, summed, strict=True))
         # Errors that remember each other for long leave few blocks, of torque as of rate.
@@ -117,7 +115,7 @@ class Grounds:
         return compare_windows(error[predictor], error[rival], size, steps.start[kept] * blocks // samples)
 
     def beats_nothing_moves(self, predictor: str) -> BoolArray:
-        """Tell about which axes the rate is replayed better than if nothing moved, by more than chance, in each part.
+        """Flag axes whose rate is replayed better than if nothing moved, by more than chance, in each part.
 
         Shape (3,).
         """
@@ -128,7 +126,7 @@ class Grounds:
         return np.asarray(np.all(np.array(lower, dtype=bool), axis=0))
 
     def lost(self, predictor: str) -> int:
-        """Count the windows of all judged parts that a predictor did not come to the end of."""
+        """Count the windows of all judged parts in which a predictor was lost."""
         return sum(_lost(steps, predictor) for steps in self.replayed.values())
 
     @property
@@ -143,7 +141,7 @@ class Grounds:
 
     @property
     def impossible(self) -> bool:
-        """Whether no body has the inertia D(q), somewhere where training was."""
+        """Whether D(q) is not positive definite at an attitude that training visited."""
         return self.physics.indefinite > 0 or self.identification.indefinite > 0
 
 

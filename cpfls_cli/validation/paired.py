@@ -1,18 +1,34 @@
-"""Whether a model errs less than its rival by more than chance: both compared block by block."""
+"""Whether a model errs less than its rival by more than chance: torque and replayed windows, block by block."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import fft
 from scipy.stats import t as student
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.dynamics.rigid_body import vertical
+from cpfls_cli.identification.data import TorqueData, TorqueSource
+from cpfls_cli.regressor.motion import Motion
 
 _FEWEST_BLOCKS = 4
 _CONFIDENCE = 0.975
 # What two solutions of the same equations may differ by, and rounding as a share of what is predicted, squared.
 _SAME, _ROUNDING = 1e-6, 1e-18
+
+BLOCKS = 20
+"""Blocks at most: enough for a test."""
+_SHORTEST_BLOCK = 20
+# Neighbouring blocks of four correlation times share little of what is common to their errors.
+_CORRELATION_TIMES = 4
+_MOST_SAMPLES = 200_000
+
+# How much worse than any run that comes to its end one is that does not.
+_LOST = 10.0
 
 
 @dataclass(frozen=True)
@@ -39,7 +55,7 @@ class Comparison:
     blocks: int
 
 
-def compare(ours: Array, theirs: Array, size: float) -> Comparison:
+def compare_errors(ours: Array, theirs: Array, size: float) -> Comparison:
     """Compare mean squared errors by Student's test of the paired logarithms.
 
     Logarithms, since errors differ from block to block by orders of magnitude, and one bad block should neither decide
@@ -77,18 +93,179 @@ def _chance(values: Array) -> float:
     return float(student.ppf(_CONFIDENCE, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
-def block_means(errors: Array, block: IntArray) -> Array:
-    """Average errors by block.
+def _block_means(errors: Array, block: IntArray) -> Array:
+    """Average errors, shape (n,), by their block, from 0; blocks without any are left out."""
+    counts = np.bincount(block)
+    return np.asarray(np.bincount(block, weights=errors)[counts > 0] / counts[counts > 0])
+
+
+def block_count(errors: Array) -> int:
+    """Count the contiguous blocks, independent of each other, that errors can be cut into.
+
+    Each block has 20 samples at least, and four correlation times of the errors.
 
     Parameters
     ----------
-    errors : array, shape (n,)
-    block : array of int, shape (n,)
-        Of each error, from 0.
+    errors : array, shape (samples, signals)
+        In the order of time.
 
     Returns
     -------
-    array, shape (blocks that have any,)
+    int
+        1 to 20.
     """
-    counts = np.bincount(block)
-    return np.asarray(np.bincount(block, weights=errors)[counts > 0] / counts[counts > 0])
+    longest = max(_SHORTEST_BLOCK, _CORRELATION_TIMES * correlation_time(errors[:_MOST_SAMPLES]))
+    return min(max(len(errors) // longest, 1), BLOCKS)
+
+
+def correlation_time(signals: Array) -> int:
+    """Find the first lag at which the autocorrelation of every signal has fallen to 1/e.
+
+    Parameters
+    ----------
+    signals : array, shape (samples, signals)
+
+    Returns
+    -------
+    int
+        Samples; 0 where nothing varies.
+    """
+    if len(signals) == 0:
+        return 0
+    centred = signals - np.mean(signals, axis=0)
+    # Twice the length, so that the end is not correlated with the start.
+    spectrum = fft.rfft(centred, fft.next_fast_len(2 * len(signals), real=True), axis=0)
+    covariance = fft.irfft(np.abs(spectrum) ** 2, axis=0)[: len(signals)]
+    return int(np.max(np.argmax(covariance <= covariance[0] / np.e, axis=0)))
+
+
+def mean_missing_torque(source: TorqueSource, torque: Callable[[Motion], Array]) -> Array:
+    """Average the body torque that a model misses, measured minus predicted, away from a vertical pitch.
+
+    Parameters
+    ----------
+    source : TorqueSource
+    torque : callable
+        Predicts the generalised torque of a motion.
+
+    Returns
+    -------
+    array, shape (3,), N m, body frame
+        0 where the pitch is vertical throughout.
+    """
+    total, count = np.zeros(3), 0
+    for data in source.chunks():
+        kept = ~vertical(data.motion.attitude)
+        missing = (data.torque - torque(data.motion))[kept]
+        total += np.sum(rotations.body_torque(data.motion.attitude[kept], missing), axis=0)
+        count += len(missing)
+    return total / max(count, 1)
+
+
+def with_constant(torque: Callable[[Motion], Array], constant: Array) -> Callable[[Motion], Array]:
+    """Add a constant body torque to the predictions of a model.
+
+    Parameters
+    ----------
+    torque : callable
+        Predicts the generalised torque of a motion.
+    constant : array, shape (3,), N m, body frame
+    """
+
+    def predicted(motion: Motion) -> Array:
+        everywhere = np.broadcast_to(constant, (len(motion), 3))
+        return torque(motion) + rotations.generalised_torque(motion.attitude, everywhere)
+
+    return predicted
+
+
+def compare_torque(
+    source: TorqueSource, ours: Callable[[Motion], Array], theirs: Callable[[Motion], Array]
+) -> Comparison:
+    """Compare the errors of body torque over contiguous blocks of held-out data.
+
+    There are as many blocks as `block_count` grants the errors. Errors are scaled by the root mean square of the
+    torque about each axis, so that the smallest counts as much as the largest, and left out near a pitch of +-90
+    degrees, as in `Score.r2_body`.
+
+    Parameters
+    ----------
+    source : TorqueSource
+        One held-out part.
+    ours, theirs : callable
+        Predict the generalised torque of a motion.
+    """
+    scale = _scale(source)
+    chunks = (_errors(data, (ours, theirs)) for data in source.chunks())
+    both = [np.concatenate(errors) / scale for errors in zip(*chunks, strict=True)]
+    samples = len(both[0])
+    block = np.arange(samples) * block_count(np.hstack(both)) // max(samples, 1)
+    own, rival = (_block_means(np.sum(errors**2, axis=1), block) for errors in both)
+    # Each of three axes has a mean square of 1 after scaling.
+    return compare_errors(own, rival, size=3.0)
+
+
+def _errors(data: TorqueData, torques: tuple[Callable[[Motion], Array], ...]) -> list[Array]:
+    """Compute the errors of body torque of each predictor away from a vertical pitch, shape (samples, 3)."""
+    kept = ~vertical(data.motion.attitude)
+    attitude = data.motion.attitude[kept]
+    return [rotations.body_torque(attitude, (data.torque - torque(data.motion))[kept]) for torque in torques]
+
+
+def _scale(source: TorqueSource) -> Array:
+    """Root mean square of the body torque; an axis without torque counts by the size of the largest."""
+    square, count = np.zeros(3), 0
+    for data in source.chunks():
+        kept = ~vertical(data.motion.attitude)
+        square += np.sum(rotations.body_torque(data.motion.attitude[kept], data.torque[kept]) ** 2, axis=0)
+        count += int(np.sum(kept))
+    size = square / max(count, 1)
+    return np.sqrt(np.where(size > _ROUNDING * np.max(size), size, np.max(size) or 1.0))
+
+
+def compare_windows(ours: Array, theirs: Array, size: float, block: IntArray) -> Comparison:
+    """Compare the errors of windows that do not overlap, block by block.
+
+    A window that one of both lost counts as ten times the largest error of all; one that both lost is left out.
+
+    Parameters
+    ----------
+    ours, theirs : array, shape (window,)
+        Mean squared errors, not finite where a run was lost.
+    size : float
+        Mean square of what is predicted.
+    block : array of int, shape (window,)
+        Of each window.
+
+    Returns
+    -------
+    Comparison
+        Without blocks where no window is left.
+    """
+    both, kept = np.stack([ours, theirs]), np.isfinite(ours) | np.isfinite(theirs)
+    worst = _LOST * max(float(np.max(both[np.isfinite(both)], initial=0.0)), size)
+    own, rival = (_block_means(errors[kept], block[kept]) for errors in np.where(np.isfinite(both), both, worst))
+    return compare_errors(own, rival, size)
+
+
+def non_overlapping(start: IntArray, horizon: int) -> IntArray:
+    """Select windows that do not overlap, from the first on.
+
+    Parameters
+    ----------
+    start : array of int, shape (window,)
+        First sample, ascending.
+    horizon : int
+        Samples behind it.
+
+    Returns
+    -------
+    array of int
+        Their numbers.
+    """
+    chosen, free = [], 0
+    for number, first in enumerate(start):
+        if first >= free:
+            chosen.append(number)
+            free = int(first) + horizon
+    return np.array(chosen, dtype=np.int64)

@@ -1,21 +1,28 @@
-"""Whether an identified model could be a body wherever training was: positive definite, no energy of its own."""
+"""Whether a model makes sense beside the data: a body wherever training was, and the same one period away."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
+from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
+from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.excitation import CELLS
-from cpfls_cli.identification.model import Model, coriolis_matrix
-from cpfls_cli.identification.physics import not_positive_definite, vertical
+from cpfls_cli.identification.judge import score_of
+from cpfls_cli.identification.model import Model
+from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues
+
+_AWAY = 2 * np.pi * np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
 @dataclass(frozen=True)
 class Physics:
-    """Physical sense of a model over the cells of roll and pitch that training visited.
+    """Physical plausibility of a model over the cells of roll and pitch that training visited.
 
     Attributes
     ----------
@@ -47,7 +54,7 @@ class Physics:
 
 
 def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
-    """Examine a model at the centres of the cells that training visited, and its D(q) at those of all.
+    """Check the plausibility of a model at the cells that training visited, and its D(q) at all cells.
 
     Parameters
     ----------
@@ -78,7 +85,7 @@ def physical_sense(model: Model, rng: np.random.Generator) -> Physics:
 
 
 def energy_share(values: InertiaValues, coriolis: Array, rate: Array) -> float:
-    """Measure the power of ``dD/dt - 2 C`` against the sizes of its terms.
+    """Compute the power of ``dD/dt - 2 C`` relative to the sizes of its terms.
 
     Parameters
     ----------
@@ -101,7 +108,7 @@ def energy_share(values: InertiaValues, coriolis: Array, rate: Array) -> float:
 
 
 def cell_centres(visited: BoolArray) -> Array:
-    """Give the attitudes at the centres of cells, without those near a pitch of +-90 degrees.
+    """Compute the attitudes at the centres of cells, without those near a pitch of +-90 degrees.
 
     Parameters
     ----------
@@ -117,3 +124,49 @@ def cell_centres(visited: BoolArray) -> Array:
     centres = (np.stack([roll, pitch, np.zeros_like(roll)], axis=1) + 0.5) * (2 * np.pi / CELLS) - np.pi
     attitude = centres * [1.0, 1.0, 0.0]
     return np.asarray(attitude[~vertical(attitude)])
+
+
+@dataclass(frozen=True)
+class PeriodErrors:
+    """Torque errors one period away, by part and Euler axis.
+
+    Attributes
+    ----------
+    parts : tuple of str
+    mse : array, shape (part, 3), (N m)^2
+        Mean squared error; the worse of one turn in roll and one turn back in pitch.
+    max_error : array, shape (part, 3), N m
+        Largest absolute error; likewise.
+    """
+
+    parts: tuple[str, ...]
+    mse: Array
+    max_error: Array
+
+
+def one_period_away(model: Model, parts: Mapping[str, TorqueSource]) -> PeriodErrors | None:
+    """Compute the errors of a model with roll one turn on, and with pitch one turn back, against the same torque.
+
+    Parameters
+    ----------
+    model : Model
+    parts : mapping of str to TorqueSource
+        By name.
+
+    Returns
+    -------
+    PeriodErrors or None
+        None where the inputs of the model are not those of the full circle.
+    """
+    if model.structure.settings.input_map != "full-circle":
+        return None
+    scores = [[score_of(data, _moved(model, shift)) for shift in _AWAY] for data in parts.values()]
+    return PeriodErrors(
+        parts=tuple(parts),
+        mse=np.max([[score.mse for score in both] for both in scores], axis=1),
+        max_error=np.max([[score.max_error for score in both] for both in scores], axis=1),
+    )
+
+
+def _moved(model: Model, shift: Array) -> Callable[[Motion], Array]:
+    return lambda motion: model.torque(replace(motion, attitude=motion.attitude + shift))

@@ -1,15 +1,19 @@
-"""What speaks for a model and against it, one sentence each."""
+"""Reasons for and against a model, one sentence each."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.findings import AXES
-from cpfls_cli.validation.grounds import Grounds
-from cpfls_cli.validation.reason import AGAINST, FOR, NEITHER, Reason
-from cpfls_cli.validation.reasons_of_errors import reasons_of_errors
+from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
+from cpfls_cli.validation.paired import Comparison
+from cpfls_cli.validation.replay import NOTHING_MOVES
+
+FOR, NEITHER, AGAINST = 1, 0, -1
 
 # White errors fall below it once in a hundred times an axis.
 _NOT_WHITE = 0.01
@@ -17,12 +21,47 @@ _SMALLEST_P = 1e-16
 DEFINITE_SHARE = 0.975
 """Share of the bootstrap draws that are to be positive definite wherever training was."""
 
+_LARGE_BESIDE_NOISE, _SMALL = 0.25, 0.01
+
+
+class Reason(NamedTuple):
+    """One sentence on a model, and whether it speaks for or against it.
+
+    Attributes
+    ----------
+    text : str
+        One sentence with its number.
+    speaks : int
+        1 for the model, -1 against it, 0 neither.
+    """
+
+    text: str
+    speaks: int
+
+
+def numbers(values: Array, shown: BoolArray | None = None) -> str:
+    """Format the values of the three axes.
+
+    Parameters
+    ----------
+    values : array, shape (3,)
+    shown : array of bool, shape (3,), optional
+        Axes to print; all by default.
+
+    Returns
+    -------
+    str
+        As ``roll 0.95 pitch 0.97 yaw 0.23``.
+    """
+    axes = np.flatnonzero(np.ones(3, dtype=bool) if shown is None else shown)
+    return " ".join(f"{AXES[axis]} {values[axis]:.3g}" for axis in axes)
+
 
 def reasons(grounds: Grounds) -> Iterator[Reason]:
-    """List what speaks for a model and against it, the most important first."""
-    yield from reasons_of_errors(grounds)
-    sense = (_definite, _draws, _elsewhere, _fuzzy_part, _determined)
-    for rule in (*sense, _band, _search, _outside, _white):
+    """List the reasons for and against a model, the most important first."""
+    of_errors = (_held_out, _hardly_excited, _beside_rigid_body, _constant, _steps, _lost)
+    of_inertia = (_definite, _draws, _elsewhere, _fuzzy_part, _determined)
+    for rule in (*of_errors, *of_inertia, _band, _search, _outside, _white):
         yield from rule(grounds)
 
 
@@ -47,7 +86,7 @@ def _draws(grounds: Grounds) -> Iterator[Reason]:
 
 
 def _elsewhere(grounds: Grounds) -> Iterator[Reason]:
-    """Where training went all round but not everywhere, a rule of all attitudes may be no body at others."""
+    """Report attitudes without a definite D(q) that training, though it went all round, did not visit."""
     physics = grounds.physics
     if grounds.one_rule and not grounds.impossible and physics.indefinite_anywhere:
         text = (
@@ -63,14 +102,14 @@ def _fuzzy_part(grounds: Grounds) -> Iterator[Reason]:
 
 
 def _determined(grounds: Grounds) -> Iterator[Reason]:
-    found = grounds.identification
+    result = grounds.identification
     if grounds.fuzzy_part_off:
         return
     if grounds.determined:
-        yield Reason(f"every coefficient is determined; condition number {found.system.condition_number:.3g}", FOR)
+        yield Reason(f"every coefficient is determined; condition number {result.system.condition_number:.3g}", FOR)
     else:
-        share, weak = 100 * float(np.mean(found.excitation.determined)), int(np.sum(~found.excitation.excited))
-        rules = f"{weak} of {len(found.excitation.name)} rules are not excited beyond the noise"
+        share, weak = 100 * float(np.mean(result.excitation.determined)), int(np.sum(~result.excitation.excited))
+        rules = f"{weak} of {len(result.excitation.name)} rules are not excited beyond the noise"
         yield Reason(f"{share:.3g} % of what the rules could say is determined by the flight; {rules}", AGAINST)
 
 
@@ -84,16 +123,17 @@ def _band(grounds: Grounds) -> Iterator[Reason]:
 
 
 def _search(grounds: Grounds) -> Iterator[Reason]:
-    found = grounds.identification
-    if not found.complete:
-        done = len(found.history.evaluations) - 1
-        text = f"the search stopped before its end ({found.stop_reason}, after {done} generations)"
+    result = grounds.identification
+    if not result.complete:
+        done = len(result.history.evaluations) - 1
+        text = f"the search stopped before its end ({result.stop_reason}, after {done} generations)"
         yield Reason(f"{text}: better partitions may exist", AGAINST)
 
 
 def _outside(grounds: Grounds) -> Iterator[Reason]:
-    found = grounds.identification
-    outside, samples = (sum(of[part] for part in grounds.held_out) for of in (found.outside, found.samples))
+    result = grounds.identification
+    counts = (result.outside, result.samples)
+    outside, samples = (sum(count[part] for part in grounds.held_out) for count in counts)
     if outside and not (grounds.fuzzy_part_off or grounds.everywhere):
         yield Reason(
             f"{100 * outside / samples:.3g} % of the held-out samples lie outside the attitudes that training visited",
@@ -103,23 +143,117 @@ def _outside(grounds: Grounds) -> Iterator[Reason]:
 
 def _white(grounds: Grounds) -> Iterator[Reason]:
     errors = grounds.residuals
-    told = np.flatnonzero(np.isfinite(errors.ljung_box))
+    tested = np.flatnonzero(np.isfinite(errors.ljung_box))
     biased = np.flatnonzero(errors.mean_p < _NOT_WHITE)
     if len(biased):
         torques = ", ".join(f"{errors.mean[axis]:.3g} N m about {AXES[axis]}" for axis in biased)
         text = f"a constant torque is left over: {torques} ({errors.part}"
         yield Reason(f"{text}, p {_printed(float(np.min(errors.mean_p[biased])))}), which the model lacks", NEITHER)
-    coloured = [AXES[axis] for axis in told if errors.ljung_box[axis] < _NOT_WHITE]
+    coloured = [AXES[axis] for axis in tested if errors.ljung_box[axis] < _NOT_WHITE]
     if coloured:
-        smallest = float(np.min(errors.ljung_box[told]))
+        smallest = float(np.min(errors.ljung_box[tested]))
         text = f"torque errors about {', '.join(coloured)} are not white ({errors.part}, p {_printed(smallest)})"
         yield Reason(f"{text}: filters of the log do that, and so does an effect that has no term", NEITHER)
-    elif len(told) and not len(biased):
+    elif len(tested) and not len(biased):
         text = f"torque errors are white noise as far as {errors.samples} samples of {errors.part} tell"
-        yield Reason(f"{text} (p {_printed(float(np.min(errors.ljung_box[told])))})", FOR)
-    elif not len(told) and np.all(errors.exact):
+        yield Reason(f"{text} (p {_printed(float(np.min(errors.ljung_box[tested])))})", FOR)
+    elif not len(tested) and np.all(errors.exact):
         yield Reason(f"the torque of {errors.part} is met to rounding", FOR)
 
 
 def _printed(p_value: float) -> str:
     return f"{p_value:.2g}" if p_value > _SMALLEST_P else f"below {_SMALLEST_P:g}"
+
+
+def _held_out(grounds: Grounds) -> Iterator[Reason]:
+    r2 = grounds.r2(MODEL)
+    if not grounds.held_out:
+        yield Reason(
+            f"judged on its own training data alone (R2 of body torque {numbers(r2)}), which says nothing of any other "
+            "flight: hold some out with identification.training_share below 1, or --validate another flight",
+            AGAINST,
+        )
+        return
+    low = [name for name, value in zip(AXES, r2, strict=True) if not value >= grounds.r2_min]
+    parts = f"worst of {len(grounds.held_out)} held-out parts" if len(grounds.held_out) > 1 else "held out"
+    text = f"R2 of body torque, {parts}: {numbers(r2)}"
+    if low:
+        yield Reason(f"{text}; below {grounds.r2_min:g} about {', '.join(low)}", AGAINST)
+    else:
+        yield Reason(f"{text}; {grounds.r2_min:g} or more about every axis", FOR)
+
+
+def _hardly_excited(grounds: Grounds) -> Iterator[Reason]:
+    for axis in np.flatnonzero(grounds.hardly_excited):
+        ours, still = grounds.rate_error(MODEL)[axis], grounds.rate_error(NOTHING_MOVES)[axis]
+        text = f"{AXES[axis]} hardly moves in training: its rate is predicted with an error of {ours:.3g} rad/s"
+        if not np.isfinite(ours):
+            yield Reason(f"{AXES[axis]} hardly moves in training, and windows of it cannot be replayed", AGAINST)
+        elif grounds.beats_nothing_moves(MODEL)[axis]:
+            neither = "which is better by more than chance, but confirms no model of its torque"
+            yield Reason(f"{text}, {still:.3g} if nothing moved, {neither}", NEITHER)
+        else:
+            yield Reason(f"{text}, {still:.3g} if nothing moved: not better by more than chance", AGAINST)
+
+
+def _beside_rigid_body(grounds: Grounds) -> Iterator[Reason]:
+    several = len(grounds.held_out) > 1
+    for part, compared in grounds.torque.items():
+        where = f" ({part})" if several else ""
+        yield _compared(f"squared error of held-out torque{where}", compared)
+    for part, steps in grounds.replayed.items():
+        if steps.windows:
+            compared = grounds.replay_beside(part, MODEL, RIGID_BODY)
+            reason = _compared(f"squared error of the body rate replayed ({part})", compared)
+            # What was learned from is no witness.
+            yield reason if part in grounds.held_out else Reason(reason.text, NEITHER)
+
+
+def _constant(grounds: Grounds) -> Iterator[Reason]:
+    """Name a constant torque that is large beside the noise, and not negligible beside the torque."""
+    axes = grounds.identification.axes
+    constant, noise = np.abs(axes.constant), axes.torque * np.sqrt(np.clip(1.0 - axes.r2, 0.0, None))
+    for axis in np.flatnonzero((constant > _LARGE_BESIDE_NOISE * noise) & (constant > _SMALL * axes.torque)):
+        share = f"{100 * constant[axis] / axes.torque[axis]:.3g} % of its torque"
+        text = f"{AXES[axis]}: a constant torque of {axes.constant[axis]:.3g} N m acts in training, {share}"
+        yield Reason(f"{text}: no inertia makes it, and errors are compared with the rigid body's without it", NEITHER)
+
+
+def _compared(what: str, errors: Comparison) -> Reason:
+    if not errors.blocks:
+        return Reason(f"{what}: nothing to compare", AGAINST)
+    if errors.ratio == 1:
+        return Reason(f"{what}: the same as that of the rigid body", AGAINST)
+    if np.isinf(errors.ratio):
+        return Reason(f"{what}: that of the rigid body is rounding, the model's is not", AGAINST)
+    text = f"{what}: {errors.ratio:.3g} times that of the rigid body"
+    if errors.lower or errors.higher:
+        return Reason(f"{text}, by more than chance over {errors.blocks} blocks", FOR if errors.lower else AGAINST)
+    return Reason(f"{text}, which may be chance over {errors.blocks} blocks", AGAINST)
+
+
+def _steps(grounds: Grounds) -> Iterator[Reason]:
+    steps = grounds.steps
+    if not steps.windows:
+        yield Reason(f"{steps.part}: no stretch without a pause or a vertical pitch to replay torques on", NEITHER)
+        return
+    ours, still = (
+        float(np.degrees(np.linalg.norm(steps.attitude[steps.model.index(name), -1])))
+        for name in (MODEL, NOTHING_MOVES)
+    )
+    if np.isfinite(ours):
+        text = (
+            f"after {steps.horizon[-1]:.3g} s of torques replayed ({steps.part}, {steps.windows} windows) the attitude"
+        )
+        yield Reason(
+            f"{text} is off by {ours:.3g} degrees, {still:.3g} if nothing moved", FOR if ours < still else AGAINST
+        )
+
+
+def _lost(grounds: Grounds) -> Iterator[Reason]:
+    if grounds.lost(MODEL):
+        yield Reason(
+            f"{grounds.lost(MODEL)} of {grounds.windows} windows replayed do not come to their end: D(q) is not "
+            "positive definite there, or the model turns faster than any step of integration",
+            AGAINST,
+        )

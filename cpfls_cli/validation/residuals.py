@@ -1,4 +1,4 @@
-"""What a model leaves of the torque: white or not, related to its inputs or not, normal or not."""
+"""Residual analysis of the torque of a model: whiteness, bias, correlation with its inputs, distribution."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import chi2, norm
+from scipy.stats import t as student
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.fuzzy.inputs import wrap
+from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.validation.autocorrelation import autocorrelation
-from cpfls_cli.validation.bias import mean_p_value
-from cpfls_cli.validation.cross_correlation import cross_correlation, inputs_of
-from cpfls_cli.validation.stretches import leading, sample_numbers, sample_period
+from cpfls_cli.validation.timeline import lagged_pairs, leading_samples, sample_numbers, sample_period
 
 # More do not change a picture; 0.1 GB of signals.
 _MOST_SAMPLES = 200_000
@@ -22,6 +21,17 @@ _MOST_SAMPLES = 200_000
 _ROUNDING = 1e-9
 _BINS = 41
 _PROBABILITIES = np.arange(1, 100) / 100
+
+_BAND = 1.96
+# Lags of fewer samples than a quarter, or whose pairs are fewer, say little and spoil the distribution of the test.
+_FEWEST_PER_LAG = 4
+
+# Few enough that a block outlasts the memory of most noise, and enough for a test.
+_BLOCKS = 20
+_FEWEST_BLOCKS, _FEWEST_SAMPLES = 4, 50
+
+# What varies by less than this share of the largest value of its kind is the rounding of a constant.
+_CONSTANT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -105,11 +115,12 @@ def examine_residuals(
     ----------
     Ljung, System Identification: Theory for the User, section 16.6 (residual analysis).
     """
-    data = leading(source, _MOST_SAMPLES)
+    data = leading_samples(source, _MOST_SAMPLES)
     predicted = torque(data.motion)
     errors, period, number = data.torque - predicted, sample_period(data.time), sample_numbers(data.time, lags + 1)
     exact = np.max(np.abs(errors), axis=0) <= _ROUNDING * np.max(np.abs(data.torque))
-    own, inputs = autocorrelation(errors, number, exact, lags), inputs_of(data, predicted)
+    correlated, p_value = autocorrelation(errors, number, exact, lags)
+    inputs = model_inputs(data, predicted)
     edges, counts = _histogram(errors)
     return ResidualAnalysis(
         part=part,
@@ -117,10 +128,11 @@ def examine_residuals(
         available=len(source),
         mean=errors.mean(axis=0),
         mean_p=mean_p_value(errors, exact),
-        lag=period * np.arange(1, len(own.value) + 1, dtype=float),
-        autocorrelation=own.value,
-        band=own.band,
-        ljung_box=own.p_value,
+        lag=period * np.arange(1, len(correlated) + 1, dtype=float),
+        autocorrelation=correlated,
+        # White errors have a standard deviation of 1 / sqrt(n) at each lag, a smaller one where pairs are missing.
+        band=float(_BAND / np.sqrt(len(data))),
+        ljung_box=p_value,
         input=inputs.name,
         input_lag=period * np.arange(-lags, lags + 1, dtype=float),
         correlation=cross_correlation(errors, inputs, number, exact, lags),
@@ -135,5 +147,166 @@ def examine_residuals(
 def _histogram(errors: Array) -> tuple[Array, IntArray]:
     largest = np.max(np.abs(errors), axis=0)
     edges = np.linspace(-1.0, 1.0, _BINS + 1)[:, None] * np.where(largest > 0, largest, 1.0)
-    counts = [np.histogram(own, bins=edge)[0] for own, edge in zip(errors.T, edges.T, strict=True)]
+    counts = [np.histogram(axis, bins=edge)[0] for axis, edge in zip(errors.T, edges.T, strict=True)]
     return edges, np.stack(counts, axis=1)
+
+
+def autocorrelation(errors: Array, number: IntArray, without: BoolArray, lags: int) -> tuple[Array, Array]:
+    """Compute the autocorrelation of errors about their mean, and the p-value of the test of Ljung and Box.
+
+    ``r_k = sum_k e(t) e(t + k) / sum e^2`` over the n_k pairs that are k samples apart, whatever is missing between
+    them. ``Q = n (n + 2) sum_k r_k^2 / n_k`` is held against chi square with as many degrees of freedom as lags.
+
+    Parameters
+    ----------
+    errors : array, shape (samples, 3)
+    number : array of int, shape (samples,)
+        As from `sample_numbers`.
+    without : array of bool, shape (3,)
+        Axes without errors, whose rounding nobody should take for a signal.
+    lags : int
+        Largest lag, in samples.
+
+    Returns
+    -------
+    value : array, shape (lag, 3)
+        From one sample on; NaN for an axis without errors. Fewer lags than asked for where all stretches are short.
+    p_value : array, shape (3,)
+        Small where the errors are not white; NaN for an axis without errors.
+
+    References
+    ----------
+    Box, Jenkins and Reinsel, Time Series Analysis, section 2.1.6; Ljung and Box, Biometrika 65 (1978), 297; with
+    missing samples: Stoffer and Toloi, Statistics and Probability Letters 13 (1992), 391.
+    """
+    samples, centred = len(errors), errors - errors.mean(axis=0)
+    products, pairs = _products(centred, number, min(lags, samples // _FEWEST_PER_LAG))
+    square = np.sum(centred**2, axis=0)
+    value = products / np.where(square > 0, square, 1.0)
+    statistic = samples * (samples + 2) * np.sum(value**2 / pairs[:, None], axis=0)
+    unknown = without | (len(pairs) == 0)
+    p_value = np.where(unknown, np.nan, chi2.sf(statistic, max(len(pairs), 1)))
+    return np.where(unknown, np.nan, value), p_value
+
+
+def _products(centred: Array, number: IntArray, lags: int) -> tuple[Array, IntArray]:
+    """Sum products and count pairs at each lag from 1 on, shapes (lag, 3) and (lag,)."""
+    products, pairs = np.zeros((lags, centred.shape[1])), np.zeros(lags, dtype=np.int64)
+    for index in range(lags):
+        earlier, later = lagged_pairs(number, index + 1)
+        products[index], pairs[index] = np.sum(centred[earlier] * centred[later], axis=0), len(earlier)
+    few = np.flatnonzero(_FEWEST_PER_LAG * pairs < len(centred))
+    enough = few[0] if len(few) else lags
+    return products[:enough], pairs[:enough]
+
+
+def mean_p_value(errors: Array, without: BoolArray) -> Array:
+    """Test whether errors are 0 in the mean, by Student's test of their means over blocks of time.
+
+    ``t = m / (s / sqrt B)`` with m the mean and s the standard deviation of the B block means. Neighbouring errors are
+    alike where filters were at work, so that they count as fewer than they are; means over long blocks are not.
+
+    Parameters
+    ----------
+    errors : array, shape (samples, 3)
+        In the order of time.
+    without : array of bool, shape (3,)
+        Axes without errors.
+
+    Returns
+    -------
+    array, shape (3,)
+        Small where the mean is not 0; NaN for an axis without errors, and for all of fewer than four samples.
+    """
+    blocks = min(max(len(errors) // _FEWEST_SAMPLES, _FEWEST_BLOCKS), _BLOCKS)
+    if len(errors) < blocks:
+        return np.full(errors.shape[1], np.nan)
+    means = np.array([block.mean(axis=0) for block in np.array_split(errors, blocks)])
+    middle, spread = means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(blocks)
+    # A constant without any noise is not chance.
+    ratio = np.where(middle == 0, 0.0, np.abs(middle) / np.maximum(spread, np.finfo(float).tiny))
+    return np.where(without, np.nan, 2 * student.sf(ratio, blocks - 1))
+
+
+@dataclass(frozen=True)
+class ModelInputs:
+    """Inputs of a model, which its errors may be correlated with.
+
+    Attributes
+    ----------
+    name : tuple of str
+    value : array, shape (samples, input)
+    varies : array of bool, shape (input,)
+        False for constants, that nothing can be correlated with.
+    """
+
+    name: tuple[str, ...]
+    value: Array
+    varies: BoolArray
+
+
+def model_inputs(data: TorqueData, predicted: Array) -> ModelInputs:
+    """List the inputs of a model, attitude, Euler rates and accelerations, and the torque that it predicts.
+
+    Not the measured torque, which holds the error and so is correlated with it even where the model is perfect.
+
+    Parameters
+    ----------
+    data : TorqueData
+    predicted : array, shape (samples, 3), N m
+        Torque of the model.
+
+    Returns
+    -------
+    ModelInputs
+        Angles within one turn.
+    """
+    motion, axes = data.motion, ("roll", "pitch", "yaw")
+    kinds = {
+        "{}": wrap(motion.attitude[:, :2]),
+        "{} rate": motion.rate,
+        "{} acceleration": motion.acceleration,
+        "predicted {} torque": predicted,
+    }
+    return ModelInputs(
+        name=tuple(kind.format(axis) for kind, values in kinds.items() for axis in axes[: values.shape[1]]),
+        value=np.concatenate(list(kinds.values()), axis=1),
+        varies=np.concatenate([_varies(values) for values in kinds.values()]),
+    )
+
+
+def cross_correlation(errors: Array, inputs: ModelInputs, number: IntArray, without: BoolArray, lags: int) -> Array:
+    """Compute the cross-correlation of errors with inputs at lags to both sides, both about their means.
+
+    ``r(k) = sum_k u(t) e(t + k) / sqrt(sum u^2 sum e^2)`` over the pairs that are k samples apart.
+
+    Parameters
+    ----------
+    errors : array, shape (samples, 3)
+    inputs : ModelInputs
+    number : array of int, shape (samples,)
+        As from `sample_numbers`.
+    without : array of bool, shape (3,)
+        Axes without errors.
+    lags : int
+        Largest lag to both sides, in samples.
+
+    Returns
+    -------
+    array, shape (input, 2 lags + 1, 3)
+        From the most negative lag on; at a positive lag the error follows the input. NaN for constant inputs and axes
+        without errors.
+    """
+    e, u = errors - errors.mean(axis=0), inputs.value - inputs.value.mean(axis=0)
+    products = np.zeros((2 * lags + 1, u.shape[1], e.shape[1]))
+    for lag in range(lags + 1):
+        earlier, later = lagged_pairs(number, lag)
+        products[lags + lag] = u[earlier].T @ e[later]
+        products[lags - lag] = u[later].T @ e[earlier]
+    size = np.sqrt(np.outer(np.sum(u**2, axis=0), np.sum(e**2, axis=0)))
+    known = np.outer(inputs.varies, ~without) & (size > 0)
+    return np.moveaxis(np.where(known, products / np.where(known, size, 1.0), np.nan), 0, 1)
+
+
+def _varies(values: Array) -> BoolArray:
+    return np.asarray(np.std(values, axis=0) > _CONSTANT * np.max(np.abs(values), initial=0.0))

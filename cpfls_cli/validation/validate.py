@@ -8,28 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import Predictor
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING, model_evaluator
 from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.validation.bands import definite_share
 from cpfls_cli.validation.bootstrap import Draws, bootstrap
-from cpfls_cli.validation.curves import Curves, curves
-from cpfls_cli.validation.definite import definite_share
+from cpfls_cli.validation.curves import Curves, RoundTrip, curves, round_trip
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
-from cpfls_cli.validation.missing_torque import mean_missing_torque, with_constant
-from cpfls_cli.validation.paired import Comparison
-from cpfls_cli.validation.paired_torque import compare_torque
-from cpfls_cli.validation.period import PeriodErrors, one_period_away
-from cpfls_cli.validation.physical import Physics, physical_sense
+from cpfls_cli.validation.paired import Comparison, compare_torque, mean_missing_torque, with_constant
+from cpfls_cli.validation.physical import PeriodErrors, Physics, one_period_away, physical_sense
+from cpfls_cli.validation.replay import StepErrors, replay_steps
 from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
-from cpfls_cli.validation.round_trip import RoundTrip, round_trip
-from cpfls_cli.validation.steps import StepErrors, replay_steps
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
-from cpfls_cli.validation.turning import Predictor
 from cpfls_cli.validation.verdict import Verdict, verdict
 
 Tell = Callable[[str], None]
-"""Takes what comes next, in words."""
+"""Takes the name of the next step, for the progress display."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +88,7 @@ def validate(
     result : Identification
     rng : numpy.random.Generator
     tell : callable, optional
-        Told what comes next.
+        Called with the name of each step.
     """
     asked, model = settings.validation, result.model
     part, source = next(iter(held_out.items()), (TRAINING, training))
@@ -116,8 +112,8 @@ def validate(
         torque=_torque_compared(held_out, result, missing),
         steps=steps,
         replayed={
-            name: replay_steps(name, own, predictors, asked.horizon_samples, asked.windows, missing)
-            for name, own in (held_out or {TRAINING: training}).items()
+            name: replay_steps(name, judged, predictors, asked.horizon_samples, asked.windows, missing)
+            for name, judged in (held_out or {TRAINING: training}).items()
         },
         residuals=residuals,
         physics=physics,
@@ -125,8 +121,7 @@ def validate(
         band=drawn.relative_width,
         definite=definite_share(model, draws),
     )
-    judged = verdict(grounds)
-    return Validation(structures, residuals, draws, drawn, again, steps, physics, period, judged)
+    return Validation(structures, residuals, draws, drawn, again, steps, physics, period, verdict(grounds))
 
 
 def _missing(training: TorqueSource, result: Identification) -> dict[str, Array]:

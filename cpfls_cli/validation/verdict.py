@@ -1,4 +1,4 @@
-"""Whether to fly with a model, and where: a verdict by rules, each with its reason."""
+"""The verdict on a model, by rules: whether to control with it, at which attitudes, and why."""
 
 from __future__ import annotations
 
@@ -8,19 +8,17 @@ from typing import Literal
 import numpy as np
 
 from cpfls_cli.arrays import BoolArray
+from cpfls_cli.dynamics.rigid_body import why_unphysical
 from cpfls_cli.identification.findings import AXES
-from cpfls_cli.identification.physics import why_unphysical
 from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
-from cpfls_cli.validation.reason import AGAINST, FOR, NEITHER, Reason, numbers
-from cpfls_cli.validation.reasons import DEFINITE_SHARE, reasons
-from cpfls_cli.validation.region import region_in_words
+from cpfls_cli.validation.reasons import AGAINST, DEFINITE_SHARE, FOR, NEITHER, Reason, numbers, reasons
 
 Label = Literal["good-for-control", "good-inside-region", "not-better-than-rigid-body", "do-not-use"]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """A verdict in words.
+    """Verdict on a model, with its reasons.
 
     Attributes
     ----------
@@ -41,7 +39,7 @@ class Verdict:
 
 
 def verdict(grounds: Grounds) -> Verdict:
-    """Judge a model by rules, the first that applies.
+    """Judge a model by the first rule that applies.
 
     1. *do-not-use* where D(q) is not positive definite at an attitude that training visited: then some torque turns
        the model the wrong way, and a controller that inverts D(q) diverges.
@@ -64,12 +62,12 @@ def verdict(grounds: Grounds) -> Verdict:
     reasons and do not decide: each of them harms a model only as far as it predicts worse, and that is measured.
     """
     label, decisive = _decided(grounds)
-    told = (decisive, *reasons(grounds))
-    return Verdict(label, _region(grounds, label), tuple(r.text for r in told), tuple(r.speaks for r in told))
+    listed = (decisive, *reasons(grounds))
+    return Verdict(label, _region(grounds, label), tuple(r.text for r in listed), tuple(r.speaks for r in listed))
 
 
 def good_axes(grounds: Grounds, predictor: str) -> BoolArray:
-    """Tell about which body axes a predictor is good enough for control, by rule 3 of `verdict`.
+    """Flag the body axes about which a predictor is good enough for control, by rule 3 of `verdict`.
 
     Parameters
     ----------
@@ -86,7 +84,7 @@ def good_axes(grounds: Grounds, predictor: str) -> BoolArray:
 
 
 def confirmed_axes(grounds: Grounds, predictor: str) -> BoolArray:
-    """Tell about which body axes the held-out R2 of torque is at least what is asked for.
+    """Flag the body axes about which the held-out R2 of torque is at least `r2_min`.
 
     Parameters
     ----------
@@ -122,7 +120,7 @@ def _better(grounds: Grounds) -> bool:
 
 
 def _not_good_enough(grounds: Grounds) -> str | None:
-    """Say why a model that is better than the rigid body is not to be used; None where it is."""
+    """Explain why a model that is better than the rigid body is not to be used; None where it is."""
     if grounds.loses_many:
         return f"{grounds.lost(MODEL)} of {grounds.windows} windows replayed do not come to their end"
     if grounds.definite is not None and grounds.definite < DEFINITE_SHARE:
@@ -137,7 +135,7 @@ def _not_good_enough(grounds: Grounds) -> str | None:
 
 
 def _r2_in_words(grounds: Grounds, predictor: str) -> str:
-    """Give the R2 of the axes that it confirms, and name those that nothing confirms."""
+    """Format the R2 of the axes that it confirms, and name those that nothing confirms."""
     confirmed, r2 = confirmed_axes(grounds, predictor), grounds.r2(predictor)
     text = f"R2 of body torque {numbers(r2, confirmed)}; {grounds.r2_min:g} is asked for"
     return text if np.all(confirmed) else f"{text}; about {_names(~confirmed)} nothing confirms it"
@@ -159,7 +157,7 @@ def _beside_rigid_body(grounds: Grounds) -> tuple[Label, Reason]:
 
 
 def _rigid_body_instead(grounds: Grounds) -> Reason:
-    """Say whether the rigid body is to be used in place of a model that is not better."""
+    """Explain whether the rigid body is to be used in place of a model that is not better."""
     bad = ~good_axes(grounds, RIGID_BODY)
     if not np.any(bad):
         use = "use the rigid body: it is simpler, and the model is not better by more than chance on held-out data"
@@ -176,15 +174,15 @@ def _names(axes: BoolArray) -> str:
 
 
 def _no_body(grounds: Grounds) -> str:
-    physics, found = grounds.physics, grounds.identification
+    physics, result = grounds.physics, grounds.identification
     if physics.indefinite:
         where = " and ".join(f"{angle:.0f}" for angle in np.degrees(physics.worst_attitude))
         at = f"in {physics.indefinite} of {physics.cells} cells of attitude that training visited, worst at roll and "
         at += f"pitch of {where} degrees"
     else:
-        at = f"at {found.indefinite} of {next(iter(found.samples.values()))} training samples"
+        at = f"at {result.indefinite} of {next(iter(result.samples.values()))} training samples"
     text = f"D(q) is not positive definite {at}: no body turns like that"
-    if grounds.held_out and np.all(confirmed_axes(grounds, RIGID_BODY)) and why_unphysical(found.rigid_body) is None:
+    if grounds.held_out and np.all(confirmed_axes(grounds, RIGID_BODY)) and why_unphysical(result.rigid_body) is None:
         text += f"; the rigid body is good for control (R2 of body torque {numbers(grounds.r2(RIGID_BODY))})"
     return text
 
@@ -192,3 +190,39 @@ def _no_body(grounds: Grounds) -> str:
 def _region(grounds: Grounds, label: Label) -> str:
     visited = region_in_words(grounds.identification.model.visited)
     return "every roll and pitch" if label == "good-for-control" else visited
+
+
+def region_in_words(visited: BoolArray) -> str:
+    """Describe the attitudes that training visited.
+
+    Parameters
+    ----------
+    visited : array of bool, shape (cells, cells)
+        Cells of roll and pitch, roll along the first axis, from -180 degrees.
+
+    Returns
+    -------
+    str
+        The shortest ranges of roll and pitch that hold all cells visited, and the share of all cells.
+    """
+    roll, pitch = (_range(np.asarray(visited.any(axis=other))) for other in (1, 0))
+    return f"roll {roll}, pitch {pitch} ({100 * np.mean(visited):.3g} % of all roll and pitch)"
+
+
+def _range(marked: BoolArray) -> str:
+    """Describe the shortest arc that holds all marked cells of a circle."""
+    cells, index = len(marked), np.flatnonzero(marked)
+    if len(index) == cells:
+        return "all round"
+    if len(index) == 0:
+        return "nowhere"
+    # The arc ends where the longest pause begins, and starts behind it.
+    pauses = np.diff(np.append(index, index[0] + cells))
+    longest = int(np.argmax(pauses))
+    start = int(index[(longest + 1) % len(index)])
+    end = start + cells - int(pauses[longest]) + 1
+    return f"{_degrees(start, cells)} to {_degrees(end, cells)} degrees"
+
+
+def _degrees(edge: int, cells: int) -> str:
+    return f"{360 * edge / cells - 180:g}"

@@ -1,14 +1,5 @@
-"""The multirotor: its rigid-body rotation and its rotors."""
+"""The multirotor: its settings and its rotors."""
 
-from cpfls_cli.vehicle.rigid_body import (
-    body_torque,
-    inertia_matrix,
-    inertia_matrix_gradient,
-    inertia_tensor,
-    newton_euler_torque,
-    rigid_body_regressor,
-    torque,
-)
 from cpfls_cli.vehicle.rotors import (
     BodyWrench,
     RotorDemand,
@@ -26,13 +17,6 @@ __all__ = [
     "RotorViolation",
     "VehicleSettings",
     "allocation_matrix",
-    "body_torque",
     "body_wrench",
-    "inertia_matrix",
-    "inertia_matrix_gradient",
-    "inertia_tensor",
-    "newton_euler_torque",
-    "rigid_body_regressor",
     "rotor_demand",
-    "torque",
 ]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.inertia import INERTIA_PARAMETERS, INERTIA_PLACES, body_torque_columns, symmetric, symmetric_columns
+from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, body_torque_columns, symmetric, symmetric_columns
 
 PARAMETERS = np.array([1.0, 2.0, 3.0, 0.4, 0.5, 0.6])
 MATRIX = np.array([[1.0, 0.4, 0.5], [0.4, 2.0, 0.6], [0.5, 0.6, 3.0]])
@@ -24,7 +24,7 @@ def test_three_parameters_fill_the_diagonal():
 
 def test_names_say_the_places():
     axes = "xyz"
-    assert tuple(f"I{axes[row]}{axes[column]}" for row, column in INERTIA_PLACES) == INERTIA_PARAMETERS
+    assert tuple(f"I{axes[row]}{axes[column]}" for row, column in INERTIA_ENTRIES) == INERTIA_PARAMETERS
 
 
 def test_columns_times_parameters_are_the_matrix_times_the_vectors():

@@ -18,6 +18,11 @@ def test_rotation_matrix_is_scipys_intrinsic_zyx():
     np.testing.assert_allclose(rotations.rotation_matrix(attitude), expected, atol=1e-14)
 
 
+def test_angles_come_back_from_matrices():
+    attitude, _, _ = states()
+    np.testing.assert_allclose(rotations.euler_angles(rotations.rotation_matrix(attitude)), attitude, atol=1e-12)
+
+
 def test_body_rate_is_the_rotation_vector_of_a_small_step():
     attitude, rate, _ = states()
     step = 1e-5

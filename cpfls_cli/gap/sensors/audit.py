@@ -12,10 +12,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.hooks import FaultFit, ReadingError, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.inertial import InertiaModel
 from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
 from cpfls_cli.gap.balance.windows import Recording, Windows
 from cpfls_cli.gap.sensors.channels import (

@@ -3,9 +3,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli import rotations
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.trajectory.rotation import RotationLimits, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.vehicle.rigid_body import newton_euler_torque
 
 INERTIA = (0.6, 0.7, 1.2, 0.02, -0.01, 0.03)
 TORQUE = (5.0, 5.0, 3.0)

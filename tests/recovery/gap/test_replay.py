@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from cpfls_cli import rotations
+from cpfls_cli.dynamics.integration import ReplayModel
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.gap.replay.rate_equation import ReplayModel, euler_angles
-from cpfls_cli.gap.replay.replay import held, replay, rigid_body, start_rate, start_samples
-from cpfls_cli.gap.replay.worst_stretch import worst_stretch
+from cpfls_cli.gap.replay import held, replay, rigid_body, start_rate, start_samples, worst_stretch
 from cpfls_cli.regressor.regressor import InertiaValues
-from cpfls_cli.vehicle.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 VEHICLE = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.03, -0.02, 0.04))
@@ -115,10 +114,6 @@ def test_a_smoothed_start_has_less_of_the_noise_and_does_not_lag():
     noisy = start_rate(flight(rigid_torque(), body_rate=BODY_RATE + noise)) - BODY_RATE
     assert noisy[10:-10].std() < 0.65 * 0.02
     assert np.abs(start_rate(flight(rigid_torque())) - BODY_RATE).max() < 2e-5
-
-
-def test_angles_come_back_from_matrices():
-    np.testing.assert_allclose(euler_angles(rotations.rotation_matrix(ATTITUDE)), ATTITUDE, atol=1e-12)
 
 
 def test_what_cannot_be_simulated_says_why():

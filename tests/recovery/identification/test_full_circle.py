@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.excitation import optimised_rotation
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.identification.settings import LocalSearchSettings
@@ -10,7 +11,7 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, StructureSettings
 from cpfls_cli.trajectory import TrajectorySettings, full_rotation, plan
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.vehicle import VehicleSettings, newton_euler_torque
+from cpfls_cli.vehicle import VehicleSettings
 
 INERTIA = [0.6, 0.8, 1.2]
 DURATION, SAMPLES = 20.0, 800

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli import rotations
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.regressor import Motion
-from cpfls_cli.vehicle import newton_euler_torque
 
 INERTIA = np.diag([0.6, 0.65, 1.2])
 TRAINING = {"turns": (3.0, -4.0, 1.0), "seed": 24}

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
@@ -12,9 +13,7 @@ from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.validation.bands import band, inertia_band
-from cpfls_cli.validation.bootstrap import bootstrap
-from cpfls_cli.validation.scores import BlockScores
-from cpfls_cli.vehicle import newton_euler_torque
+from cpfls_cli.validation.bootstrap import BlockScores, bootstrap
 
 RUNS, SAMPLES, BLOCKS, DRAWS = 200, 2000, 40, 200
 INERTIA = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])

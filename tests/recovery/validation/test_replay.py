@@ -8,14 +8,14 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification import Model, TorqueData
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.trajectory import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.validation.steps import replay_steps
-from cpfls_cli.vehicle import newton_euler_torque
+from cpfls_cli.validation.replay import replay_steps
 
 INERTIA = np.array([0.6, 0.8, 1.2, 0.03, -0.02, 0.04])
 RANGE = InputRange(-1.0, 1.0)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data
 from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.chromosome import uniform_chromosome
@@ -12,12 +13,9 @@ from cpfls_cli.identification.excitation import visited_cells
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import Motion, uniform_breakpoints
-from cpfls_cli.validation.blocks import time_blocks
-from cpfls_cli.validation.bootstrap import bootstrap
-from cpfls_cli.validation.curves import curves
-from cpfls_cli.validation.round_trip import round_trip
-from cpfls_cli.validation.simulated import Missed, Simulated
-from cpfls_cli.vehicle import newton_euler_torque
+from cpfls_cli.validation.bootstrap import MissedTorque, bootstrap
+from cpfls_cli.validation.curves import SimulatedTorque, curves, round_trip
+from cpfls_cli.validation.timeline import time_blocks
 
 SAMPLES = 800
 
@@ -90,9 +88,9 @@ def test_the_noise_is_what_the_model_missed_turned_over_block_by_block(monkeypat
     blocks = time_blocks(training, 2.0)
     monkeypatch.setattr(data, "CHUNK", 37)
     factor = np.array([1.0, -1.0, 0.0, 2.0])
-    source = Simulated(training, model, blocks, factor)
+    source = SimulatedTorque(training, model, blocks, factor)
     made = np.concatenate([chunk.torque for chunk in source.chunks()])
-    missed = np.concatenate([chunk.torque for chunk in Missed(training, model).chunks()])
+    missed = np.concatenate([chunk.torque for chunk in MissedTorque(training, model).chunks()])
     np.testing.assert_allclose(missed, training.torque - model.torque(training.motion), atol=1e-12)
     expected = model.torque(training.motion) + np.repeat(factor, 200)[:, None] * missed
     np.testing.assert_allclose(made, expected, atol=1e-12)

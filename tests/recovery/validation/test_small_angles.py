@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
@@ -12,7 +13,6 @@ from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, uniform_breakpoints
 from cpfls_cli.validation.bands import inertia_band
 from cpfls_cli.validation.bootstrap import bootstrap
-from cpfls_cli.vehicle import newton_euler_torque
 
 RUNS, SAMPLES, NOISE = 40, 1200, 0.05
 TENSOR = np.diag([0.6, 0.8, 1.2])

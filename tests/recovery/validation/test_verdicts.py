@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.inertia import symmetric
@@ -13,13 +14,11 @@ from cpfls_cli.regressor import Motion
 from cpfls_cli.trajectory import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.grounds import Grounds
-from cpfls_cli.validation.paired import Comparison
-from cpfls_cli.validation.paired_torque import compare_torque
+from cpfls_cli.validation.paired import Comparison, compare_torque
 from cpfls_cli.validation.physical import physical_sense
+from cpfls_cli.validation.replay import replay_steps
 from cpfls_cli.validation.residuals import examine_residuals
-from cpfls_cli.validation.steps import replay_steps
 from cpfls_cli.validation.verdict import good_axes, verdict
-from cpfls_cli.vehicle import newton_euler_torque
 
 INERTIA = symmetric([0.6, 0.8, 1.2])
 UNSEARCHED = {"population": 2, "generations": 0, "local_search": LocalSearchSettings(enabled=False)}

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.identification.settings import LocalSearchSettings, ValidationSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import generalised_torque
-from cpfls_cli.validation.paired_torque import compare_torque
+from cpfls_cli.validation.paired import compare_torque
 from cpfls_cli.validation.validate import validate
-from cpfls_cli.vehicle import newton_euler_torque
 
 INERTIA = symmetric([0.6, 0.8, 1.2])
 SETTINGS = IdentificationSettings(

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.control import Actuators, Loop, gains, plan_of, rigid_plant
+from cpfls_cli.control import AttitudeLoop, TorqueActuators, gains, plan_of
+from cpfls_cli.dynamics.equations_of_motion import rigid_plant
 
 INERTIA = np.array([[0.6, 0.02, -0.03], [0.02, 0.7, 0.01], [-0.03, 0.01, 1.2]])
 FREQUENCY, DAMPING = (1.2, 1.0, 0.6), 0.7
@@ -36,6 +37,6 @@ def make_plan():
 def make_loop():
     def make(plant=None, actuators=None, sensing=None, integration_rate=400.0):
         plant = rigid_plant(INERTIA) if plant is None else plant
-        return Loop(plant, gains(FREQUENCY, DAMPING), actuators or Actuators(), sensing, integration_rate)
+        return AttitudeLoop(plant, gains(FREQUENCY, DAMPING), actuators or TorqueActuators(), sensing, integration_rate)
 
     return make

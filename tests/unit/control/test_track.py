@@ -7,21 +7,19 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
 from cpfls_cli.control import (
-    Actuators,
     Controller,
-    RigidBody,
     Sensing,
+    TorqueActuators,
     computed_torque,
     flown_signals,
-    model_plant,
     plan_of,
     proportional_derivative,
-    rigid_plant,
     scores,
     track,
 )
+from cpfls_cli.dynamics.equations_of_motion import RigidBody, model_plant, rigid_plant
+from cpfls_cli.dynamics.rigid_body import torque
 from cpfls_cli.errors import SettingError
-from cpfls_cli.vehicle.rigid_body import torque
 
 START = np.array([0.1, -0.15, 0.2])
 NOTHING = np.zeros(3)
@@ -142,7 +140,7 @@ def test_a_model_in_the_place_of_the_vehicle_turns_as_it_says(make_plan, make_lo
 
 def test_a_lag_delays_the_torque_and_a_limit_clips_it(make_plan, make_loop, inertia):
     plan, limit = make_plan(duration=1.0), np.array([2.0, 2.0, 1.0])
-    loop = make_loop(actuators=Actuators(0.02, limit))
+    loop = make_loop(actuators=TorqueActuators(0.02, limit))
     tracked = track(plan, [exact(inertia)], loop, START, NOTHING)
     assert np.all(tracked.body_torque[0, 0] == 0)
     assert np.all(np.abs(tracked.body_torque) <= limit)

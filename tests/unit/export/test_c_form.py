@@ -5,8 +5,8 @@ import subprocess
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.export import c_source, reference_points
-from cpfls_cli.identification.physics import vertical
 from cpfls_cli.regressor import Motion
 from tests.unit.export.cases import CASES, Case, errors, model_of, sheet_of, states, wanted_of
 from tests.unit.export.compiled import CHECKS, build, drive, driver, evaluate, require_gcc, written

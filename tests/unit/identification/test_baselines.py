@@ -1,9 +1,9 @@
 import numpy as np
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import TorqueData
 from cpfls_cli.identification.baselines import constant_inertia_columns, fit_baselines
 from cpfls_cli.regressor import Motion
-from cpfls_cli.vehicle import newton_euler_torque
 
 PARAMETERS = np.array([0.6, 0.7, 1.2, 0.05, -0.08, 0.1])
 

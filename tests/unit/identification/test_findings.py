@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque, not_positive_definite, why_unphysical
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.identification.axes import axis_evidence
-from cpfls_cli.identification.physics import not_positive_definite, why_unphysical
 from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import body_rate, generalised_torque
-from cpfls_cli.vehicle import newton_euler_torque
-from cpfls_cli.vehicle.rigid_body import inertia_matrix
 
 INERTIA = np.array([0.6, 0.7, 1.2, 0.0, 0.0, 0.0])
 

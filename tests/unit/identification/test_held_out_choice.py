@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.errors import SettingError
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion
-from cpfls_cli.vehicle import newton_euler_torque
 
 SETTINGS = IdentificationSettings(
     population=10,

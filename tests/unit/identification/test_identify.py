@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.identification.search_run import SearchRun
 from cpfls_cli.identification.settings import LocalSearchSettings, RidgeSettings
 from cpfls_cli.regressor import Motion
-from cpfls_cli.vehicle import newton_euler_torque
 
 SMALL = {"population": 10, "generations": 2, "local_search": LocalSearchSettings(evaluations=2)}
 SEARCHED = {**SMALL, "consequents": "seesaw", "products": "additive", "membership_functions": 3}

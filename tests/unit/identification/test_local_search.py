@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, local_search
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges
-from cpfls_cli.vehicle import newton_euler_torque
 
 STRUCTURES = {
     "seesaw": {"consequents": "seesaw", "products": "additive", "membership_functions": (3, 4, 2, 3, 3, 4)},

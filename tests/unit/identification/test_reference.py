@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode
 from cpfls_cli.identification.identify import model_evaluator
@@ -14,7 +15,6 @@ from cpfls_cli.identification.reference import ReferenceEvaluator
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure
 from cpfls_cli.trajectory import TrajectorySettings, plan
-from cpfls_cli.vehicle import newton_euler_torque
 
 PAPER = {"base": "none", "consequents": "seesaw", "products": "additive", "input_map": "data-range"}
 OFF = LocalSearchSettings(enabled=False)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data, dense, identify, samples
 from cpfls_cli.identification.axes import axis_evidence
 from cpfls_cli.identification.chromosome import decode
@@ -12,7 +13,6 @@ from cpfls_cli.identification.judge import score, score_of
 from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges
-from cpfls_cli.vehicle import newton_euler_torque
 
 SETTINGS = {
     "consequents": "seesaw",

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
-from cpfls_cli.vehicle import newton_euler_torque
 
 
 def relative_residual(tensor, **settings):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data
 from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
@@ -16,7 +17,6 @@ from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor
 from cpfls_cli.validation.bootstrap import bootstrap
-from cpfls_cli.vehicle import newton_euler_torque
 
 DRAWS = 30
 VALIDATION = ValidationSettings(draws=DRAWS)

@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.dynamics.rigid_body import inertia_matrix
+from cpfls_cli.identification import IdentificationSettings, Model, TorqueData
 from cpfls_cli.identification.excitation import visited_cells
-from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.validation.bands import inertia_band
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.curves import curves
-from cpfls_cli.vehicle.rigid_body import inertia_matrix
 
 BEST = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
 STRUCTURE = model_structure(IdentificationSettings(harmonic_order=1))

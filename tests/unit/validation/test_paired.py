@@ -1,21 +1,31 @@
-"""Comparisons of errors block by block: what is chance, what is not, and what is rounding."""
+"""Comparisons of errors block by block: chance, what is not, and rounding; the constant torque that is missed."""
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.data import Flights, TorqueData
 from cpfls_cli.regressor import Motion
-from cpfls_cli.validation.memory import BLOCKS, block_count, correlation_time
-from cpfls_cli.validation.paired import compare
-from cpfls_cli.validation.paired_torque import compare_torque
-from cpfls_cli.validation.paired_windows import apart, compare_windows
+from cpfls_cli.rotations import generalised_torque
+from cpfls_cli.validation.paired import (
+    BLOCKS,
+    block_count,
+    compare_errors,
+    compare_torque,
+    compare_windows,
+    correlation_time,
+    mean_missing_torque,
+    non_overlapping,
+    with_constant,
+)
+
+CONSTANT = np.array([0.4, -0.3, 0.2])
 
 
 def test_equal_models_differ_by_chance_as_often_as_they_should():
     rng = np.random.default_rng(61)
-    found = [compare(*rng.lognormal(sigma=1.0, size=(2, BLOCKS)), 1.0) for _ in range(1500)]
+    found = [compare_errors(*rng.lognormal(sigma=1.0, size=(2, BLOCKS)), 1.0) for _ in range(1500)]
     # Half of the 5 % each; a little less, since the mean has to agree.
     most = binom.ppf(0.9999, 1500, 0.025)
     assert 0 < sum(one.lower for one in found) < most
@@ -24,7 +34,7 @@ def test_equal_models_differ_by_chance_as_often_as_they_should():
 
 def test_a_better_model_is_found_though_blocks_differ_by_orders_of_magnitude():
     theirs = np.logspace(-6, 0, BLOCKS)
-    found = compare(0.8 * theirs * np.random.default_rng(62).uniform(0.9, 1.1, BLOCKS), theirs, 1.0)
+    found = compare_errors(0.8 * theirs * np.random.default_rng(62).uniform(0.9, 1.1, BLOCKS), theirs, 1.0)
     assert (found.lower, found.higher) == (True, False)
     assert found.ratio == pytest.approx(0.8, abs=0.08)
 
@@ -32,23 +42,23 @@ def test_a_better_model_is_found_though_blocks_differ_by_orders_of_magnitude():
 def test_one_bad_block_of_twenty_is_not_better():
     theirs = np.ones(BLOCKS)
     ours = np.where(np.arange(BLOCKS) == 3, 100.0, 0.9)
-    found = compare(ours, theirs, 1.0)
+    found = compare_errors(ours, theirs, 1.0)
     assert (found.lower, found.higher) == (False, False)
 
 
 @pytest.mark.parametrize(("ours", "theirs"), [(1e-25, 1e-28), (0.0, 0.0), (0.3, 0.3 * (1 + 1e-9))])
 def test_rounding_is_no_difference(ours, theirs):
-    found = compare(np.full(BLOCKS, ours), np.full(BLOCKS, theirs), 1.0)
+    found = compare_errors(np.full(BLOCKS, ours), np.full(BLOCKS, theirs), 1.0)
     assert (found.ratio, found.lower, found.higher) == (1.0, False, False)
 
 
 def test_errors_beside_rounding_are_higher():
-    found = compare(np.full(BLOCKS, 1e-3), np.full(BLOCKS, 1e-30), 1.0)
+    found = compare_errors(np.full(BLOCKS, 1e-3), np.full(BLOCKS, 1e-30), 1.0)
     assert (found.ratio, found.higher) == (np.inf, True)
 
 
 def test_three_blocks_prove_nothing():
-    found = compare(np.full(3, 0.1), np.ones(3), 1.0)
+    found = compare_errors(np.full(3, 0.1), np.ones(3), 1.0)
     assert (found.lower, found.blocks) == (False, 3)
 
 
@@ -80,8 +90,8 @@ def test_all_windows_lost_is_worse_than_any():
 
 def test_windows_apart_do_not_overlap():
     start = np.array([0, 3, 10, 12, 19, 20, 50])
-    np.testing.assert_array_equal(start[apart(start, 10)], [0, 10, 20, 50])
-    assert len(apart(start[:0], 10)) == 0
+    np.testing.assert_array_equal(start[non_overlapping(start, 10)], [0, 10, 20, 50])
+    assert len(non_overlapping(start[:0], 10)) == 0
 
 
 def flight(torque, attitude):
@@ -145,3 +155,31 @@ def test_blocks_are_at_least_four_correlation_times_long():
     assert block_count(slow) == 1000 // (4 * correlation_time(slow))
     assert correlation_time(np.ones((50, 2))) == 0
     assert block_count(np.zeros((0, 3))) == 1
+
+
+def pushed_flight(seed=92, samples=200):
+    rng = np.random.default_rng(seed)
+    attitude = rng.uniform(-np.pi, np.pi, (samples, 3))
+    attitude[::9, 1] = np.pi / 2
+    motion = Motion(attitude, rng.standard_normal((samples, 3)), np.zeros((samples, 3)))
+    return TorqueData(
+        np.arange(samples), motion, 2 * motion.rate + generalised_torque(attitude, np.tile(CONSTANT, (samples, 1)))
+    )
+
+
+def predicted(motion):
+    return 2 * motion.rate
+
+
+def test_a_constant_is_found_in_body_axes_whatever_the_attitude():
+    both = Flights((pushed_flight(), pushed_flight(93)))
+    np.testing.assert_allclose(mean_missing_torque(both, predicted), CONSTANT, rtol=1e-9)
+
+
+def test_put_back_nothing_is_missing():
+    data = pushed_flight()
+    np.testing.assert_allclose(with_constant(predicted, CONSTANT)(data.motion), data.torque, atol=1e-12)
+
+
+def test_a_vertical_pitch_throughout_tells_nothing():
+    np.testing.assert_array_equal(mean_missing_torque(pushed_flight()[::9], predicted), np.zeros(3))

@@ -11,7 +11,6 @@ from cpfls_cli.identification.data import TorqueData, joined
 from cpfls_cli.regressor import Motion
 from cpfls_cli.validation import residuals
 from cpfls_cli.validation.residuals import examine_residuals
-from cpfls_cli.validation.stretches import lagged_pairs, leading, sample_numbers, sample_period, stretch_numbers
 
 AXES = 3
 
@@ -145,20 +144,6 @@ def test_histogram_and_quantiles():
     np.testing.assert_allclose(slope, [1.0, 2.0, 0.5], rtol=0.05)
 
 
-def test_a_pause_starts_a_stretch_and_jitter_does_not():
-    time = np.arange(20) * 0.01 + np.random.default_rng(53).uniform(-0.002, 0.002, 20)
-    time[12:] += 0.01
-    np.testing.assert_array_equal(stretch_numbers(time), np.repeat([0, 1], [12, 8]))
-    np.testing.assert_array_equal(stretch_numbers(time[:1]), [0])
-    assert np.isnan(sample_period(time[:1]))
-
-
-def test_a_long_source_is_cut():
-    data = flight(np.ones((30, AXES)))
-    assert len(leading(data, 12)) == 12
-    assert len(leading(data, 100)) == 30
-
-
 @pytest.mark.parametrize("missing", [0.02, 0.1])
 def test_white_noise_stays_white_where_samples_are_missing(missing):
     """With the mean of every stretch taken out, two in three p-values were below 0.01 at 2 % missing."""
@@ -182,14 +167,6 @@ def test_pairs_across_a_missing_sample_by_hand():
     for lag in range(1, 5):
         expected = sum(value[t] * value[t + lag] for t in kept if t + lag in value) / (own @ own)
         assert found.autocorrelation[lag - 1, 1] == pytest.approx(expected, rel=1e-12)
-
-
-def test_a_slow_flight_and_a_fast_one_are_two_stretches():
-    slow, fast = 0.01 * np.arange(300), 0.002 * np.arange(2000)
-    for time in (np.r_[slow, 1e4 + fast], np.r_[fast, 1e4 + slow]):
-        assert stretch_numbers(time)[-1] == 1
-        assert sample_numbers(time, 8)[-1] == 2298 + 8
-    np.testing.assert_array_equal(lagged_pairs(sample_numbers(slow[[0, 1, 3, 4]], 8), 2), [[1], [2]])
 
 
 def test_a_bias_shows_in_the_mean_alone():

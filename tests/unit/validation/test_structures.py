@@ -1,4 +1,4 @@
-"""Cross-validation of structures against refits of rows written out, and what it tells apart."""
+"""Structures to compare, and their cross-validation against refits of rows written out."""
 
 from dataclasses import replace
 
@@ -6,16 +6,63 @@ import numpy as np
 import pytest
 from scipy import linalg
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.cross_validation import contiguous_blocks
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.identification.settings import ValidationSettings
-from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
-from cpfls_cli.validation.candidates import candidates
-from cpfls_cli.validation.structures import RIGID_BODY, compare_structures
-from cpfls_cli.vehicle import newton_euler_torque
+from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.validation.structures import RIGID_BODY_NAME, candidate_structures, compare_structures, structure_name
+
+OWN = [
+    {},
+    {"membership_functions": 3},
+    {"consequents": "seesaw", "products": "additive", "membership_functions": 5, "input_map": "data-range"},
+    {"consequents": "seesaw", "structure": "fls", "membership_functions": (1, 2, 3, 4, 3, 2)},
+    {"harmonic_order": 8, "products": "additive"},
+]
+
+
+@pytest.mark.parametrize("keys", OWN)
+def test_the_own_structure_comes_first_and_every_name_once(keys):
+    own = StructureSettings(**keys)
+    listed = candidate_structures(own)
+    assert listed[0] == own
+    names = [structure_name(structure) for structure in listed]
+    assert len(set(names)) == len(names)
+    assert 5 <= len(names) <= 12
+    assert {1, 3, 5}.issubset(structure.membership_functions for structure in listed)
+    assert {"full-circle", "data-range"} == {structure.input_map for structure in listed}
+    harmonic = {structure.harmonic_order for structure in listed if structure.consequents == "harmonic"}
+    assert {1, 2, 3}.issubset(harmonic)
+    assert any(structure.consequents == "seesaw" for structure in listed)
+    assert all(model_structure(structure).parameters > 0 for structure in listed)
+
+
+def test_settings_of_an_identification_are_a_structure_too():
+    assert candidate_structures(IdentificationSettings()) == candidate_structures(StructureSettings())
+
+
+def test_one_rule_of_harmonics_has_no_use_for_an_input_map():
+    one_rule = [
+        s for s in candidate_structures(StructureSettings()) if s.membership_functions == 1 and s.harmonic_order == 2
+    ]
+    assert len(one_rule) == 1
+
+
+@pytest.mark.parametrize(
+    ("keys", "name"),
+    [
+        (OWN[0], "harmonic 2 tensor, 1 function, full-circle"),
+        (OWN[2], "seesaw additive, 5 functions, data-range"),
+        (OWN[3], "seesaw tensor, 1-2-3-4-3-2 functions, full-circle, classic"),
+    ],
+)
+def test_names(keys, name):
+    assert structure_name(StructureSettings(**keys)) == name
+
 
 SAMPLES = 300
 VALIDATION = ValidationSettings(folds=4)
@@ -58,11 +105,11 @@ def test_without_a_rigid_body_errors_are_those_of_refits(every):
         ranges = data_ranges(structure, training.motion.attitude)
         return Regressor(structure, m, ranges).matrix(uniform_breakpoints(structure))
 
-    structure = model_structure(candidates(settings("none", **keys))[0])
+    structure = model_structure(candidate_structures(settings("none", **keys))[0])
     own = int(np.flatnonzero(compared.own)[0])
     for place, columns in ((0, rigid_columns), (own, fuzzy)):
         assert (compared.error[place], compared.standard_error[place]) == pytest.approx(errors(columns), rel=1e-8)
-    assert compared.name[0] == RIGID_BODY
+    assert compared.name[0] == RIGID_BODY_NAME
     assert compared.parameters[[0, own]].tolist() == [0, structure.parameters]
     assert np.isinf(compared.ridge_weight[0])
     assert np.all(compared.ridge_weight[1:] == 0)
@@ -96,7 +143,7 @@ def test_what_the_flight_holds_decides(base):
 
 def test_structures_that_the_samples_cannot_tell_are_left_out():
     compared = compare_structures(flight(samples=60), flight(samples=60), settings("none"))
-    assert compared.name[0] == RIGID_BODY
+    assert compared.name[0] == RIGID_BODY_NAME
     assert np.max(compared.parameters) <= 3 * 45
     assert np.isfinite(compared.error).all()
     shipped = compare_structures(flight(), flight(), settings("none", harmonic_order=8, membership_functions=9))

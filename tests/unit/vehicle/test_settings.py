@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.errors import SettingError
-from cpfls_cli.vehicle import VehicleSettings, inertia_tensor
+from cpfls_cli.vehicle import VehicleSettings
 from cpfls_cli.vehicle.settings import RotorSettings
 
 

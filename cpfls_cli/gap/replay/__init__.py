@@ -1,1 +1,0 @@
-"""Flights simulated again from their own actuation."""

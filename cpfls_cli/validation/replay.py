@@ -1,0 +1,264 @@
+"""Prediction by horizon: measured torques replayed through models from many points of a flight."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.dynamics.equations_of_motion import Predictor, RotationState, acceleration_law
+from cpfls_cli.dynamics.integration import free_runs
+from cpfls_cli.identification.data import TorqueSource, gathered, sample_times
+from cpfls_cli.validation.timeline import sample_period, stretch_numbers
+
+# 40 MB of rotations, rates and torques at a time.
+_SAMPLES_AT_ONCE = 200_000
+CLEAR = 0.3
+"""|cos(pitch)| from which on D(q) is examined: its errors come to the body axes divided by the square, here by ten."""
+
+NOTHING_MOVES = "nothing-moves"
+"""The predictor by which attitude and body rate stay what they were at the start of a window."""
+
+
+@dataclass(frozen=True)
+class ReplayWindows:
+    """Measured motion and torque in windows of equal length.
+
+    Attributes
+    ----------
+    time : array, shape (window, sample), s
+    rotation : array, shape (window, sample, 3, 3)
+        Body to world.
+    body_rate : array, shape (window, sample, 3), rad/s, body frame
+    torque : array, shape (window, sample, 3), N m, body frame
+    beyond : array of bool, shape (window,)
+        Whether the pitch of the flight is beyond +-90 degrees; in no window it crosses them.
+    """
+
+    time: Array
+    rotation: Array
+    body_rate: Array
+    torque: Array
+    beyond: BoolArray
+
+    @property
+    def start(self) -> RotationState:
+        """Measured state at the start of the windows."""
+        return RotationState(
+            self.rotation[:, 0], self.body_rate[:, 0], self.beyond, np.ones(len(self.time), dtype=bool)
+        )
+
+
+@dataclass(frozen=True)
+class WindowPlan:
+    """Starts and length of windows.
+
+    Attributes
+    ----------
+    start : array of int, shape (window,)
+        Sample, ascending.
+    horizon : int
+        Samples behind the start; fewer than asked for where no window of that length fits.
+    period : float, s
+        Usual time between samples.
+    """
+
+    start: IntArray
+    horizon: int
+    period: float
+
+
+def plan_windows(source: TorqueSource, horizon: int, most: int) -> WindowPlan:
+    """Select windows, evenly spread over all that hold no pause and no pitch within 17 degrees of the vertical.
+
+    Parameters
+    ----------
+    source : TorqueSource
+    horizon : int
+        Samples; halved until a window fits.
+    most : int
+        Windows.
+
+    Returns
+    -------
+    WindowPlan
+        Without windows where not even one of a single step fits.
+    """
+    time = sample_times(source)
+    stretch = stretch_numbers(time)
+    steep = np.concatenate([np.abs(np.cos(data.motion.attitude[:, 1])) < CLEAR for data in source.chunks()])
+    starts = _starts(stretch, steep, horizon)
+    while len(starts) == 0 and horizon > 1:
+        horizon //= 2
+        starts = _starts(stretch, steep, horizon)
+    spread = np.unique(np.linspace(0, len(starts) - 1, min(most, len(starts))).round().astype(np.int64))
+    return WindowPlan(starts[spread], horizon, sample_period(time))
+
+
+def read_windows(source: TorqueSource, plan: WindowPlan) -> Iterator[ReplayWindows]:
+    """Read the measurements in the windows, some windows at a time."""
+    at_once = max(_SAMPLES_AT_ONCE // (plan.horizon + 1), 1)
+    for first in range(0, len(plan.start), at_once):
+        wanted = plan.start[first : first + at_once, None] + np.arange(plan.horizon + 1)
+        samples, index = np.unique(wanted, return_inverse=True)
+        data, index = gathered(source, samples), index.reshape(wanted.shape)
+        attitude, rate = data.motion.attitude, data.motion.rate
+        yield ReplayWindows(
+            time=data.time[index],
+            rotation=rotations.rotation_matrix(attitude)[index],
+            body_rate=rotations.body_rate(attitude, rate)[index],
+            torque=rotations.body_torque(attitude, data.torque)[index],
+            beyond=np.cos(attitude[index[:, 0], 1]) < 0,
+        )
+
+
+def _starts(stretch: IntArray, steep: BoolArray, horizon: int) -> IntArray:
+    """List the samples from which a window stays in one stretch and clear of the vertical."""
+    last = np.arange(horizon, len(stretch))
+    first = last - horizon
+    before = np.concatenate([[0], np.cumsum(steep)])
+    clear = (stretch[last] == stretch[first]) & (before[last + 1] == before[first])
+    return np.asarray(first[clear], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class StepErrors:
+    """Root mean square errors of attitude and body rate by horizon.
+
+    Attributes
+    ----------
+    part : str
+        Part of the data.
+    model : tuple of str
+        Predictors; the last one is `NOTHING_MOVES`.
+    samples : array of int, shape (horizon,)
+        From 1.
+    horizon : array, shape (horizon,), s
+    windows : int
+        Windows replayed.
+    attitude : array, shape (predictor, horizon, 3), rad
+        Of the rotation vector from the measured to the predicted attitude, body axes. NaN from where on a predictor
+        has lost a window: then it has no such error.
+    body_rate : array, shape (predictor, horizon, 3), rad/s, body axes
+    lost : array of int, shape (predictor, horizon)
+        Windows in which a predictor's inertia was not positive definite, or which it turned faster than any step can
+        follow.
+    window_error : array, shape (predictor, window, 3), (rad/s)^2
+        Mean squared error of the body rate over a window; NaN where lost. To compare predictors window by window.
+    start : array of int, shape (window,)
+        First sample of each window, ascending.
+    """
+
+    part: str
+    model: tuple[str, ...]
+    samples: IntArray
+    horizon: Array
+    windows: int
+    attitude: Array
+    body_rate: Array
+    lost: IntArray
+    window_error: Array
+    start: IntArray
+
+
+def replay_steps(
+    part: str,
+    source: TorqueSource,
+    predictors: Mapping[str, Predictor],
+    horizon_samples: int,
+    windows: int,
+    missing: Mapping[str, Array] = MappingProxyType({}),
+) -> StepErrors:
+    """Replay measured torques from many starts and compare the motion with the measured one.
+
+    The body torque is that measured, whatever attitude the prediction has come to.
+
+    Parameters
+    ----------
+    part : str
+        Name of the part of the data.
+    source : TorqueSource
+    predictors : mapping of str to InertiaModel or array, shape (6,)
+        By name; an array holds the inertia parameters of a rigid body.
+    horizon_samples : int
+        Length of the windows; shorter where the data have no window of that length without a pause.
+    windows : int
+        Windows at most, evenly spread.
+    missing : mapping of str to array, shape (3,), N m, body frame, optional
+        Constant torque that a predictor misses, which is not its inertia's; taken off what was measured.
+
+    Returns
+    -------
+    StepErrors
+        NaN throughout where the data have no window at all.
+
+    References
+    ----------
+    Measure and predictor `NOTHING_MOVES`: Busetto, Cereda, Forgione and others, Nonlinear System Identification
+    Nano-drone Benchmark, arXiv:2512.14450 (2025).
+    """
+    plan, names = plan_windows(source, horizon_samples, windows), (*predictors, NOTHING_MOVES)
+    sums = [_SquaredErrors(plan.horizon) for _ in names]
+    for measured in read_windows(source, plan):
+        runs = [
+            _run(predictor, replace(measured, torque=measured.torque - missing.get(name, 0.0)))
+            for name, predictor in predictors.items()
+        ]
+        for errors, run in zip(sums, [*runs, _still(measured)], strict=True):
+            errors.add(measured, run)
+    return StepErrors(
+        part=part,
+        model=names,
+        samples=np.arange(1, plan.horizon + 1),
+        horizon=plan.period * np.arange(1, plan.horizon + 1, dtype=float),
+        windows=len(plan.start),
+        attitude=np.array([errors.root_mean_square(errors.attitude) for errors in sums]),
+        body_rate=np.array([errors.root_mean_square(errors.body_rate) for errors in sums]),
+        lost=np.array([errors.lost for errors in sums]),
+        window_error=np.array([np.concatenate([np.zeros((0, 3)), *errors.window_error]) for errors in sums]),
+        start=plan.start,
+    )
+
+
+class _SquaredErrors:
+    """Squared errors by horizon and axis, and by window."""
+
+    def __init__(self, horizon: int) -> None:
+        self.attitude, self.body_rate = np.zeros((horizon, 3)), np.zeros((horizon, 3))
+        self.lost = np.zeros(horizon, dtype=np.int64)
+        self.windows = 0
+        self.window_error: list[Array] = []
+
+    def add(self, measured: ReplayWindows, run: Iterator[RotationState]) -> None:
+        by_window = np.zeros((len(measured.time), 3))
+        for step, state in enumerate(run):
+            turned, rate = _errors(measured, step + 1, state)
+            self.lost[step] += np.sum(~state.exists)
+            self.attitude[step] += np.sum(turned**2, axis=0)
+            self.body_rate[step] += np.sum(rate**2, axis=0)
+            by_window += np.where(state.exists[:, None], rate**2, np.nan)
+        self.windows += len(by_window)
+        self.window_error.append(by_window / len(self.lost))
+
+    def root_mean_square(self, squares: Array) -> Array:
+        whole = (self.lost == 0) & (self.windows > 0)
+        return np.where(whole[:, None], np.sqrt(squares / max(self.windows, 1)), np.nan)
+
+
+def _errors(measured: ReplayWindows, sample: int, state: RotationState) -> tuple[Array, Array]:
+    away = measured.rotation[:, sample].swapaxes(1, 2) @ state.rotation
+    return Rotation.from_matrix(away).as_rotvec(), state.body_rate - measured.body_rate[:, sample]
+
+
+def _still(measured: ReplayWindows) -> Iterator[RotationState]:
+    return iter([measured.start] * (measured.time.shape[1] - 1))
+
+
+def _run(predictor: Predictor, windows: ReplayWindows) -> Iterator[RotationState]:
+    fastest = float(np.max(np.linalg.norm(windows.body_rate, axis=2), initial=0.0))
+    return free_runs(acceleration_law(predictor), windows.start, windows.time, windows.torque, fastest)

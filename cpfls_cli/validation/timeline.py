@@ -1,0 +1,160 @@
+"""Samples in the order of time: stretches without a pause, lags, contiguous blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.identification.data import TorqueData, TorqueSource, gathered, sample_times
+
+# Flights of several sample rates may follow each other, and samples may be missing: as many steps around each tell
+# what is usual there.
+_STEPS_AROUND = 25
+
+_DEFAULT_BLOCKS = 40
+_MOST_BLOCKS = 200
+_FEWEST_BLOCKS = 2
+
+# Shorter blocks are no longer independent of their neighbours where noise is coloured.
+_FEWEST_SAMPLES = 20
+
+
+def sample_period(time: Array) -> float:
+    """Compute the usual time from one sample to the next.
+
+    Parameters
+    ----------
+    time : array, shape (samples,), s
+
+    Returns
+    -------
+    float, s
+        The median; NaN for a single sample.
+    """
+    return float(np.median(np.diff(time))) if len(time) > 1 else float("nan")
+
+
+def stretch_numbers(time: Array) -> IntArray:
+    """Label every sample by its stretch, in which samples follow each other without a pause.
+
+    Parameters
+    ----------
+    time : array, shape (samples,), s
+        Ascending; may jitter by less than half a step.
+
+    Returns
+    -------
+    array of int, shape (samples,)
+        From 0; a new number behind every step of more than one and a half of those usual around it.
+    """
+    number = np.zeros(len(time), dtype=np.int64)
+    number[1:] = np.cumsum(_steps(time) > 1)
+    return number
+
+
+def sample_numbers(time: Array, longest: int) -> IntArray:
+    """Assign numbers to samples by their time, so that missing ones are counted too.
+
+    Parameters
+    ----------
+    time : array, shape (samples,), s
+        Ascending; may jitter by less than half a step.
+    longest : int
+        Steps that no pause is longer than.
+
+    Returns
+    -------
+    array of int, shape (samples,)
+        From 0; ascending.
+    """
+    number = np.zeros(len(time), dtype=np.int64)
+    number[1:] = np.cumsum(np.clip(_steps(time), 1, longest).astype(np.int64))
+    return number
+
+
+def lagged_pairs(number: IntArray, lag: int) -> tuple[IntArray, IntArray]:
+    """Find the pairs of samples that are a lag apart.
+
+    Parameters
+    ----------
+    number : array of int, shape (samples,)
+        As from `sample_numbers`.
+    lag : int
+        Not negative.
+
+    Returns
+    -------
+    earlier, later : array of int, shape (pairs,)
+        Indices of samples.
+    """
+    later = np.searchsorted(number, number + lag)
+    earlier = np.flatnonzero(later < len(number))
+    earlier = earlier[number[later[earlier]] == number[earlier] + lag]
+    return earlier, later[earlier]
+
+
+def leading_samples(source: TorqueSource, most: int) -> TorqueData:
+    """Gather the first samples of a source in memory.
+
+    Returns
+    -------
+    TorqueData
+        All of them where there are not more.
+    """
+    return gathered(source, np.arange(min(len(source), most)))
+
+
+def _steps(time: Array) -> Array:
+    """Round the steps to whole numbers of sample periods from one sample to the next, shape (samples - 1,)."""
+    step = np.diff(time)
+    return np.rint(step / median_filter(step, size=_STEPS_AROUND)) if len(step) else step
+
+
+@dataclass(frozen=True)
+class TimeBlocks:
+    """Blocks of equal numbers of training samples.
+
+    Attributes
+    ----------
+    starts : array, shape (blocks - 1,), s
+        Where every block but the first begins.
+    duration : float, s
+        Of one block.
+    """
+
+    starts: Array
+    duration: float
+
+    def number(self, time: Array) -> IntArray:
+        """Find the block of each sample, from 0, by its time in s."""
+        return np.searchsorted(self.starts, time, side="right").astype(np.int64)
+
+    def labels(self, source: TorqueSource) -> IntArray:
+        """Label each sample of a source by its block, from 0; blocks without samples are not counted."""
+        number = self.number(sample_times(source))
+        label = np.cumsum(np.bincount(number) > 0) - 1
+        return np.asarray(label[number])
+
+
+def time_blocks(training: TorqueSource, block_duration: float | None, most: int = _MOST_BLOCKS) -> TimeBlocks:
+    """Cut a training part into blocks.
+
+    Parameters
+    ----------
+    training : TorqueSource
+    block_duration : float or None, s
+        None: a fortieth of the training part. There are 2 to 200 blocks; above two, each has 20 samples at least, so a
+        short flight has fewer blocks than asked for, and a long one longer blocks.
+    most : int, optional
+        Blocks at most, where there is memory for fewer than 200.
+    """
+    time = sample_times(training)
+    samples = len(time)
+    step = float(np.median(np.diff(time))) if samples > 1 else 0.0
+    asked = _DEFAULT_BLOCKS if block_duration is None else round(samples * step / block_duration)
+    count = min(asked, _MOST_BLOCKS, most, samples // _FEWEST_SAMPLES)
+    count = min(max(count, _FEWEST_BLOCKS), samples)
+    return TimeBlocks(time[np.arange(1, count) * samples // count], samples * step / count)

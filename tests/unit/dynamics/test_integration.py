@@ -1,0 +1,81 @@
+"""The three kinds of runs beside each other: other unknowns and other sums, but one step and one motion."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli import rotations
+from cpfls_cli.dynamics.equations_of_motion import RotationState, acceleration_law, momentum_form, rigid_plant
+from cpfls_cli.dynamics.integration import ReplayModel, advance, free_runs, momentum_runs
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
+from cpfls_cli.inertia import symmetric
+from cpfls_cli.regressor.regressor import InertiaValues
+
+PARAMETERS = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
+TENSOR = symmetric(PARAMETERS)
+ATTITUDE = np.array([[0.2, -0.3, 0.4], [-0.5, 0.1, 2.0]])
+BODY_RATE = np.array([[0.5, -0.4, 0.3], [0.1, 0.8, -0.2]])
+TORQUE = np.array([[0.2, -0.1, 0.05], [-0.3, 0.1, 0.1]])
+
+
+class InEulerCoordinates:
+    def inertia(self, attitude):
+        return InertiaValues(inertia_matrix(attitude, TENSOR), inertia_matrix_gradient(attitude, TENSOR))
+
+
+def last(runs):
+    *_, end = runs
+    return end
+
+
+def by_euler_angles(steps):
+    state = np.hstack([ATTITUDE, BODY_RATE])
+    return advance(rigid_plant(TENSOR), state, lambda _: TORQUE, 0.5, steps)
+
+
+def by_rotation_matrices(predictor, steps):
+    time = np.tile(np.linspace(0.0, 0.5, steps + 1), (2, 1))
+    exists = np.ones(2, dtype=bool)
+    start = RotationState(rotations.rotation_matrix(ATTITUDE), BODY_RATE, ~exists, exists)
+    torque = np.repeat(TORQUE[:, None], steps + 1, axis=1)
+    return last(free_runs(acceleration_law(predictor), start, time, torque, fastest=0.0))
+
+
+def by_momenta(inertia, steps):
+    """Runs of one flight: each starts at a sample of its own torque."""
+    torque = np.repeat(TORQUE, steps + 1, axis=0)
+    starts = np.array([0, steps + 1])
+    rotation = rotations.rotation_matrix(ATTITUDE)
+    return last(momentum_runs(ReplayModel(torque, inertia), starts, BODY_RATE, rotation, 0.5 / steps, steps))
+
+
+@pytest.mark.parametrize("predictor", [PARAMETERS, InEulerCoordinates()], ids=["tensor", "Euler coordinates"])
+def test_all_kinds_of_runs_come_to_the_same_end(predictor):
+    inertia = TENSOR if isinstance(predictor, np.ndarray) else predictor
+    end = by_euler_angles(200)
+    free, (rate, rotation) = by_rotation_matrices(predictor, 200), by_momenta(inertia, 200)
+    assert free.exists.all()
+    for body_rate, turned in ((free.body_rate, free.rotation), (rate, rotation)):
+        np.testing.assert_allclose(body_rate, end[:, 3:], atol=1e-9)
+        np.testing.assert_allclose(rotations.euler_angles(turned), end[:, :3], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "body_rate",
+    [
+        lambda steps: by_euler_angles(steps)[:, 3:],
+        lambda steps: by_rotation_matrices(PARAMETERS, steps).body_rate,
+        lambda steps: by_momenta(TENSOR, steps)[0],
+    ],
+    ids=["Euler angles", "rotation matrices", "momenta"],
+)
+def test_the_step_is_of_fourth_order(body_rate):
+    """Halving the step divides the difference to the next finer solution by 16."""
+    coarse, middle, fine = (body_rate(steps) for steps in (4, 8, 16))
+    ratio = np.abs(coarse - middle).max() / np.abs(middle - fine).max()
+    assert np.log2(ratio) == pytest.approx(4.0, abs=0.3)
+
+
+def test_momentum_form_of_a_rigid_body_is_that_of_newton_and_euler():
+    momentum, direct = momentum_form(ATTITUDE, BODY_RATE, InEulerCoordinates().inertia(ATTITUDE))
+    np.testing.assert_allclose(momentum, BODY_RATE @ TENSOR, atol=1e-12)
+    np.testing.assert_allclose(direct, np.cross(BODY_RATE, BODY_RATE @ TENSOR), atol=1e-12)
