@@ -23,19 +23,19 @@ EFFECTS = [
     (candidate("rotor_acceleration"), [5e-5]),
 ]
 TENSOR = np.array([[0.6, 0.03, -0.02], [0.03, 0.7, 0.04], [-0.02, 0.04, 1.2]])
-VEHICLE = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.03, -0.02, 0.04))
+COUPLED = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.03, -0.02, 0.04))
 TIME = 0.005 * np.arange(1600)
 ATTITUDE, RATE, SECOND = sines(TIME, [0.4, 0.3, 0.8], 0.2, 1.0, np.random.default_rng(0))
 VELOCITY, ACCELERATION, _ = sines(TIME, [3.0, 2.0, 1.0], 0.1, 0.6, np.random.default_rng(1))
 FLIGHT = Signals(
     time=TIME,
-    vehicle=VEHICLE,
+    vehicle=COUPLED,
     attitude=ATTITUDE,
     body_rate=rotations.body_rate(ATTITUDE, RATE),
     velocity=VELOCITY,
     stated_thrust=np.full(len(TIME), 58.86),
 )
-THROUGH = windows(0.005, 0.4, 0.5)
+AVERAGED = windows(0.005, 0.4, 0.5)
 
 
 def test_nothing_is_left_of_a_flight_without_an_effect():
@@ -117,13 +117,13 @@ def test_momentum_is_never_differentiated(noise):
 
 
 def averaged(balance):
-    return THROUGH.average(balance.direct) + THROUGH.derivative(balance.momentum)
+    return AVERAGED.average(balance.direct) + AVERAGED.derivative(balance.momentum)
 
 
 def test_rigid_body_is_newton_and_euler():
     turning = rotations.body_acceleration(ATTITUDE, RATE, SECOND)
     expected = turning @ TENSOR + np.cross(FLIGHT.body_rate, FLIGHT.body_rate @ TENSOR)
-    np.testing.assert_allclose(averaged(rotation_balance(FLIGHT)), THROUGH.average(expected), atol=2e-6)
+    np.testing.assert_allclose(averaged(rotation_balance(FLIGHT)), AVERAGED.average(expected), atol=2e-6)
     assert np.abs(expected).max() > 1
 
 
@@ -159,7 +159,7 @@ def lagrange_torque(model):
 def test_a_model_in_euler_coordinates_is_lagrange_turned_to_the_body():
     model = Patterned()
     expected = rotations.body_torque(ATTITUDE, lagrange_torque(model))
-    np.testing.assert_allclose(averaged(rotation_balance(FLIGHT, model)), THROUGH.average(expected), atol=2e-5)
+    np.testing.assert_allclose(averaged(rotation_balance(FLIGHT, model)), AVERAGED.average(expected), atol=2e-5)
     assert np.abs(expected - rotations.body_torque(ATTITUDE, SECOND @ TENSOR)).max() > 0.1
 
 
@@ -179,4 +179,4 @@ def test_force_is_what_an_accelerometer_feels_times_the_mass(known):
     felt = Rotation.from_euler("ZYX", ATTITUDE[:, ::-1]).inv().apply(ACCELERATION + np.array([0.0, 0.0, 9.81]))
     given = {name: felt if isinstance(value, str) else value for name, value in known.items()}
     found = averaged(translation_balance(replace(FLIGHT, **given)))
-    np.testing.assert_allclose(found, 6.0 * THROUGH.average(felt), atol=2e-5)
+    np.testing.assert_allclose(found, 6.0 * AVERAGED.average(felt), atol=2e-5)
