@@ -22,10 +22,8 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
-from cpfls_cli.identification.chromosome import LARGEST_GENE, encode
-from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.evaluator import LARGEST_GENE, Evaluator, encode, refine
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.local_search import refine
 from cpfls_cli.identification.reference import ReferenceEvaluator
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 

@@ -25,7 +25,7 @@ from pymoo.optimize import minimize
 from benchmarks.shared.measure import table
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, pareto_front, start, step
-from cpfls_cli.identification.presets import PRESETS
+from cpfls_cli.identification.settings import PRESETS
 
 EVALUATIONS = 5000
 SEEDS = range(5)

@@ -21,12 +21,12 @@ pin_threads()
 
 import numpy as np
 
-from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.export import Evidence, Provenance, Sheet, c_source, reference_points
+from cpfls_cli.export import c_source, reference_points
 from cpfls_cli.fuzzy import InputRange
 from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
+from tests.unit.export.cases import sheet_of
 
 BATCH, PASSES, SINGLES = 4096, 50, 50
 BUDGET_NS = 10_000
@@ -90,8 +90,7 @@ def random_model(settings: StructureSettings) -> Model:
 
 def write(model: Model, folder: Path) -> None:
     """Export a model, and compile it in both precisions."""
-    provenance = Provenance("none", "", Header("0", 0, ""), {}, "0")
-    sheet = Sheet("m", model, "none", provenance, Evidence(True, "", {"parts": {}, "models": {}}, (), None))
+    sheet = sheet_of(model, name="m")
     source = c_source(sheet, reference_points(model, np.random.default_rng(1)), "m")
     (folder / "m.c").write_text(source.source)
     (folder / "m.h").write_text(source.header)

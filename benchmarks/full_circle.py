@@ -35,8 +35,8 @@ from benchmarks.shared.full_circle import (
 )
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.overrides import variants
-from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.data import TorqueData, joined
+from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor.structure import model_structure
 

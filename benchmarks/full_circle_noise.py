@@ -34,8 +34,8 @@ from benchmarks.shared.full_circle import (
     searched,
     uniform_model,
 )
-from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.data import TorqueData, joined
+from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion
 

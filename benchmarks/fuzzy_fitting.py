@@ -37,7 +37,7 @@ from scipy.interpolate import LSQBivariateSpline, RBFInterpolator
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy import PeriodicSettings, breakpoints, fit_periodic, uniform_weights
-from cpfls_cli.fuzzy.periodic_structure import PeriodicStructure
+from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
 
 Predict = Callable[[Array], Array]
 Fit = Callable[[Array, Array], Predict]

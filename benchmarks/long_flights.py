@@ -33,10 +33,9 @@ from cpfls_cli.artifacts.spec import SCHEMA_VERSION
 from cpfls_cli.artifacts.store import text_sha256
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.flights.flight_source import MOTION, flight_source
-from cpfls_cli.identification.chromosome import LARGEST_GENE
 from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.evaluator import LARGEST_GENE, refine
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.local_search import refine
 
 SIZES = (5_000, 50_000, 500_000, 5_000_000)
 NOISE = 0.01

@@ -29,9 +29,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.config.load import load_study
 from cpfls_cli.evolution import pareto_front
 from cpfls_cli.flights.training import read_training
-from cpfls_cli.identification.choice import choose
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.search import choose
 from cpfls_cli.identification.settings import IdentificationSettings
 
 DEFAULT = IdentificationSettings()

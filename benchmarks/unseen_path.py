@@ -35,8 +35,8 @@ from benchmarks.shared.full_circle import (
 )
 from benchmarks.shared.studies import paper_flight, paper_study
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion
 from cpfls_cli.trajectory import plan

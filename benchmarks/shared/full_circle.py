@@ -12,14 +12,12 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.excitation import optimised_rotation
-from cpfls_cli.identification.choice import choose
-from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueData, TorqueSource
-from cpfls_cli.identification.evaluator import Evaluator
+from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.search import search
+from cpfls_cli.identification.search import choose, search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion, StructureSettings
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, TypeVar
+
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, EULER, dataset, record
+
+if TYPE_CHECKING:
+    from cpfls_cli.validation.validate import Validation
+
+G = TypeVar("G")
 
 _CURVE = ("curve", "point", "axis", "axis")
 
@@ -26,9 +34,19 @@ class ResidualsGroup:
 
     part: str = dataset("part", "part whose residuals are examined")
     samples: int = dataset("samples", "residuals examined")
-    available: int = dataset("available", "residuals of the whole part")
-    mean: Array = dataset("mean", "constant torque that the model lacks", "axis", units="N m", frame=EULER, gaps=True)
-    mean_p: Array = dataset("mean_p", "p-value of a mean of 0: small where it is not", "axis", frame=EULER, gaps=True)
+    available: int | None = dataset("available", "residuals of the whole part", default=None)
+    mean: Array | None = dataset(
+        "mean",
+        "constant torque that the model lacks",
+        "axis",
+        units="N m",
+        frame=EULER,
+        gaps=True,
+        default=None,
+    )
+    mean_p: Array | None = dataset(
+        "mean_p", "p-value of a mean of 0: small where it is not", "axis", frame=EULER, gaps=True, default=None
+    )
     lag: Array = dataset("lag", "lags of the autocorrelation, from one sample on", "lag", units="s")
     autocorrelation: Array = dataset("autocorrelation", "of the torque error", "lag", "axis", frame=EULER, gaps=True)
     band: float = dataset("band", "1.96 / sqrt(samples): holds 95 % of the lags of white noise")
@@ -102,7 +120,9 @@ class StepsGroup:
     samples: IntArray = dataset("samples", "samples replayed", "horizon")
     horizon: Array = dataset("horizon", "the same as time", "horizon", units="s")
     windows: int = dataset("windows", "windows replayed")
-    lost: IntArray = dataset("lost", "windows in which a predictor ran away", "predictor", "horizon")
+    lost: IntArray | None = dataset(
+        "lost", "windows in which a predictor ran away", "predictor", "horizon", default=None
+    )
     attitude: Array = dataset(
         "attitude", "root mean square error", "predictor", "horizon", "axis", units="rad", frame=BODY, gaps=True
     )
@@ -141,7 +161,44 @@ class PeriodGroup:
 class VerdictGroup:
     """How far to trust the model, and why."""
 
-    label: str = dataset("label", "good-for-control, good-inside-region, not-better-than-rigid-body, do-not-use")
-    region: str = dataset("region", "region of attitudes that the verdict is about, in words")
-    reason: tuple[str, ...] = dataset("reason", "what speaks for it and against it", "reason")
-    speaks: Array = dataset("speaks", "1 for the model, -1 against it, 0 neither", "reason")
+    label: str | None = dataset(
+        "label", "good-for-control, good-inside-region, not-better-than-rigid-body, do-not-use", default=None
+    )
+    region: str | None = dataset("region", "region of attitudes that the verdict is about, in words", default=None)
+    reason: tuple[str, ...] | None = dataset("reason", "what speaks for it and against it", "reason", default=None)
+    speaks: Array | None = dataset("speaks", "1 for the model, -1 against it, 0 neither", "reason", default=None)
+
+    @property
+    def reasons(self) -> list[tuple[str, int]]:
+        """What speaks for the model (1), against it (-1) or neither (0), what decided first."""
+        reason = self.reason or ()
+        speaks = [0] * len(reason) if self.speaks is None else [int(sign) for sign in self.speaks]
+        return list(zip(reason, speaks, strict=False))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The verdict for machines."""
+        reasons = [{"text": text, "speaks": speaks} for text, speaks in self.reasons]
+        return {"label": self.label, "region": self.region or "", "reasons": reasons}
+
+
+def group_of(kind: type[G], result: object) -> G:
+    """Arrange a result as a group of datasets that have the names of its attributes."""
+    values = {field.name: getattr(result, field.name) for field in fields(kind)}  # type: ignore[arg-type]  # a record
+    return kind(**values)
+
+
+def evidence_groups(evidence: Validation) -> dict[str, Any]:
+    """Arrange the evidence on a model as groups of datasets by the names that its record has for them."""
+    results: tuple[tuple[str, type[Any], object], ...] = (
+        ("structures", StructuresGroup, evidence.structures),
+        ("residuals", ResidualsGroup, evidence.residuals),
+        ("uncertainty", UncertaintyGroup, evidence.draws),
+        ("curves", CurvesGroup, evidence.curves),
+        ("round_trip", RoundTripGroup, evidence.round_trip),
+        ("steps", StepsGroup, evidence.steps),
+        ("physics", PhysicsGroup, evidence.physics),
+        ("period", PeriodGroup, evidence.period),
+        ("verdict", VerdictGroup, evidence.verdict),
+    )
+    return {name: group_of(kind, result) for name, kind, result in results if result is not None}

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+
+import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.checkpoint import HistoryGroup
@@ -16,10 +20,25 @@ from cpfls_cli.artifacts.evidence import (
     StructuresGroup,
     UncertaintyGroup,
     VerdictGroup,
+    evidence_groups,
+    group_of,
 )
+from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, Format, Record, dataset, group, record
+from cpfls_cli.errors import InputError
+from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 
-_JUDGED = ("judged_model", "part", "axis")
+if TYPE_CHECKING:
+    # What evaluates a model loads compiled kernels, which nobody waits for who only reads one.
+    from cpfls_cli.config.study import Study
+    from cpfls_cli.identification.identify import Identification
+    from cpfls_cli.identification.model import Model
+    from cpfls_cli.regressor.structure import ModelStructure
+    from cpfls_cli.validation.bootstrap import Draws
+    from cpfls_cli.validation.validate import Validation
+
+WELL_CONDITIONED = 100.0
+"""Largest condition number of a model whose coefficients are all known."""
 
 
 @record
@@ -93,34 +112,9 @@ class FrontGroup:
 class SearchGroup:
     """How the search ended."""
 
-    stop_reason: str = dataset("stop_reason", "generations, converged, time-limit or interrupted")
-    complete: bool = dataset("complete", "1 where the search came to its end, 0 where `--resume` goes on")
-
-
-@record
-class JudgedGroup:
-    """Scores of the model and its baselines, by part of the data and axis."""
-
-    models: tuple[str, ...] = dataset("models", "the model and its baselines", "judged_model")
-    parts: tuple[str, ...] = dataset("parts", "training, held-out rest, other flights", "part")
-    samples: IntArray = dataset("samples", "samples judged", "part")
-    outside: IntArray = dataset("outside", "of them outside the attitudes that training visited", "part")
-    mse: Array = dataset("mse", "mean squared torque error", *_JUDGED, units="(N m)^2", frame=EULER)
-    max_error: Array = dataset("max_error", "largest torque error", *_JUDGED, units="N m", frame=EULER)
-    relative_error: Array = dataset(
-        "relative_error", "largest error over largest torque", *_JUDGED, frame=EULER, gaps=True
-    )
-    r2: Array = dataset("r2", "share of the torque's variance explained", *_JUDGED, frame=EULER, gaps=True)
-    vaf: Array | None = dataset(
-        "vaf",
-        "the same without the mean of the error: variance accounted for",
-        *_JUDGED,
-        frame=EULER,
-        gaps=True,
-        default=None,
-    )
-    r2_body: Array = dataset(
-        "r2_body", "the same for body torque, not near a pitch of +-90 deg", *_JUDGED, frame=BODY, gaps=True
+    stop_reason: str | None = dataset("stop_reason", "generations, converged, time-limit or interrupted", default=None)
+    complete: bool | None = dataset(
+        "complete", "1 where the search came to its end, 0 where `--resume` goes on", default=None
     )
 
 
@@ -176,3 +170,253 @@ class ModelRecord(Record):
     physics: PhysicsGroup | None = group("physics", default=None)
     period: PeriodGroup | None = group("period", default=None)
     verdict: VerdictGroup | None = group("verdict", default=None)
+
+    @classmethod
+    def of(cls, result: Identification, base: str, learned: IntArray, evidence: Validation | None) -> Self:
+        """Arrange an identification and the evidence on it.
+
+        Parameters
+        ----------
+        base : str
+            ``none`` or ``rigid-body``.
+        learned : array of int
+            Indices of the samples that trained.
+        evidence : Validation or None
+            None where it was not gathered.
+        """
+        baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
+        return cls(
+            model=_model(result, base),
+            solve=SolveGroup(
+                singular_values=result.system.singular_values,
+                rank=result.system.rank,
+                condition_number=result.system.condition_number,
+                parameters=result.system.parameters,
+            ),
+            rules=group_of(RulesGroup, result.excitation),
+            front=group_of(FrontGroup, result.front),
+            history=group_of(HistoryGroup, result.history),
+            search=SearchGroup(stop_reason=result.stop_reason, complete=result.complete),
+            judged=JudgedGroup.of(result),
+            baselines=BaselinesGroup(
+                rigid_body=baselines["rigid-body"], constant_inertia=baselines["constant-inertia"]
+            ),
+            ridge=None if result.ridge is None else group_of(RidgeGroup, result.ridge),
+            training_indices=learned,
+            findings=tuple(result.findings),
+            **({} if evidence is None else evidence_groups(evidence)),
+        )
+
+    @cached_property
+    def study(self) -> Study:
+        """The study that it was identified with."""
+        return _study(self.origin.config, self.FORMAT.name)
+
+    def rebuilt(self, path: object) -> Model:
+        """Rebuild the model.
+
+        Parameters
+        ----------
+        path : Path
+            For messages.
+
+        Raises
+        ------
+        InputError
+            If the config and the numbers of the artifact do not fit each other.
+        """
+        return rebuilt_model(self.origin.config, self.model, path)
+
+    def draws(self) -> Draws | None:
+        """Give the bootstrap draws behind its bands; None for a model without."""
+        from cpfls_cli.validation.bootstrap import Draws
+
+        if self.uncertainty is None:
+            return None
+        own = self.uncertainty
+        return Draws(own.coefficients, own.rigid_body, own.best_rigid_body, own.blocks, own.block_duration)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the search came to its end; models of before searches could be stopped did."""
+        return self.search is None or self.search.complete is not False
+
+    @property
+    def stop_reason(self) -> str:
+        """Why the search ended; empty where that is not known."""
+        return (self.search and self.search.stop_reason) or ""
+
+    @property
+    def searched(self) -> bool:
+        """Whether it has partitions to search for; without, one chromosome was evaluated."""
+        return bool(np.size(self.model.weights))
+
+    @property
+    def on_rigid_body(self) -> bool:
+        """Whether a rigid body lies under the fuzzy part."""
+        return self.model.base == "rigid-body"
+
+    @property
+    def fuzzy_part_off(self) -> bool:
+        """Whether cross-validation switched the fuzzy part off."""
+        return bool(np.isinf(self.model.ridge_weight))
+
+    @property
+    def same_everywhere(self) -> bool:
+        """Whether one rule acts at all attitudes, and training went all the way round in roll and in pitch."""
+        functions = [name.split(" rule ")[0] for name in self.rules.name]
+        visited = np.asarray(self.model.visited, dtype=bool)
+        return len(set(functions)) == len(functions) and all(bool(visited.any(axis=axis).all()) for axis in (0, 1))
+
+    @property
+    def known_everywhere(self) -> bool:
+        """Whether its one rule is known well enough to hold at attitudes that training did not visit."""
+        full = self.solve.rank == self.solve.parameters
+        return self.same_everywhere and full and self.solve.condition_number <= WELL_CONDITIONED
+
+    @property
+    def verdict_label(self) -> str | None:
+        """How far to trust it, as `Verdict` names it; None where that was not judged."""
+        return None if self.verdict is None else self.verdict.label
+
+    @property
+    def validated(self) -> bool:
+        """Whether any evidence was gathered for it."""
+        evidence = (self.structures, self.residuals, self.uncertainty, self.curves, self.round_trip, self.steps)
+        return any(part is not None for part in (*evidence, self.physics, self.period, self.verdict))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The model for machines.
+
+        ``not_positive_definite`` is None: only the identification itself counts the training samples at which D(q) is
+        not positive definite.
+        """
+        judged, solve = self.judged, self.solve
+        stated = six_parameters(self.study.vehicle.inertia_kg_m2)
+        return {
+            **judged.summary_of(MODEL, TRAINING),
+            "condition_number": solve.condition_number,
+            "rank": solve.rank,
+            "parameters": solve.parameters,
+            "generations": len(self.history.evaluations) - 1,
+            "evaluations": int(self.history.evaluations[-1]),
+            "stop_reason": self.stop_reason,
+            "complete": self.complete,
+            "front": len(self.front.objectives),
+            "choice_error": None if self.front.held_out is None else float(np.min(self.front.held_out)),
+            "samples": judged.samples_of(TRAINING),
+            "learned": len(self.training_indices),
+            "ridge_weight": self.model.ridge_weight,
+            "fuzzy_part": "off" if self.fuzzy_part_off else "on",
+            "inertia_kg_m2": {
+                "found": dict(zip(INERTIA_PARAMETERS, self.baselines.rigid_body.tolist(), strict=True)),
+                "stated": dict(zip(INERTIA_PARAMETERS, stated.tolist(), strict=True)),
+            },
+            "not_positive_definite": None,
+            "baselines": {name: judged.summary_of(name, TRAINING) for name in judged.baselines},
+            "held_out": {part: self._held_out_summary(part) for part in judged.held_out},
+            "findings": list(self.findings),
+            "verdict": None if self.verdict is None or self.verdict.label is None else self.verdict.summary,
+        }
+
+    def _held_out_summary(self, part: str) -> dict[str, Any]:
+        judged = self.judged
+        return {
+            **judged.summary_of(MODEL, part),
+            "samples": judged.samples_of(part),
+            "outside": int(judged.outside[judged.parts.index(part)]),
+            "baselines": {name: judged.summary_of(name, part) for name in judged.baselines},
+        }
+
+
+class StoredModel(Protocol):
+    """The numbers that a model is rebuilt from, as an artifact holds them."""
+
+    @property
+    def weights(self) -> Array | None:
+        """Of the chromosome, shape (gene,)."""
+        ...
+
+    @property
+    def coefficients(self) -> Array | None:
+        """Of the rule consequents, shape (parameter,), kg m^2."""
+        ...
+
+    @property
+    def rigid_body(self) -> Array | None:
+        """Inertia under the fuzzy part, shape (6,), kg m^2."""
+        ...
+
+    @property
+    def input_range(self) -> Array | None:
+        """Minimum and maximum of roll and pitch inputs, shape (2, 2)."""
+        ...
+
+    @property
+    def visited(self) -> BoolArray | None:
+        """Cells of roll and pitch that training visited, shape (cell, cell)."""
+        ...
+
+
+def rebuilt_model(config: str, stored: StoredModel, path: object) -> Model:
+    """Rebuild a model from the study that made it and its stored numbers.
+
+    Parameters
+    ----------
+    config : str
+        The study as YAML.
+    path : Path
+        For messages.
+
+    Raises
+    ------
+    InputError
+        If the study and the numbers do not fit each other.
+    """
+    from cpfls_cli.fuzzy.inputs import InputRange
+    from cpfls_cli.identification.evaluator import decode
+    from cpfls_cli.identification.model import Model
+    from cpfls_cli.regressor.structure import model_structure
+
+    structure = model_structure(_study(config, path).identification)
+    numbers = (stored.weights, stored.coefficients, stored.rigid_body, stored.input_range, stored.visited)
+    weights, coefficients, rigid_body, ranges, visited = map(np.asarray, numbers)
+    if len(weights) != structure.genes or len(coefficients) != structure.parameters:
+        raise InputError(
+            f"{path}: holds {len(weights)} weights and {len(coefficients)} coefficients; its config asks for "
+            f"{structure.genes} and {structure.parameters}"
+        )
+    roll, pitch = (InputRange(*map(float, row)) for row in ranges)
+    return Model(structure, (roll, pitch), decode(structure, weights), coefficients, rigid_body, visited.astype(bool))
+
+
+def _study(config: str, path: object) -> Study:
+    from cpfls_cli.config.load import parse_config, validate
+
+    source = f"{path}: /config"
+    return validate(parse_config(config, source), source)
+
+
+def _model(result: Identification, base: str) -> ModelGroup:
+    model = result.model
+    names = [p.name for p, peaks in zip(model.structure.partitions, model.partitions, strict=True) for _ in peaks]
+    return ModelGroup(
+        weights=result.front.chromosomes[result.front.chosen],
+        partition=tuple(names),
+        breakpoints=np.concatenate(model.partitions),
+        coefficients=model.coefficients,
+        parameter=tuple(_parameter_names(model.structure)),
+        rigid_body=model.rigid_body,
+        base=base,
+        input_range=np.array([[r.minimum, r.maximum] for r in model.ranges]),
+        visited=model.visited,
+        ridge_weight=result.fit.ridge_weight,
+    )
+
+
+def _parameter_names(structure: ModelStructure) -> Iterator[str]:
+    for block in structure.blocks:
+        for rule in range(block.rules):
+            for feature in range(block.features):
+                yield f"{block.function.name} rule {rule + 1} c{feature}"

@@ -12,9 +12,9 @@ from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification.chromosome import decode
+from cpfls_cli.identification.evaluator import decode
+from cpfls_cli.identification.identify import Identification
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.results import Identification
 from cpfls_cli.regressor.structure import ModelStructure, model_structure
 
 _MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")

@@ -14,9 +14,8 @@ from cpfls_cli.arrays import IntArray
 from cpfls_cli.artifacts.formats import CHECKPOINT
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.evolution.archive import Archive, Evaluation
-from cpfls_cli.evolution.history import History
-from cpfls_cli.evolution.state import EvolutionState
-from cpfls_cli.identification.search_run import Unfinished
+from cpfls_cli.evolution.state import EvolutionState, History
+from cpfls_cli.identification.search import Unfinished
 
 _BEFORE_ALL = -1
 _SEAL = "sha256"

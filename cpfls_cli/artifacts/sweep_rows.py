@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.identification.results import Identification
+from cpfls_cli.identification.identify import Identification
 from cpfls_cli.search.sweep_plan import SweepPlan, SweptSetting
 
 Rows = dict[str, Any]

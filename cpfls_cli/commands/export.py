@@ -1,35 +1,34 @@
-"""Stage `export`: an identified model as JSON, C or Python, for use without this program."""
+"""Command `export`: an identified model as JSON, C or Python, for use without this program."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import keyword
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-import cpfls_cli
 from cpfls_cli.artifacts.extended_file import is_extended
-from cpfls_cli.artifacts.formats import MODEL
 from cpfls_cli.artifacts.job import Job, take_inputs
-from cpfls_cli.artifacts.model_file import read_model
+from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import check_output, write_text
-from cpfls_cli.artifacts.store import Artifact
-from cpfls_cli.commands.export_names import form_of, outputs_of, prefix_of
-from cpfls_cli.config.load import parse_config
+from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.c_form import c_source
-from cpfls_cli.export.evidence import evidence_of
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points
-from cpfls_cli.export.python_form import python_source
-from cpfls_cli.export.sheet import Provenance, Sheet
-from cpfls_cli.flights.sources import read_good
+from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.source import c_source, python_source
+from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
+from cpfls_cli.pages.model import export_answer
 from cpfls_cli.report.outcome import Outcome
 
 _SEED = 1
+_ENDINGS = {"json": ".json", "c": ".c", "python": ".py"}
+# What the module imports: under such a name it would import itself.
+_IMPORTED = ("numpy", "sys", "warnings")
 
 
 def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
@@ -44,24 +43,38 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     name : str or None
         Prefix of the names in C, name of the model in JSON; None takes the name of the output.
     """
-    form = form or form_of(job.output)
-    prefix = prefix_of(job.output, form, name)
-    outputs = outputs_of(job.output, form)
+    form = form or _form_of(job.output)
+    prefix = _prefix_of(job.output, form, name)
+    outputs = _outputs_of(job.output, form)
     files = [take_inputs(replace(job, output=output), {"model": model})["model"] for output in outputs]
     # The file that was asked for first: a message about its folder is to name it.
     for output in reversed(outputs):
         check_output(output, job.force)
     sheet = _sheet(model, prefix, files[0].sha256)
-    if not sheet.evidence.complete and not job.force:
+    if not sheet.record.complete and not job.force:
         raise InputError(
-            f"{model}: the search for this model did not come to its end ({sheet.evidence.stop_reason or 'unknown'}); "
+            f"{model}: the search for this model did not come to its end ({sheet.record.stop_reason or 'unknown'}); "
             "`cpfls identify ... --resume` goes on, --force exports the model as it is, marked as incomplete"
         )
     texts = _texts(sheet, form, outputs)
     if not job.dry_run:
         for path, text in texts.items():
             write_text(path, text)
-    return _outcome(sheet, form, texts, job.dry_run, tuple(_warnings(sheet, model)))
+    sizes = {str(path): len(text.encode()) for path, text in texts.items()}
+    summary = {
+        "dry_run": job.dry_run,
+        "format": form,
+        "name": sheet.name,
+        "output": list(sizes),
+        "bytes": sum(sizes.values()),
+        "complete": sheet.record.complete,
+        "verdict": sheet.record.verdict_label,
+        "parameters": sheet.model.structure.parameters,
+        "fuzzy": sheet.fuzzy,
+        "rigid_body": sheet.rigid,
+        "region_share": sheet.region_share,
+    }
+    return Outcome(summary, tuple(export_answer(sheet.record, model, sizes, dry_run=job.dry_run)))
 
 
 def _sheet(path: Path, name: str, sha256: str) -> Sheet:
@@ -70,9 +83,8 @@ def _sheet(path: Path, name: str, sha256: str) -> Sheet:
             f"{path}: is a model with effects (made by `cpfls extend` or `cpfls gap`), which export cannot write; "
             "export the model that was given to that command with --model"
         )
-    artifact = read_good(path, MODEL)
-    model = _usable(read_model(artifact, path), path)
-    return Sheet(name, model, artifact.text("model/base"), _provenance(artifact, path, sha256), evidence_of(artifact))
+    record = read_record(path, ModelRecord)
+    return Sheet(name, _usable(record.rebuilt(path), path), record, path.name, sha256)
 
 
 def _usable(model: Model, path: Path) -> Model:
@@ -85,11 +97,6 @@ def _usable(model: Model, path: Path) -> Model:
     return model
 
 
-def _provenance(artifact: Artifact, path: Path, sha256: str) -> Provenance:
-    config = parse_config(artifact.header.config, f"{path}: /config")
-    return Provenance(path.name, sha256, artifact.header, config, cpfls_cli.__version__)
-
-
 def _texts(sheet: Sheet, form: str, outputs: list[Path]) -> dict[Path, str]:
     points = reference_points(sheet.model, np.random.default_rng(_SEED))
     if form == "json":
@@ -100,39 +107,64 @@ def _texts(sheet: Sheet, form: str, outputs: list[Path]) -> dict[Path, str]:
     return {outputs[0]: written.header, outputs[1]: written.source}
 
 
-def _warnings(sheet: Sheet, model: Path) -> Iterator[str]:
-    """Say what speaks against flying with this model."""
-    verdict = sheet.evidence.verdict
-    if not sheet.evidence.complete:
-        yield "the model is incomplete, and marked as such: do not fly with it"
-    if verdict is None:
-        identification = sheet.provenance.config.get("identification") or {}
-        off = not (identification.get("validation") or {}).get("enabled", True)
-        why = "identification.validation.enabled was off when it was identified" if off else "it was not validated"
-        yield f"{model}: holds no verdict: {why}; nothing says how far to trust it; `cpfls identify` it with it on"
-    elif verdict.label == "do-not-use":
-        against = [reason for reason, speaks in verdict.reasons if speaks < 0]
-        yield ": ".join([f"{model}: its verdict is do-not-use, exported all the same", *against[:1]])
+def _form_of(output: Path) -> str:
+    """Choose a form by the suffix of a file.
+
+    Returns
+    -------
+    {"json", "c", "python"}
+
+    Raises
+    ------
+    InputError
+    """
+    for form, ending in _ENDINGS.items():
+        if output.suffix == ending:
+            return form
+    endings = ", ".join(f"{ending} ({form})" for form, ending in _ENDINGS.items())
+    raise InputError(f"{output}: the ending tells no form; end the name in one of {endings}")
 
 
-def _outcome(sheet: Sheet, form: str, texts: Mapping[Path, str], dry_run: bool, warnings: tuple[str, ...]) -> Outcome:
-    evidence = sheet.evidence
-    sizes = {str(path): len(text.encode()) for path, text in texts.items()}
-    summary = {
-        "dry_run": dry_run,
-        "format": form,
-        "name": sheet.name,
-        "output": list(sizes),
-        "bytes": sum(sizes.values()),
-        "complete": evidence.complete,
-        "verdict": evidence.verdict.label if evidence.verdict else None,
-        "parameters": sheet.model.structure.parameters,
-        "fuzzy": sheet.fuzzy,
-        "rigid_body": sheet.rigid,
-        "region_share": float(np.mean(sheet.model.visited)),
-    }
-    verb = "would be written" if dry_run else "written"
-    lines = [f"{path}: {verb} ({size} bytes)" for path, size in sizes.items()]
-    lines.append(f"training visited {summary['region_share']:.1%} of the circle of roll and pitch")
-    lines.append(f"verdict: {evidence.verdict.label if evidence.verdict else 'none'}")
-    return Outcome(summary, tuple(lines), warnings)
+def _prefix_of(output: Path, form: str, name: str | None) -> str:
+    """Choose the prefix of the names in source code.
+
+    Parameters
+    ----------
+    name : str or None
+        What was asked for.
+
+    Raises
+    ------
+    InputError
+    """
+    if name is None:
+        return identifier(output.stem)
+    if form == "python":
+        raise InputError(f"--name {name}: a module of Python is called as its file is; leave --name out, or rename -o")
+    return checked_identifier(name)
+
+
+def _outputs_of(output: Path, form: str) -> list[Path]:
+    """Name the files to be written, the one that needs the others last.
+
+    Raises
+    ------
+    InputError
+    """
+    ending = _ENDINGS[form]
+    if output.suffix != ending:
+        raise InputError(f"{output}: --format {form} writes a file that ends in {ending}; name it so")
+    if form == "python" and not _importable(output.stem):
+        raise InputError(
+            f"{output}: Python cannot import a module of this name; use letters, digits and _, no digit first, none of "
+            f"its own words, not {' or '.join(_IMPORTED)}, such as {identifier(output.stem)}_model.py"
+        )
+    if form != "c":
+        return [output]
+    if not re.fullmatch(r"[A-Za-z0-9_.+-]+", output.stem):
+        raise InputError(f"{output}: C includes its header by name; use letters, digits and any of _ . + - in it")
+    return [output.with_suffix(".h"), output]
+
+
+def _importable(stem: str) -> bool:
+    return stem.isidentifier() and not keyword.iskeyword(stem) and stem not in _IMPORTED

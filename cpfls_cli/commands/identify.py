@@ -1,40 +1,32 @@
-"""Stage `identify`: find a model in a flight and judge it."""
+"""Command `identify`: find a model in flights and judge it."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from itertools import chain, count
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from cpfls_cli.artifacts.formats import MODEL
-from cpfls_cli.artifacts.job import Job, finish_data
-from cpfls_cli.artifacts.model_file import model_data
-from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.validation_file import validation_data
-from cpfls_cli.commands.stopped import stopped, without_model
-from cpfls_cli.commands.validating import gather_evidence, verdict_lines, verdict_summary, without_evidence
-from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.errors import ComputationError, ConfigError, InputError
-from cpfls_cli.flights.choosing import choosing_roles, choosing_source
-from cpfls_cli.flights.flight_source import flight_source
+from cpfls_cli.artifacts.job import Job, finish
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.commands.stopped import not_judged, stopped, without_model
+from cpfls_cli.config.study import generator, settings_of
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.flights.choosing import choosing_source
+from cpfls_cli.flights.judging import held_out_parts, input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
-from cpfls_cli.flights.training import TrainingData, flight_roles, read_training
-from cpfls_cli.identification.choice import require_flights
+from cpfls_cli.flights.training import TrainingData, read_training
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.identify import TRAINING, identify
-from cpfls_cli.identification.judge import Score
-from cpfls_cli.identification.results import Identification
-from cpfls_cli.identification.search import NothingFoundError
-from cpfls_cli.identification.search_run import SearchRun, SearchStep
-from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
+from cpfls_cli.identification.identify import Identification, identify
+from cpfls_cli.identification.search import NothingFoundError, SearchRun, SearchStep, require_flights
+from cpfls_cli.inertia import six_parameters
+from cpfls_cli.pages.model import answer
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
-from cpfls_cli.validation.verdict import Verdict
-from cpfls_cli.workers.worker_error import WorkerError
+from cpfls_cli.validation.validate import Validation
+from cpfls_cli.validation.validate import validate as examine
+from cpfls_cli.workers.workforce import WorkerError
 
 
 def run(
@@ -75,33 +67,14 @@ def run(
         search.end(result.stop_reason)
         raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
     with search.kept():
-        gathered = gather_evidence(job, result, data, held_out)
-        model = model_data(result, job.study.identification.base, data.indices)
-        evidence = gathered.evidence
-        finish_data(job, MODEL, model | (validation_data(evidence) if evidence else {}), inputs)
+        evidence, interrupt = _evidence(job, result, data, held_out)
+        record = finish(job, ModelRecord.of(result, job.study.identification.base, data.indices, evidence), inputs)
     search.end(result.stop_reason)
-    verdict = evidence.verdict if evidence else None
-    outcome = _outcome(job, result, verdict, len(data.learned), time.perf_counter() - clock, others)
-    outcome = without_evidence(outcome, gathered, job.output)
-    return stopped(outcome, result.stop_reason, watch.signal, job.output)
-
-
-def input_roles(
-    flights: Sequence[Path], selection: Path | None, validate: Sequence[Path], choose_on: Sequence[Path] = ()
-) -> dict[str, Path]:
-    """Give the inputs of an identification their roles.
-
-    Parameters
-    ----------
-    flights : sequence of Path
-        That train.
-    validate : sequence of Path
-        That judge.
-    choose_on : sequence of Path
-        That the model is chosen on.
-    """
-    roles = flight_roles(flights) | ({"selection": selection} if selection else {}) | choosing_roles(choose_on)
-    return roles | {f"validate-{number}": path for number, path in enumerate(validate, start=1)}
+    seconds = round(time.perf_counter() - clock, 3)
+    summary = {**record.summary, "not_positive_definite": result.indefinite, "seconds": seconds}
+    warnings = [Text(sentence, "warning") for sentence in others]
+    outcome = Outcome(summary, (*warnings, *answer(source_of(job, record))))
+    return stopped(not_judged(outcome, interrupt, job.output), result.stop_reason, watch.signal, job.output)
 
 
 def _identify(
@@ -137,46 +110,6 @@ def _of(flights: Sequence[Path], error: ComputationError) -> ComputationError:
     return ComputationError(f"{' '.join(str(path) for path in flights)}: {error}")
 
 
-def held_out_parts(
-    study: Study, rests: Mapping[str, TorqueSource], inputs: Mapping[str, InputFile], validate: Sequence[Path]
-) -> dict[str, TorqueSource]:
-    """Gather what is judged but not learned from, under names of their own.
-
-    Parameters
-    ----------
-    rests : mapping of str to TorqueSource
-        What of the flights that train is held out.
-    inputs : mapping of str to InputFile
-        By role, see `input_roles`.
-    validate : sequence of Path
-        Other flights.
-
-    Raises
-    ------
-    ConfigError
-        If a part was to be held out, and nothing is left for it.
-    InputError
-        If one of the flights trains too.
-    """
-    if study.identification.training_share < 1 and not rests:
-        raise ConfigError(
-            f"identification.embargo_s = {study.identification.embargo_s:g}: leaves nothing of the flight to be "
-            "held out; lower it, or lower identification.training_share"
-        )
-    parts = dict(rests)
-    learned = {file.sha256 for role, file in inputs.items() if role.startswith("flight")}
-    for number, path in enumerate(validate, start=1):
-        if inputs[f"validate-{number}"].sha256 in learned:
-            raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
-        parts[_free_name(path.name, {TRAINING, *parts})] = flight_source(path)
-    return parts
-
-
-def _free_name(name: str, taken: set[str]) -> str:
-    numbered = (f"{name} ({number})" for number in count(2))
-    return next(candidate for candidate in chain([name], numbered) if candidate not in taken)
-
-
 def _shown(job: Job) -> Callable[[SearchStep], None]:
     """Show the progress of a search on that of its job; a new machine needs half a minute before the first step."""
     job.progress(0.0, 1, "loads compiled loops; at the first use on a machine compiles them")
@@ -190,99 +123,39 @@ def _note(step: SearchStep) -> str:
     return f"{generation}  best error {step.best[0]:.3g}, max {step.best[1]:.3g} N m, cond {step.best[2]:.4g}"
 
 
-def _outcome(
-    job: Job,
-    result: Identification,
-    verdict: Verdict | None,
-    learned: int,
-    seconds: float,
-    others: tuple[str, ...],
-) -> Outcome:
-    training = result.scores["training"]
-    held_out = {part: scores for part, scores in result.scores.items() if part != "training"}
-    baselines = [name for name in training if name != "model"]
-    summary = {
-        **_score_summary(training["model"]),
-        "condition_number": result.system.condition_number,
-        "rank": result.system.rank,
-        "parameters": result.system.parameters,
-        "generations": len(result.history.evaluations) - 1,
-        "evaluations": int(result.history.evaluations[-1]),
-        "stop_reason": result.stop_reason,
-        "complete": result.complete,
-        "front": len(result.front.objectives),
-        "choice_error": None if result.front.held_out is None else float(np.min(result.front.held_out)),
-        "samples": result.samples["training"],
-        "learned": learned,
-        "ridge_weight": result.fit.ridge_weight,
-        "fuzzy_part": "off" if np.isinf(result.fit.ridge_weight) else "on",
-        "inertia_kg_m2": {
-            "found": dict(zip(INERTIA_PARAMETERS, result.rigid_body.tolist(), strict=True)),
-            "stated": dict(
-                zip(INERTIA_PARAMETERS, six_parameters(job.study.vehicle.inertia_kg_m2).tolist(), strict=True)
-            ),
-        },
-        "not_positive_definite": result.indefinite,
-        "baselines": {name: _score_summary(training[name]) for name in baselines},
-        "held_out": {
-            part: {
-                **_score_summary(scores["model"]),
-                "samples": result.samples[part],
-                "outside": result.outside[part],
-                "baselines": {name: _score_summary(scores[name]) for name in baselines},
-            }
-            for part, scores in held_out.items()
-        },
-        "findings": list(result.findings),
-        "verdict": verdict_summary(verdict),
-        "seconds": round(seconds, 3),
-    }
-    stall = job.study.identification.stall_generations
-    lines = [*_lines(result, learned, stall), *verdict_lines(verdict)]
-    return Outcome(summary, tuple(lines), (*others, *result.findings))
+class _StoppedError(Exception):
+    """Somebody waits for the program to stop."""
 
 
-def _score_summary(score: Score) -> dict[str, Any]:
-    return {
-        "mse": float(np.mean(score.mse)),
-        "max_error": float(np.max(score.max_error)),
-        "relative_error": score.worst_relative_error,
-        "mse_by_axis": [float(value) for value in score.mse],
-        "r2": [float(value) for value in score.r2],
-        "r2_body": [float(value) for value in score.r2_body],
-    }
+def _evidence(
+    job: Job, result: Identification, data: TrainingData, held_out: Mapping[str, TorqueSource]
+) -> tuple[Validation | None, int | None]:
+    """Gather the evidence on a model; an interrupt leaves the model without it.
 
+    Parameters
+    ----------
+    held_out : mapping of str to TorqueSource
+        What nothing was learned from, by name.
 
-def _ending(result: Identification, stall: int | None) -> list[str]:
-    """Say of a search that ended before its last generation why; one that was stopped has a note of its own."""
-    if result.stop_reason != "converged":
-        return []
-    generation = len(result.history.evaluations) - 1
-    return [
-        f"converged after generation {generation}: no objective improved enough "
-        f"(identification.stall_generations = {stall})"
-    ]
+    Returns
+    -------
+    evidence : Validation or None
+        None if disabled or interrupted.
+    signal : int or None
+        Number of the signal that interrupted it.
+    """
+    settings = job.study.identification
+    if not settings.validation.enabled or result.stop_reason == "interrupted":
+        return None, None
+    rng, total = generator(job.study, "validate"), settings.generations + 1
+    with job.deferred_interrupts() as interrupted, settings_of("identification", job.study):
 
+        def tell(note: str) -> None:
+            if interrupted() is not None:
+                raise _StoppedError
+            job.progress(total, total, note)
 
-def _lines(result: Identification, learned: int, stall: int | None) -> list[str]:
-    system = result.system
-    lines = [
-        f"{system.parameters} parameters from {learned} samples; rank {system.rank}, "
-        f"condition number {system.condition_number:.5g}; {result.history.evaluations[-1]} evaluations",
-        *_ending(result, stall),
-    ]
-    if result.front.held_out is not None:
-        members = len(result.front.held_out)
-        lines.append(
-            f"chosen among {members} on the flights kept for it, mean squared error {np.min(result.front.held_out):.3g}"
-        )
-    moments = " ".join(f"{name} {value:.4g}" for name, value in zip(INERTIA_PARAMETERS, result.rigid_body, strict=True))
-    lines.append(f"rigid body that fits best, kg m^2: {moments}")
-    width = max(len(part) for part in result.scores)
-    for part, scores in result.scores.items():
-        for name, score in scores.items():
-            r2 = " ".join(f"{value:8.4f}" for value in score.r2_body)
-            errors = f"MSE {np.mean(score.mse):9.3g}  largest error {np.max(score.max_error):9.3g} N m"
-            relative = f"relative {score.worst_relative_error:8.3%}"
-            lines.append(f"{part:{width}}  {name:16}  {errors}  {relative}  body R2 roll pitch yaw {r2}")
-    return lines
+        try:
+            return examine(data.training, data.learned, held_out, settings, result, rng, tell), None
+        except _StoppedError:
+            return None, interrupted()

@@ -15,9 +15,8 @@ from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.training import flight_roles, split_training, uniform_regressor
 from cpfls_cli.pages.selection import answer
 from cpfls_cli.pages.source import source_of
-from cpfls_cli.reduction.baseline import random_streamed
-from cpfls_cli.reduction.streamed import check_streamed, reduce_streamed
 from cpfls_cli.reduction.survey import survey
+from cpfls_cli.reduction.training_set import check_streamed, random_streamed, reduce_streamed
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
 RANDOM_DRAWS = 20

@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.errors import ComputationError, CpflsError, StoppedError
-from cpfls_cli.identification.search_run import StopReason, is_end
+from cpfls_cli.identification.search import StopReason, is_end
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome
 
 _STOPPED = {"interrupted": "the search was interrupted", "time-limit": "--time-limit ended the search"}
 _REMEDY = "the same command with --resume goes on"
-FROM_SIGNAL = 128
-"""What the number of a signal is added to for an exit code."""
+_FROM_SIGNAL = 128
 
 
 def stopped(outcome: Outcome, reason: StopReason, signal: int | None, output: Path) -> Outcome:
@@ -34,9 +34,25 @@ def stopped(outcome: Outcome, reason: StopReason, signal: int | None, output: Pa
     """
     if is_end(reason):
         return outcome
-    note = f"{output}: is incomplete, because {_STOPPED[reason]}; {_REMEDY}"
-    code = 0 if signal is None else FROM_SIGNAL + signal
-    return replace(outcome, warnings=(*outcome.warnings, note), exit_code=code)
+    return _with_note(outcome, f"{output}: is incomplete, because {_STOPPED[reason]}; {_REMEDY}", signal)
+
+
+def not_judged(outcome: Outcome, signal: int | None, output: Path) -> Outcome:
+    """Add to what is said of a model that an interrupt left it without evidence.
+
+    Parameters
+    ----------
+    signal : int or None
+        Number of the signal; None where the evidence was gathered or not asked for.
+    output : Path
+        The model.
+    """
+    if signal is None:
+        return outcome
+    note = (
+        f"{output}: is complete but was not judged, because of the interrupt; the same command with --force judges it"
+    )
+    return _with_note(outcome, note, signal)
 
 
 def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
@@ -57,4 +73,10 @@ def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
     if is_end(reason):
         return None
     message = f"{_STOPPED[reason]} before a model was found, so none is written; {_REMEDY}"
-    return ComputationError(message) if signal is None else StoppedError(message, FROM_SIGNAL + signal)
+    return ComputationError(message) if signal is None else StoppedError(message, _FROM_SIGNAL + signal)
+
+
+def _with_note(outcome: Outcome, note: str, signal: int | None) -> Outcome:
+    """Add a note, and the exit code that a shell gives a program that a signal ended."""
+    code = 0 if signal is None else _FROM_SIGNAL + signal
+    return replace(outcome, blocks=(*outcome.blocks, Text(note, "warning")), exit_code=code)

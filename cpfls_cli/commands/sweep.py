@@ -13,15 +13,13 @@ from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.state_file import StoppedSearch
 from cpfls_cli.artifacts.sweep_rows import RUN, Rows, run_row, sweep_data, with_row
-from cpfls_cli.commands.identify import input_roles
 from cpfls_cli.commands.stopped import stopped
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.judging import input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
-from cpfls_cli.identification.identify import identify
-from cpfls_cli.identification.results import Identification
-from cpfls_cli.identification.search import NothingFoundError
-from cpfls_cli.identification.search_run import SearchStep, StopReason, is_end
+from cpfls_cli.identification.identify import Identification, identify
+from cpfls_cli.identification.search import NothingFoundError, SearchStep, StopReason, is_end
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.sweep_words import sweep_outcome
 from cpfls_cli.report.outcome import Outcome, nothing_written

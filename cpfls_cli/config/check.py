@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from cpfls_cli.config.keys import known_keys
 from cpfls_cli.config.study import SECTIONS, Study
 from cpfls_cli.errors import SettingError
-from cpfls_cli.identification.presets import PRESETS
+from cpfls_cli.identification.settings import PRESETS
 
 _PRESET_SECTION = "identification"
 _UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}

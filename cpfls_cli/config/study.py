@@ -18,8 +18,7 @@ from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.errors import ConfigError, SettingError
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.identification.sweep_settings import SweepSettings
+from cpfls_cli.identification.settings import IdentificationSettings, SweepSettings
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.settings import Settings
 from cpfls_cli.simulation.settings import SimulationSettings

@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.evolution.dominance import pareto_front, worst_where_not_finite
+from cpfls_cli.evolution.ranking import pareto_front, worst_where_not_finite
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Archive:
 
 
 def _whole(blocks: list[_Block]) -> _Block:
-    """Put what was stored block by block into one array, and keep it so."""
+    """Join the stored blocks to one array, and keep it in their place."""
     if len(blocks) > 1:
         blocks[:] = [cast(_Block, np.concatenate(blocks))]
     return blocks[0]

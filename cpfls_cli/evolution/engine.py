@@ -10,17 +10,23 @@ import numpy as np
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
-from cpfls_cli.evolution.coding import BITS_PER_GENE, gray_decode, gray_encode
-from cpfls_cli.evolution.history import History
-from cpfls_cli.evolution.migration import migrate
-from cpfls_cli.evolution.operators import intermediate_recombination, mutate, single_point_crossover
+from cpfls_cli.evolution.operators import (
+    BITS_PER_GENE,
+    gray_decode,
+    gray_encode,
+    intermediate_recombination,
+    linear_ranking_fitness,
+    members,
+    migrate,
+    mutate,
+    reinsert,
+    single_point_crossover,
+    stochastic_universal_sampling,
+    subpopulation_labels,
+)
 from cpfls_cli.evolution.ranking import rank
-from cpfls_cli.evolution.reinsertion import reinsert
-from cpfls_cli.evolution.selection import linear_ranking_fitness, stochastic_universal_sampling
 from cpfls_cli.evolution.settings import EvolutionSettings
-from cpfls_cli.evolution.state import EvolutionState, Generation
-from cpfls_cli.evolution.stopping import ended
-from cpfls_cli.evolution.subpopulations import members, subpopulation_labels
+from cpfls_cli.evolution.state import EvolutionState, Generation, History, ended
 
 
 def evolve(

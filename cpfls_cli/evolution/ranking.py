@@ -1,13 +1,71 @@
-"""Ranks of individuals with several objectives; smaller is better."""
+"""Dominance between vectors of objectives that are minimised, and ranks of individuals; smaller is better."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.evolution.dominance import dominance_matrix, worst_where_not_finite
-from cpfls_cli.evolution.positions import positions
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.evolution.settings import Ranking
+
+
+def worst_where_not_finite(objectives: Array) -> Array:
+    """Replace every objective that is not finite by +inf, the worst value.
+
+    Parameters
+    ----------
+    objectives : array, shape (individuals, objectives)
+
+    Returns
+    -------
+    array, shape (individuals, objectives)
+        Without NaN, so every comparison is defined.
+    """
+    return np.where(np.isfinite(objectives), objectives, np.inf)
+
+
+def dominance_matrix(objectives: Array) -> BoolArray:
+    """Tell which individual Pareto-dominates which: nowhere worse, and better in one objective at least.
+
+    Parameters
+    ----------
+    objectives : array, shape (individuals, objectives)
+
+    Returns
+    -------
+    array of bool, shape (individuals, individuals)
+        Element (i, j) is true where i dominates j.
+
+    References
+    ----------
+    Paper, section 6.
+    """
+    costs = worst_where_not_finite(objectives)
+    nowhere_worse = np.ones((len(costs), len(costs)), dtype=np.bool_)
+    for cost in costs.T:
+        nowhere_worse &= cost[:, np.newaxis] <= cost
+    return nowhere_worse & ~nowhere_worse.T
+
+
+def pareto_front(objectives: Array) -> IntArray:
+    """Find the non-dominated individuals.
+
+    Parameters
+    ----------
+    objectives : array, shape (individuals, objectives)
+
+    Returns
+    -------
+    array of int, shape (front,)
+        Indices in increasing order. Of equal vectors of objectives only the first is kept.
+    """
+    costs = worst_where_not_finite(objectives)
+    front = []
+    # In lexicographic order nobody is dominated by a later one, so the first of the remaining is always kept.
+    remaining = np.lexsort(costs.T[::-1])
+    while remaining.size:
+        front.append(remaining[0])
+        remaining = remaining[np.any(costs[remaining] < costs[remaining[0]], axis=1)]
+    return np.sort(np.array(front, dtype=np.int64))
 
 
 def rank(objectives: Array, method: Ranking, first_weight: int = 1) -> IntArray:
@@ -110,3 +168,21 @@ def pareto_front_ranks(objectives: Array) -> IntArray:
         ranks[members] = front
         dominating = dominating - np.count_nonzero(dominates[members], axis=0)
     return ranks
+
+
+def positions(values: Array | IntArray) -> Array:
+    """Give each value its position among the sorted values, equal ones the mean of theirs.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        No NaN; infinite values of one sign are equal.
+
+    Returns
+    -------
+    array, shape (n,)
+        From 1 to n, with halves.
+    """
+    # scipy.stats.rankdata does the same, but its import takes longer than the rest of the start.
+    _, inverse, count = np.unique(values, return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(count) - 0.5 * (count - 1))[inverse])

@@ -1,14 +1,67 @@
-"""State of a running evolution, and what is reported of it after each generation."""
+"""State of a running evolution, its history, the report of a generation, and the conditions of its end."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Archive
-from cpfls_cli.evolution.history import History
+from cpfls_cli.evolution.settings import EvolutionSettings
+
+End = Literal["generations", "converged"]
+
+
+@dataclass(frozen=True)
+class History:
+    """Course of the search, one row for each generation from the initial population on.
+
+    Attributes
+    ----------
+    evaluations : array of int, shape (generations + 1,)
+        Chromosomes evaluated so far.
+    best : array, shape (generations + 1, objectives)
+        Best of each objective so far; +inf where none had a finite value.
+    front_size : array of int, shape (generations + 1,)
+        Members of the Pareto front so far.
+    """
+
+    evaluations: IntArray
+    best: Array
+    front_size: IntArray
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(self.evaluations)
+
+    @classmethod
+    def empty(cls, objectives: int) -> History:
+        """Create the history of no generation, for this number of objectives."""
+        none = np.empty(0, dtype=np.int64)
+        return cls(none, np.empty((0, objectives)), none)
+
+    def extended(self, archive: Archive) -> History:
+        """Add what has been evaluated by now.
+
+        Parameters
+        ----------
+        archive : Archive
+            Holds one evaluation at least.
+
+        Returns
+        -------
+        History
+            With one more row.
+        """
+        front = archive.front.objectives
+        # The front holds the smallest value of every objective, so the rest of the archive is not needed.
+        return History(
+            np.append(self.evaluations, len(archive)),
+            np.concatenate([self.best, front.min(axis=0, keepdims=True)]),
+            np.append(self.front_size, len(front)),
+        )
 
 
 @dataclass(frozen=True)
@@ -96,3 +149,43 @@ def best(generation: Generation) -> Array:
     # The front holds the smallest value of every objective, so the archive itself is not needed.
     smallest: Array = generation.front_objectives.min(axis=0)
     return smallest
+
+
+def ended(state: EvolutionState, settings: EvolutionSettings) -> End | None:
+    """Tell whether an evolution has reached its end.
+
+    Returns
+    -------
+    {"generations", "converged"} or None
+        None where another generation is to be bred.
+    """
+    if state.index >= settings.generations:
+        return "generations"
+    return "converged" if stalled(state.history, settings.stall_generations, settings.stall_improvement) else None
+
+
+def stalled(history: History, generations: int | None, improvement: float) -> bool:
+    """Tell whether the best of no objective improved enough over the last generations.
+
+    ``best_before - best_now <= improvement * |best_before|`` for every objective.
+
+    Parameters
+    ----------
+    history : History
+    generations : int or None
+        Generations looked back; never stalled if None.
+    improvement : float
+        Relative improvement that is not enough.
+
+    Returns
+    -------
+    bool
+        False while the history is shorter. An objective that got its first finite value improved.
+    """
+    if generations is None or len(history) <= generations:
+        return False
+    before, now = history.best[-1 - generations], history.best[-1]
+    known = np.isfinite(before)
+    if np.any(np.isfinite(now[~known])):
+        return False
+    return bool(np.all(before[known] - now[known] <= improvement * np.abs(before[known])))

@@ -1,22 +1,115 @@
-"""What an optimised path minimises: the conditioning of the regressor, with a penalty beyond the limits."""
+"""What an optimised path minimises, with its gradient: conditioning of the regressor, penalty beyond the limits."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
 import numpy as np
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.excitation.conditioning import conditioning, regressor_of
-from cpfls_cli.excitation.motion_gradient import motion_gradient
-from cpfls_cli.excitation.regressor_gradient import regressor_gradient
 from cpfls_cli.excitation.variables import design
-from cpfls_cli.regressor import ModelStructure
+from cpfls_cli.regressor import ModelStructure, Motion, Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.structure import PITCH, ROLL, Block, InertiaFunction
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationMotion, RotationPath
 
+# Share of the largest eigenvalue below which an eigenvalue of a Gram matrix is rounding error.
+_ROUNDING = 1e-15
 # In the course of the descent: from all eigenvalues to the extremes, and from limits that give way to hard ones.
 _EXPONENTS, _COSTS = (1.0, 16.0), (100.0, 3000.0)
 # Share of a limit from which on it costs.
 _FREE_SHARE = 0.98
 _LOAD_STEP = 1e-4
+# The slopes of membership functions and of the triangle wave have kinks and jumps; a wide step, in rad, smooths them.
+_ATTITUDE_STEP = 0.1
+_ATTITUDE, _RATE, _ACCELERATION = range(3)
+ALL_INPUTS = tuple(product(range(3), range(3)))
+"""Every component of attitude, rate and acceleration."""
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """Conditioning of a Gram matrix.
+
+    Attributes
+    ----------
+    condition_number : float
+        Of the regressor, the root of that of its Gram matrix.
+    smoothed : float
+        See `conditioning`.
+    slope : array, shape (parameters, parameters)
+        Derivative of `smoothed` by the Gram matrix.
+    """
+
+    condition_number: float
+    smoothed: float
+    slope: Array
+
+
+def conditioning(gram: Array, exponent: float) -> Conditioning:
+    """Bound the logarithm of the condition number by a function without kinks.
+
+    ``(log tr G^p + log tr G^-p) / 2p``, which falls to the logarithm of the condition number as p grows.
+
+    Parameters
+    ----------
+    gram : array, shape (parameters, parameters)
+        ``G = Q^T Q``.
+    exponent : float
+        p; one weighs all eigenvalues (the A criterion of design), a large one only the extremes (the K criterion).
+
+    References
+    ----------
+    Pukelsheim (1993), Optimal Design of Experiments, chapter 6: matrix means.
+    """
+    eigenvalues, vectors = np.linalg.eigh(gram)
+    values = np.maximum(eigenvalues, _ROUNDING * eigenvalues[-1])
+    large, small = (values / values[-1]) ** exponent, (values[0] / values) ** exponent
+    spread = values[-1] / values[0]
+    smoothed = 0.5 * (np.log(spread) + (np.log(large.sum()) + np.log(small.sum())) / exponent)
+    weights = 0.5 * (large / large.sum() - small / small.sum()) / values
+    return Conditioning(float(np.sqrt(spread)), float(smoothed), (vectors * weights) @ vectors.T)
+
+
+def regressor_of(structure: ModelStructure, motion: Array) -> Array:
+    """Build Q of a motion for uniform partitions.
+
+    Parameters
+    ----------
+    structure : ModelStructure
+    motion : array, shape (3, samples, 3)
+        Attitude, Euler rates, Euler accelerations.
+
+    Returns
+    -------
+    array, shape (samples, 3, parameters)
+    """
+    ranges = data_ranges(structure, motion[0])
+    return Regressor(structure, Motion(*motion), ranges).matrix(uniform_breakpoints(structure))
+
+
+def condition_number(path: RotationPath, structure: ModelStructure, samples: int) -> float:
+    """Find the condition number of the regressor along a path.
+
+    Parameters
+    ----------
+    path : RotationPath
+    structure : ModelStructure
+        Its partitions are taken to be uniform.
+    samples : int
+        At equal times over the duration.
+
+    Returns
+    -------
+    float
+        1e15 and more where the path does not excite all parameters.
+    """
+    motion = path.sample(path.times(samples))
+    Q = regressor_of(structure, np.stack([motion.attitude, motion.attitude_rate, motion.attitude_acceleration]))
+    # The Gram matrix would lose what is below 1e-8 of the largest singular value.
+    return float(np.linalg.cond(np.linalg.qr(Q.reshape(-1, structure.parameters), mode="r")))
 
 
 class Objective:
@@ -99,7 +192,7 @@ def conditioning_gradient(structure: ModelStructure, motion: Array, exponent: fl
 
 
 def penalty_gradient(limits: RotationLimits, motion: Array, cost: float) -> Array:
-    """Differentiate the mean square of what exceeds the limits by the motion.
+    """Differentiate the mean square of the excess over the limits by the motion.
 
     Parameters
     ----------
@@ -116,3 +209,88 @@ def penalty_gradient(limits: RotationLimits, motion: Array, cost: float) -> Arra
     excess = np.sign(loads) * np.maximum(np.abs(loads) - _FREE_SHARE, 0.0)
     weights = 2 * cost / len(loads) * excess
     return motion_gradient(lambda moved: limits.loads(RotationMotion(*moved)), motion, weights, _LOAD_STEP)
+
+
+def regressor_gradient(structure: ModelStructure, motion: Array, weights: Array) -> Array:
+    """Differentiate ``sum_n <weights_n, Q(motion_n)>``: by rates and accelerations exactly, by attitude by differences.
+
+    Parameters
+    ----------
+    structure : ModelStructure
+        Its partitions are taken to be uniform.
+    motion : array, shape (3, samples, 3)
+        Attitude, Euler rates, Euler accelerations.
+    weights : array, shape (samples, 3, parameters)
+
+    Returns
+    -------
+    array, shape (3, samples, 3)
+
+    References
+    ----------
+    method.md section 2: ``tau = J qdd + (dJ/dt) qd - 1/2 grad_q (qd^T J qd)``.
+    """
+    inputs = (_ATTITUDE, ROLL), (_ATTITUDE, PITCH)
+    gradient = motion_gradient(lambda moved: regressor_of(structure, moved), motion, weights, _ATTITUDE_STEP, inputs)
+    regressor = Regressor(structure, Motion(*motion), data_ranges(structure, motion[_ATTITUDE]))
+    for index, block in enumerate(structure.blocks):
+        places = _places(block.function)
+        value, slopes = _weighted(regressor, index, block, weights[:, :, block.columns])
+        momentum = motion[_RATE] @ places
+        gradient[_ACCELERATION] += value @ places
+        gradient[_RATE] += rotations.multiply(slopes, motion[_RATE]) @ places
+        gradient[_RATE] += rotations.multiply(slopes.swapaxes(1, 2), momentum)
+        gradient[_RATE] -= np.trace(slopes, axis1=1, axis2=2)[:, None] * momentum
+    return gradient
+
+
+def _weighted(regressor: Regressor, index: int, block: Block, weights: Array) -> tuple[Array, Array]:
+    """Weighted sums of an inertia function's basis, (samples, 3), and of its slopes by each angle, (samples, 3, 3)."""
+    basis = regressor.basis(index, uniform_breakpoints(regressor.structure))
+    slopes = np.zeros((len(weights), 3, 3))
+    for angle, slope in zip(block.function.inputs, basis.gradient, strict=True):
+        slopes[:, :, angle] = rotations.multiply(weights, slope)
+    return rotations.multiply(weights, basis.value), slopes
+
+
+def _places(function: InertiaFunction) -> Array:
+    """Symmetric matrix with ones in a function's places."""
+    places = np.zeros((3, 3))
+    places[function.row, function.column] = places[function.column, function.row] = 1.0
+    return places
+
+
+def motion_gradient(
+    function: Callable[[Array], Array],
+    motion: Array,
+    weights: Array,
+    step: float,
+    inputs: Sequence[tuple[int, int]] = ALL_INPUTS,
+) -> Array:
+    """Differentiate ``sum_n <weights_n, f(motion_n)>`` by central differences.
+
+    A jump is smoothed over the step, so that its share in the slope is not lost between samples.
+
+    Parameters
+    ----------
+    function : callable
+        Takes a motion, shape (3, samples, 3), to values of shape (samples, ...), sample by sample.
+    motion : array, shape (3, samples, 3)
+        Attitude, Euler rates, Euler accelerations.
+    weights : array, shape (samples, ...)
+    step : float, rad and s
+    inputs : sequence of pairs of int
+        Index of attitude, rate or acceleration, and of the axis.
+
+    Returns
+    -------
+    array, shape (3, samples, 3)
+        Zero for the inputs that are left out.
+    """
+    gradient, flat = np.zeros_like(motion), weights.reshape(len(weights), -1)
+    for kind, axis in inputs:
+        shift = np.zeros_like(motion)
+        shift[kind, :, axis] = step
+        difference = function(motion + shift) - function(motion - shift)
+        gradient[kind, :, axis] = np.einsum("ni,ni->n", flat, difference.reshape(flat.shape)) / (2 * step)
+    return gradient

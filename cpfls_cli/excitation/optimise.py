@@ -1,16 +1,14 @@
-"""Optimal excitation: a path of full rotations on which the parameters of a model are best conditioned."""
+"""Optimal excitation: a path of full rotations that conditions the parameters of a model best, found by Adam."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.excitation.adam import adam
-from cpfls_cli.excitation.conditioning import condition_number
-from cpfls_cli.excitation.objective import Objective
+from cpfls_cli.excitation.objective import Objective, condition_number
 from cpfls_cli.excitation.variables import path_of, variables_of
 from cpfls_cli.regressor import ModelStructure, StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation
@@ -24,11 +22,14 @@ _SAMPLES, _SAMPLES_PER_PARAMETER, _SAMPLES_PER_SECOND = 500, 2, 8
 _FINER = 10
 # Of each design variable, in rad or rad/s.
 _STEP = 0.05
+# Of Adam: share of the mean and of the mean square of the gradient that is kept; what keeps it from dividing by zero.
+_MEMORY, _SQUARE_MEMORY = 0.9, 0.99
+_SMALL = 1e-12
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """An optimised path and what it is worth.
+    """An optimised path, its condition number, and the course of the search.
 
     Attributes
     ----------
@@ -112,7 +113,7 @@ def _better(
 
 
 class _Report:
-    """Count what is done, and pass on what it reached."""
+    """Count evaluations, and report the condition number that each reached."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = progress, total, 0
@@ -122,3 +123,38 @@ class _Report:
         if self._progress is not None:
             self._progress(self._done, self._total, f"condition number {condition_number:.3g}")
         return condition_number
+
+
+def adam(gradient: Callable[[Array], Array], start: Array, iterations: int, step: float) -> Iterator[Array]:
+    """Descend by Adam with a step that falls to zero along half a cosine.
+
+    Parameters
+    ----------
+    gradient : callable
+        Gradient at given variables, with noise of mean zero.
+    start : array
+    iterations : int
+    step : float
+        Of each variable, at the beginning.
+
+    Yields
+    ------
+    array
+        Variables after each iteration.
+
+    References
+    ----------
+    Kingma & Ba (2015), Adam: a method for stochastic optimization, ICLR. Loshchilov & Hutter (2017), SGDR, ICLR, for
+    the cosine.
+    """
+    variables = start.copy()
+    mean, square = np.zeros_like(start), np.zeros_like(start)
+    for iteration in range(1, iterations + 1):
+        slope = gradient(variables)
+        mean = _MEMORY * mean + (1 - _MEMORY) * slope
+        square = _SQUARE_MEMORY * square + (1 - _SQUARE_MEMORY) * slope**2
+        unbiased = mean / (1 - _MEMORY**iteration)
+        size = np.sqrt(square / (1 - _SQUARE_MEMORY**iteration)) + _SMALL
+        falling = 0.5 * (1 + np.cos(np.pi * (iteration - 1) / iterations))
+        variables = variables - step * falling * unbiased / size
+        yield variables

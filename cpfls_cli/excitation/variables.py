@@ -82,7 +82,7 @@ def path_of(variables: Array, like: RotationPath) -> RotationPath:
 
 
 def design(like: RotationPath, time: Array) -> Design:
-    """Lay out the motion at some times.
+    """Build the linear map from design variables to the motion at some times.
 
     Parameters
     ----------

@@ -1,30 +1,178 @@
-"""What the templates of source code are filled with, in any language."""
+"""A model as source code without dependencies: C99, which needs its mathematics only, and Python, which needs NumPy."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from cpfls_cli.dynamics.rigid_body import VERTICAL
-from cpfls_cli.export.facts import banner, facts
-from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.tables import number, rules_along
-from cpfls_cli.export.text import comment_lines, literal_text
+from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import VERTICAL, vertical
+from cpfls_cli.export.points import Expected
+from cpfls_cli.export.sheet import Sheet, rule_labels, rules_along
+from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
 from cpfls_cli.identification.excitation import CELLS
+from cpfls_cli.identification.model import Model
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import ModelStructure
 
+_OUTSIDE, _VERTICAL = 1, 4
 
-def fill(template: str, words: dict[str, Any]) -> str:
-    """Fill a template.
+
+@dataclass(frozen=True)
+class CSource:
+    """C source code."""
+
+    source: str
+    header: str
+
+
+def c_source(sheet: Sheet, points: Expected, stem: str) -> CSource:
+    """Write a model as C99.
 
     Parameters
     ----------
-    template : str
-        File name.
-    words : dict
-        All that it asks for.
+    points : Expected
+        For the self-test.
+    stem : str
+        Name of both files without ``.c`` and ``.h``.
     """
+    words = {
+        **_common_words(sheet),
+        "source": comment_text(f"{stem}.c"),
+        "header": comment_text(f"{stem}.h"),
+        **_c_tables(sheet.model),
+        "points": [_c_point(points, index) for index in range(len(points))],
+    }
+    return CSource(_fill("model.c.j2", words), _fill("model.h.j2", words))
+
+
+def _c_tables(model: Model) -> dict[str, Any]:
+    structure = model.structure
+    packed = np.packbits(model.visited, axis=1)
+    return {
+        "partitions": [
+            {
+                "label": p.name,
+                "table": f"{p.function}_{('roll', 'pitch')[p.input]}",
+                "functions": p.functions,
+                "rows": filled(c_row(peaks), 4),
+            }
+            for p, peaks in zip(structure.partitions, model.partitions, strict=True)
+        ],
+        "rules": {
+            p.name: f"rules_of(&{name}_input, {p.function}_{name}, {p.functions})"
+            for p in structure.partitions
+            for name in (("roll", "pitch")[p.input],)
+        },
+        "blocks": [
+            {
+                "name": block.function.name,
+                "rules": block.rules,
+                "inputs": len(block.partitions),
+                "rows": c_rows(
+                    model.coefficients[block.columns].reshape(block.rules, block.features),
+                    rule_labels(block, structure),
+                ),
+            }
+            for block in structure.blocks
+            if block.partitions
+        ],
+        "rigid_rows": [c_row(row) for row in symmetric(model.rigid_body)],
+        "visited_rows": [", ".join(f"0x{byte:02x}" for byte in row) for row in packed],
+        "cell_bytes": packed.shape[1],
+    }
+
+
+def _c_point(points: Expected, index: int) -> str:
+    motion = points.motion[index : index + 1]
+    vectors = [motion.attitude[0], motion.rate[0], motion.acceleration[0]]
+    matrices = [points.inertia[index], points.coriolis[index], np.array([points.torque[index], points.body[index]])]
+    parts = [_braced(v) for v in vectors] + [_matrix(m) for m in matrices] + [_braced(points.scale[index])]
+    flags = (0 if points.inside[index] else _OUTSIDE) | (_VERTICAL if vertical(motion.attitude)[0] else 0)
+    return "    {\n" + "\n".join(filled(f"{part},", 8) for part in parts) + f"\n        {flags}u\n    }},"
+
+
+def _braced(values: Array) -> str:
+    return f"{{{c_row(values)}}}"
+
+
+def _matrix(values: Array) -> str:
+    return "{ " + ", ".join(_braced(row) for row in values) + " }"
+
+
+def python_source(sheet: Sheet, points: Expected, file: str) -> str:
+    """Write a model as a module of Python.
+
+    Parameters
+    ----------
+    points : Expected
+        For the self-test.
+    file : str
+        Name of the file.
+    """
+    label = sheet.record.verdict_label
+    words = {
+        **_common_words(sheet),
+        "source": comment_text(file),
+        "verdict_label": None if label is None else ascii(label),
+        **_python_tables(sheet.model),
+        "points": [_python_point(points, index) for index in range(len(points))],
+    }
+    return _fill("model.py.j2", words)
+
+
+def visited_rows(model: Model) -> list[str]:
+    """Draw the region that training visited.
+
+    Returns
+    -------
+    list of str
+        ``#`` for a visited cell, ``.`` for another; a line for each roll.
+    """
+    return ["".join(row) for row in np.where(model.visited, "#", ".")]
+
+
+def _python_tables(model: Model) -> dict[str, Any]:
+    structure = model.structure
+    return {
+        "partitions": [
+            {"label": partition.name, "rows": python_rows(peaks, 8)}
+            for partition, peaks in zip(structure.partitions, model.partitions, strict=True)
+        ],
+        "blocks": [
+            {
+                "name": block.function.name,
+                "rows": python_rows(model.coefficients[block.columns].reshape(block.rules, block.features), 8),
+            }
+            for block in structure.blocks
+            if block.partitions
+        ],
+        "rigid_body": python_rows(symmetric(model.rigid_body), 4),
+        "visited_rows": visited_rows(model),
+    }
+
+
+def _python_point(points: Expected, index: int) -> str:
+    motion = points.motion[index : index + 1]
+    entries = {
+        "q": motion.attitude[0],
+        "qd": motion.rate[0],
+        "qdd": motion.acceleration[0],
+        "D": points.inertia[index],
+        "C": points.coriolis[index],
+        "torque": points.torque[index],
+        "body": points.body[index],
+        "scale": points.scale[index],
+    }
+    lines = [filled(f'"{name}": {values.tolist()!r},', 8) for name, values in entries.items()]
+    return "\n".join(["    {", *lines, f'        "inside": {bool(points.inside[index])},', "    },"])
+
+
+def _fill(template: str, words: dict[str, Any]) -> str:
+    """Fill a template with all that it asks for."""
     environment = Environment(
         loader=PackageLoader("cpfls_cli.export"),
         undefined=StrictUndefined,
@@ -36,17 +184,16 @@ def fill(template: str, words: dict[str, Any]) -> str:
     return environment.get_template(template).render(words)
 
 
-def common_words(sheet: Sheet) -> dict[str, Any]:
+def _common_words(sheet: Sheet) -> dict[str, Any]:
     """Gather what all languages ask for: names, numbers, and which parts of the code the structure needs."""
-    verdict = sheet.evidence.verdict
     return {
         "name": sheet.name,
         "macro": sheet.name.upper(),
-        "banner": comment_lines(banner(sheet)),
-        "facts": comment_lines(facts(sheet)),
-        "complete": sheet.evidence.complete,
-        "verdict_label": literal_text(verdict.label) if verdict else "none",
-        "model_sha256": sheet.provenance.sha256,
+        "banner": comment_lines(sheet.banner),
+        "facts": comment_lines(sheet.facts),
+        "complete": sheet.record.complete,
+        "verdict_label": literal_text(sheet.record.verdict_label or "none"),
+        "model_sha256": sheet.sha256,
         "vertical": VERTICAL,
         "cells": CELLS,
         "cell_deg": 360 // CELLS,

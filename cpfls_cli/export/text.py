@@ -1,14 +1,15 @@
-"""Text from anywhere, made fit for comments, names and literals of source code."""
+"""Text, names and numbers as source code: text from anywhere made fit for comments and literals, tables of numbers."""
 
 from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 
-_COLUMNS = 112
+_COMMENT_COLUMNS, _NUMBER_COLUMNS = 112, 116
 
 
 def comment_lines(paragraphs: Sequence[str]) -> list[str]:
@@ -28,7 +29,7 @@ def comment_lines(paragraphs: Sequence[str]) -> list[str]:
     for paragraph in paragraphs:
         safe = comment_text(paragraph)
         lines += [
-            f" {line}" for line in textwrap.wrap(safe, _COLUMNS, subsequent_indent="  ", break_on_hyphens=False)
+            f" {line}" for line in textwrap.wrap(safe, _COMMENT_COLUMNS, subsequent_indent="  ", break_on_hyphens=False)
         ] or [""]
     return lines
 
@@ -70,3 +71,56 @@ def checked_identifier(name: str) -> str:
             f"--name {name or repr(name)}: is no identifier; use letters, digits and underscores, a letter first"
         )
     return name
+
+
+def number(value: float) -> str:
+    """Write a number with as many digits as bring it back."""
+    return repr(float(value))
+
+
+def c_row(values: Iterable[float]) -> str:
+    """Write numbers for an array of C."""
+    return ", ".join(f"R({number(value)})" for value in values)
+
+
+def c_rows(values: Array, labels: Sequence[str]) -> str:
+    """Write the rows of a table of C, each in braces, under a comment that names it.
+
+    Parameters
+    ----------
+    values : array, shape (rows, columns)
+    labels : sequence of str
+        One for each row.
+    """
+    return "\n".join(
+        f"    /* {label} */\n    {{\n{filled(c_row(row), 8)}\n    }},"
+        for label, row in zip(labels, values, strict=True)
+    )
+
+
+def python_rows(values: Array, indent: int) -> str:
+    """Write a table as nested lists of Python.
+
+    Parameters
+    ----------
+    values : array, shape (columns,) or (rows, columns)
+    indent : int
+        Spaces before each line.
+    """
+    if values.ndim == 1:
+        return filled("[" + ", ".join(number(value) for value in values) + "]", indent)
+    rows = ",\n".join(python_rows(row, indent + 4) for row in values)
+    return f"{' ' * indent}[\n{rows},\n{' ' * indent}]"
+
+
+def filled(text: str, indent: int) -> str:
+    """Break a list of numbers into lines.
+
+    Parameters
+    ----------
+    indent : int
+        Spaces before each line.
+    """
+    blank = " " * indent
+    wide = {"break_long_words": False, "break_on_hyphens": False}
+    return textwrap.fill(text, _NUMBER_COLUMNS, initial_indent=blank, subsequent_indent=blank + " ", **wide)  # type: ignore[arg-type]

@@ -1,15 +1,127 @@
-"""The basis of a fuzzy system: rule firing times consequent features, with gradients by the input angles."""
+"""Basis functions of a fuzzy system: rule firing times consequent features, with gradients by the input angles."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.consequents import Features, row_products
 from cpfls_cli.fuzzy.inputs import MappedInput
 from cpfls_cli.fuzzy.membership import join_ends, membership_sensitivity, memberships
+
+Consequents = Literal["seesaw", "harmonic"]
+Products = Literal["additive", "tensor"]
+
+
+@dataclass(frozen=True)
+class Features:
+    """Consequent features of samples.
+
+    Attributes
+    ----------
+    value : array, shape (samples, features)
+        The first feature is the constant 1.
+    gradient : array, shape (inputs, samples, features)
+        Derivative by each input angle, 1/rad.
+    """
+
+    value: Array
+    gradient: Array
+
+
+def feature_count(inputs: int, consequents: Consequents, harmonic_order: int, products: Products) -> int:
+    """Count the coefficients of one rule.
+
+    Parameters
+    ----------
+    inputs : int
+        Number of input angles, 1 or 2.
+    consequents : {"seesaw", "harmonic"}
+    harmonic_order : int
+        Highest harmonic; used by `harmonic` only.
+    products : {"additive", "tensor"}
+    """
+    single = 1 if consequents == "seesaw" else 2 * harmonic_order
+    return int((1 + single) ** inputs) if products == "tensor" else 1 + single * inputs
+
+
+def features(
+    angles: list[Array],
+    mapped: list[MappedInput],
+    consequents: Consequents,
+    harmonic_order: int,
+    products: Products,
+) -> Features:
+    """Evaluate the consequent features of a fuzzy system.
+
+    `seesaw` gives ``1, s_1, s_2``, the paper's. `harmonic` puts ``sin k q, cos k q``, k = 1..order, in place of
+    each s; it is smooth everywhere. `additive` joins the inputs' features side by side, `tensor` multiplies them.
+
+    Parameters
+    ----------
+    angles : list of array, shape (samples,), rad
+        One or two input angles.
+    mapped : list of MappedInput
+        The same angles as the system sees them.
+    consequents, harmonic_order, products
+        See `feature_count`.
+
+    References
+    ----------
+    Equation (7); method.md section 5.
+    """
+    if consequents == "seesaw":
+        single = [_with_constant(m.consequent[:, None], m.consequent_slope[:, None]) for m in mapped]
+    else:
+        single = [_with_constant(*_harmonics(angle, harmonic_order)) for angle in angles]
+    if len(single) == 1:
+        value, slope = single[0]
+        return Features(value, slope[None])
+    return _tensor(*single) if products == "tensor" else _additive(*single)
+
+
+def _harmonics(angle: Array, order: int) -> tuple[Array, Array]:
+    multiples = np.arange(1, order + 1)
+    phase = angle[:, None] * multiples
+    sine, cosine = np.sin(phase), np.cos(phase)
+    return np.hstack([sine, cosine]), np.hstack([multiples * cosine, -multiples * sine])
+
+
+def _with_constant(value: Array, slope: Array) -> tuple[Array, Array]:
+    one = np.ones((len(value), 1))
+    return np.hstack([one, value]), np.hstack([0.0 * one, slope])
+
+
+def _additive(first: tuple[Array, Array], second: tuple[Array, Array]) -> Features:
+    (value_1, slope_1), (value_2, slope_2) = first, second
+    value = np.hstack([value_1, value_2[:, 1:]])
+    by_first = np.hstack([slope_1, np.zeros_like(slope_2[:, 1:])])
+    by_second = np.hstack([np.zeros_like(slope_1), slope_2[:, 1:]])
+    return Features(value, np.stack([by_first, by_second]))
+
+
+def _tensor(first: tuple[Array, Array], second: tuple[Array, Array]) -> Features:
+    (value_1, slope_1), (value_2, slope_2) = first, second
+    gradient = np.stack([row_products(slope_1, value_2), row_products(value_1, slope_2)])
+    return Features(row_products(value_1, value_2), gradient)
+
+
+def row_products(first: Array, second: Array) -> Array:
+    """Multiply all pairs of columns, sample by sample (row-wise Kronecker product).
+
+    Parameters
+    ----------
+    first : array, shape (samples, m)
+    second : array, shape (samples, n)
+
+    Returns
+    -------
+    array, shape (samples, m * n)
+        The index of `second` runs fastest.
+    """
+    return (first[:, :, None] * second[:, None, :]).reshape(len(first), -1)
 
 
 @dataclass(frozen=True)

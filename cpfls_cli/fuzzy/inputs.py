@@ -1,4 +1,4 @@
-"""How an angle becomes the inputs of antecedents and consequents: seesaw, full circle, data range."""
+"""Maps from an angle to the inputs of antecedents and consequents: seesaw, full circle, data range."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class InputRange:
 
 @dataclass(frozen=True)
 class MappedInput:
-    """One angle as the fuzzy system sees it.
+    """Inputs of antecedents and consequents for one angle, with their slopes.
 
     Attributes
     ----------

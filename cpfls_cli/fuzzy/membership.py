@@ -1,4 +1,18 @@
-"""Zadeh-formed membership functions of a partition, their slopes, and their derivatives by the breakpoints."""
+"""Zadeh-formed membership functions on a partition: breakpoints, degrees, slopes, derivatives by the breakpoints.
+
+The formula is that of `z_function`: the falling edge of a function over the position u between its own peak (0) and
+the next one (1). All else of a partition follows from it, whatever its shape: the next function rises as 1 minus it,
+and the slopes follow by the chain rule. It has to fall from 1 to 0, with slope 0 at both ends: else the torque jumps.
+
+Another formula is written here, and in the copies that stand where this one cannot be called:
+
+- `cpfls_cli.regressor.kernels`, `_z_function`: the compiled loops of the search. numba caches compiled code by its
+  file, and would not notice that a function which it compiled in from another file has changed.
+- `cpfls_cli/export/templates/model.c.j2`, `rules_of`, and `model.py.j2`, `_rules`: they run without this package.
+- `Z_FUNCTION` here, the words that the JSON of a model carries, and docs/method.md section 4.
+
+`tests/unit/export/test_membership.py` evaluates all of them at the same points.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +21,70 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+
+Z_FUNCTION = "1 - 2 u^2 up to u = 1/2 and 2 (1 - u)^2 after it"
+"""`z_function` in words."""
+
+
+def breakpoints(weights: Array) -> Array:
+    """Decode the breakpoints of a partition, ``b_k = sum_{i<=k} a_i / sum_j a_j``.
+
+    Parameters
+    ----------
+    weights : array, shape (functions - 1,), >= 0
+        Weights a_i. An empty array is the partition of one function.
+
+    Returns
+    -------
+    array, shape (functions,)
+        Where each membership function has its only peak: 0, b_1, ..., 1. One function alone has its peak at 0.
+        All weights zero give NaN: such a partition is not defined.
+
+    References
+    ----------
+    Equation (10); method.md section 4.
+    """
+    total = np.sum(weights)
+    if len(weights) == 0:
+        return np.zeros(1)
+    if not total > 0:
+        return np.full(len(weights) + 1, np.nan)
+    ends = np.concatenate([[0.0], np.cumsum(weights) / total])
+    ends[-1] = 1.0
+    return ends
+
+
+def breakpoint_jacobian(weights: Array) -> Array:
+    """Differentiate the inner breakpoints by the weights.
+
+    Parameters
+    ----------
+    weights : array, shape (functions - 1,), >= 0, not all zero
+
+    Returns
+    -------
+    array, shape (functions - 2, functions - 1)
+        ``d b_k / d a_j = ([j <= k] - b_k) / sum a``; no rows for fewer than three functions.
+    """
+    count = len(weights)
+    inner = breakpoints(weights)[1:-1]
+    counted = np.tri(max(count - 1, 0), count)
+    return np.asarray((counted - inner[:, None]) / np.sum(weights), dtype=float)
+
+
+def uniform_weights(functions: int) -> Array:
+    """Give the weights of the equidistant partition.
+
+    Parameters
+    ----------
+    functions : int
+        Number of membership functions, at least 1.
+
+    Returns
+    -------
+    array, shape (functions - 1,)
+    """
+    return np.ones(functions - 1)
 
 
 @dataclass(frozen=True)
@@ -48,12 +126,37 @@ class _Located:
     position: Array
 
 
+def z_function(position: Array) -> tuple[Array, Array, Array]:
+    """Evaluate Zadeh's z-function, the edge along which a membership function falls.
+
+    ``z(u) = 1 - 2 u^2`` up to the middle, ``2 (1 - u)^2`` after it.
+
+    Parameters
+    ----------
+    position : array, shape (samples,)
+        u on [0, 1]: 0 at the function's own peak, 1 at its neighbour's.
+
+    Returns
+    -------
+    value, first, second : array, shape (samples,)
+        The function, and its derivatives by u.
+
+    References
+    ----------
+    Equation (8) with the squares that its print lost; method.md section 4.
+    """
+    left = position < 0.5
+    rest = 1.0 - position
+    value = np.where(left, 1.0 - 2.0 * position**2, 2.0 * rest**2)
+    first = np.where(left, -4.0 * position, -4.0 * rest)
+    return value, first, np.where(left, -4.0, 4.0)
+
+
 def memberships(scaled_input: Array, breakpoints: Array) -> Memberships:
     """Evaluate all functions of a partition.
 
-    Between two neighbouring breakpoints the left function falls along Zadeh's z-function, ``1 - 2 u^2`` up to the
-    middle and ``2 (1 - u)^2`` after it, and the right one rises along s = 1 - z. Beyond the ends the outer functions
-    stay at 1.
+    Between two neighbouring breakpoints the left function falls along `z_function`, and the right one rises along
+    s = 1 - z. Beyond the ends the outer functions stay at 1.
 
     Parameters
     ----------
@@ -69,7 +172,7 @@ def memberships(scaled_input: Array, breakpoints: Array) -> Memberships:
     if len(breakpoints) == 1:
         return Memberships(np.ones((len(scaled_input), 1)), np.zeros((len(scaled_input), 1)))
     at = _locate(scaled_input, breakpoints)
-    falling, slope, _ = _z_function(at.position)
+    falling, slope, _ = z_function(at.position)
     slope = np.where(_inside(scaled_input), slope, 0.0) / at.width
     return Memberships(
         _spread(falling, 1.0 - falling, at.interval, len(breakpoints)),
@@ -92,7 +195,7 @@ def membership_sensitivity(scaled_input: Array, breakpoints: Array) -> Membershi
     slope = np.zeros((samples, functions, functions))
     if functions > 2:
         at = _locate(scaled_input, breakpoints)
-        _, first, second = (np.where(_inside(scaled_input), part, 0.0) for part in _z_function(at.position))
+        _, first, second = (np.where(_inside(scaled_input), part, 0.0) for part in z_function(at.position))
         rows = np.arange(samples)
         for end, towards in ((0, at.position - 1.0), (1, -at.position)):
             by_value = first * towards / at.width
@@ -139,15 +242,6 @@ def _locate(scaled_input: Array, breakpoints: Array) -> _Located:
     safe = np.where(empty, 1.0, width)
     position = np.where(empty, 1.0, (clipped - breakpoints[interval]) / safe)
     return _Located(interval, safe, position)
-
-
-def _z_function(position: Array) -> tuple[Array, Array, Array]:
-    """Zadeh's z-function of u on [0, 1] with its first and second derivative."""
-    left = position < 0.5
-    rest = 1.0 - position
-    value = np.where(left, 1.0 - 2.0 * position**2, 2.0 * rest**2)
-    first = np.where(left, -4.0 * position, -4.0 * rest)
-    return value, first, np.where(left, -4.0, 4.0)
 
 
 def _spread(left: Array, right: Array, interval: IntArray, functions: int) -> Array:

@@ -1,28 +1,85 @@
-"""Fit a periodic fuzzy system to samples by one linear least-squares problem."""
+"""Fit a periodic fuzzy system to samples: its settings, and one linear least-squares problem with a ridge."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import fields, replace
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from numbers import Integral, Real
+from typing import Annotated, Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
+from annotated_types import Ge, Lt
+from typing_extensions import Doc
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
-from cpfls_cli.fuzzy.partition import breakpoints, uniform_weights
-from cpfls_cli.fuzzy.periodic_settings import PeriodicSettings
-from cpfls_cli.fuzzy.periodic_structure import PeriodicStructure
-from cpfls_cli.fuzzy.periodic_system import FitQuality, PeriodicSystem
-from cpfls_cli.fuzzy.ridge import RidgeSolution, solve_ridge
-from cpfls_cli.fuzzy.samples import as_angles, as_values, blocks
+from cpfls_cli.fuzzy.basis import Consequents, Products
+from cpfls_cli.fuzzy.membership import breakpoints, uniform_weights
+from cpfls_cli.fuzzy.periodic_system import FitQuality, PeriodicStructure, PeriodicSystem, as_angles, as_values, blocks
+from cpfls_cli.settings import Settings
+
+SMALLEST_TOLERANCE = 3e-7
+"""The sums of products behind a fit square the singular values: below this share of the largest they are rounding."""
 
 # Two functions share one rule, as one function does.
 _COUNTS = {1: (1, *range(3, 22)), 2: (1, *range(3, 8))}
 _SAMPLES_PER_COEFFICIENT = 3
 # Columns are computed twice rather than kept above this many numbers, 64 MB.
 _MOST_KEPT = 8_000_000
+Blocks = Callable[[], Iterator[tuple[Array, Array]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeriodicSettings(Settings):
+    """Structure and regularisation of a fitted periodic system."""
+
+    membership_functions: Annotated[
+        int | tuple[int, ...] | None,
+        Doc("functions of each input, or one number per input; null: what the samples carry, up to 7 (one input: 21)"),
+    ] = None
+    consequents: Annotated[Consequents, Doc("what each rule adds up: sines and cosines, or the paper's seesaw")] = (
+        "harmonic"
+    )
+    harmonic_order: Annotated[int, Ge(1), Doc("highest harmonic of each rule (consequents: harmonic)")] = 1
+    products: Annotated[Products, Doc("whether the features of two inputs are joined or multiplied")] = "tensor"
+    ridge_weight: Annotated[float, Ge(0), Doc("weight of the squared coefficients, per sample")] = 0.0
+    rank_tolerance: Annotated[
+        float, Ge(SMALLEST_TOLERANCE), Lt(1), Doc("singular values below this share of the largest count as zero")
+    ] = 1e-6
+
+    def __post_init__(self) -> None:
+        """Refuse what no system can have: these settings are written in Python, where no config is checked."""
+        # A list is what one writes first; nothing but this sets a field of a frozen instance.
+        object.__setattr__(self, "membership_functions", _counts(self.membership_functions))
+        if self.consequents not in ("harmonic", "seesaw"):
+            raise SettingError("consequents", f"consequents = {self.consequents!r}: give 'harmonic' or 'seesaw'")
+        if self.products not in ("additive", "tensor"):
+            raise SettingError("products", f"products = {self.products!r}: give 'additive' or 'tensor'")
+        if not _is_count(self.harmonic_order):
+            message = f"harmonic_order = {self.harmonic_order!r}: give a whole number of 1 or more"
+            raise SettingError("harmonic_order", message)
+        if not (isinstance(self.ridge_weight, Real) and 0 <= self.ridge_weight < float("inf")):
+            raise SettingError("ridge_weight", f"ridge_weight = {self.ridge_weight!r}: give a number of 0 or more")
+        if not (isinstance(self.rank_tolerance, Real) and SMALLEST_TOLERANCE <= self.rank_tolerance < 1):
+            message = f"rank_tolerance = {self.rank_tolerance!r}: give a number from {SMALLEST_TOLERANCE:g} to below 1"
+            raise SettingError("rank_tolerance", message)
+
+
+def _is_count(value: object) -> TypeGuard[Integral]:
+    return isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= 1
+
+
+def _counts(functions: object) -> int | tuple[int, ...] | None:
+    if functions is None:
+        return None
+    several = isinstance(functions, list | tuple)
+    given = list(functions) if isinstance(functions, list | tuple) else [functions]
+    counts = [int(count) for count in given if _is_count(count)]
+    if len(counts) < max(len(given), 1):
+        message = f"membership_functions = {functions!r}: give whole numbers of 1 or more, one or one for each input"
+        raise SettingError("membership_functions", message)
+    return tuple(counts) if several else counts[0]
 
 
 def fit_periodic(
@@ -127,7 +184,7 @@ def _with(settings: PeriodicSettings, functions: tuple[int, ...]) -> PeriodicStr
 
 def _quality(solution: RidgeSolution, samples: int, unit: float) -> FitQuality:
     residual_rms = float(np.sqrt(solution.residual_square / samples)) * unit
-    left = 1.0 - solution.effective_coefficients / samples
+    unspent = 1.0 - solution.effective_coefficients / samples
     return FitQuality(
         samples=samples,
         coefficients=len(solution.coefficients),
@@ -135,5 +192,90 @@ def _quality(solution: RidgeSolution, samples: int, unit: float) -> FitQuality:
         condition_number=solution.condition_number,
         effective_coefficients=solution.effective_coefficients,
         residual_rms=residual_rms,
-        cross_validation_rms=residual_rms / left if left > 0 else float("inf"),
+        cross_validation_rms=residual_rms / unspent if unspent > 0 else float("inf"),
     )
+
+
+@dataclass(frozen=True)
+class RidgeSolution:
+    """Solution of ``min |A c - y|^2 + weight |c|^2``.
+
+    Attributes
+    ----------
+    coefficients : array, shape (coefficients,)
+        Of minimum norm where the samples do not determine all.
+    rank : int
+        Number of singular values of A above the tolerance.
+    condition_number : float
+        Largest over smallest kept singular value of A; infinite for rank zero.
+    effective_coefficients : float
+        Trace of the matrix that takes y to its fit: the rank without a weight, less with one.
+    residual_square : float
+        Sum of the squared residuals.
+    """
+
+    coefficients: Array
+    rank: int
+    condition_number: float
+    effective_coefficients: float
+    residual_square: float
+
+
+def solve_ridge(blocks: Blocks, weight: float, rank_tolerance: float) -> RidgeSolution:
+    """Solve a least-squares problem whose rows come in blocks.
+
+    The eigenvalues of the sums are the squares of the singular values, which costs digits; one step of refinement
+    with the residuals of the samples themselves gives them back.
+
+    Parameters
+    ----------
+    blocks : callable
+        Gives the rows of A and y, block after block; called twice.
+    weight : float
+        Weight of the squared coefficients.
+    rank_tolerance : float
+        Singular values below this share of the largest count as zero.
+
+    References
+    ----------
+    Björck, Numerical Methods for Least Squares Problems (1996), sections 2.9 and 6.6.
+    """
+    gram, moment = _sums(blocks)
+    squares, vectors = np.linalg.eigh(gram)
+    kept = squares > rank_tolerance**2 * squares[-1]
+    squares, vectors = squares[kept], vectors[:, kept]
+
+    def solved(right_side: Array) -> Array:
+        return np.asarray(vectors @ ((vectors.T @ right_side) / (squares + weight)))
+
+    first = solved(moment)
+    square, back = _residual(blocks, first)
+    step = solved(back - weight * first)
+    rank = len(squares)
+    return RidgeSolution(
+        coefficients=first + step,
+        rank=rank,
+        condition_number=float(np.sqrt(squares[-1] / squares[0])) if rank else float("inf"),
+        effective_coefficients=float(np.sum(squares / (squares + weight))),
+        residual_square=max(0.0, square - float(step @ (2.0 * back - gram @ step))),
+    )
+
+
+def _sums(blocks: Blocks) -> tuple[Array, Array]:
+    gram, moment = None, None
+    for columns, values in blocks():
+        square, product = columns.T @ columns, columns.T @ values
+        gram, moment = (square, product) if gram is None or moment is None else (gram + square, moment + product)
+    if gram is None or moment is None:
+        raise ValueError("no rows")
+    return gram, moment
+
+
+def _residual(blocks: Blocks, coefficients: Array) -> tuple[float, Array]:
+    """Sum of the squared residuals, and the residuals times the columns."""
+    square, back = 0.0, np.zeros_like(coefficients)
+    for columns, values in blocks():
+        residual = values - columns @ coefficients
+        square += float(residual @ residual)
+        back += columns.T @ residual
+    return square, back

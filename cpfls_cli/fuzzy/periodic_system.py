@@ -1,20 +1,103 @@
-"""A periodic fuzzy system with its coefficients: a continuous function of one or two angles."""
+"""A periodic fuzzy system of one or two angles: its columns and coefficients, and checks of samples given to it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.periodic_structure import PeriodicStructure
-from cpfls_cli.fuzzy.samples import as_points, blocks
+from cpfls_cli.fuzzy.basis import (
+    Antecedent,
+    Basis,
+    Consequents,
+    Features,
+    Products,
+    antecedent,
+    basis,
+    feature_count,
+    features,
+    row_products,
+)
+from cpfls_cli.fuzzy.inputs import InputRange, map_input, wrap
+
+# The map of the full circle takes no range from the data.
+_NO_RANGE = InputRange(0.0, 1.0)
+
+# Blocks of this length stay in the cache of a processor and bound the memory of any number of samples.
+_BLOCK = 2048
+
+
+@dataclass(frozen=True)
+class PeriodicStructure:
+    """Partitions and consequents of a periodic system, ``f(q) = columns(q) @ coefficients``.
+
+    Attributes
+    ----------
+    breakpoints : tuple of array, shape (functions,)
+        One partition per input, of the angle modulo 2 pi over 2 pi; the first and the last function are one.
+    consequents, harmonic_order, products
+        See `feature_count`.
+    """
+
+    breakpoints: tuple[Array, ...]
+    consequents: Consequents
+    harmonic_order: int
+    products: Products
+
+    @property
+    def inputs(self) -> int:
+        """Number of input angles."""
+        return len(self.breakpoints)
+
+    @property
+    def coefficients(self) -> int:
+        """Number of coefficients: rules times features of a rule."""
+        count = feature_count(self.inputs, self.consequents, self.harmonic_order, self.products)
+        for partition in self.breakpoints:
+            count *= max(len(partition) - 1, 1)
+        return count
+
+    def columns(self, angles: Array) -> Array:
+        """Evaluate the columns alone.
+
+        Parameters
+        ----------
+        angles : array, shape (samples, inputs), rad
+
+        Returns
+        -------
+        array, shape (samples, coefficients)
+        """
+        rules, consequent = self._parts(angles)
+        firing = rules[0].value
+        for rule in rules[1:]:
+            firing = row_products(firing, rule.value)
+        return row_products(firing, consequent.value)
+
+    def basis(self, angles: Array) -> Basis:
+        """Evaluate the columns and their derivatives.
+
+        Parameters
+        ----------
+        angles : array, shape (samples, inputs), rad
+        """
+        return basis(*self._parts(angles))
+
+    def _parts(self, angles: Array) -> tuple[list[Antecedent], Features]:
+        single = [wrap(angle) for angle in angles.T]
+        mapped = [map_input(angle, "full-circle", True, _NO_RANGE) for angle in single]
+        rules = [
+            antecedent(one, partition, circular=True) for one, partition in zip(mapped, self.breakpoints, strict=True)
+        ]
+        return rules, features(single, mapped, self.consequents, self.harmonic_order, self.products)
 
 
 @dataclass(frozen=True)
 class FitQuality:
-    """How well the samples determine a system, and how well it fits them.
+    """Rank, conditioning and errors of a fit.
 
     Attributes
     ----------
@@ -112,3 +195,109 @@ class PeriodicSystem:
         for rows in blocks(len(checked)):
             output[rows] = (self.structure.basis(checked[rows]).gradient @ self.coefficients).T
         return output.reshape(*outer, self.structure.inputs)
+
+
+def as_angles(angles: npt.ArrayLike, inputs: int | None = None) -> Array:
+    """Check input angles and give them one column per input.
+
+    Parameters
+    ----------
+    angles : array-like, shape (samples, 2), (samples, 1) or (samples,), rad
+        Any number of turns.
+    inputs : int, optional
+        Number of inputs that a system has.
+
+    Returns
+    -------
+    array, shape (samples, inputs), rad
+
+    Raises
+    ------
+    ValueError
+        Another shape, or a value that is not finite.
+    """
+    given = _numbers("angles", angles)
+    columns = given[:, None] if given.ndim == 1 else given
+    expected = (
+        "(samples, 1 or 2)" if inputs is None else f"(samples, {inputs}), or {_point_shape(inputs)} for one point"
+    )
+    if columns.ndim != 2 or columns.shape[1] not in ((1, 2) if inputs is None else (inputs,)):
+        raise ValueError(f"angles: expected shape {expected}, got {given.shape}")
+    return _finite("angles", columns)
+
+
+def as_points(angles: npt.ArrayLike, inputs: int) -> tuple[Array, tuple[int, ...]]:
+    """Check the angles at which a system is asked for; a single point needs no column of samples.
+
+    Parameters
+    ----------
+    angles : array-like, shape (samples, inputs) or (inputs,), rad; one input: (samples,) or () too
+    inputs : int
+
+    Returns
+    -------
+    columns : array, shape (samples, inputs), rad
+    outer : tuple of int
+        Shape of one result for each point: (samples,), or () for a single point.
+
+    Raises
+    ------
+    ValueError
+        Another shape, or a value that is not finite.
+    """
+    given = _numbers("angles", angles)
+    if given.shape == _point_shape(inputs):
+        return as_angles(given.reshape(1, inputs), inputs), ()
+    columns = as_angles(given, inputs)
+    return columns, (len(columns),)
+
+
+def _point_shape(inputs: int) -> tuple[int, ...]:
+    return () if inputs == 1 else (inputs,)
+
+
+def as_values(values: npt.ArrayLike, samples: int) -> Array:
+    """Check the values to fit.
+
+    Parameters
+    ----------
+    values : array-like, shape (samples,)
+    samples : int
+        Number of input angles that they belong to.
+
+    Returns
+    -------
+    array, shape (samples,)
+
+    Raises
+    ------
+    ValueError
+        Another shape, or a value that is not finite.
+    """
+    given = _numbers("values", values)
+    if given.shape != (samples,):
+        raise ValueError(f"values: expected shape ({samples},), one value for each row of angles, got {given.shape}")
+    return _finite("values", given)
+
+
+def blocks(samples: int) -> Iterator[slice]:
+    """Cut samples into blocks."""
+    return (slice(start, min(start + _BLOCK, samples)) for start in range(0, samples, _BLOCK))
+
+
+def _numbers(name: str, given: npt.ArrayLike) -> Array:
+    try:
+        numbers = np.asarray(given)
+        if np.iscomplexobj(numbers):
+            raise TypeError("these are complex")
+        return numbers.astype(float)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: expected an array of real numbers ({error})") from error
+
+
+def _finite(name: str, given: Array) -> Array:
+    bad = np.argwhere(~np.isfinite(given))
+    if len(bad):
+        first = ", ".join(str(index) for index in bad[0])
+        raise ValueError(f"{name}: {len(bad)} values are not finite, the first is {name}[{first}]; leave such rows out")
+    return given

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
-from cpfls_cli.identification.rigid_columns import RIGID
-from cpfls_cli.identification.samples import Products
+from cpfls_cli.identification.data import sample_times
+from cpfls_cli.identification.samples import Products, Samples
+from cpfls_cli.identification.settings import RidgeSettings
+from cpfls_cli.regressor.motion import RIGID
 
 SMALLEST_ERROR = 1e-12
 """Share of the mean squared torque below which sums of products cannot tell errors apart."""
@@ -86,7 +88,7 @@ def contiguous_blocks(judged: Array, learned: Array, folds: int, embargo: float)
 
 
 def ridge_curve(learned: Products, judged: Products, left_out: BoolArray, weights: Array, size: Array) -> RidgeCurve:
-    """Cross-validate the ridge weight on the columns after the first six.
+    """Cross-validate the ridge weight of the fuzzy columns, which stand after the six of the rigid body.
 
     The six rigid-body columns are free of penalty. For each fold they are eliminated (Schur complement), and one
     eigendecomposition of the rest serves all weights. Errors that only rounding tells apart count as equal.
@@ -142,3 +144,63 @@ def _ridge_path(gram: Array, moment: Array, weights: Array) -> Array:
     fuzzy = vectors @ (projected[:, None] / (np.maximum(values, 0.0)[:, None] + weights))
     fuzzy = np.column_stack([fuzzy, np.zeros(len(fuzzy))])
     return np.vstack([alone[:, None] - onto @ fuzzy, fuzzy])
+
+
+@dataclass(frozen=True)
+class RidgeChoice:
+    """Folds and candidates from which cross-validation chooses the ridge weight of a fuzzy part over a rigid body.
+
+    Attributes
+    ----------
+    judged : Samples
+        The whole training part, labelled by fold.
+    left_out : array of bool, shape (folds, labels)
+        Labels of the learned samples that do not train in each fold.
+    weights : array, shape (tried,)
+    """
+
+    judged: Samples
+    left_out: BoolArray
+    weights: Array
+
+
+def with_folds(learned: Samples, judged: Samples, settings: RidgeSettings) -> tuple[Samples, RidgeChoice]:
+    """Label samples for the cross-validation of a ridge weight.
+
+    Parameters
+    ----------
+    learned, judged : Samples
+        The samples that parameters are learned from, and the whole training part.
+    settings : RidgeSettings
+
+    Returns
+    -------
+    learned : Samples
+        Labelled by the folds in which they do not train.
+    choice : RidgeChoice
+
+    Raises
+    ------
+    SettingError
+        If there are too few samples for the folds.
+    """
+    if len(learned.ready.source) < 2 * settings.folds:
+        few = len(learned.ready.source)
+        raise SettingError("ridge.folds", f"{few} samples are too few for that many blocks; use more samples")
+    times = sample_times(judged.ready.source), sample_times(learned.ready.source)
+    blocks = contiguous_blocks(*times, settings.folds, settings.embargo_s)
+    fold, label, left_out = np.argmax(blocks.validation, axis=0), *_groups(blocks.left_out)
+    choice = RidgeChoice(
+        judged=replace(judged, label=fold, labels=len(blocks.validation)),
+        left_out=left_out,
+        weights=np.geomspace(settings.smallest, settings.largest, settings.count),
+    )
+    return replace(learned, label=label, labels=left_out.shape[1]), choice
+
+
+def _groups(left_out: BoolArray) -> tuple[IntArray, BoolArray]:
+    """Group samples that are left out in the same folds: their label, and what each label is left out of."""
+    bits = np.arange(len(left_out))
+    code = np.sum(left_out.astype(np.int64) << bits[:, None], axis=0)
+    codes, label = np.unique(code, return_inverse=True)
+    return label.astype(np.int64), (codes >> bits[:, None] & 1).astype(bool)

@@ -20,7 +20,7 @@ _PAUSE = 1e4
 
 
 class TorqueSource(Protocol):
-    """Samples in the order of time, in memory or not: they are met chunk by chunk, as often as asked for."""
+    """Samples in the order of time, in memory or not, that can be read chunk by chunk any number of times."""
 
     def __len__(self) -> int:
         """Count the samples."""
@@ -92,7 +92,7 @@ class Flights:
 
 
 def joined(flights: Sequence[TorqueSource]) -> TorqueSource:
-    """Take several flights as one source.
+    """Join several flights to one source.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def split_flight(time: Array, training_share: float, embargo: float) -> Split:
 
 
 def axis_scale(source: TorqueSource) -> Array:
-    """Scale of the torque about each axis.
+    """Compute the scale of the torque about each axis.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the training data excited: cells of attitude, rules, axes."""
+"""Excitation by the training data: visited cells of attitude, fired rules, and what explains each axis."""
 
 from __future__ import annotations
 
@@ -9,11 +9,16 @@ import numpy as np
 from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.fuzzy.inputs import wrap
-from cpfls_cli.identification.dense import regressor_blocks
+from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale
+from cpfls_cli.identification.judge import Explained
 from cpfls_cli.identification.least_squares import Triangle
 from cpfls_cli.identification.samples import Samples
+from cpfls_cli.identification.solver import regressor_blocks
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
 from cpfls_cli.regressor.regressor import Breakpoints
+from cpfls_cli.rotations import body_acceleration, body_torque, euler_rate_matrix
 
 CELLS = 72
 """Cells per turn, 5 degrees each."""
@@ -24,7 +29,7 @@ DETERMINED_SHARE = 0.5
 
 @dataclass(frozen=True)
 class RuleExcitation:
-    """How far data excite each rule.
+    """Excitation of each rule by data.
 
     Attributes
     ----------
@@ -130,3 +135,49 @@ def _firing(learned: Samples, partitions: Breakpoints) -> Array:
 def _cells(angle: Array) -> IntArray:
     cells: IntArray = np.floor((wrap(angle) + np.pi) * (CELLS / (2 * np.pi))).astype(np.int64)
     return np.clip(cells, 0, CELLS - 1)
+
+
+@dataclass(frozen=True)
+class AxisEvidence:
+    """Share of each body axis that a rigid body and a constant torque explain.
+
+    Attributes
+    ----------
+    constant : array, shape (3,), N m
+        Constant body torque fitted beside the rigid body.
+    r2 : array, shape (3,)
+        Share of the body torque explained by both, at samples where the pitch is not vertical; NaN if there are none.
+    torque : array, shape (3,), N m
+        Root mean square of the body torque at these samples.
+    acceleration : array, shape (3,), rad/s^2
+        Root mean square of the derivative of the body rates.
+    """
+
+    constant: Array
+    r2: Array
+    torque: Array
+    acceleration: Array
+
+
+def axis_evidence(source: TorqueSource, rank_tolerance: float) -> AxisEvidence:
+    """Fit six inertia parameters and a constant body torque, and measure what they explain of each axis."""
+    scale = 1.0 / axis_scale(source)
+    rows = ((_columns(data) * scale[:, None], data.torque * scale) for data in source.chunks())
+    triangle = Triangle.of((columns.reshape(-1, columns.shape[2]), torque.reshape(-1)) for columns, torque in rows)
+    parameters = triangle.solve(rank_tolerance).coefficients
+    explained, count, torque, acceleration = Explained(), 0, np.zeros(3), np.zeros(3)
+    for data in source.chunks():
+        motion, known = data.motion, ~vertical(data.motion.attitude)
+        by_both = _columns(data) @ parameters
+        measured, predicted = (body_torque(motion.attitude[known], values[known]) for values in (data.torque, by_both))
+        explained.add(measured, measured - predicted)
+        count, torque = count + len(measured), torque + np.sum(measured**2, axis=0)
+        acceleration += np.sum(body_acceleration(motion.attitude, motion.rate, motion.acceleration) ** 2, axis=0)
+    size = np.sqrt([torque / max(count, 1), acceleration / len(source)])
+    return AxisEvidence(parameters[RIGID:], explained.r2, size[0], size[1])
+
+
+def _columns(data: TorqueData) -> Array:
+    """Columns of six inertia parameters and three constant body torques, shape (samples, 3, 9)."""
+    constant = euler_rate_matrix(data.motion.attitude).swapaxes(1, 2)
+    return np.concatenate([rigid_columns(data.motion), constant], axis=2)

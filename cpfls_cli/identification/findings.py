@@ -1,4 +1,4 @@
-"""What an identification has to confess, in words."""
+"""Warnings about an identification, in sentences."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.rigid_body import VERTICAL, why_unphysical
-from cpfls_cli.identification.axes import AxisEvidence
-from cpfls_cli.identification.excitation import RuleExcitation
-from cpfls_cli.identification.fit import Fit
+from cpfls_cli.identification.excitation import AxisEvidence, RuleExcitation
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.least_squares import LeastSquares
+from cpfls_cli.identification.solver import Fit
 
 AXES = ("roll", "pitch", "yaw")
 BADLY_EXPLAINED_R2 = 0.5
@@ -29,8 +28,8 @@ RIVALS = {
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """All that a verdict on an identification rests on.
+class FitDiagnostics:
+    """Diagnostics of an identification that its warnings, and a verdict on it, rest on.
 
     Attributes
     ----------
@@ -65,46 +64,51 @@ class Evidence:
     vertical: Mapping[str, int]
     scores: Mapping[str, Mapping[str, Score]]
 
+    @property
+    def training_scores(self) -> Mapping[str, Score]:
+        """Scores on the training part, by model."""
+        return next(iter(self.scores.values()))
 
-def findings(evidence: Evidence) -> list[str]:
-    """Say in words what failed or was not excited, what matters most first."""
+
+def findings(diagnostics: FitDiagnostics) -> list[str]:
+    """List what failed or was not excited in sentences, the most important first."""
     of_the_model = (_physics, _scale, _axes, _rank, _silent_rules, _fuzzy_part_off)
     of_its_errors = (_beaten, _badly_explained, _outside, _vertical)
-    return [finding for rule in of_the_model + of_its_errors for finding in rule(evidence)]
+    return [finding for rule in of_the_model + of_its_errors for finding in rule(diagnostics)]
 
 
-def _physics(evidence: Evidence) -> Iterator[str]:
+def _physics(diagnostics: FitDiagnostics) -> Iterator[str]:
     remedy = "check signs, axes, frames and units of the log"
-    why = why_unphysical(evidence.rigid_body)
+    why = why_unphysical(diagnostics.rigid_body)
     if why is not None:
         yield f"the rigid body that fits best {why}: {remedy}"
-    if evidence.indefinite:
-        training = next(iter(evidence.samples.values()))
-        share = f"{evidence.indefinite} of {training} training samples"
-        if why is None and np.all(evidence.scores[_training(evidence)]["rigid-body"].r2_body > BADLY_EXPLAINED_R2):
+    if diagnostics.indefinite:
+        training = next(iter(diagnostics.samples.values()))
+        share = f"{diagnostics.indefinite} of {training} training samples"
+        if why is None and np.all(diagnostics.training_scores["rigid-body"].r2_body > BADLY_EXPLAINED_R2):
             remedy = "a rigid body explains this flight, so it is the structure or its excitation that fails"
         yield f"D(q) is not positive definite at {share}: not a model of a body, do not use it; {remedy}"
 
 
-def _scale(evidence: Evidence) -> Iterator[str]:
-    if evidence.stated is None:
+def _scale(diagnostics: FitDiagnostics) -> Iterator[str]:
+    if diagnostics.stated is None:
         return
     # An axis that the flight does not explain says nothing about scales.
-    explained = evidence.axes.r2 > BADLY_EXPLAINED_R2
-    ratio = (evidence.rigid_body[:3] / evidence.stated[:3])[explained]
+    explained = diagnostics.axes.r2 > BADLY_EXPLAINED_R2
+    ratio = (diagnostics.rigid_body[:3] / diagnostics.stated[:3])[explained]
     if np.any(ratio > LARGEST_SCALE) or np.any(ratio < 1 / LARGEST_SCALE):
-        found = " ".join(f"{value:.3g}" for value in ratio)
+        ratios = " ".join(f"{value:.3g}" for value in ratio)
         axes = ", ".join(np.array(AXES)[explained])
         yield (
-            f"the moments of inertia found ({axes}) are {found} times those stated (vehicle.inertia_kg_m2): check the "
+            f"the moments of inertia found ({axes}) are {ratios} times those stated (vehicle.inertia_kg_m2): check the "
             "units of torque and rates, the rotors' factors, and the vehicle"
         )
 
 
-def _axes(evidence: Evidence) -> Iterator[str]:
+def _axes(diagnostics: FitDiagnostics) -> Iterator[str]:
     """Tell a constant torque, a lack of excitation, and torque that is not inertial from each other."""
-    alone = evidence.scores[_training(evidence)]["rigid-body"].r2_body
-    seen = evidence.axes
+    alone = diagnostics.training_scores["rigid-body"].r2_body
+    seen = diagnostics.axes
     for axis, name in enumerate(AXES):
         large = abs(seen.constant[axis]) > LARGE_CONSTANT_SHARE * seen.torque[axis]
         if large and 1 - seen.r2[axis] < 0.75 * (1 - alone[axis]):
@@ -121,18 +125,14 @@ def _axes(evidence: Evidence) -> Iterator[str]:
             )
 
 
-def _training(evidence: Evidence) -> str:
-    return next(iter(evidence.scores))
+def _rank(diagnostics: FitDiagnostics) -> Iterator[str]:
+    parameters = diagnostics.system.parameters
+    if diagnostics.system.rank < parameters:
+        yield f"rank {diagnostics.system.rank} of {parameters}: the minimum-norm solution was taken"
 
 
-def _rank(evidence: Evidence) -> Iterator[str]:
-    parameters = evidence.system.parameters
-    if evidence.system.rank < parameters:
-        yield f"rank {evidence.system.rank} of {parameters}: the minimum-norm solution was taken"
-
-
-def _silent_rules(evidence: Evidence) -> Iterator[str]:
-    rules = evidence.excitation
+def _silent_rules(diagnostics: FitDiagnostics) -> Iterator[str]:
+    rules = diagnostics.excitation
     silent = [name for name, excited in zip(rules.name, rules.excited, strict=True) if not excited]
     if silent:
         rest = f" and {len(silent) - NAMED} more" if len(silent) > NAMED else ""
@@ -140,19 +140,19 @@ def _silent_rules(evidence: Evidence) -> Iterator[str]:
         yield f"{len(silent)} of {len(rules.name)} rules not excited beyond the noise: {named}{rest}"
 
 
-def _fuzzy_part_off(evidence: Evidence) -> Iterator[str]:
-    if np.isinf(evidence.fit.ridge_weight):
-        left = _percent(1 - evidence.scores[_training(evidence)]["model"].r2_body)
+def _fuzzy_part_off(diagnostics: FitDiagnostics) -> Iterator[str]:
+    if np.isinf(diagnostics.fit.ridge_weight):
+        unexplained = _percent(1 - diagnostics.training_scores["model"].r2_body)
         yield (
             "cross-validation switched the fuzzy part off: no evidence for an inertia that depends on attitude; what "
-            f"the rigid body leaves unexplained of roll, pitch, yaw ({left}; above 100 % a constant explains more) is "
-            "noise or an effect that has no term"
+            f"the rigid body leaves unexplained of roll, pitch, yaw ({unexplained}; above 100 % a constant explains "
+            "more) is noise or an effect that has no term"
         )
 
 
-def _beaten(evidence: Evidence) -> Iterator[str]:
+def _beaten(diagnostics: FitDiagnostics) -> Iterator[str]:
     """Name the parts of the data on which a simpler model explains more about most axes."""
-    for part, by_model in evidence.scores.items():
+    for part, by_model in diagnostics.scores.items():
         ours = by_model["model"].r2_body
         for rival, words in RIVALS.items():
             theirs = by_model[rival].r2_body if rival in by_model else ours
@@ -163,12 +163,12 @@ def _beaten(evidence: Evidence) -> Iterator[str]:
                 yield f"{part}: {words} leaves less of the torque about {axes} unexplained ({shares})"
 
 
-def _badly_explained(evidence: Evidence) -> Iterator[str]:
+def _badly_explained(diagnostics: FitDiagnostics) -> Iterator[str]:
     """Name held-out parts and axes that the model does not explain, where it did in training."""
-    training, *held_out = evidence.scores
-    learned = evidence.scores[training]["model"].r2_body
+    training, *held_out = diagnostics.scores
+    learned = diagnostics.scores[training]["model"].r2_body
     for part in held_out:
-        r2 = evidence.scores[part]["model"].r2_body
+        r2 = diagnostics.scores[part]["model"].r2_body
         bad = [
             name
             for name, ours, before in zip(AXES, r2, learned, strict=True)
@@ -182,16 +182,17 @@ def _percent(shares: Array) -> str:
     return " ".join(f"{100 * share:.3g}" for share in shares) + " %"
 
 
-def _outside(evidence: Evidence) -> Iterator[str]:
-    for part, outside in evidence.outside.items():
+def _outside(diagnostics: FitDiagnostics) -> Iterator[str]:
+    for part, outside in diagnostics.outside.items():
         if outside:
-            samples = evidence.samples[part]
+            samples = diagnostics.samples[part]
             yield f"{part}: {outside} of {samples} samples lie outside the attitudes that training visited"
 
 
-def _vertical(evidence: Evidence) -> Iterator[str]:
-    """Say which samples the shares of body torque in the other sentences leave out."""
-    left_out = [f"{count} of {evidence.samples[part]} ({part})" for part, count in evidence.vertical.items() if count]
+def _vertical(diagnostics: FitDiagnostics) -> Iterator[str]:
+    """Name the samples that the shares of body torque in the other sentences leave out."""
+    samples, vertical = diagnostics.samples, diagnostics.vertical
+    left_out = [f"{count} of {samples[part]} ({part})" for part, count in vertical.items() if count]
     if left_out:
         yield (
             f"body torque is judged without the samples nearer than {np.degrees(np.arcsin(VERTICAL)):.0f} degrees to a "

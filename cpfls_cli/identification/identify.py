@@ -3,37 +3,65 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.identification.axes import axis_evidence
-from cpfls_cli.identification.baselines import Baseline, fit_baselines
-from cpfls_cli.identification.chromosome import decode, uniform_chromosome
+from cpfls_cli.evolution.state import History
+from cpfls_cli.identification.cross_validation import RidgeCurve, with_folds
 from cpfls_cli.identification.data import TorqueSource, axis_scale
-from cpfls_cli.identification.evaluator import Evaluator
-from cpfls_cli.identification.excitation import RuleExcitation, rule_excitation, visited_cells
-from cpfls_cli.identification.findings import Evidence, findings
-from cpfls_cli.identification.fit import Fit
-from cpfls_cli.identification.folds import with_folds
-from cpfls_cli.identification.judge import Score, score_of
+from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
+from cpfls_cli.identification.excitation import RuleExcitation, axis_evidence, rule_excitation, visited_cells
+from cpfls_cli.identification.findings import FitDiagnostics, findings
+from cpfls_cli.identification.judge import Baseline, Score, fit_baselines, score_of
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.results import Identification
 from cpfls_cli.identification.samples import Ready, Samples
-from cpfls_cli.identification.search import search
-from cpfls_cli.identification.search_run import UNWATCHED, SearchRun
+from cpfls_cli.identification.search import UNWATCHED, Front, SearchRun, StopReason, is_end, search
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.identification.solver import Solver
+from cpfls_cli.identification.solver import Fit, Solver
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
 from cpfls_cli.regressor.structure import model_structure
 
 TRAINING = "training"
 UNIFORM = "uniform-partitions"
+
+
+@dataclass(frozen=True)
+class Identification(FitDiagnostics):
+    """Result of an identification: the model, its diagnostics and the warnings that follow from them.
+
+    Attributes
+    ----------
+    model : Model
+    front : Front
+    history : History
+    stop_reason : str
+        Why the search ended: generations, converged, time-limit or interrupted.
+    ridge : RidgeCurve or None
+        For a rigid-body base: how the ridge weight was chosen.
+    baselines : tuple of Baseline
+        Fitted to the same samples.
+    findings : tuple of str
+        Warnings: what failed or was not excited.
+    """
+
+    model: Model
+    front: Front
+    history: History
+    stop_reason: StopReason
+    ridge: RidgeCurve | None
+    baselines: tuple[Baseline, ...]
+    findings: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether the search came to its end."""
+        return is_end(self.stop_reason)
 
 
 def identify(
@@ -78,8 +106,8 @@ def identify(
     Paper section 9; method.md sections 4, 5, 7 and 8.
     """
     evaluator = model_evaluator(training, learned, settings)
-    found = search(evaluator, settings, rng, run, kept)
-    solved = _solve(evaluator, found.front.chromosomes[found.front.chosen])
+    result = search(evaluator, settings, rng, run, kept)
+    solved = _solve(evaluator, result.front.chromosomes[result.front.chosen])
     if solved is None:
         raise ComputationError("no chromosome gave a finite model; the data may not move at all")
     model, fit, system = solved
@@ -90,7 +118,7 @@ def identify(
         predictors[UNIFORM] = uniform[0].torque
     parts = {TRAINING: training, **held_out}
     scores = {part: _scores(predictors, data) for part, data in parts.items()}
-    evidence = Evidence(
+    diagnostics = FitDiagnostics(
         fit=fit,
         system=system,
         excitation=_excitation(evaluator, model, baselines[0], scores[TRAINING], settings),
@@ -103,8 +131,14 @@ def identify(
         vertical={part: _count(data, vertical) for part, data in parts.items()},
         scores=scores,
     )
-    ridge, told = evaluator.solver.curve(model.partitions), tuple(findings(evidence))
-    return Identification(**vars(evidence), **vars(found), model=model, ridge=ridge, baselines=baselines, findings=told)
+    return Identification(
+        **vars(diagnostics),
+        **vars(result),
+        model=model,
+        ridge=evaluator.solver.curve(model.partitions),
+        baselines=baselines,
+        findings=tuple(findings(diagnostics)),
+    )
 
 
 def model_evaluator(training: TorqueSource, learned: TorqueSource, settings: IdentificationSettings) -> Evaluator:
@@ -164,7 +198,7 @@ def _excitation(
     scores: Mapping[str, Score],
     settings: IdentificationSettings,
 ) -> RuleExcitation:
-    """Measure what of the fuzzy part alone the samples determine beyond their noise, whatever lies underneath."""
+    """Measure how much of the fuzzy part alone the samples determine beyond their noise."""
     noise = float(np.sqrt(min(np.mean(scores[name].mse) for name in ("model", rigid_body.name))))
     inertia = float(np.mean(np.abs(rigid_body.parameters[:3])))
     return rule_excitation(evaluator.solver.learned, model.partitions, noise, inertia, settings.rank_tolerance)

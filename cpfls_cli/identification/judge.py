@@ -1,4 +1,4 @@
-"""Judge torque predictions, axis by axis."""
+"""Scores of torque predictions by axis, the baselines that a model must beat, and the spread over replicates."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.identification.data import TorqueData, TorqueSource
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.identification.least_squares import Triangle
+from cpfls_cli.inertia import symmetric_columns
+from cpfls_cli.regressor.motion import Motion, rigid_columns
 from cpfls_cli.rotations import body_torque
+
+Columns = Callable[[Motion], Array]
 
 
 @dataclass(frozen=True)
 class Score:
-    """How well a prediction meets measured torque.
+    """Scores of a torque prediction.
 
     Attributes
     ----------
@@ -85,7 +89,7 @@ class Explained:
         self._measured, self._error, self._square = _AboutMean(), _AboutMean(), np.zeros(3)
 
     def add(self, measured: Array, error: Array) -> None:
-        """Take note of samples, if any; both arrays have the shape (samples, 3)."""
+        """Add samples, if any; both arrays have the shape (samples, 3)."""
         if len(measured) == 0:
             return
         self._measured.add(measured)
@@ -104,7 +108,7 @@ class Explained:
 
     @property
     def vaf(self) -> Array:
-        """The same of the error about its mean: what is left when a constant is forgiven."""
+        """Variance accounted for by channel: the same of the error about its mean, without its constant part."""
         return 1.0 - _ratio(self._error.square, self._measured.square)
 
 
@@ -129,7 +133,7 @@ class _AboutMean:
 
 
 class _Sums:
-    """What a score needs of the samples."""
+    """Sums over samples that a score is made of."""
 
     def __init__(self) -> None:
         self._largest, self._largest_error = np.zeros(3), np.zeros(3)
@@ -138,8 +142,8 @@ class _Sums:
     def add(self, data: TorqueData, predicted: Array) -> None:
         error, attitude = data.torque - predicted, data.motion.attitude
         self._euler.add(data.torque, error)
-        told = ~vertical(attitude)
-        self._body.add(*(body_torque(attitude[told], torque[told]) for torque in (data.torque, error)))
+        known = ~vertical(attitude)
+        self._body.add(*(body_torque(attitude[known], torque[known]) for torque in (data.torque, error)))
         self._largest = np.maximum(self._largest, np.max(np.abs(data.torque), axis=0))
         self._largest_error = np.maximum(self._largest_error, np.max(np.abs(error), axis=0))
 
@@ -157,3 +161,111 @@ class _Sums:
 def _ratio(numerator: Array, denominator: Array) -> Array:
     safe = np.where(denominator > 0, denominator, 1.0)
     return np.where(denominator > 0, numerator / safe, np.nan)
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A linear model with few parameters.
+
+    Attributes
+    ----------
+    name : str
+    columns : callable
+        Motion to columns, shape (samples, 3, parameters).
+    parameters : array, shape (parameters,)
+    """
+
+    name: str
+    columns: Columns
+    parameters: Array
+
+    def torque(self, motion: Motion) -> Array:
+        """Predict the generalised torque, shape (samples, 3), N m."""
+        return np.asarray(self.columns(motion) @ self.parameters)
+
+
+def constant_inertia_columns(motion: Motion) -> Array:
+    """Build the columns of a constant symmetric J in ``J qdd``: J11, J22, J33, J12, J13, J23.
+
+    Returns
+    -------
+    array, shape (samples, 3, 6)
+    """
+    return symmetric_columns(motion.acceleration)
+
+
+def no_torque_columns(motion: Motion) -> Array:
+    """Build the columns of the prediction that no torque acts: none.
+
+    Returns
+    -------
+    array, shape (samples, 3, 0)
+    """
+    return np.zeros((len(motion), 3, 0))
+
+
+def fit_baselines(source: TorqueSource, row_scale: Array, rank_tolerance: float) -> tuple[Baseline, ...]:
+    """Fit all baselines to the samples that a model is trained on.
+
+    Parameters
+    ----------
+    source : TorqueSource
+    row_scale : array, shape (3,)
+        Weight of each axis, the model's own.
+    rank_tolerance : float
+
+    Returns
+    -------
+    tuple of Baseline
+        Rigid body, constant inertia, torque zero.
+    """
+    kinds: tuple[tuple[str, Columns], ...] = (
+        ("rigid-body", rigid_columns),
+        ("constant-inertia", constant_inertia_columns),
+        ("torque-zero", no_torque_columns),
+    )
+    return tuple(Baseline(name, columns, _fit(columns, source, row_scale, rank_tolerance)) for name, columns in kinds)
+
+
+def _fit(columns: Columns, source: TorqueSource, row_scale: Array, rank_tolerance: float) -> Array:
+    blocks = ((columns(data.motion) * row_scale[:, None], data.torque * row_scale) for data in source.chunks())
+    rows = ((matrix.reshape(torque.size, matrix.shape[2]), torque.reshape(-1)) for matrix, torque in blocks)
+    return Triangle.of(rows).solve(rank_tolerance).coefficients
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean and variance of a measure over replicates.
+
+    Attributes
+    ----------
+    count : int
+        Replicates that have a value.
+    mean : float
+        NaN without any.
+    variance : float
+        Unbiased; NaN for fewer than two.
+    """
+
+    count: int
+    mean: float
+    variance: float
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation."""
+        return float(np.sqrt(self.variance))
+
+
+def spread(values: Array) -> Spread:
+    """Measure how far replicates lie apart: ``s^2 = sum (x - mean x)^2 / (n - 1)``.
+
+    Parameters
+    ----------
+    values : array, shape (replicates,)
+        Not finite where a replicate found nothing.
+    """
+    known = values[np.isfinite(values)]
+    mean = float(np.mean(known)) if len(known) else float("nan")
+    variance = float(np.var(known, ddof=1)) if len(known) > 1 else float("nan")
+    return Spread(len(known), mean, variance)

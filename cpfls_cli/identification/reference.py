@@ -1,4 +1,4 @@
-"""The plain evaluator that the fast one is held against: dense Q, singular value decomposition, 2-point Jacobian."""
+"""The reference that the fast evaluator is tested against: dense Q, singular value decomposition, 2-point Jacobian."""
 
 from __future__ import annotations
 
@@ -10,19 +10,17 @@ from scipy.optimize import least_squares
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.evaluator import NOT_DEFINED, OBJECTIVES
-from cpfls_cli.identification.fit import Fit
+from cpfls_cli.identification.evaluator import LARGEST_GENE, NOT_DEFINED, OBJECTIVES, decode, encode
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.identification.solver import LARGEST_SQUARE, NO_RIGID_BODY
+from cpfls_cli.identification.solver import LARGEST_SQUARE, NO_RIGID_BODY, Fit
 from cpfls_cli.regressor.regressor import Breakpoints, Regressor, data_ranges
 from cpfls_cli.regressor.structure import ModelStructure, model_structure
 
 
 @dataclass(frozen=True)
 class ReferenceEvaluator:
-    """Gives chromosomes their objectives as plainly as the paper writes them; for tests and benchmarks.
+    """Evaluate chromosomes step by step as the paper writes it; for tests and benchmarks.
 
     Attributes
     ----------
@@ -123,8 +121,10 @@ class ReferenceEvaluator:
             Q = _matrix(self._learned, decode(self.structure, weights))
             return np.asarray(torque - Q @ _solve(Q, torque, self.settings.rank_tolerance)[0])
 
-        found = least_squares(residual, weights, jac="2-point", bounds=(0.0, 1.0), x_scale="jac", max_nfev=evaluations)
-        return np.asarray(found.x, dtype=float)
+        optimum = least_squares(
+            residual, weights, jac="2-point", bounds=(0.0, 1.0), x_scale="jac", max_nfev=evaluations
+        )
+        return np.asarray(optimum.x, dtype=float)
 
     @cached_property
     def _whole(self) -> Regressor:

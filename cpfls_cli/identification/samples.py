@@ -1,4 +1,4 @@
-"""Samples to fit or to judge: sums over them for any partitions, without a regressor in memory."""
+"""Samples to fit or to judge, and sums over them for any partitions without a regressor in memory."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification.data import TorqueData, TorqueSource
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.kernels import Chunk, Table
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.regressor.structure import ModelStructure
 from cpfls_cli.regressor.table import padded_breakpoints, structure_table
@@ -73,7 +73,7 @@ class MovedProducts:
 
 @dataclass(frozen=True)
 class Ready:
-    """Samples made ready for compiled loops, chunk by chunk.
+    """Samples in the layout of the compiled loops, chunk by chunk.
 
     Attributes
     ----------
@@ -86,11 +86,11 @@ class Ready:
     rigid: bool
 
     def __reduce__(self) -> tuple[type[Ready], tuple[TorqueSource, bool]]:
-        """Send the source alone to workers, who make it ready themselves."""
+        """Pickle the source alone; workers convert it themselves."""
         return type(self), (self.source, self.rigid)
 
     def __iter__(self) -> Iterator[Chunk]:
-        """Make one chunk ready after the other, or take those that are kept."""
+        """Convert one chunk after the other, or take those that are kept."""
         return iter(self._kept) if len(self.source) <= _KEPT else self._made()
 
     @cached_property
@@ -178,7 +178,7 @@ class Samples:
         return square[:, 0], largest[:, 0]
 
     def projected(self, partitions: Breakpoints, parameters: Array, directions: Array) -> tuple[Array, Array]:
-        """Multiply out residual and columns, without the loss that products of products would have.
+        """Multiply residual and columns directly, without the loss of digits of products of products.
 
         Parameters
         ----------
@@ -235,9 +235,9 @@ class Samples:
         total = np.zeros((self.labels, columns, columns))
         for chunk, label in self._chunks():
             dense = chunk.dense * self.scale[:, None]
-            for own in np.unique(label):
-                rows = dense[label == own].reshape(-1, columns)
-                total[own] += rows.T @ rows
+            for value in np.unique(label):
+                rows = dense[label == value].reshape(-1, columns)
+                total[value] += rows.T @ rows
         return total
 
     def _chunks(self) -> Iterator[tuple[Chunk, IntArray]]:

@@ -1,32 +1,139 @@
-"""The search for non-dominated partitions: the genetic algorithm over a model's evaluator."""
+"""The search for non-dominated partitions: how it is run and stopped, its result, and the choice of a member."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
 
-from cpfls_cli.arrays import IntArray
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
 from cpfls_cli.evolution.engine import start, step
-from cpfls_cli.evolution.history import History
-from cpfls_cli.evolution.state import EvolutionState
-from cpfls_cli.evolution.stopping import ended
-from cpfls_cli.identification.choice import choose, require_flights
-from cpfls_cli.identification.chromosome import uniform_chromosome
+from cpfls_cli.evolution.state import End, EvolutionState, History, ended
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator
-from cpfls_cli.identification.held_out import held_out_errors
-from cpfls_cli.identification.results import Front
-from cpfls_cli.identification.search_run import UNWATCHED, SearchRun, SearchStep, Stop, StopReason, Unfinished
-from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator, decode, uniform_chromosome
+from cpfls_cli.identification.samples import Ready, Samples
+from cpfls_cli.identification.settings import Choice, IdentificationSettings
+from cpfls_cli.workers.employ import employ
 from cpfls_cli.workers.workforce import Workforce, gathered
+
+Stop = Literal["time-limit", "interrupted"]
+StopReason = End | Stop
+
+
+def is_end(reason: StopReason) -> bool:
+    """Tell a search that came to its end from one that was stopped; the parameters are those reasons."""
+    return reason in get_args(End)
+
+
+@dataclass(frozen=True)
+class SearchStep:
+    """Progress of a search.
+
+    Attributes
+    ----------
+    generation : int
+        The generation under evaluation; 0 is the initial population.
+    generations : int
+        The last one.
+    share : float
+        Share of its new chromosomes that are evaluated.
+    best : array, shape (3,), or None
+        Best of each objective up to the generation before; None during the first.
+    """
+
+    generation: int
+    generations: int
+    share: float
+    best: Array | None
+
+
+@dataclass(frozen=True)
+class Unfinished:
+    """Evaluated part of a generation that was not finished.
+
+    Attributes
+    ----------
+    submitted : array of int, shape (evaluations, genes)
+        Chromosomes as they were before the evaluation.
+    evaluation : Evaluation
+    """
+
+    submitted: IntArray
+    evaluation: Evaluation
+
+
+def _unwatched(_: object) -> None:
+    pass
+
+
+def _unstopped() -> None:
+    return None
+
+
+@dataclass(frozen=True)
+class SearchRun:
+    """Conditions under which a search is run; they do not change the result of a search that comes to its end.
+
+    Attributes
+    ----------
+    resumed : EvolutionState or None
+        Where to go on; None starts with a new population.
+    unfinished : Unfinished or None
+        What need not be evaluated again in the generation that comes first.
+    workers : callable
+        Takes the evaluator; gives the context in which workers evaluate by it, one chromosome after the other in
+        this process by default.
+    progress : callable
+        Takes a `SearchStep`, after each part of a generation that was evaluated.
+    on_generation : callable
+        Takes the state after each generation, the initial population included. The next generation changes it.
+    on_stop : callable
+        Takes what is `Unfinished` where the search is stopped within a generation.
+    should_stop : callable
+        Asked after each part of a generation: why to stop now, or None.
+    """
+
+    resumed: EvolutionState | None = None
+    unfinished: Unfinished | None = None
+    workers: Callable[[Evaluate], AbstractContextManager[Workforce]] = employ
+    progress: Callable[[SearchStep], None] = _unwatched
+    on_generation: Callable[[EvolutionState], None] = _unwatched
+    on_stop: Callable[[Unfinished], None] = _unwatched
+    should_stop: Callable[[], Stop | None] = _unstopped
+
+
+UNWATCHED = SearchRun()
+"""From the start to the end, one chromosome after the other."""
+
+
+@dataclass(frozen=True)
+class Front:
+    """Non-dominated chromosomes of the whole search.
+
+    Attributes
+    ----------
+    chromosomes : array of int, shape (members, genes)
+    objectives : array, shape (members, 3)
+    chosen : int
+        The member that became the model.
+    held_out : array, shape (members,), or None
+        Mean squared errors on flights kept for the choice; None where the objectives alone decided.
+    """
+
+    chromosomes: IntArray
+    objectives: Array
+    chosen: int
+    held_out: Array | None = None
 
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What a search found.
+    """Result of a search.
 
     Attributes
     ----------
@@ -57,7 +164,7 @@ class NothingFoundError(ComputationError):
 
 
 class _StoppedError(Exception):
-    """Leave a generation, with what was evaluated of it."""
+    """A stop within a generation, with the part that was evaluated."""
 
     def __init__(self, reason: Stop, unfinished: Unfinished) -> None:
         super().__init__(reason)
@@ -156,14 +263,14 @@ def _watched(
 
 
 def _recalled(genes: IntArray, unfinished: Unfinished | None) -> tuple[list[tuple[IntArray, Evaluation]], IntArray]:
-    """Take what is evaluated already; also the rows that are not."""
+    """Return the evaluations that are known already, and the rows that are not."""
     if unfinished is None:
         return [], np.arange(len(genes))
     row_of = {chromosome.tobytes(): row for row, chromosome in enumerate(unfinished.submitted)}
-    found = np.array([row_of.get(chromosome.tobytes(), -1) for chromosome in genes])
-    known, evaluation = found[found >= 0], unfinished.evaluation
+    rows = np.array([row_of.get(chromosome.tobytes(), -1) for chromosome in genes])
+    known, evaluation = rows[rows >= 0], unfinished.evaluation
     recalled = Evaluation(evaluation.genes[known], evaluation.objectives[known])
-    return [(np.flatnonzero(found >= 0), recalled)], np.flatnonzero(found < 0)
+    return [(np.flatnonzero(rows >= 0), recalled)], np.flatnonzero(rows < 0)
 
 
 def _front(
@@ -181,3 +288,92 @@ def _front(
     genes, objectives = front.genes[usable], front.objectives[usable]
     held_out = None if kept is None else held_out_errors(evaluator, kept, genes)
     return Front(genes, objectives, choose(objectives, settings.choice, held_out), held_out)
+
+
+def choose(objectives: Array, rule: Choice, held_out: Array | None = None) -> int:
+    """Choose one member of a Pareto front.
+
+    Parameters
+    ----------
+    objectives : array, shape (members, 3)
+        Mean squared error, largest error, condition number.
+    rule : {"mse-below-median-condition", "mse", "max-error", "held-out"}
+        The first takes the smallest mean squared error among members whose condition number is at most the
+        median of the front.
+    held_out : array, shape (members,), optional
+        Mean squared errors on flights kept for the choice, which `held-out` takes the smallest of.
+
+    Returns
+    -------
+    int
+        Index of the member.
+
+    Raises
+    ------
+    SettingError
+        If the rule and the flights kept for the choice do not go together.
+
+    References
+    ----------
+    method.md section 7.
+    """
+    require_flights(rule, given=held_out is not None)
+    if held_out is not None:
+        return int(np.argmin(held_out))
+    if rule == "max-error":
+        return int(np.argmin(objectives[:, 1]))
+    candidates = np.arange(len(objectives))
+    if rule == "mse-below-median-condition":
+        candidates = np.flatnonzero(objectives[:, 2] <= np.median(objectives[:, 2]))
+    return int(candidates[np.argmin(objectives[candidates, 0])])
+
+
+def require_flights(rule: Choice, *, given: bool) -> None:
+    """Require that a rule and the flights kept for the choice go together.
+
+    Parameters
+    ----------
+    rule : Choice
+    given : bool
+        Whether there are such flights.
+
+    Raises
+    ------
+    SettingError
+    """
+    if rule == "held-out" and not given:
+        raise SettingError("choice", "needs a flight that is kept for the choice; add --choose-on FLIGHT")
+    if rule != "held-out" and given:
+        raise SettingError("choice", "does not use the flights of --choose-on; set it to held-out, or leave them out")
+
+
+def held_out_errors(evaluator: Evaluator, kept: TorqueSource, chromosomes: IntArray) -> Array:
+    """Compute the errors of chromosomes on data that is neither trained nor judged on in the end.
+
+    Parameters
+    ----------
+    evaluator : Evaluator
+        Solves each chromosome on the samples that it learns from.
+    kept : TorqueSource
+    chromosomes : array of int, shape (members, genes)
+
+    Returns
+    -------
+    array, shape (members,)
+        Mean squared error; of the torque in (N m)^2, or scaled by axis as the evaluator's own. Infinite where a
+        chromosome has no finite model.
+    """
+    samples = replace(
+        Samples.of(Ready(kept, evaluator.judge.ready.rigid), evaluator.structure, evaluator.judge.ranges),
+        scale=evaluator.solver.learned.scale,
+    )
+    return np.array([_error(evaluator, samples, chromosome) for chromosome in chromosomes])
+
+
+def _error(evaluator: Evaluator, samples: Samples, chromosome: IntArray) -> float:
+    fit = evaluator.fit(chromosome)
+    if fit is None:
+        return float("inf")
+    partitions = decode(evaluator.structure, chromosome.astype(float))
+    squares, _ = samples.errors(partitions, fit.coefficients, fit.rigid_body)
+    return float(squares[0]) / (3 * len(samples.ready.source))

@@ -1,18 +1,51 @@
-"""Settings of the identification: structure, search, base, validation."""
+"""Settings of the identification: structure, search, its presets, base, validation; and of a sweep over them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Literal
 
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt, Le, MinLen
 from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.evolution.settings import EvolutionSettings
-from cpfls_cli.identification.presets import Preset
 from cpfls_cli.regressor.structure import StructureSettings
 from cpfls_cli.settings import Settings
+
+Preset = Literal["fast", "paper"]
+
+# Every key of the search is named, so that the paper's search stays what it is when defaults change.
+_PAPER: Final = MappingProxyType(
+    {
+        "population": 75,
+        "generations": 25,
+        "subpopulations": 5,
+        "migration_rate": 0.2,
+        "migration_interval": 5,
+        "generation_gap": 0.8,
+        "crossover_rate": 0.8,
+        "recombination": "single-point",
+        "insertion_rate": 0.8,
+        "selective_pressure": 1.5,
+        "mutated_individuals": 0.04,
+        "mutated_bits": 0.01,
+        "ranking": "quantity-dominance",
+        "first_objective_weight": 1,
+        "reinsertion": "uniform",
+        "stall_generations": None,
+        "start": "random",
+    }
+)
+
+PRESETS: Final[Mapping[Preset, Mapping[str, int | float | str | None]]] = MappingProxyType(
+    {"fast": MappingProxyType({}), "paper": _PAPER}
+)
+"""By name; what a preset leaves out has the default of its key."""
+
 
 Base = Literal["none", "rigid-body"]
 Choice = Literal["mse-below-median-condition", "mse", "max-error", "held-out"]
@@ -113,3 +146,34 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         """Apply the rules of both parents."""
         StructureSettings.__post_init__(self)
         EvolutionSettings.__post_init__(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepSetting(Settings):
+    """One column of a sweep: what is different in it."""
+
+    name: Annotated[str, MinLen(1), Doc("how it is called in tables")]
+    set: Annotated[
+        dict[str, Any],
+        Doc("keys of reduction and identification, as --set takes them; reduction.size: null learns from all samples"),
+    ] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepSettings(Settings):
+    """What `cpfls sweep` runs: every setting with every seed."""
+
+    seeds: Annotated[int, Ge(1), Le(10_000), Doc("runs of each setting, with seed, seed + 1, seed + 2 and so on")] = 10
+    set: Annotated[dict[str, Any], Doc("keys of every setting that does not set them itself")] = field(
+        default_factory=dict
+    )
+    settings: Annotated[
+        tuple[SweepSetting, ...], Doc("what is tried, by name; empty: the study as it is, once for each seed")
+    ] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse settings that cannot be told apart."""
+        count = Counter(setting.name for setting in self.settings)
+        for number, setting in enumerate(self.settings):
+            if count[setting.name] > 1:
+                raise SettingError(f"settings.{number}.name", "stands more than once; give each setting its own name")

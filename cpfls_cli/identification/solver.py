@@ -2,45 +2,110 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.identification.cross_validation import RidgeCurve, ridge_curve
-from cpfls_cli.identification.dense import decomposed
-from cpfls_cli.identification.fit import Fit
-from cpfls_cli.identification.least_squares import LeastSquares
-from cpfls_cli.identification.normal_equations import NormalEquations, Project, solve_normal
-from cpfls_cli.identification.rigid_columns import RIGID
+from cpfls_cli.arrays import Array
+from cpfls_cli.identification.cross_validation import RidgeChoice, RidgeCurve, ridge_curve
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.least_squares import LeastSquares, NormalEquations, Project, Triangle, solve_normal
 from cpfls_cli.identification.samples import Products, Samples
-from cpfls_cli.regressor.regressor import Breakpoints
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
+from cpfls_cli.regressor.regressor import Breakpoints, Regressor
 
+# Samples written out at a time: some 10 MB for 113 parameters.
+_BLOCK = 4096
 NO_RIGID_BODY = np.zeros(RIGID)
 LARGEST_SQUARE = 1e200
 
 
 @dataclass(frozen=True)
-class RidgeChoice:
-    """What chooses the ridge weight of a fuzzy part over a rigid body.
+class Fit:
+    """Linear parameters of a model, with the weights and the conditioning of their fit.
 
     Attributes
     ----------
-    judged : Samples
-        The whole training part, labelled by fold.
-    left_out : array of bool, shape (folds, labels)
-        Labels of the learned samples that do not train in each fold.
-    weights : array, shape (tried,)
+    coefficients : array, shape (parameters,), kg m^2
+        Of the fuzzy inertia functions.
+    rigid_body : array, shape (6,), kg m^2
+        Inertia parameters under them; zero without a rigid-body base.
+    ridge_weight : float
+        0 without a ridge; infinite where the fuzzy part is off.
+    mean_squared_error : float
+        What the solver minimised, on the samples it learned from: of the torque in (N m)^2, or cross-validated and
+        scaled by axis for a rigid-body base.
+    conditioning : float
+        Condition number of the system solved; one of smaller rank is always worse, and finite.
+    row_scale : array, shape (3,), 1/(N m)
+        What the rows of each axis were multiplied with.
+    column_size : array, shape (parameters,)
+        What the columns were divided by before the ridge held their coefficients; 1 without a ridge.
     """
 
-    judged: Samples
-    left_out: BoolArray
-    weights: Array
+    coefficients: Array
+    rigid_body: Array
+    ridge_weight: float
+    mean_squared_error: float
+    conditioning: float
+    row_scale: Array
+    column_size: Array
+
+
+def decomposed(learned: Samples, partitions: Breakpoints, fit: Fit, rank_tolerance: float) -> tuple[Fit, LeastSquares]:
+    """Solve for the linear parameters by a singular value decomposition of all rows.
+
+    Parameters
+    ----------
+    learned : Samples
+    partitions : sequence of array, shape (functions,)
+    fit : Fit
+        Gives ridge weight and column sizes.
+    rank_tolerance : float
+
+    Returns
+    -------
+    fit : Fit
+        With the parameters of the decomposition.
+    unpenalised : LeastSquares
+        Of the parameters in use, without any penalty.
+    """
+    rigid, off = learned.ready.rigid, np.isinf(fit.ridge_weight)
+    triangle = Triangle.of(_rows(learned, partitions, fit, fuzzy=not off))
+    unpenalised = triangle.solve(rank_tolerance)
+    if off:
+        return replace(fit, rigid_body=unpenalised.coefficients), unpenalised
+    parameters, rows = learned.structure.parameters, 3 * len(learned.ready.source)
+    if not rigid:
+        # Sums of products leave only rounding of an error far below the torque.
+        error = triangle.square(unpenalised.coefficients) / rows
+        return replace(fit, coefficients=unpenalised.coefficients, mean_squared_error=error), unpenalised
+    penalty = np.sqrt(fit.ridge_weight * rows) * np.eye(parameters, RIGID + parameters, RIGID)
+    penalised = triangle.below(penalty).solve(rank_tolerance).coefficients
+    return replace(fit, coefficients=penalised[RIGID:] / fit.column_size, rigid_body=penalised[:RIGID]), unpenalised
+
+
+def regressor_blocks(learned: Samples) -> Iterator[tuple[TorqueData, Regressor]]:
+    """Yield the samples block by block, small enough to write out, with their regressors."""
+    for data in learned.ready.source.chunks():
+        for start in range(0, len(data), _BLOCK):
+            block = data[start : start + _BLOCK]
+            yield block, Regressor(learned.structure, block.motion, learned.ranges)
+
+
+def _rows(learned: Samples, partitions: Breakpoints, fit: Fit, *, fuzzy: bool) -> Iterator[tuple[Array, Array]]:
+    for data, regressor in regressor_blocks(learned):
+        columns = [rigid_columns(data.motion)] if learned.ready.rigid else []
+        if fuzzy:
+            columns.append(regressor.matrix(partitions) / fit.column_size)
+        scaled = np.concatenate(columns, axis=2) * learned.scale[:, None]
+        yield scaled.reshape(-1, scaled.shape[2]), (data.torque * learned.scale).reshape(-1)
 
 
 @dataclass(frozen=True)
 class Solver:
-    """Solves for fuzzy coefficients: all torque from them, the paper's; or over six free inertia parameters.
+    """Solve for the fuzzy coefficients, alone as in the paper or with six free inertia parameters under them.
 
     Attributes
     ----------
@@ -56,7 +121,7 @@ class Solver:
     rank_tolerance: float
 
     def fit(self, partitions: Breakpoints) -> Fit | None:
-        """Solve for the linear parameters, with a ridge weight of their own.
+        """Solve for the linear parameters, with the ridge weight that these partitions need.
 
         Parameters
         ----------
@@ -106,7 +171,7 @@ class Solver:
         return self._equations(self.learned.products(partitions).sum(), weight, size)
 
     def parameters(self, solution: Array, size: Array) -> tuple[Array, Array]:
-        """Take apart a solution of the equations: fuzzy coefficients and rigid body."""
+        """Split a solution of the equations into fuzzy coefficients and rigid body."""
         if self.ridge is None:
             return solution / size, NO_RIGID_BODY
         return solution[RIGID:] / size, solution[:RIGID]
@@ -166,7 +231,7 @@ class Solver:
 
 
 def column_size(products: Products) -> Array:
-    """Root mean square of the fuzzy columns; 1 for columns of zeros.
+    """Compute the root mean square of the fuzzy columns; 1 for columns of zeros.
 
     Parameters
     ----------

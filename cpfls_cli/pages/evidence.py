@@ -1,88 +1,310 @@
-"""What a model holds as evidence of how far to trust it."""
+"""The evidence on models: verdict, scores by axis, other structures, physical sense, and prediction by horizon."""
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
-from cpfls_cli.pages.source import Source
-from cpfls_cli.report.content import Tone
+import numpy as np
 
-# One dataset of each part of the evidence; the others come with it.
-_KEYS = {
-    "verdict": "verdict/label",
-    "structures": "structures/name",
-    "residuals": "residuals/autocorrelation",
-    "uncertainty": "uncertainty/best_rigid_body",
-    "curves": "curves/inertia",
-    "round_trip": "round_trip/inertia",
-    "steps": "steps/body_rate",
-    "physics": "physics/cells",
-    "period": "period/mse",
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.evidence import PeriodGroup, PhysicsGroup, StepsGroup, StructuresGroup
+from cpfls_cli.artifacts.model import ModelRecord, RidgeGroup
+from cpfls_cli.artifacts.scores import AXES, MODEL
+from cpfls_cli.pages.figures.before_after import HELD, legend_over
+from cpfls_cli.pages.model import TORQUE, verdict
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.report.canvas import BASELINE, legend_above, plain_ticks, plot, style_of
+from cpfls_cli.report.content import Block, Cell, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.numbers import count, number, percent, plain, r_squared
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_ROUNDING = 1e-9
+# Of equal candidates rounding must not choose one.
+_TIE = 1.0 + 1e-6
+_DECADE = 10.0
+_SCORES = (f"RMSE, {TORQUE}", "NRMSE", "R²", "VAF", f"Largest, {TORQUE}", "Relative")
+_PREDICTORS = {"rigid-body": "rigid body", "nothing-moves": "nothing moves"}
+_STEP_ROWS = (("attitude", "attitude, °", 180.0 / np.pi), ("body_rate", "body rate, rad/s", 1.0))
+_STEP_AXES = ("about x", "about y", "about z")
+_STEP_STYLES: dict[str, dict[str, Any]] = {
+    "model": {**style_of(0), "linewidth": 1.8},
+    "rigid-body": {**BASELINE, "linewidth": 1.6},
+    "nothing-moves": HELD,
 }
-# As in `cpfls predict`.
-_WELL_CONDITIONED = 100.0
-
-Part = Literal[
-    "verdict", "structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "period"
-]
-
-VERDICTS: dict[str, tuple[str, Tone]] = {
-    "good-for-control": ("Good for control", "good"),
-    "good-inside-region": ("Good inside the region that training visited, and only there", "note"),
-    "not-better-than-rigid-body": ("Not better than the rigid body", "warning"),
-    "do-not-use": ("Do not use it", "warning"),
-}
-"""Labels of a verdict in words."""
-
-SHORT_VERDICTS = {
-    "good-for-control": "good for control",
-    "good-inside-region": "good inside its region",
-    "not-better-than-rigid-body": "no better than a rigid body",
-    "do-not-use": "do not use",
-}
-"""The same for a cell of a table."""
 
 
-def has(model: Source, part: Part) -> bool:
-    """Tell whether a model holds a part of the evidence."""
-    return _KEYS[part] in model.artifact.data
-
-
-def validated(model: Source) -> bool:
-    """Tell whether any evidence was gathered for a model."""
-    return any(key in model.artifact.data for key in _KEYS.values())
-
-
-def verdict_words(model: Source) -> tuple[str, Tone]:
-    """Say a verdict in words.
-
-    Parameters
-    ----------
-    model : Source
-        With a verdict.
+def validation_section(sources: Sources) -> Section | None:
+    """Show the verdicts on the models and what they rest on.
 
     Returns
     -------
-    tone : {"plain", "note", "good", "warning"}
+    Section or None
+        None where no model was given.
     """
-    label = model.artifact.text("verdict/label")
-    return VERDICTS.get(label, (label, "note"))
+    return section_of_each("validation", "How far to trust it", sources.models, _validation)
 
 
-def complete(model: Source) -> bool:
-    """Tell whether the search for a model came to its end."""
-    return "search/complete" not in model.artifact.data or model.artifact.number("search/complete") != 0
+def steps_section(sources: Sources) -> Section | None:
+    """Show how well the models predict motion, where that was tried.
+
+    Returns
+    -------
+    Section or None
+        None where no model holds it.
+    """
+    models = [model for model in sources.models if model.record.steps is not None]
+    return section_of_each("steps", "Prediction by horizon", models, _steps)
 
 
-def same_everywhere(model: Source) -> bool:
-    """Tell whether one rule acts at all attitudes, and training went all the way round in roll and in pitch."""
-    visited = model.artifact.array("model/visited") != 0
-    return not model.searched and all(bool(visited.any(axis=angle).all()) for angle in (0, 1))
+def _validation(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+    record = model.record
+    yield Heading(model.label)
+    yield from verdict(model)
+    yield _scores(model, index)
+    if record.period is not None:
+        yield _period(record, record.period, index)
+    if record.physics is not None:
+        yield _physics(record.physics)
+    if record.ridge is not None:
+        yield Text(ridge_sentence(record.ridge))
+        yield _ridge_figure(f"ridge-curve-{index}", model, record.ridge)
+    if record.structures is not None:
+        yield _structures(record.structures, index)
 
 
-def known_everywhere(model: Source) -> bool:
-    """Tell whether the one rule of a model is known well enough to hold where training was not."""
-    rank, parameters, condition = (
-        model.artifact.number(f"solve/{key}") for key in ("rank", "parameters", "condition_number")
+def _scores(model: Source[ModelRecord], index: int) -> Table:
+    judged = model.record.judged
+    rows: list[list[str | Cell]] = []
+    for part in judged.parts:
+        by_axis = {measure: judged.of_axes(measure, MODEL, part) for measure in ("mse", "r2", "vaf", "max_error")}
+        relative, share = judged.of_axes("relative_error", MODEL, part), judged.nrmse(MODEL, part)
+        for axis, name in enumerate(AXES):
+            mse, r2, vaf, largest = (float(values[axis]) for values in by_axis.values())
+            rows.append(
+                [
+                    f"{part}, {judged.samples_of(part)} samples" if axis == 0 else "",
+                    name,
+                    number(float(np.sqrt(mse)), 3),
+                    percent(float(share[axis])),
+                    Cell(r_squared(r2), "warning" if r2 < 0 else "plain"),
+                    r_squared(vaf),
+                    number(largest, 3),
+                    percent(float(relative[axis])),
+                ]
+            )
+    caption = (
+        f"Torque error of {model.label} by part and Euler axis. NRMSE: over the standard deviation of the torque. VAF: "
+        "R² without the mean of the error. Relative: largest error over largest torque."
     )
-    return same_everywhere(model) and rank == parameters and condition <= _WELL_CONDITIONED
+    return Table(f"scores-{index}", caption, ("Part", "Axis", *_SCORES), rows, frozenset({0, 1}))
+
+
+def _period(record: ModelRecord, period: PeriodGroup, index: int) -> Table:
+    rows: list[list[str]] = []
+    for part, mse, largest in zip(period.parts, period.mse, period.max_error, strict=True):
+        here, largest_here = (record.judged.of_axes(measure, MODEL, part) for measure in ("mse", "max_error"))
+        columns = (np.sqrt(here), np.sqrt(mse), largest_here, largest)
+        rows += [
+            [part if axis == 0 else "", name, *(number(float(column[axis]), 3) for column in columns)]
+            for axis, name in enumerate(AXES)
+        ]
+    caption = (
+        "The same attitudes, told one turn away in roll and in pitch: no vehicle notices, and a periodic model must "
+        "not either. Root mean square and largest error, N m."
+    )
+    header = ("Part", "Axis", "RMSE here", "RMSE one period away", "Largest here", "Largest one period away")
+    return Table(f"period-{index}", caption, header, rows, frozenset({0, 1}))
+
+
+def _physics(physics: PhysicsGroup) -> Facts:
+    roll, pitch = np.degrees(physics.worst_attitude)
+    smallest = number(physics.smallest_eigenvalue, 3)
+    definite = "in all" if physics.indefinite == 0 else f"not in {physics.indefinite}"
+    rounding = " (rounding)" if physics.energy < _ROUNDING else ""
+    return Facts(
+        [
+            (
+                "D(q) positive definite",
+                f"{definite} of {physics.cells} cells of roll and pitch that training visited",
+            ),
+            (
+                "Its smallest eigenvalue",
+                f"{smallest} kg m², at roll {plain(round(roll))}°, pitch {plain(round(pitch))}°",
+            ),
+            ("Energy that C(q, qd) makes", f"{number(physics.energy, 2)} of its own terms{rounding}"),
+        ]
+    )
+
+
+def ridge_sentence(ridge: RidgeGroup) -> str:
+    """Say whether the flight holds evidence for an inertia that depends on attitude beyond a rigid body's."""
+    off, best = ridge.error[np.isinf(ridge.weight)], int(np.argmin(ridge.error))
+    if not off.size:
+        return "The curve has no point without the fuzzy part, so it cannot say whether that part helps."
+    alone, least, deviation = float(off[0]), ridge.error[best], ridge.standard_error[best]
+    gain = 1.0 - least / off[0] if off[0] > 0 else 0.0
+    if np.isinf(ridge.weight[best]) or gain <= 0:
+        return (
+            "No fuzzy part does better on blocks that were left out than none: this flight holds no evidence for an "
+            "inertia that depends on attitude in another way than a rigid body's does."
+        )
+    reduction = (
+        f"On blocks that were left out, the best fuzzy part takes {percent(gain)} off the error of the rigid body"
+    )
+    if alone - least <= deviation:
+        return (
+            f"{reduction}, which is within one standard error: the flight holds hardly any evidence for a fuzzy part."
+        )
+    ratio = float((alone - least) / deviation) if deviation > 0 else np.inf
+    return f"{reduction}, {number(ratio, 2)} standard errors: the flight holds evidence for a fuzzy part."
+
+
+def _ridge_figure(name: str, model: Source[ModelRecord], ridge: RidgeGroup) -> Plot:
+    """Draw the cross-validated error with its standard error; the last point has no fuzzy part at all.
+
+    References
+    ----------
+    method.md section 8.
+    """
+    weight, error = ridge.weight, ridge.error
+    chosen = _chosen(weight, model.record.model.ridge_weight)
+    # The point without a fuzzy part stands a decade beyond the largest weight.
+    position = np.where(np.isfinite(weight), weight, 10.0 * weight[np.isfinite(weight)].max(initial=1e-9))
+    mark: dict[str, Any] = {"markersize": 10, "markerfacecolor": "none", "markeredgewidth": 2}
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        style = {"color": style_of(0)["color"], "markersize": 4, "capsize": 3, "linewidth": 1.2}
+        axes.errorbar(position, error, ridge.standard_error, fmt="o-", label="error ± one standard error", **style)
+        axes.plot([position[chosen]], [error[chosen]], "D", color=style_of(1)["color"], label="chosen", **mark)
+        axes.set_xscale("log")
+        _scale(axes, error)
+        last = len(weight) - 1
+        shown = [*range(0, last - 1, max(last // 6, 1)), last]
+        axes.set_xticks(position[shown], [_weight_words(weight[index], 1) for index in shown])
+        axes.minorticks_off()
+        axes.set_xlabel("ridge weight on the fuzzy part")
+        axes.set_ylabel("cross-validated error, scaled torque²")
+        legend_above(axes)
+
+    caption = (
+        f"Ridge curve of {model.label}: error on blocks of the training flight that were left out in turn. The last "
+        "point is the rigid body alone (fuzzy part off). The largest weight within one standard error of the best is "
+        "taken."
+    )
+    return plot(name, caption, "Cross-validated error over the ridge weight, the chosen weight marked", 3.0, draw)
+
+
+def _chosen(weight: Array, value: float) -> int:
+    if np.isinf(value):
+        return len(weight) - 1
+    finite = np.where(np.isfinite(weight), weight, np.finfo(float).max)
+    return int(np.argmin(np.abs(finite - value)))
+
+
+def _scale(axes: Axes, error: Array) -> None:
+    """Take a logarithmic scale where errors differ by more than a decade."""
+    if error.min() > 0 and error.max() > _DECADE * error.min():
+        axes.set_yscale("log", nonpositive="clip")
+    else:
+        plain_ticks(axes.yaxis)
+
+
+def _weight_words(weight: float, digits: int) -> str:
+    return "fuzzy part off" if np.isinf(weight) else number(weight, digits)
+
+
+def _structures(structures: StructuresGroup, index: int) -> Table:
+    least = _TIE * float(np.min(structures.error))
+    rows: list[list[str | Cell]] = []
+    for candidate, name in enumerate(structures.name):
+        error, deviation = float(structures.error[candidate]), float(structures.standard_error[candidate])
+        best = error <= least
+        shown = f"{number(error, 4)} ± {number(deviation, 2)}{' ◂ least' if best else ''}"
+        rows.append(
+            [
+                f"{name} (this model)" if structures.own[candidate] else name,
+                count(structures.parameters[candidate]),
+                Cell(shown, "good" if best else "plain"),
+                _weight_words(float(structures.ridge_weight[candidate]), 2),
+            ]
+        )
+    caption = (
+        "Structures compared by cross-validation over contiguous blocks, without a search: mean squared error of the "
+        "scaled torque on the blocks that were left out, ± one standard error. Differences within that are chance."
+    )
+    header = ("Structure", "Parameters", "Held-out error", "Ridge weight")
+    return Table(f"structures-{index}", caption, header, rows, frozenset({0}), frozenset({0}))
+
+
+def _steps(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+    steps = model.record.steps
+    assert steps is not None, "only models that hold them are shown"
+    yield Heading(model.label)
+    yield _steps_figure(f"steps-{index}", model.label, steps)
+    yield _steps_table(steps, index)
+
+
+def _steps_figure(name: str, label: str, steps: StepsGroup) -> Plot:
+    """Draw errors over the horizon on logarithmic axes, beside the rigid body and beside nothing that moves."""
+
+    def draw(figure: Figure) -> None:
+        grid = figure.subplots(len(_STEP_ROWS), len(_STEP_AXES), sharex=True, sharey="row")
+        for panels, (quantity, title, scale) in zip(grid, _STEP_ROWS, strict=True):
+            _draw_steps(panels, steps, scale * getattr(steps, quantity))
+            panels[0].set_ylabel(title)
+        for axes, axis in zip(grid[0], _STEP_AXES, strict=True):
+            axes.set_title(axis)
+        grid[-1][1].set_xlabel("horizon, s")
+        legend_over(figure, grid[0][0])
+
+    caption = (
+        f"Root mean square error after so many seconds, with the measured torques of {steps.part} "
+        f"replayed through {label} from {steps.windows} starts. Nothing moves: attitude and body rate stay what they "
+        "were; a model above that line predicts nothing. Both axes are logarithmic."
+    )
+    return plot(name, caption, "Error of predicted attitude and body rate over the horizon, by axis", 4.4, draw)
+
+
+def _draw_steps(panels: list[Axes], steps: StepsGroup, errors: Array) -> None:
+    from matplotlib.ticker import FuncFormatter
+
+    for index, predictor in enumerate(steps.model):
+        style = _STEP_STYLES.get(predictor, style_of(index + 1))
+        for axes, column in zip(panels, errors[index].T, strict=True):
+            positive = np.where(column > 0, column, np.nan)
+            axes.plot(steps.horizon, positive, label=_PREDICTORS.get(predictor, predictor), **style)
+    for axes in panels:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.minorticks_off()
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, smallest=1e-3)))
+
+
+def _steps_table(steps: StepsGroup, index: int) -> Table:
+    count_of_steps = len(steps.horizon)
+    sizes = [scale * np.sqrt(np.sum(getattr(steps, quantity) ** 2, axis=2)) for quantity, _, scale in _STEP_ROWS]
+    rows: list[list[str | Cell]] = []
+    for step in sorted({0, count_of_steps // 5, count_of_steps // 2, count_of_steps - 1}):
+        for row, predictor in enumerate(steps.model):
+            cells = [_error_cell(size[:, step], row) for size in sizes]
+            reach = f"{number(float(steps.horizon[step]), 3)} s" if row == 0 else ""
+            samples = count(steps.samples[step]) if row == 0 else ""
+            rows.append([reach, samples, _PREDICTORS.get(predictor, predictor), *cells])
+    caption = (
+        f"Root mean square error after so much time on {steps.part}, all axes together. Marked: the "
+        "least. — where a predictor could not be simulated over every window."
+    )
+    header = ("Horizon", "Samples", "Predictor", "Attitude, °", "Body rate, rad/s")
+    return Table(f"steps-table-{index}", caption, header, rows, frozenset({0, 2}))
+
+
+def _error_cell(errors: Array, row: int) -> Cell:
+    least = np.isfinite(errors[row]) and errors[row] <= _TIE * np.nanmin(errors)
+    text = number(float(errors[row]), 3)
+    return Cell(f"{text} ◂", "good") if least else Cell(text)

@@ -4,32 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from cpfls_cli.pages.comparison import comparison_section
+from cpfls_cli.pages.evidence import steps_section, validation_section
+from cpfls_cli.pages.fuzzy_part import partitions_section, rules_section
+from cpfls_cli.pages.identification import identification_section, search_section
 from cpfls_cli.pages.missing import missing
-from cpfls_cli.pages.sections.comparison import comparison_section
+from cpfls_cli.pages.residuals import residuals_section
 from cpfls_cli.pages.sections.diagnosis import diagnosis_section
 from cpfls_cli.pages.sections.disagreement import disagreement_section
 from cpfls_cli.pages.sections.extension import extension_section
 from cpfls_cli.pages.sections.flight import flight_section
-from cpfls_cli.pages.sections.identification import identification_section
-from cpfls_cli.pages.sections.partitions import partitions_section
 from cpfls_cli.pages.sections.path import path_section
 from cpfls_cli.pages.sections.prediction import prediction_section
 from cpfls_cli.pages.sections.provenance import provenance_section
 from cpfls_cli.pages.sections.replicates import replicates_section
 from cpfls_cli.pages.sections.reproduction import reproduction_section
-from cpfls_cli.pages.sections.residuals import residuals_section
-from cpfls_cli.pages.sections.rules import rules_section
-from cpfls_cli.pages.sections.search import search_section
 from cpfls_cli.pages.sections.sensors import sensors_section
-from cpfls_cli.pages.sections.steps import steps_section
-from cpfls_cli.pages.sections.summary import models_section, summary_section
 from cpfls_cli.pages.sections.tracking import tracking_section
-from cpfls_cli.pages.sections.uncertainty import uncertainty_section
 from cpfls_cli.pages.sections.unseen import unseen_section
-from cpfls_cli.pages.sections.validation import validation_section
 from cpfls_cli.pages.sections.vehicle import vehicle_section
 from cpfls_cli.pages.selection import reduction_section
 from cpfls_cli.pages.source import Sources
+from cpfls_cli.pages.summary import models_section, summary_section
+from cpfls_cli.pages.uncertainty import uncertainty_section
 from cpfls_cli.report.content import Document
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page

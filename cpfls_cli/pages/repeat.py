@@ -19,7 +19,6 @@ from cpfls_cli.artifacts.formats import (
     TRAJECTORY,
 )
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.pages.evidence import complete
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import HASH_SHOWN
 
@@ -101,7 +100,7 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
     if command is None:
         yield f"# {output}: no command is known that makes it"
         return
-    if source.artifact.spec == MODEL and not complete(source):
+    if source.artifact.spec == MODEL and not source.record.complete:
         yield f"# the search for {output} was stopped before its end; this one goes on to it"
     words = ["cpfls", command.name, config_name(source)]
     for role in command.arguments:

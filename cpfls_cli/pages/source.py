@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, Self
@@ -23,7 +23,7 @@ from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import ReportSettings, resolved
-from cpfls_cli.report.content import HASH_SHOWN, Origin
+from cpfls_cli.report.content import HASH_SHOWN, Block, Origin, Section
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 R = TypeVar("R", bound=Record, default=Any)
@@ -182,3 +182,26 @@ def unique_labels(names: Sequence[str], hashes: Sequence[str]) -> list[str]:
 def source_of(job: Job, record: R) -> Source[R]:
     """Name the artifact that a job has just written, so that its page can speak of it."""
     return Source.of(job.output.name, "", record, resolved(job.study), job.study.vehicle, 0)
+
+
+def section_of_each(
+    name: str, title: str, sources: Sequence[Source[R]], blocks: Callable[[Source[R], int], Iterable[Block]]
+) -> Section | None:
+    """Join what is shown of each source to one section.
+
+    Parameters
+    ----------
+    name : str
+        Identifier of the section.
+    blocks : callable
+        What is shown of one source; takes it and its number, from 1.
+
+    Returns
+    -------
+    Section or None
+        None where there is no source.
+    """
+    if not sources:
+        return None
+    shown = [block for number, source in enumerate(sources, start=1) for block in blocks(source, number)]
+    return Section(name, title, shown)

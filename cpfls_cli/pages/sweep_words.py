@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.spread import Spread, spread
+from cpfls_cli.identification.judge import Spread, spread
 from cpfls_cli.report.outcome import Outcome
 
 _MEASURES = ("mse", "max_error", "relative_error")

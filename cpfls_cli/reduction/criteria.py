@@ -1,18 +1,280 @@
-"""The selection rules by name."""
+"""Rules that choose samples one by one: smallest singular value, A- and D-optimality, and the rule as printed."""
 
 from __future__ import annotations
 
-from cpfls_cli.reduction.criterion import Criterion
-from cpfls_cli.reduction.optimal_design import OptimalDesign
-from cpfls_cli.reduction.printed import PrintedRule
-from cpfls_cli.reduction.row_space import RowSpace
-from cpfls_cli.reduction.settings import CriterionName
-from cpfls_cli.reduction.smallest import SmallestSingularValue
+from typing import Protocol
 
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.reduction.factor import TriangularFactor
+from cpfls_cli.reduction.lazy_search import eigenvalues_below, first_best, lazy_best
+from cpfls_cli.reduction.settings import CriterionName
+from cpfls_cli.reduction.survey import RowSpace, project
+
+# Lowest eigenvectors of the successive Rayleigh-Ritz bounds for the samples still in doubt.
+_BOUND_VECTORS = (6, 24)
+# Updates lose a little accuracy each; an exact refresh costs as much as some ten of them.
+_REFRESH_STEPS = 100
+# A rise below this fraction is rounding.
+_SMALLEST_RISE = 1e-12
 EXCHANGE_INFORMATION: dict[str, float] = {"K-exchange": 0.0, "KD-exchange": 2.0}
 """Weight of the information kept, for the criteria that choose by exchange. Without it models come out several times
 worse than from random samples; with 2 no worse; with 3, the condition number of 80 samples of the paper's path is not
 below half of the full set's any more."""
+
+
+class Criterion(Protocol):
+    """A rule that names the next sample; the caller then adds that sample to the factor."""
+
+    def next_sample(self, factor: TriangularFactor, available: BoolArray) -> int:
+        """Name the available sample that improves the criterion most; the lowest index where several do.
+
+        Parameters
+        ----------
+        factor : TriangularFactor
+            Factor of the samples chosen so far.
+        available : array of bool, shape (samples,)
+            Samples that are not chosen yet.
+        """
+        ...
+
+
+class SmallestSingularValue:
+    """Maximise ``sigma_min`` of the chosen rows; their rank must be full.
+
+    Parameters
+    ----------
+    rows : array, shape (samples, 3, columns)
+    """
+
+    def __init__(self, rows: Array) -> None:
+        self._rows = rows
+
+    def next_sample(self, factor: TriangularFactor, available: BoolArray) -> int:
+        """Name the sample with the largest ``lambda_min(G + R_i^T R_i)``.
+
+        Upper bounds for all samples come from the two lowest eigenvectors. The best few by the bound are
+        evaluated; better bounds then discard every sample that cannot reach the level found, and only the rest
+        are compared exactly. The result is the same as if all had been evaluated.
+
+        Parameters
+        ----------
+        factor : TriangularFactor
+        available : array of bool, shape (samples,)
+
+        References
+        ----------
+        Paper, section 8, step 1; method.md, section 6.
+        """
+        eigenvalues = factor.singular_values[::-1] ** 2
+        vectors = factor.singular_vectors[:, ::-1]
+        bounds = smallest_eigenvalue_bound(eigenvalues, project(self._rows, vectors[:, :2]))
+
+        def exceeds(projections: Array, level: float) -> BoolArray:
+            kept = projections.shape[2]
+            return np.asarray(eigenvalues_below(eigenvalues[:kept], projections, level) == 0)
+
+        bounds = np.where(available, bounds, -np.inf)
+        return lazy_best(self._rows, vectors, bounds, eigenvalues[0], exceeds, _BOUND_VECTORS)
+
+
+def smallest_eigenvalue_bound(eigenvalues: Array, projections: Array) -> Array:
+    """Bound ``lambda_min(G + R_i^T R_i)`` from above, by its Rayleigh-Ritz value on two eigenvectors of G.
+
+    Parameters
+    ----------
+    eigenvalues : array, shape (columns,), ascending
+        Eigenvalues of G.
+    projections : array, shape (samples, 3, 2)
+        Rows of each sample along the two lowest eigenvectors; with one column, along the only one.
+
+    Returns
+    -------
+    array, shape (samples,)
+    """
+    squares = np.einsum("nij,nij->nj", projections, projections)
+    if projections.shape[2] == 1:
+        return np.asarray(eigenvalues[0] + squares[:, 0])
+    first, second = eigenvalues[0] + squares[:, 0], eigenvalues[1] + squares[:, 1]
+    coupling = np.einsum("ni,ni->n", projections[:, :, 0], projections[:, :, 1])
+    bound = 0.5 * (first + second) - np.hypot(0.5 * (first - second), coupling)
+    rounding = 4.0 * np.finfo(float).eps * (first + second)
+    return np.asarray(bound + rounding)
+
+
+class OptimalDesign:
+    """Keep ``K_i = R_i G^-1 R_i^T`` and ``M_i = R_i G^-2 R_i^T`` of every sample as the selection grows.
+
+    Parameters
+    ----------
+    rows : array, shape (samples, 3, columns)
+    optimality : {"A", "D"}
+        A minimises ``trace G^-1``, the sum of the parameters' variances; D maximises ``det G``.
+    """
+
+    def __init__(self, rows: Array, optimality: str) -> None:
+        self._rows = rows
+        self._optimality = optimality
+        self._steps = 0
+
+    def next_sample(self, factor: TriangularFactor, available: BoolArray) -> int:
+        """Name the sample with the largest gain.
+
+        The gain is ``trace((I + K_i)^-1 M_i)`` for A, the fall of ``trace G^-1``, and ``det(I + K_i)`` for D,
+        the factor by which ``det G`` grows.
+
+        Parameters
+        ----------
+        factor : TriangularFactor
+            Factor of the samples chosen so far, of full rank; all but the first call must follow a call whose
+            sample was added.
+        available : array of bool, shape (samples,)
+
+        References
+        ----------
+        method.md, section 6.
+        """
+        if self._steps % _REFRESH_STEPS == 0:
+            self._refresh(factor)
+        gain = variance_reduction(self._K, self._M) if self._optimality == "A" else information_growth(self._K)
+        index = first_best(gain, available)
+        self._update(factor, index)
+        self._steps += 1
+        return index
+
+    def _refresh(self, factor: TriangularFactor) -> None:
+        half = project(self._rows, factor.singular_vectors) / factor.singular_values
+        self._K = half @ half.swapaxes(1, 2)
+        if self._optimality == "A":
+            half /= factor.singular_values
+            self._M = half @ half.swapaxes(1, 2)
+
+    def _update(self, factor: TriangularFactor, index: int) -> None:
+        """Update by ``(G + R^T R)^-1 = G^-1 - B S B^T`` with ``B = G^-1 R^T`` and ``S = (I + R B)^-1``."""
+        B = factor.solve(self._rows[index])
+        S = np.linalg.inv(np.eye(3) + self._K[index])
+        if self._optimality == "D":
+            C = project(self._rows, B)
+            self._K = self._K - project(C, S) @ C.swapaxes(1, 2)
+            return
+        both = project(self._rows, np.hstack([B, factor.solve(B.T)]))
+        C, E = both[:, :, :3], both[:, :, 3:]
+        CS = project(C, S)
+        cross = CS @ E.swapaxes(1, 2)
+        self._K = self._K - CS @ C.swapaxes(1, 2)
+        self._M = self._M - cross - cross.swapaxes(1, 2) + project(CS, B.T @ B) @ CS.swapaxes(1, 2)
+
+
+def information_growth(K: Array) -> Array:
+    """Compute ``det(I + K_i)``, the factor by which a sample raises ``det G``.
+
+    Parameters
+    ----------
+    K : array, shape (samples, 3, 3)
+        ``R_i G^-1 R_i^T``.
+
+    Returns
+    -------
+    array, shape (samples,)
+    """
+    return np.asarray(np.linalg.det(np.eye(3) + K))
+
+
+def variance_reduction(K: Array, M: Array) -> Array:
+    """Compute ``trace((I + K_i)^-1 M_i)``, by which a sample lowers ``trace G^-1``.
+
+    Parameters
+    ----------
+    K, M : array, shape (samples, 3, 3)
+        ``R_i G^-1 R_i^T`` and ``R_i G^-2 R_i^T``.
+
+    Returns
+    -------
+    array, shape (samples,)
+    """
+    inverse = np.linalg.inv(np.eye(3) + K)
+    return np.asarray(np.einsum("nij,nij->n", inverse, M))
+
+
+class PrintedRule:
+    """Raise the smallest singular value most; where no sample raises it, raise the largest one most.
+
+    Parameters
+    ----------
+    rows : array, shape (samples, 3, columns)
+    rank_tolerance : float
+        Singular values below this fraction of the largest count as zero.
+    full_column_rank : bool
+        Whether all samples together determine every parameter. If not, the smallest singular value over all
+        parameters is zero whatever is chosen.
+    """
+
+    def __init__(self, rows: Array, rank_tolerance: float, *, full_column_rank: bool) -> None:
+        self._rows = rows
+        self._tolerance = rank_tolerance
+        self._full_column_rank = full_column_rank
+        self._smallest = SmallestSingularValue(rows)
+        self._lengths = np.einsum("nij,nij->n", rows, rows)
+
+    def next_sample(self, factor: TriangularFactor, available: BoolArray) -> int:
+        """Name the sample that raises ``sigma_min`` most, else the one that raises ``sigma_max`` most.
+
+        Parameters
+        ----------
+        factor : TriangularFactor
+        available : array of bool, shape (samples,)
+
+        References
+        ----------
+        Paper, section 8, step 1.
+        """
+        if self._full_column_rank and factor.rank >= factor.columns - 3:
+            index = self._smallest.next_sample(factor, available)
+            if self._raises(factor, index):
+                return index
+        return self._largest(factor, available)
+
+    def _raises(self, factor: TriangularFactor, index: int) -> bool:
+        stacked = np.vstack([np.diag(factor.singular_values), self._rows[index] @ factor.singular_vectors])
+        values = np.linalg.svd(stacked, compute_uv=False)
+        nonzero = values[-1] > self._tolerance * values[0]
+        return bool(nonzero and values[-1] > factor.singular_value_min * (1.0 + _SMALLEST_RISE))
+
+    def _largest(self, factor: TriangularFactor, available: BoolArray) -> int:
+        eigenvalues, vectors = factor.singular_values**2, factor.singular_vectors
+        along = project(self._rows, vectors[:, :1])[:, :, 0]
+        bounds = largest_eigenvalue_bound(eigenvalues, along, self._lengths)
+
+        def exceeds(projections: Array, level: float) -> BoolArray:
+            return np.asarray(eigenvalues_below(eigenvalues, projections, level) < len(eigenvalues))
+
+        return lazy_best(self._rows, vectors, np.where(available, bounds, -np.inf), eigenvalues[0], exceeds)
+
+
+def largest_eigenvalue_bound(eigenvalues: Array, along: Array, lengths: Array) -> Array:
+    """Bound ``lambda_max(G + R_i^T R_i)`` from above, by the 2x2 matrix of the norms of its blocks.
+
+    The blocks are the top eigenvector of G and everything orthogonal to it.
+
+    Parameters
+    ----------
+    eigenvalues : array, shape (columns,), descending
+        Eigenvalues of G.
+    along : array, shape (samples, 3)
+        Rows of each sample along the top eigenvector.
+    lengths : array, shape (samples,)
+        Squared Frobenius norm of each sample's rows.
+
+    Returns
+    -------
+    array, shape (samples,)
+    """
+    inside = np.einsum("ni,ni->n", along, along)
+    outside = np.clip(lengths - inside, 0.0, None)
+    first, second = eigenvalues[0] + inside, (eigenvalues[1] if len(eigenvalues) > 1 else 0.0) + outside
+    bound = 0.5 * (first + second) + np.hypot(0.5 * (first - second), np.sqrt(inside * outside))
+    return np.asarray(bound * (1.0 + 8.0 * np.finfo(float).eps))
 
 
 def make_criterion(space: RowSpace, name: CriterionName) -> Criterion:

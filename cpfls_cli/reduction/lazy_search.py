@@ -1,4 +1,4 @@
-"""Find the best of many samples exactly while evaluating only the few that can be best."""
+"""Exact search for the best of many samples that evaluates only the few that can be best; ties go to the first."""
 
 from __future__ import annotations
 
@@ -8,14 +8,54 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.reduction.survey import project
-from cpfls_cli.reduction.ties import TIE_TOLERANCE
+
+# Equal samples get scores that differ by rounding, depending on where in the array they stand.
+TIE_TOLERANCE = 1e-10
 
 Predicate = Callable[[Array, float], BoolArray]
-
 # Samples evaluated first, to get a level that most others can be shown not to reach.
 _SCOUTS = 16
 # The level they reach need not be exact: this fraction of the gain over the floor is enough.
 _SCOUT_TOLERANCE = 1e-2
+
+
+def first_best(scores: Array, available: BoolArray) -> int:
+    """Find the lowest available index whose score is the largest one up to rounding.
+
+    Parameters
+    ----------
+    scores : array, shape (samples,)
+    available : array of bool, shape (samples,)
+    """
+    allowed = np.where(available, scores, -np.inf)
+    best = allowed.max()
+    return int(np.argmax(allowed >= best - TIE_TOLERANCE * abs(best)))
+
+
+def eigenvalues_below(eigenvalues: Array, projections: Array, shift: float) -> IntArray:
+    """Count the eigenvalues of ``diag(eigenvalues) + Z_i^T Z_i`` below a shift.
+
+    By Sylvester's law of inertia it is the count of ``eigenvalues`` below the shift less the count of negative
+    eigenvalues of the 3x3 matrix ``I + Z_i (diag(eigenvalues) - shift)^-1 Z_i^T``.
+
+    Parameters
+    ----------
+    eigenvalues : array, shape (columns,)
+    projections : array, shape (samples, 3, columns)
+        Z_i: rows of each sample in the eigenvectors' basis.
+    shift : float
+
+    Returns
+    -------
+    array of int, shape (samples,)
+    """
+    distance = eigenvalues - shift
+    # A shift on an eigenvalue moves off it by no more than that eigenvalue's own rounding, so nothing overflows.
+    rounding = np.finfo(float).eps * np.maximum(np.abs(eigenvalues), abs(shift)) + np.finfo(float).tiny
+    distance = np.copysign(np.maximum(np.abs(distance), rounding), distance)
+    schur = np.eye(3) + (projections / distance) @ projections.swapaxes(1, 2)
+    negative = np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0, axis=1)
+    return np.asarray(np.count_nonzero(distance < 0.0) - negative, dtype=np.int64)
 
 
 def lazy_best(

@@ -1,4 +1,4 @@
-"""A regressor too large to hold, read in chunks: its samples counted and its row space known."""
+"""The row space of a regressor read in chunks, and its samples in coordinates of that space."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BLOCK = 1024
 
 
 class Spectrum:
-    """What the kept singular values of a regressor tell of it."""
+    """Rank and condition number by the kept singular values of a regressor."""
 
     singular_values: Array
 
@@ -37,7 +37,7 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Survey(Spectrum):
-    """What one pass over a regressor tells.
+    """Number of samples and row space of a regressor, found in one pass.
 
     Attributes
     ----------
@@ -163,3 +163,65 @@ def _require_shape(chunk: Array, columns: int | None) -> int:
     if chunk.ndim != 3 or chunk.shape[1] != 3 or 0 in chunk.shape or chunk.shape[2] != (columns or chunk.shape[2]):
         raise ComputationError(f"Q: expected shape (samples, 3, {expected}), got {chunk.shape}")
     return int(chunk.shape[2])
+
+
+@dataclass(frozen=True)
+class RowSpace(Spectrum):
+    """Samples of a regressor, expressed in an orthonormal basis of the row space of all its samples.
+
+    Attributes
+    ----------
+    rows : array, shape (samples, 3, rank)
+        ``Q V_r``: the same nonzero singular values as Q, for every subset of samples.
+    singular_values : array, shape (rank,), descending
+        Kept singular values of all samples.
+    parameters : int
+        Columns of Q.
+    rank_tolerance : float
+        Singular values below this fraction of the largest count as zero.
+    """
+
+    rows: Array
+    singular_values: Array
+    parameters: int
+    rank_tolerance: float
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return len(self.rows)
+
+    @property
+    def smallest_samples(self) -> int:
+        """Fewest samples that can reach the rank, at three rows each."""
+        return -(-self.rank // 3)
+
+
+def row_space(Q: Array, rank_tolerance: float) -> RowSpace:
+    """Project a regressor on its numerical row space, ``R_i = Q_i V_r``.
+
+    Parameters
+    ----------
+    Q : array, shape (samples, 3, parameters)
+    rank_tolerance : float
+        Singular values below this fraction of the largest count as zero.
+
+    Raises
+    ------
+    ComputationError
+        If the shape is wrong, a value is not finite, or all values are zero.
+    """
+    surveyed = survey(lambda: [Q], rank_tolerance)
+    return space_of(surveyed, np.concatenate(list(surveyed.projected())))
+
+
+def space_of(surveyed: Survey, rows: Array) -> RowSpace:
+    """Place samples in the row space of a surveyed regressor.
+
+    Parameters
+    ----------
+    surveyed : Survey
+    rows : array, shape (samples, 3, rank)
+        Some or all of its samples, projected.
+    """
+    return RowSpace(rows, surveyed.singular_values, surveyed.parameters, surveyed.rank_tolerance)

@@ -259,6 +259,14 @@ def _locate(functions: int, breakpoints: Array, antecedent: Array, interval: Int
 
 
 @_compiled
+def _z_function(u: float) -> tuple[float, float, float]:
+    """Zadeh's z-function with its first and second derivative: the copy of `cpfls_cli.fuzzy.membership.z_function`."""
+    first, rest = u < 0.5, 1.0 - u
+    value = 1.0 - 2.0 * u * u if first else 2.0 * rest * rest
+    return value, -4.0 * (u if first else rest), -4.0 if first else 4.0
+
+
+@_compiled
 def _fire(table: Table, index: int, breakpoints: Array, count: int, at: _Batch) -> None:
     """Find the two functions of a partition that fire; see `cpfls_cli.fuzzy.membership.memberships`."""
     axis, functions = table.partitions[index, _ANGLE], table.partitions[index, _FUNCTIONS]
@@ -278,10 +286,8 @@ def _fire(table: Table, index: int, breakpoints: Array, count: int, at: _Batch) 
         inverse = 1.0 / (end - start if wide else 1.0)
         u = min(max(x, 0.0) - start, end - start) * inverse if wide else 1.0
         inside = antecedent_slope[n] if x >= 0.0 and x <= 1.0 else 0.0
-        first = u < 0.5
-        rest = 1.0 - u
-        falling = 1.0 - 2.0 * u * u if first else 2.0 * rest * rest
-        slope = -4.0 * (u if first else rest) * inside * inverse
+        falling, falling_slope, _ = _z_function(u)
+        slope = falling_slope * inside * inverse
         position[n], width[n], input_slope[n] = u, (end - start if wide else 1.0), inside
         left[n], right[n], left_slope[n], right_slope[n] = falling, 1.0 - falling, slope, -slope
     for n in range(count):
@@ -326,12 +332,12 @@ def _carry(block: IntArray, rate: Array, acceleration: Array, scale: Array, carr
     share = 0.5 if row == column else 1.0
     for axis in range(3):
         from_axis = column if axis == row else row
-        own = 1.0 if axis in (row, column) else 0.0
+        acts = 1.0 if axis in (row, column) else 0.0
         by_value, by_roll, by_pitch = carried[axis, 0], carried[axis, 1], carried[axis, 2]
         for n in range(len(rate)):
             energy = share * rate[n, row] * rate[n, column]
-            moved = own * rate[n, from_axis]
-            by_value[n] = own * acceleration[n, from_axis] * scale[axis]
+            moved = acts * rate[n, from_axis]
+            by_value[n] = acts * acceleration[n, from_axis] * scale[axis]
             by_roll[n] = (moved * rate[n, 0] - (energy if axis == 0 else 0.0)) * scale[axis]
             by_pitch[n] = (moved * rate[n, 1] - (energy if axis == 1 else 0.0)) * scale[axis]
 
@@ -568,12 +574,12 @@ def _sum_two(block: IntArray, i: int, j: int, output: Array, count: int, at: _Ba
     mu, mu_slope = at.degree[block[_FIRST], i], at.degree_slope[block[_FIRST], i]
     nu, nu_slope = at.degree[block[_SECOND], j], at.degree_slope[block[_SECOND], j]
     value, by_roll, by_pitch = at.total[0], at.total[1], at.total[2]
-    own, own_roll, own_pitch = output[0], output[1], output[2]
+    output_value, output_roll, output_pitch = output[0], output[1], output[2]
     for n in range(count):
         firing = mu[n] * nu[n]
-        value[n] += firing * own[n]
-        by_roll[n] += mu_slope[n] * nu[n] * own[n] + firing * own_roll[n]
-        by_pitch[n] += mu[n] * nu_slope[n] * own[n] + firing * own_pitch[n]
+        value[n] += firing * output_value[n]
+        by_roll[n] += mu_slope[n] * nu[n] * output_value[n] + firing * output_roll[n]
+        by_pitch[n] += mu[n] * nu_slope[n] * output_value[n] + firing * output_pitch[n]
 
 
 @_compiled
@@ -735,7 +741,7 @@ def _add_difference(left: Array, right: Array, firing: Array, count: int, total:
 
 
 @_compiled
-def _step(table: Table, block: IntArray, place: int, count: int, at: _Batch) -> None:
+def _step(table: Table, block: IntArray, input_index: int, count: int, at: _Batch) -> None:
     """Step of a block's output at a breakpoint of one input: what fires left of it less what fires right of it.
 
     The step of value, slope by roll and slope by pitch; and that of the value where the other input fires by its slope.
@@ -747,26 +753,26 @@ def _step(table: Table, block: IntArray, place: int, count: int, at: _Batch) -> 
             for n in range(count):
                 step[k, n] = at.output[0, k, n] - at.output[1, k, n]
         return
-    other = block[_SECOND - place]
+    other = block[_SECOND - input_index]
     others = table.partitions[other, _FIRING]
     for o in range(others):
-        left, right = (o, others + o) if place == 0 else (2 * o, 2 * o + 1)
+        left, right = (o, others + o) if input_index == 0 else (2 * o, 2 * o + 1)
         for k in range(3):
             _add_difference(at.output[left, k], at.output[right, k], at.degree[other, o], count, step[k])
         _add_difference(at.output[left, 0], at.output[right, 0], at.degree_slope[other, o], count, step[3])
 
 
 @_compiled
-def _move(table: Table, block: IntArray, carried: Array, place: int, count: int, at: _Batch) -> None:
+def _move(table: Table, block: IntArray, carried: Array, input_index: int, count: int, at: _Batch) -> None:
     """Differentiate the torque of an inertia function by the breakpoints around one of its inputs."""
-    index = block[_FIRST + place]
-    own, functions, first = (
+    index = block[_FIRST + input_index]
+    angle, functions, first = (
         table.partitions[index, _ANGLE],
         table.partitions[index, _FUNCTIONS],
         table.partitions[index, _FIRST_INNER],
     )
-    _step(table, block, place, count, at)
-    value, by_own, by_other, beside = at.step[0], at.step[1 + own], at.step[2 - own], at.step[3]
+    _step(table, block, input_index, count, at)
+    value, by_own, by_other, beside = at.step[0], at.step[1 + angle], at.step[2 - angle], at.step[3]
     position, width = at.position[index], at.width[index]
     input_slope, interval = at.input_slope[index], at.interval[index]
     for end in range(2):
@@ -776,8 +782,7 @@ def _move(table: Table, block: IntArray, carried: Array, place: int, count: int,
             inner = k >= 1 and k <= functions - 2
             column[n] = first + k - 1 if inner else -1
             moves = 1.0 if inner and input_slope[n] != 0.0 else 0.0
-            falling = -4.0 * u if u < 0.5 else -4.0 * (1.0 - u)
-            bending = -4.0 if u < 0.5 else 4.0
+            _, falling, bending = _z_function(u)
             towards = u - 1.0 if end == 0 else -u
             per_width = moves / width[n]
             degree = falling * towards * per_width
@@ -785,8 +790,8 @@ def _move(table: Table, block: IntArray, carried: Array, place: int, count: int,
             own_slope = slope * value[n] + degree * by_own[n]
             other_slope = degree * (by_other[n] + beside[n])
             for axis in range(3):
-                carry = carried[axis, 0, n] * degree * value[n] + carried[axis, 1 + own, n] * own_slope
-                moved[3 * n + axis] = carry + carried[axis, 2 - own, n] * other_slope
+                carry = carried[axis, 0, n] * degree * value[n] + carried[axis, 1 + angle, n] * own_slope
+                moved[3 * n + axis] = carry + carried[axis, 2 - angle, n] * other_slope
 
 
 @_compiled
@@ -794,9 +799,9 @@ def _move_all(table: Table, coefficients: Array, count: int, at: _Batch) -> None
     for b in range(len(table.blocks)):
         block = table.blocks[b]
         _outputs(table, block, coefficients, count, at)
-        for place in range(block[_INPUTS]):
-            if table.partitions[block[_FIRST + place], _FUNCTIONS] > 2:
-                _move(table, block, at.carried[b], place, count, at)
+        for input_index in range(block[_INPUTS]):
+            if table.partitions[block[_FIRST + input_index], _FUNCTIONS] > 2:
+                _move(table, block, at.carried[b], input_index, count, at)
 
 
 @_compiled

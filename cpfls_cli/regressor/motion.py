@@ -1,4 +1,4 @@
-"""What a motion contributes to the regressor before any fuzzy system is evaluated."""
+"""Motion of the attitude, how each inertia function enters the torque along it, and the columns of a rigid body."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray, require_columns
+from cpfls_cli.dynamics.rigid_body import rigid_body_regressor
 from cpfls_cli.regressor.structure import InertiaFunction
+
+RIGID = 6
+"""Inertia parameters of a rigid body."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Carrier:
-    """How one inertia function enters the torque.
+    """Factors with which one inertia function enters the torque.
 
     With E the symmetric matrix that has ones in the function's places, a function f(q) there gives the torque
     ``E qdd f + E qd (df/dt) - 1/2 (qd^T E qd) grad f``: the Christoffel form of equations (3) and (4).
@@ -65,7 +69,7 @@ class Carrier:
 
 
 def carrier(function: InertiaFunction, motion: Motion) -> Carrier:
-    """Evaluate how an inertia function enters the torque along a motion.
+    """Evaluate the factors of an inertia function along a motion.
 
     References
     ----------
@@ -75,3 +79,13 @@ def carrier(function: InertiaFunction, motion: Motion) -> Carrier:
     places[function.row, function.column] = places[function.column, function.row] = 1.0
     rate = motion.rate @ places
     return Carrier(motion.acceleration @ places, rate, 0.5 * np.sum(motion.rate * rate, axis=1))
+
+
+def rigid_columns(motion: Motion) -> Array:
+    """Build the columns of the six inertia parameters Ixx, Iyy, Izz, Ixy, Ixz, Iyz in the generalised torque.
+
+    Returns
+    -------
+    array, shape (samples, 3, 6)
+    """
+    return rigid_body_regressor(motion.attitude, motion.rate, motion.acceleration)

@@ -1,4 +1,4 @@
-"""The regressor Q(q, qd, qdd): torque is Q times the linear parameters of the fuzzy inertia functions."""
+"""The regressor Q(q, qd, qdd), which gives the torque from the linear parameters, and its slopes by the breakpoints."""
 
 from __future__ import annotations
 
@@ -8,10 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.basis import Antecedent, Basis, antecedent, basis, rule_firing
-from cpfls_cli.fuzzy.consequents import Features, features
+from cpfls_cli.fuzzy.basis import (
+    Antecedent,
+    AntecedentSensitivity,
+    Basis,
+    Features,
+    antecedent,
+    antecedent_sensitivity,
+    basis,
+    features,
+    rule_firing,
+)
 from cpfls_cli.fuzzy.inputs import InputRange, MappedInput, input_range, map_input
-from cpfls_cli.fuzzy.partition import breakpoints, uniform_weights
+from cpfls_cli.fuzzy.membership import breakpoints, uniform_weights
 from cpfls_cli.regressor.motion import Carrier, Motion, carrier
 from cpfls_cli.regressor.structure import PITCH, ROLL, Block, ModelStructure
 
@@ -27,7 +36,7 @@ class InertiaValues:
     value : array, shape (samples, 3, 3), kg m^2
         J(q), symmetric.
     gradient : array, shape (samples, 3, 3, 3), kg m^2/rad
-        The first index after the sample is the angle by which J is differentiated.
+        The first index after the sample is the angle by input_index J is differentiated.
     """
 
     value: Array
@@ -137,13 +146,13 @@ class Regressor:
         torque = np.zeros((len(self.motion), 3))
         for index, block in enumerate(self.structure.blocks):
             carried, evaluated = self.carriers[index], self.basis(index, partitions)
-            own = coefficients[block.columns]
+            of_block = coefficients[block.columns]
             along = np.zeros(len(self.motion))
             for angle, gradient in zip(block.function.inputs, evaluated.gradient, strict=True):
-                slope = gradient @ own
+                slope = gradient @ of_block
                 along += slope * self.motion.rate[:, angle]
                 torque[:, angle] -= carried.energy * slope
-            torque += carried.acceleration * (evaluated.value @ own)[:, None] + carried.rate * along[:, None]
+            torque += carried.acceleration * (evaluated.value @ of_block)[:, None] + carried.rate * along[:, None]
         return torque
 
     def basis(self, index: int, partitions: Breakpoints) -> Basis:
@@ -203,12 +212,12 @@ class Regressor:
         J = np.zeros((len(self.motion), 3, 3))
         dJ = np.zeros((len(self.motion), 3, 3, 3))
         for index, block in enumerate(self.structure.blocks):
-            function, own = block.function, coefficients[block.columns]
+            function, of_block = block.function, coefficients[block.columns]
             evaluated = self.basis(index, partitions)
             for row, column in {(function.row, function.column), (function.column, function.row)}:
-                J[:, row, column] = evaluated.value @ own
+                J[:, row, column] = evaluated.value @ of_block
                 for angle, gradient in zip(function.inputs, evaluated.gradient, strict=True):
-                    dJ[:, angle, row, column] = gradient @ own
+                    dJ[:, angle, row, column] = gradient @ of_block
         return InertiaValues(J, dJ)
 
     def _features(self, block: Block) -> Features | None:
@@ -227,3 +236,92 @@ class Regressor:
             terms[:, angle, :] -= carried.energy[:, None] * gradient
         terms += carried.rate[:, :, None] * along[:, None, :]
         return terms
+
+
+def torque_sensitivity(regressor: Regressor, partitions: Breakpoints, coefficients: Array) -> list[Array]:
+    """Differentiate the model torque by every inner breakpoint, in closed form.
+
+    Parameters
+    ----------
+    regressor : Regressor
+    partitions : sequence of array, shape (functions,)
+    coefficients : array, shape (parameters,)
+
+    Returns
+    -------
+    list of array, shape (samples, 3, functions - 2)
+        One per partition.
+    """
+    structure = regressor.structure
+    sensitivity = [np.zeros((len(regressor.motion), 3, max(p.functions - 2, 0))) for p in structure.partitions]
+    for index, block in enumerate(structure.blocks):
+        for input_index, partition in enumerate(block.partitions):
+            if structure.partitions[partition].functions > 2:
+                sensitivity[partition] = _block_sensitivity(regressor, partitions, coefficients, index, input_index)
+    return sensitivity
+
+
+def _block_sensitivity(
+    regressor: Regressor, partitions: Breakpoints, coefficients: Array, index: int, input_index: int
+) -> Array:
+    """Differentiate one inertia function's torque by the breakpoints along one of its inputs."""
+    block = regressor.structure.blocks[index]
+    value, gradient = _function_sensitivity(regressor, partitions, coefficients, index, input_index)
+    carried = regressor.carriers[index]
+    torque: Array = carried.acceleration[:, :, None] * value[:, None, :]
+    for angle, by_angle in zip(block.function.inputs, gradient, strict=True):
+        along = by_angle * regressor.motion.rate[:, angle, None]
+        torque += carried.rate[:, :, None] * along[:, None, :]
+        torque[:, angle, :] -= carried.energy[:, None] * by_angle
+    return torque
+
+
+def _function_sensitivity(
+    regressor: Regressor, partitions: Breakpoints, coefficients: Array, index: int, input_index: int
+) -> tuple[Array, list[Array]]:
+    """Differentiate f(q) and its gradient by breakpoints; the consequents do not depend on them."""
+    block = regressor.structure.blocks[index]
+    consequent = regressor.features[index]
+    assert consequent is not None
+    antecedents = regressor.antecedents(index, partitions)
+    rules = [a.value.shape[1] for a in antecedents]
+    per_rule = coefficients[block.columns].reshape(block.rules, block.features).T
+    moved = antecedent_sensitivity(
+        regressor.mapped[block.function.inputs[input_index]],
+        partitions[block.partitions[input_index]],
+        regressor.structure.circular,
+    )
+    outputs = _along(consequent.value @ per_rule, rules, input_index)
+    value = _contract(outputs, moved.value, antecedents, input_index, slope=False)
+    gradient = []
+    for direction, slopes in enumerate(consequent.gradient):
+        by_consequent = _contract(
+            _along(slopes @ per_rule, rules, input_index), moved.value, antecedents, input_index, slope=False
+        )
+        gradient.append(by_consequent + _by_antecedent(outputs, moved, antecedents, input_index, direction))
+    return value, gradient
+
+
+def _by_antecedent(
+    outputs: Array, moved: AntecedentSensitivity, antecedents: list[Antecedent], input_index: int, direction: int
+) -> Array:
+    if direction == input_index:
+        return _contract(outputs, moved.slope, antecedents, input_index, slope=False)
+    return _contract(outputs, moved.value, antecedents, input_index, slope=True)
+
+
+def _along(rule_outputs: Array, rules: list[int], input_index: int) -> Array:
+    """Arrange rule outputs as (samples, rules along the moved input, rules along the other)."""
+    if len(rules) == 1:
+        return rule_outputs[:, :, None]
+    grid = rule_outputs.reshape(-1, *rules)
+    return grid if input_index == 0 else grid.swapaxes(1, 2)
+
+
+def _contract(outputs: Array, moved: Array, antecedents: list[Antecedent], input_index: int, *, slope: bool) -> Array:
+    """Sum rule outputs over both inputs' rules; the other input fires by its value or by its slope."""
+    if len(antecedents) == 1:
+        return np.asarray(np.einsum("nl,nlb->nb", outputs[:, :, 0], moved))
+    other = antecedents[1 - input_index]
+    fired = np.einsum("nlm,nm->nl", outputs, other.slope if slope else other.value)
+    return np.asarray(np.einsum("nl,nlb->nb", fired, moved))

@@ -1,4 +1,4 @@
-"""What a model consists of: which inertia function has which inputs, partitions, rules and coefficients."""
+"""Structure of a model: inputs, partitions, rules and coefficients of each inertia function."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from annotated_types import Ge, Le
 from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.fuzzy.consequents import Consequents, Products, feature_count
+from cpfls_cli.fuzzy.basis import Consequents, Products, feature_count
 from cpfls_cli.fuzzy.inputs import InputMap
 from cpfls_cli.settings import Settings
 
@@ -130,7 +130,7 @@ class Block:
 
 @dataclass(frozen=True)
 class ModelStructure:
-    """The fuzzy part of a model, counted out.
+    """Partitions and blocks of coefficients of the fuzzy part of a model.
 
     Attributes
     ----------
@@ -185,12 +185,12 @@ def model_structure(settings: StructureSettings) -> ModelStructure:
 def _blocks(settings: StructureSettings, partitions: tuple[Partition, ...]) -> Iterator[Block]:
     start = 0
     for function in INERTIA_FUNCTIONS:
-        own = tuple(i for i, partition in enumerate(partitions) if partition.function == function.name)
+        of_function = tuple(i for i, partition in enumerate(partitions) if partition.function == function.name)
         rules = 1
-        for i in own:
+        for i in of_function:
             rules *= _rules(partitions[i].functions, settings.structure == "cpfls")
-        features = _features(len(own), settings)
-        yield Block(function, own, rules, features, slice(start, start + rules * features))
+        features = _features(len(of_function), settings)
+        yield Block(function, of_function, rules, features, slice(start, start + rules * features))
         start += rules * features
 
 

@@ -1,4 +1,4 @@
-"""A model structure in the numbers that compiled loops read."""
+"""A model structure as the table of numbers that compiled loops read."""
 
 from __future__ import annotations
 
@@ -76,5 +76,5 @@ def _block(structure: ModelStructure, block: Block) -> tuple[int, ...]:
     first, second = (*block.partitions, 0, 0)[:2]
     functions = structure.partitions[second].functions
     rules = max(functions - 1, 1) if structure.circular else functions
-    place = block.function.row, block.function.column, len(block.partitions)
-    return (*place, first, second, block.features, block.columns.start, rules)
+    entry = block.function.row, block.function.column, len(block.partitions)
+    return (*entry, first, second, block.features, block.columns.start, rules)

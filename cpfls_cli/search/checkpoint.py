@@ -16,7 +16,7 @@ from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.state import EvolutionState
 from cpfls_cli.flights.sources import read_good
-from cpfls_cli.identification.search_run import Unfinished
+from cpfls_cli.identification.search import Unfinished
 from cpfls_cli.search.resuming import differences, nothing_to_resume, require_same
 
 _SECTION = "identification"

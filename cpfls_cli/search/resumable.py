@@ -16,11 +16,10 @@ from cpfls_cli.artifacts.state_file import StoppedSearch
 from cpfls_cli.artifacts.store import format_name, read_artifact
 from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.evolution.archive import Evaluate
-from cpfls_cli.identification.search_run import SearchRun, SearchStep, Stop, StopReason, is_end
+from cpfls_cli.identification.search import SearchRun, SearchStep, Stop, StopReason, is_end
 from cpfls_cli.search.checkpoint import Checkpoint
 from cpfls_cli.workers.employ import employ
-from cpfls_cli.workers.worker_error import WorkerError
-from cpfls_cli.workers.workforce import Workforce
+from cpfls_cli.workers.workforce import WorkerError, Workforce
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,15 @@ from pathlib import Path
 from cpfls_cli.artifacts.formats import SELECTION
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.commands.identify import held_out_parts
 from cpfls_cli.config.overrides import Variant, variants
 from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.flights.choosing import choosing_source
+from cpfls_cli.flights.judging import held_out_parts
 from cpfls_cli.flights.training import TrainingData
-from cpfls_cli.identification.choice import require_flights
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.identify import TRAINING
+from cpfls_cli.identification.search import require_flights
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.search.sweep_samples import SweepSamples
 

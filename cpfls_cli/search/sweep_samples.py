@@ -15,8 +15,8 @@ from cpfls_cli.config.overrides import Variant
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.flights.training import SplitFlights, TrainingData, split_training, uniform_regressor
 from cpfls_cli.identification.data import gathered
-from cpfls_cli.reduction.streamed import check_streamed, reduce_streamed
 from cpfls_cli.reduction.survey import survey
+from cpfls_cli.reduction.training_set import check_streamed, reduce_streamed
 from cpfls_cli.regressor.structure import StructureSettings
 
 

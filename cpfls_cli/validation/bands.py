@@ -10,9 +10,8 @@ from scipy import stats
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.motion import RIGID, Motion, rigid_columns
 from cpfls_cli.regressor.regressor import Regressor
 from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.physical import cell_centres

@@ -10,12 +10,12 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.identification.evaluator import Evaluator
-from cpfls_cli.identification.fit import Fit
+from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.normal_equations import SMALLEST_SINGULAR_SHARE
-from cpfls_cli.identification.rigid_columns import RIGID
 from cpfls_cli.identification.samples import Products, Ready
 from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.identification.solver import Fit
+from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.validation.timeline import time_blocks
 
 POWER = 0.75

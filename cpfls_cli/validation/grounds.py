@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.findings import HARDLY_EXCITED_SHARE
-from cpfls_cli.identification.results import Identification
+from cpfls_cli.identification.identify import Identification
 from cpfls_cli.validation.paired import BLOCKS, Comparison, compare_windows, non_overlapping
 from cpfls_cli.validation.physical import Physics
 from cpfls_cli.validation.replay import NOTHING_MOVES, StepErrors

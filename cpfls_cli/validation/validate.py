@@ -10,8 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import Predictor
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.identify import TRAINING, model_evaluator
-from cpfls_cli.identification.results import Identification
+from cpfls_cli.identification.identify import TRAINING, Identification, model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.validation.bands import definite_share
 from cpfls_cli.validation.bootstrap import Draws, bootstrap

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
+import logging
 import pickle
+import threading
 import uuid
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
+from functools import partial
 
-from distributed import Client, Future, as_completed
+from distributed import Client, Future, KilledWorker, WorkerPlugin, as_completed, get_worker
+from threadpoolctl import threadpool_limits
 
 from cpfls_cli.arrays import IntArray
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Evaluate, Evaluation
-from cpfls_cli.workers.attempt import Failure, result_of
-from cpfls_cli.workers.chunks import chunks
-from cpfls_cli.workers.cluster_errors import explained, require_workers
-from cpfls_cli.workers.cluster_worker import Shipped, evaluate_shipped
-from cpfls_cli.workers.quiet import quiet
-from cpfls_cli.workers.same_versions import require_same_processor, require_same_versions
-from cpfls_cli.workers.worker_error import WorkerError
-from cpfls_cli.workers.workforce import Workforce
+from cpfls_cli.workers.compatibility import require_same_processor, require_same_versions
+from cpfls_cli.workers.workforce import Failure, WorkerError, Workforce, attempt, chunks, result_of
 
 _LONGEST_SILENCE_S = 1.0
+
+
+# Those that Dask gives a level or a handler of their own; all others take theirs from these.
+_NOISY = ("distributed", "distributed.client", "tornado", "tornado.application", "asyncio")
 
 
 class Cluster(Workforce):
@@ -129,3 +132,116 @@ def _connected(address: str, patience_s: float) -> Iterator[Client]:
             yield client
         finally:
             client.close()
+
+
+def require_workers(client: Client, patience_s: float) -> None:
+    """Require that a scheduler has a worker.
+
+    Parameters
+    ----------
+    client : Client
+        Connection to the scheduler.
+    patience_s : float
+        How long to wait for one.
+
+    Raises
+    ------
+    WorkerError
+        If there is none, or none is left.
+    """
+    try:
+        client.wait_for_workers(1, timeout=patience_s)
+    except TimeoutError as error:
+        address = client.scheduler.address
+        raise WorkerError(
+            f"the Dask scheduler at {address} has no workers: start some with `dask worker {address} --nthreads 1`; "
+            "where they vanished because their machines ran out of memory, start fewer on each"
+        ) from error
+
+
+@contextmanager
+def explained(client: Client) -> Iterator[None]:
+    """Turn whatever Dask raises into an error with a remedy.
+
+    Parameters
+    ----------
+    client : Client
+        Connection to the scheduler.
+
+    Raises
+    ------
+    WorkerError
+        In place of whatever Dask raises.
+    """
+    try:
+        yield
+    except ComputationError:
+        raise
+    except Exception as error:
+        raise WorkerError(_words(error, client)) from error
+
+
+def _words(error: Exception, client: Client) -> str:
+    if client.status != "running":
+        return "the Dask scheduler vanished: start it and its workers again"
+    if isinstance(error, (KilledWorker, CancelledError)):
+        return (
+            "one Dask worker after the other vanished while it evaluated the same chromosomes; where their machines "
+            "ran out of memory, start fewer workers on each, or add memory"
+        )
+    return f"the Dask cluster failed with {type(error).__name__}: {error}"
+
+
+class Shipped(WorkerPlugin):  # type: ignore[misc]
+    """A pickled evaluator that the scheduler gives to each worker, also to one that joins or comes back later.
+
+    Scattered data would not stay: Dask drops copies while they are idle, and then the only one with its worker.
+    Threads of one worker do not share an evaluator, because nothing says that it may be used by two at once.
+    """
+
+    def __init__(self, evaluator: bytes) -> None:
+        self._evaluator = evaluator
+        self._loaded = threading.local()
+
+    def __reduce__(self) -> tuple[type[Shipped], tuple[bytes]]:
+        return Shipped, (self._evaluator,)
+
+    def evaluate(self, genes: IntArray) -> Evaluation:
+        """Evaluate chromosomes by this thread's own evaluator."""
+        if not hasattr(self._loaded, "evaluate"):
+            self._loaded.evaluate = self._load()
+        evaluation: Evaluation = self._loaded.evaluate(genes)
+        return evaluation
+
+    def _load(self) -> Evaluate:
+        evaluate: Evaluate = pickle.loads(self._evaluator)
+        # Loading has loaded the libraries of linear algebra too. Sums in one order give the same bytes everywhere.
+        threadpool_limits(limits=1)
+        return evaluate
+
+
+def evaluate_shipped(genes: IntArray, name: str) -> Evaluation | Failure:
+    """Evaluate chromosomes on a worker of a cluster.
+
+    Parameters
+    ----------
+    genes : array of int, shape (individuals, genes)
+    name : str
+        By which the evaluator was shipped.
+    """
+    shipped: Shipped = get_worker().plugins[name]
+    return attempt(partial(shipped.evaluate, genes))
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Silence Dask's log, whose failures are raised as errors anyway."""
+    loggers = [logging.getLogger(name) for name in _NOISY]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)

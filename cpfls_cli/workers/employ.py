@@ -1,15 +1,18 @@
-"""Choose where chromosomes are evaluated."""
+"""Choose where chromosomes are evaluated: in this process, in processes beside it, or on a cluster."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
+from urllib.parse import urlsplit
 
-from cpfls_cli.evolution.archive import Evaluate
-from cpfls_cli.workers.address import require_address
+from cpfls_cli.arrays import IntArray
+from cpfls_cli.errors import InputError
+from cpfls_cli.evolution.archive import Evaluate, Evaluation
 from cpfls_cli.workers.processes import processes
-from cpfls_cli.workers.serial import Serial
-from cpfls_cli.workers.worker_error import WorkerError
-from cpfls_cli.workers.workforce import Workforce
+from cpfls_cli.workers.workforce import WorkerError, Workforce, chunks
+
+_SCHEMES = ("tcp", "tls")
 
 
 def employ(evaluate: Evaluate, *, count: int = 1, scheduler: str | None = None) -> AbstractContextManager[Workforce]:
@@ -54,3 +57,34 @@ def _cluster(evaluate: Evaluate, address: str) -> AbstractContextManager[Workfor
             f"a scheduler needs Dask, which is not installed here ({error}): pip install 'cpfls[dask]'"
         ) from error
     return cluster(evaluate, address)
+
+
+class Serial(Workforce):
+    """The evaluator itself, row by row, so that it can be stopped between any two."""
+
+    def __init__(self, evaluate: Evaluate) -> None:
+        self._evaluate = evaluate
+
+    def stream(self, genes: IntArray) -> Iterator[tuple[IntArray, Evaluation]]:
+        """Evaluate chromosomes in order; parameters are those of `Workforce.stream`."""
+        for rows in chunks(len(genes), max(len(genes), 1)):
+            yield rows, self._evaluate(genes[rows])
+
+
+def require_address(address: str) -> None:
+    """Require that a text is an address.
+
+    Raises
+    ------
+    InputError
+        If it is not of the form tcp://host:port, or tls://host:port.
+    """
+    try:
+        parts = urlsplit(address)
+        complete = parts.scheme in _SCHEMES and bool(parts.hostname) and bool(parts.port)
+    except ValueError:
+        complete = False
+    if not complete:
+        raise InputError(
+            f"scheduler = {address}: not an address; expected tcp://host:port, such as tcp://10.0.0.1:8786"
+        )

@@ -12,16 +12,13 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing import resource_tracker
-from multiprocessing.connection import wait
+from multiprocessing.connection import Connection, wait
 
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.evolution.archive import Evaluate, Evaluation
-from cpfls_cli.workers.attempt import Failure, result_of
-from cpfls_cli.workers.chunks import chunks
-from cpfls_cli.workers.process_worker import work
-from cpfls_cli.workers.worker_error import WorkerError
-from cpfls_cli.workers.workforce import Workforce
+from cpfls_cli.workers.workforce import Failure, WorkerError, Workforce, attempt, chunks, result_of
 
 _LONGEST_FAREWELL_S = 5.0
 
@@ -153,7 +150,7 @@ def _start(started: list[_Process], count: int) -> None:
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Hold signals back, also in the processes started meanwhile, which are open to them before they run our code."""
+    """Block signals, also in the processes started meanwhile, which would take them before they run our code."""
     if sys.platform == "win32":
         yield
         return
@@ -172,3 +169,31 @@ def _ending(exit_code: int | None) -> str:
     if exit_code < 0:
         return f"killed by {signal.Signals(-exit_code).name}"
     return f"exit code {exit_code}"
+
+
+def work(connection: Connection) -> None:
+    """Serve one pipe until it closes, which it also does when the other side is killed.
+
+    Parameters
+    ----------
+    connection : Connection
+        Brings the pickled evaluator first, and then chromosomes; takes None when the evaluator is loaded, then one
+        Evaluation or Failure for each array of chromosomes.
+    """
+    # An interrupt from the keyboard reaches the whole group of processes; the parent decides what it means.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        _serve(connection)
+    except (EOFError, ConnectionError):
+        return
+
+
+def _serve(connection: Connection) -> None:
+    evaluate: Evaluate | Failure = attempt(partial(pickle.loads, connection.recv_bytes()))
+    if isinstance(evaluate, Failure):
+        connection.send(evaluate)
+        return
+    connection.send(None)
+    while True:
+        connection.send(attempt(partial(evaluate, connection.recv())))

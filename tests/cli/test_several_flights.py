@@ -4,8 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
+from cpfls_cli.artifacts import job
 from cpfls_cli.artifacts.store import file_sha256
-from cpfls_cli.commands import job
 from cpfls_cli.flights import flight_source, training
 
 

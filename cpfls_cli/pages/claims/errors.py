@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.scores import MODEL, TRAINING
 from cpfls_cli.pages.claims.claim import Claim
-from cpfls_cli.pages.judged import MODEL, TRAINING, judged
 from cpfls_cli.pages.printed import PRINTED_RELATIVE_ERROR
 from cpfls_cli.pages.source import Sources
 from cpfls_cli.pages.swept import joined_sweeps
@@ -43,14 +43,14 @@ def _errors(sources: Sources) -> Iterator[Array]:
                 yield np.nan_to_num(setting.relative_error[:, 0], nan=np.inf)
     for model in sources.models:
         if model.config["identification"]["structure"] == "cpfls":
-            yield np.array([judged(model).worst(MODEL, TRAINING)[0]])
+            yield np.array([model.record.judged.worst(MODEL, TRAINING)[0]])
 
 
 def _elsewhere(sources: Sources) -> str:
     """Say what the claim leaves out: flights that the models did not learn from."""
     found = [
         f"{percent(scores.worst(MODEL, part)[0], 2)} on {part}"
-        for scores in map(judged, sources.models)
+        for scores in (model.record.judged for model in sources.models)
         for part in scores.parts
         if part != TRAINING
     ]

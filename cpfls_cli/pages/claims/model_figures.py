@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cpfls_cli.fuzzy.partition import breakpoints
+from cpfls_cli.artifacts.scores import MODEL, TRAINING
+from cpfls_cli.fuzzy.membership import breakpoints
 from cpfls_cli.pages.claims.compared import ComparedFigure, agreement, not_shown, reading
-from cpfls_cli.pages.judged import MODEL, TRAINING, judged
 from cpfls_cli.pages.printed import PRINTED_BREAKPOINTS, PRINTED_RELATIVE_ERROR, PRINTED_WEIGHTS, TABLE_4
 from cpfls_cli.pages.source import Sources
 from cpfls_cli.report.numbers import change, number, percent
@@ -62,7 +62,7 @@ def error_compared(sources: Sources) -> ComparedFigure:
     ]
     if not shown:
         return not_shown(title, printed, "Missing: a prediction along the flight that its model learned from.")
-    largest, axis = judged(shown[0]).worst(MODEL, TRAINING)
+    largest, axis = shown[0].record.judged.worst(MODEL, TRAINING)
     agrees = largest < PRINTED_RELATIVE_ERROR
     why = "Relative to the largest torque of each axis; the absolute errors belong to torques of other sizes."
     return ComparedFigure(title, printed, f"at most {percent(largest, 2)} ({axis})", agreement(agrees), why)

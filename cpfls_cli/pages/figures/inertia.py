@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from cpfls_cli.pages.figures.inertia_curves import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.pages.figures.prediction import shade_outside
 from cpfls_cli.pages.source import Source
+from cpfls_cli.pages.uncertainty import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.report.canvas import band, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Plot
 

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.pages.figures.inertia_curves import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.pages.source import Source
+from cpfls_cli.pages.uncertainty import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.report.canvas import BASELINE, band, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Plot
 from cpfls_cli.report.decimation import runs

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.spread import spread
+from cpfls_cli.identification.judge import spread
 from cpfls_cli.pages.swept_setting import SweptSetting
 from cpfls_cli.report.canvas import plain_ticks, plot, style_of
 from cpfls_cli.report.content import Plot

@@ -12,9 +12,8 @@ from cpfls_cli.pages.figures.replay import has_replay, replay_figure
 from cpfls_cli.pages.figures.whiteness import whiteness_figure
 from cpfls_cli.pages.gap_verdict import levels
 from cpfls_cli.pages.gap_words import effect_title, joined, known_channels, titles_of
-from cpfls_cli.pages.sections.each import section_of_each
 from cpfls_cli.pages.sections.gap_tables import coefficients_table, effects_table, parameters_table
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Heading, Section, Text
 
 

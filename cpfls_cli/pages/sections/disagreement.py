@@ -8,8 +8,7 @@ from cpfls_cli.pages.figures.dependence import dependence_figure, heat_map_figur
 from cpfls_cli.pages.figures.replay import has_replay, replay_figure
 from cpfls_cli.pages.figures.residual_time import STRETCHES, residual_time_figure
 from cpfls_cli.pages.gap_words import channel_unit, channel_words, known_channels, whole_percent
-from cpfls_cli.pages.sections.each import section_of_each
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Cell, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import number
 

@@ -9,9 +9,8 @@ from cpfls_cli.pages.figures.gap_sizes import gap_sizes_figure
 from cpfls_cli.pages.figures.intervals import intervals_figure
 from cpfls_cli.pages.figures.replay import has_replay, replay_figure
 from cpfls_cli.pages.gap_words import joined, known_channels, titles_of
-from cpfls_cli.pages.sections.each import section_of_each
 from cpfls_cli.pages.sections.gap_tables import coefficients_table, gap_table, parameters_table
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Table
 from cpfls_cli.report.numbers import number
 

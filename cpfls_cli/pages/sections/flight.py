@@ -10,8 +10,7 @@ from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.pages.figures.attitude import attitude_figure
 from cpfls_cli.pages.figures.rotation import rotation_figure
 from cpfls_cli.pages.figures.torque import torque_figure
-from cpfls_cli.pages.sections.each import section_of_each
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import count, number, plain
 

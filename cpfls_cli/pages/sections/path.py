@@ -11,8 +11,7 @@ from cpfls_cli.pages.figures.derivatives import derivatives_figure
 from cpfls_cli.pages.figures.rotation import rotation_figure
 from cpfls_cli.pages.leg import DERIVATIVES, UNITS, peaks
 from cpfls_cli.pages.printed import PRINTED_PEAKS
-from cpfls_cli.pages.sections.each import section_of_each
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Section, Table
 from cpfls_cli.report.numbers import number
 

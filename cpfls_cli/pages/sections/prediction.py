@@ -7,11 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from cpfls_cli.artifacts.formats import MODEL
-from cpfls_cli.pages.evidence import known_everywhere
 from cpfls_cli.pages.figures.inertia import inertia_figure
 from cpfls_cli.pages.figures.prediction import error_figure, torques_figure
-from cpfls_cli.pages.sections.each import section_of_each
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Heading, Section, Text
 
 
@@ -43,7 +41,7 @@ def _prediction(prediction: Source, index: int, sources: Sources) -> Iterator[Bl
     if outside:
         visited = f"{outside} of {samples} samples lie outside the attitudes that training visited"
         model = sources.by_hash(prediction.made_from("model"))
-        if model is not None and model.artifact.spec == MODEL and known_everywhere(model):
+        if model is not None and model.artifact.spec == MODEL and model.record.known_everywhere:
             known = "one rule holds everywhere and all its coefficients are known"
             yield Text(f"{visited}: {known}, so it holds there too, if the structure does.", "note")
         else:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.spread import spread
+from cpfls_cli.identification.judge import spread
 from cpfls_cli.pages.figures.replicates import replicates_figure
 from cpfls_cli.pages.source import Sources
 from cpfls_cli.pages.swept import Sweep, joined_sweeps, printed_beside, repeats_table_5

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from cpfls_cli.pages.claims import Claim, Verdict, claims_of
 from cpfls_cli.pages.claims.compared import ComparedFigure
 from cpfls_cli.pages.claims.figures import compared_figures
-from cpfls_cli.pages.figures.seesaw import seesaw_figure
+from cpfls_cli.pages.fuzzy_part import seesaw_figure
 from cpfls_cli.pages.source import Sources
 from cpfls_cli.report.content import Block, Cell, Folded, Section, Table, Text, Tone
 

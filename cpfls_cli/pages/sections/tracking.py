@@ -9,10 +9,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.formats import MODEL
-from cpfls_cli.pages.evidence import known_everywhere
 from cpfls_cli.pages.figures.tracking import AXES, CONTROLLERS, tracking_figure
-from cpfls_cli.pages.sections.each import section_of_each
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Cell, Heading, Section, Table, Text, Tone
 from cpfls_cli.report.numbers import number, percent, plain
 
@@ -79,7 +77,7 @@ def _limits(flight: Source, sources: Sources) -> Iterator[Text]:
     samples, outside = len(artifact.array("time")), int(np.sum(artifact.array("tracking/outside")))
     if outside:
         beyond = f"{outside} of {samples} samples of this flight lie outside the attitudes that training visited"
-        if model is not None and model.artifact.spec == MODEL and known_everywhere(model):
+        if model is not None and model.artifact.spec == MODEL and model.record.known_everywhere:
             yield Text(f"{beyond}: one rule holds everywhere and all its coefficients are known.", "note")
         else:
             yield Text(f"{beyond}: the model extrapolates there.", "warning")

@@ -9,11 +9,18 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.pages.gap_words import sentence
 from cpfls_cli.validation import validate
 
 EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "period", "verdict")
 VALIDATION = [spec for spec in MODEL.datasets if spec.path.split("/")[0] in EVIDENCE]
-LABELS = {"good-for-control", "good-inside-region", "not-better-than-rigid-body", "do-not-use"}
+WORDS = {
+    "good-for-control": "Good for control",
+    "good-inside-region": "Good inside the region that training visited, and only there",
+    "not-better-than-rigid-body": "Not better than the rigid body",
+    "do-not-use": "Do not use it",
+}
+SIGNS = {1: "For it", -1: "Against it", 0: "To know"}
 
 
 @pytest.fixture(scope="module")
@@ -48,11 +55,23 @@ def test_one_period_away_where_inputs_go_all_the_way_round(cpfls, study, pipelin
 def test_the_verdict_is_printed_with_its_reasons(validated):
     _, text, summary = validated
     verdict = summary["verdict"]
-    assert verdict["label"] in LABELS
-    assert f"verdict: {verdict['label'].replace('-', ' ')}; {verdict['region']}" in text
+    assert f"\nVERDICT: {WORDS[verdict['label']]}\n  Region: {verdict['region']}.\n" in text
     for reason in verdict["reasons"]:
-        assert reason["text"] in text
-        assert reason["speaks"] in (-1, 0, 1)
+        assert f"\n  {SIGNS[reason['speaks']]}: {sentence(reason['text'])}\n" in text
+
+
+def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls, study, tmp_path):
+    model, text, _ = validated
+    page = tmp_path / "report.json"
+    assert cpfls("report", study, model, "-o", page).exit_code == 0
+    sections = json.loads(page.read_text(encoding="utf-8"))["sections"]
+    blocks = {block.get("name", block["kind"]): block for section in sections for block in section["blocks"]}
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    for row in blocks["headline-1"]["rows"]:
+        assert " ".join(" ".join(row).split()) in lines
+    box = blocks["box"]
+    assert f"{box['label']}: {box['title']}" in lines
+    assert all(sentence in lines for sentence in box["sentences"])
 
 
 def test_bands_go_with_a_prediction_and_hold_the_model(validated, cpfls, study, pipeline, tmp_path):

@@ -8,10 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.export import Verdict, c_source, json_text, python_source, reference_points
-from cpfls_cli.export.tables import number
-from cpfls_cli.export.text import checked_identifier, comment_text, identifier
-from tests.unit.export.cases import CASES, model_of, sheet_of
+from cpfls_cli.export import c_source, json_text, python_source, reference_points
+from cpfls_cli.export.text import checked_identifier, comment_text, identifier, number
+from tests.unit.export.cases import CASES, model_of, sheet_of, verdict_of
 
 MODEL = model_of(CASES["seesaw, one function"])
 POINTS = reference_points(MODEL, np.random.default_rng(1))
@@ -44,7 +43,7 @@ def without_comments(code):
 
 
 def hostile(*texts):
-    verdict = Verdict(texts[0], texts[1], ((texts[2], -1.0),))
+    verdict = verdict_of(texts[0], texts[1], (texts[2], -1))
     return sheet_of(
         MODEL, file=texts[3], source=texts[4], findings=texts[:2], stop_reason=texts[5], complete=False, verdict=verdict
     )

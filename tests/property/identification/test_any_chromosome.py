@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode
+from cpfls_cli.identification.evaluator import LARGEST_GENE, decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.reduction.compound import Compound
+from cpfls_cli.reduction.exchange import Compound
 
 seeds = st.integers(0, 2**32 - 1)
 columns = st.integers(1, 6)

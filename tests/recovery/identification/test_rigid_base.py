@@ -5,11 +5,11 @@ import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
-from cpfls_cli.identification.baselines import fit_baselines
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.rigid_columns import rigid_columns
+from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import rigid_columns
 
 PARAMETERS = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
 SETTINGS = IdentificationSettings(base="rigid-body", harmonic_order=2, products="tensor", membership_functions=1)

@@ -6,12 +6,12 @@ from scipy import signal
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
-from cpfls_cli.identification.chromosome import uniform_chromosome
+from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import rigid_columns
 from cpfls_cli.validation.bands import band, inertia_band
 from cpfls_cli.validation.bootstrap import BlockScores, bootstrap
 

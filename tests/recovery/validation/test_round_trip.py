@@ -7,10 +7,10 @@ import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data
-from cpfls_cli.identification.baselines import fit_baselines
-from cpfls_cli.identification.chromosome import uniform_chromosome
+from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.excitation import visited_cells
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import Motion, uniform_breakpoints
 from cpfls_cli.validation.bootstrap import MissedTorque, bootstrap

@@ -1,34 +1,41 @@
 """Presets of the search: what they fill in, and that a key that is given wins."""
 
+import re
 from dataclasses import asdict, fields
+from pathlib import Path
 
 import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cpfls_cli.config.load import validate
 from cpfls_cli.config.study import resolved
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.evolution import EvolutionSettings
-from cpfls_cli.identification.presets import PRESETS
-from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.identification.settings import PRESETS, IdentificationSettings
 
-# Section 9 and Table 5 of the paper.
-PAPER = {
-    "population": 75,
-    "generations": 25,
-    "subpopulations": 5,
-    "migration_rate": 0.2,
-    "migration_interval": 5,
-    "generation_gap": 0.8,
-    "crossover_rate": 0.8,
-    "recombination": "single-point",
-    "insertion_rate": 0.8,
-    "selective_pressure": 1.5,
-    "mutated_individuals": 0.04,
-    "mutated_bits": 0.01,
-    "ranking": "quantity-dominance",
-    "first_objective_weight": 1,
-    "reinsertion": "uniform",
-    "start": "random",
+METHOD = Path(__file__).parents[3] / "docs/method.md"
+ROW = re.compile(r"^\| `(\w+)` \| (\S+) \| (\S+) \|$", re.MULTILINE)
+TABLE = METHOD.read_text(encoding="utf-8").partition("| key of `identification` |")[2].partition("\n\n")[0]
+PAGE = {key: {"paper": paper, "fast": fast} for key, paper, fast in ROW.findall(TABLE)}
+# A value of each key that is neither the paper's nor the default.
+OTHER = {
+    "population": 44,
+    "generations": 7,
+    "subpopulations": 2,
+    "migration_rate": 0.11,
+    "migration_interval": 3,
+    "generation_gap": 0.5,
+    "crossover_rate": 0.6,
+    "insertion_rate": 0.4,
+    "selective_pressure": 1.2,
+    "mutated_individuals": 0.3,
+    "mutated_bits": 0.02,
+    "ranking": "pareto-count",
+    "first_objective_weight": 4,
+    "reinsertion": "fitness",
+    "stall_generations": 9,
 }
 
 
@@ -36,15 +43,35 @@ def identification(**keys):
     return validate({"identification": keys}, "study.yaml").identification
 
 
-def test_the_paper_has_its_operators():
-    settings = asdict(identification(preset="paper"))
-    assert {key: settings[key] for key in PAPER} == PAPER
+@pytest.mark.parametrize("preset", ["paper", "fast"])
+def test_a_preset_gives_what_the_method_page_says(preset):
+    """Section 7 of the page, where section 9 and Table 5 of the paper are read."""
+    settings = asdict(identification(preset=preset))
+    stated = {key: yaml.safe_load(row[preset]) for key, row in PAGE.items()}
+    assert {key: settings[key] for key in stated} == stated
 
 
-def test_a_key_that_is_given_wins_over_the_preset():
-    settings = identification(preset="paper", generations=200, reinsertion="fitness")
-    assert (settings.generations, settings.reinsertion) == (200, "fitness")
-    assert settings.recombination == "single-point"
+def test_the_page_names_every_key_of_the_paper():
+    assert set(PAGE) == set(PRESETS["paper"])
+
+
+@given(st.sets(st.sampled_from(sorted(OTHER))))
+def test_a_preset_fills_in_only_what_is_not_given(keys):
+    chosen = {key: OTHER[key] for key in keys}
+    settings = asdict(identification(preset="paper", **chosen))
+    untouched = asdict(identification(**chosen))
+    for key, value in settings.items():
+        if key in chosen:
+            assert value == chosen[key]
+        elif key in PAGE:
+            assert value == yaml.safe_load(PAGE[key]["paper"])
+        elif key != "preset":
+            assert value == untouched[key]
+
+
+def test_the_other_values_would_be_noticed():
+    for key, value in OTHER.items():
+        assert value not in (yaml.safe_load(text) for text in PAGE[key].values())
 
 
 def test_without_a_preset_keys_have_their_defaults():

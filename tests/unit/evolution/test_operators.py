@@ -1,6 +1,61 @@
 import numpy as np
+import pytest
 
-from cpfls_cli.evolution.operators import intermediate_recombination, mutate, single_point_crossover
+from cpfls_cli.evolution import gray_decode, gray_encode
+from cpfls_cli.evolution.operators import (
+    intermediate_recombination,
+    linear_ranking_fitness,
+    members,
+    migrate,
+    mutate,
+    reinsert,
+    single_point_crossover,
+    stochastic_universal_sampling,
+    subpopulation_labels,
+)
+
+
+def test_three_bit_code_is_the_published_table():
+    table = ["000", "001", "011", "010", "110", "111", "101", "100"]
+    bits = gray_encode(np.arange(8)[:, np.newaxis], bits_per_gene=3)
+    assert ["".join(str(int(bit)) for bit in row) for row in bits] == table
+
+
+def test_genes_lie_one_after_another_most_significant_bit_first():
+    bits = gray_encode(np.array([[65535, 0]]))
+    assert np.flatnonzero(bits[0]).tolist() == [0]
+    assert gray_decode(bits).tolist() == [[65535, 0]]
+
+
+def test_every_pair_of_neighbours_differs_in_one_bit():
+    bits = gray_encode(np.arange(2**16)[:, np.newaxis])
+    assert np.all(np.count_nonzero(bits[1:] != bits[:-1], axis=1) == 1)
+
+
+def test_fitness_falls_linearly_from_the_pressure_to_its_complement():
+    np.testing.assert_allclose(linear_ranking_fitness(np.array([30, 10, 50, 20, 40]), 1.5), [1.0, 1.5, 0.5, 1.25, 0.75])
+
+
+def test_equal_ranks_share_the_mean_fitness():
+    np.testing.assert_allclose(linear_ranking_fitness(np.array([1, 1, 1, 2]), 2.0), [4 / 3, 4 / 3, 4 / 3, 0])
+
+
+def test_pressure_of_one_makes_all_equal():
+    np.testing.assert_array_equal(linear_ranking_fitness(np.array([3, 1, 2]), 1.0), 1.0)
+
+
+def test_parents_come_in_random_order():
+    chosen = stochastic_universal_sampling(np.ones(200), 200, np.random.default_rng(1))
+    assert sorted(chosen.tolist()) == list(range(200))
+    assert np.count_nonzero(np.diff(chosen) > 0) < 150
+
+
+def test_mean_number_of_copies_is_the_expectation():
+    rng, fitness = np.random.default_rng(2), np.array([0.3, 1.1, 0.0, 1.6])
+    spins = 4000
+    counts = sum(np.bincount(stochastic_universal_sampling(fitness, 5, rng), minlength=4) for _ in range(spins))
+    # A spin's count differs from its expectation by less than one: 0.5 / sqrt(4000) = 0.008 at most.
+    np.testing.assert_allclose(counts / spins, 5 * fitness / 3.0, atol=0.04)
 
 
 def alternating(individuals, length):
@@ -83,3 +138,110 @@ def test_intermediate_recombination_stays_in_range_and_takes_its_share_of_the_pa
 def test_equal_parents_have_equal_offspring():
     genes = np.tile(np.arange(7), (4, 1))
     np.testing.assert_array_equal(intermediate_recombination(genes, 1.0, 65535, np.random.default_rng(11)), genes)
+
+
+@pytest.mark.parametrize(
+    ("population", "subpopulations", "sizes"),
+    [(75, 5, [15] * 5), (17, 5, [4, 4, 3, 3, 3]), (6, 1, [6])],
+)
+def test_subpopulations_are_as_even_as_possible(population, subpopulations, sizes):
+    groups = members(subpopulation_labels(population, subpopulations))
+    assert [len(group) for group in groups] == sizes
+    assert np.concatenate(groups).tolist() == list(range(population))
+
+
+@pytest.mark.parametrize(("population", "moved"), [(75, 3), (77, 3), (23, 1)])
+def test_each_subpopulation_receives_its_share_from_the_others(population, moved):
+    labels = subpopulation_labels(population, 5)
+    source = migrate(labels, 0.2, np.random.default_rng(1))
+    for label, group in enumerate(members(labels)):
+        arrivals = source[group] != group
+        assert np.count_nonzero(arrivals) == moved
+        assert label not in labels[source[group[arrivals]]]
+        assert len(set(source[group].tolist())) == len(group)
+
+
+def test_the_net_is_complete_and_everyone_may_leave_or_be_replaced():
+    labels, rng = subpopulation_labels(20, 4), np.random.default_rng(2)
+    routes, leaving, replaced = set(), set(), set()
+    for _ in range(200):
+        source = migrate(labels, 0.2, rng)
+        places = np.flatnonzero(source != np.arange(20))
+        routes |= {(int(labels[source[place]]), int(labels[place])) for place in places}
+        leaving |= set(source[places].tolist())
+        replaced |= set(places.tolist())
+    assert len(routes) == 4 * 3
+    assert leaving == replaced == set(range(20))
+
+
+@pytest.mark.parametrize(("subpopulations", "rate"), [(1, 0.2), (5, 0.0)])
+def test_nobody_moves(subpopulations, rate):
+    labels = subpopulation_labels(20, subpopulations)
+    np.testing.assert_array_equal(migrate(labels, rate, np.random.default_rng(3)), np.arange(20))
+
+
+def test_a_share_that_is_whole_is_not_rounded_down():
+    labels = subpopulation_labels(200, 2)
+    source = migrate(labels, 0.29, np.random.default_rng(4))
+    assert np.count_nonzero(source[:100] != np.arange(100)) == 29
+
+
+PARENTS, OFFSPRING = subpopulation_labels(30, 2), subpopulation_labels(24, 2)
+RANKS = np.random.default_rng(1).permutation(54)
+GENES = np.arange(54)[:, np.newaxis]
+
+
+def split(values, labels):
+    return [values[labels == label] for label in (0, 1)]
+
+
+@pytest.mark.parametrize("method", ["uniform", "fitness"])
+def test_the_fittest_offspring_of_each_subpopulation_enter(method):
+    source = reinsert(GENES, RANKS, PARENTS, OFFSPRING, 0.8, method, np.random.default_rng(2))
+    for places, offspring_ranks in zip(split(source, PARENTS), split(RANKS[30:], OFFSPRING), strict=True):
+        # 12 offspring, 0.8 of them is 9.6, rounded 10
+        assert sorted(RANKS[places[places >= 30]]) == sorted(offspring_ranks)[:10]
+
+
+def test_fitness_based_reinsertion_keeps_the_fittest_parents():
+    source = reinsert(GENES, RANKS, PARENTS, OFFSPRING, 0.8, "fitness", np.random.default_rng(3))
+    for places, parent_ranks in zip(split(source, PARENTS), split(RANKS[:30], PARENTS), strict=True):
+        assert sorted(RANKS[places[places < 30]]) == sorted(parent_ranks)[:5]
+
+
+def test_uniform_reinsertion_replaces_each_parent_equally_often():
+    rng = np.random.default_rng(4)
+    runs = [reinsert(GENES, RANKS, PARENTS, OFFSPRING, 0.8, "uniform", rng) for _ in range(1500)]
+    replaced = np.mean([source != np.arange(30) for source in runs], axis=0)
+    # 10 of 15, standard deviation 0.012: the best parent is lost as often as the worst.
+    np.testing.assert_allclose(replaced, 2 / 3, atol=0.06)
+
+
+def test_survivors_keep_their_places():
+    source = reinsert(GENES, RANKS, PARENTS, OFFSPRING, 0.8, "uniform", np.random.default_rng(5))
+    kept = source < 30
+    np.testing.assert_array_equal(source[kept], np.flatnonzero(kept))
+
+
+def test_fitness_based_reinsertion_breaks_ties_at_random():
+    rng = np.random.default_rng(6)
+    kept = {
+        tuple(reinsert(GENES, np.zeros(54, dtype=int), PARENTS, OFFSPRING, 0.8, "fitness", rng) < 30) for _ in range(20)
+    }
+    assert len(kept) > 10
+
+
+def test_elitist_reinsertion_keeps_the_fittest_of_parents_and_offspring():
+    source = reinsert(GENES, RANKS, PARENTS, OFFSPRING, 1.0, "elitist", np.random.default_rng(6))
+    labels = np.concatenate([PARENTS, OFFSPRING])
+    for places, ranks in zip(split(source, PARENTS), split(RANKS, labels), strict=True):
+        assert sorted(RANKS[places]) == sorted(ranks)[:15]
+
+
+def test_elitist_reinsertion_keeps_one_of_equal_chromosomes_as_long_as_there_are_others():
+    genes = np.array([[5], [5], [7], [8], [5], [9]])
+    ranks, labels = np.array([1, 1, 4, 6, 1, 5]), np.zeros(4, dtype=int)
+    kept = reinsert(genes, ranks, labels, labels[:2], 1.0, "elitist", np.random.default_rng(7))
+    assert kept.tolist() == [0, 2, 5, 3]
+    kept = reinsert(np.full((6, 1), 5), ranks, labels, labels[:2], 1.0, "elitist", np.random.default_rng(7))
+    assert sorted(ranks[kept]) == [1, 1, 1, 4]

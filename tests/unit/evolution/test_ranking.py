@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+from scipy.stats import rankdata
 
 from cpfls_cli.evolution import rank
+from cpfls_cli.evolution.ranking import positions
 
 # a, b and c do not dominate one another; d is dominated by b; e by all four.
 HAND_WORKED = np.array([[1.0, 4.0], [2.0, 2.0], [4.0, 1.0], [3.0, 3.0], [4.0, 4.0]])
@@ -36,3 +38,13 @@ def test_a_weight_counts_the_first_objective_so_many_times():
 @pytest.mark.parametrize("method", ["pareto-count", "pareto-fronts"])
 def test_pareto_rankings_know_no_weight(method):
     np.testing.assert_array_equal(rank(HAND_WORKED, method, 10), rank(HAND_WORKED, method))
+
+
+@pytest.mark.parametrize("values", [[3, 1, 2], [1, 1, 2, 1], [np.inf, 0.5, np.inf, -1.0, 0.5], [7]])
+def test_positions_are_ranks_with_ties_averaged(values):
+    np.testing.assert_array_equal(positions(np.array(values)), rankdata(values, method="average"))
+
+
+def test_positions_of_many_values_with_ties():
+    values = np.random.default_rng(1).integers(0, 50, 500)
+    np.testing.assert_array_equal(positions(values), rankdata(values, method="average"))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque, torque
-from cpfls_cli.excitation.conditioning import regressor_of
+from cpfls_cli.excitation.objective import regressor_of
 from cpfls_cli.regressor import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationPath
 

@@ -4,14 +4,19 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
+import yaml
 
+from cpfls_cli.artifacts.evidence import VerdictGroup
+from cpfls_cli.artifacts.model import ModelGroup, ModelRecord, SearchGroup
+from cpfls_cli.artifacts.scores import JudgedGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.export import Evidence, Provenance, Sheet, Verdict, expected
+from cpfls_cli.export import Sheet, expected
 from cpfls_cli.fuzzy import InputRange, breakpoints
 from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure
 
+MEASURES = ("mse", "max_error", "relative_error", "r2", "r2_body")
 PAPER = {"consequents": "seesaw", "products": "additive", "membership_functions": 5, "input_map": "data-range"}
 RIGID = np.array([0.6, 0.5, 1.2, 0.02, -0.03, 0.01])
 
@@ -95,33 +100,48 @@ def _special(model: Model, axis: int) -> np.ndarray:
 
 def sheet_of(model: Model, **changes) -> Sheet:
     """Put a model on a sheet with evidence in plain words, or with what a test wants."""
-    parts = {"training": {"samples": 100, "outside": 0}}
-    scores = {"model": {"training": {"relative_error": [0.1, np.nan, 0.2], "r2": [0.9, -np.inf, 0.5]}}}
     given = {
         "name": "vehicle",
         "file": "model.h5",
         "complete": True,
         "stop_reason": "generations",
         "findings": ("two of five rules are not excited",),
-        "verdict": Verdict("good-inside-region", "up to 30 degrees", (("it predicts other flights", 1.0),)),
+        "verdict": verdict_of("good-inside-region", "up to 30 degrees", ("it predicts other flights", 1)),
         "source": "flight.h5",
         "config": {"seed": 1, "identification": {"structure": "cpfls"}},
         **changes,
     }
-    header = Header("0.1.0", 1, "seed: 1\n", {"flight": InputFile(given["source"], "0" * 64, "cpfls/flight")})
-    return Sheet(
-        given["name"],
-        model,
-        "rigid-body" if model.rigid_body.any() else "none",
-        Provenance(given["file"], "a" * 64, header, given["config"], "0.1.0"),
-        Evidence(
-            given["complete"],
-            given["stop_reason"],
-            {"parts": parts, "models": scores},
-            given["findings"],
-            given["verdict"],
-        ),
+    inputs = {"flight": InputFile(given["source"], "0" * 64, "cpfls/flight")}
+    record = ModelRecord(
+        header=Header("0.1.0", 1, yaml.safe_dump(given["config"]), inputs),
+        model=_stored(model),
+        judged=_judged(),
+        search=SearchGroup(stop_reason=given["stop_reason"], complete=given["complete"]),
+        findings=given["findings"],
+        verdict=given["verdict"],
+        **dict.fromkeys(("solve", "rules", "front", "history", "baselines", "training_indices")),
     )
+    return Sheet(given["name"], model, record, given["file"], "a" * 64)
+
+
+def verdict_of(label: str, region: str, *reasons: tuple[str, int]) -> VerdictGroup:
+    """Arrange a verdict with its reasons and what they speak for."""
+    texts, speaks = zip(*reasons, strict=True)
+    return VerdictGroup(label=label, region=region, reason=texts, speaks=np.array(speaks, dtype=float))
+
+
+def _stored(model: Model) -> ModelGroup:
+    numbers = dict.fromkeys(("weights", "partition", "breakpoints", "parameter", "input_range", "ridge_weight"))
+    base = "rigid-body" if model.rigid_body.any() else "none"
+    own = {name: getattr(model, name) for name in ("coefficients", "rigid_body", "visited")}
+    return ModelGroup(base=base, **numbers, **own)
+
+
+def _judged() -> JudgedGroup:
+    scores = {"relative_error": [0.1, np.nan, 0.2], "r2": [0.9, -np.inf, 0.5]}
+    measures = {name: np.array([[scores.get(name, [1.0, 2.0, 3.0])]]) for name in MEASURES}
+    samples, outside = np.array([100]), np.array([0])
+    return JudgedGroup(models=("model",), parts=("training",), samples=samples, outside=outside, **measures)
 
 
 def wanted_of(model: Model, motion: Motion, step: int = 1000) -> SimpleNamespace:

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cpfls_cli.export import Verdict, json_text, reference_points
-from tests.unit.export.cases import CASES, model_of, sheet_of, states
+from cpfls_cli.export import json_text, reference_points
+from tests.unit.export.cases import CASES, model_of, sheet_of, states, verdict_of
 
 
 def refuse_constant(name):
@@ -129,14 +129,15 @@ def test_numbers_come_back_bit_by_bit():
 def test_what_is_not_finite_is_null_and_what_is_not_known_is_too():
     document = document_of(model_of(CASES["paper"]), verdict=None, stop_reason="", config={"a": float("inf")})
     scores = document["judged"]["models"]["model"]["training"]
-    assert scores == {"relative_error": [0.1, None, 0.2], "r2": [0.9, None, 0.5]}
+    known = {name: [1.0, 2.0, 3.0] for name in ("mse", "max_error", "r2_body")}
+    assert scores == {**known, "relative_error": [0.1, None, 0.2], "r2": [0.9, None, 0.5]}
     assert document["verdict"] is None
     assert document["stop_reason"] is None
     assert document["provenance"]["config"] == {"a": None}
 
 
 def test_the_verdict_and_its_reasons_are_there():
-    verdict = Verdict("do-not-use", "nowhere", (("D is not positive definite", -1.0), ("few samples", 0.0)))
+    verdict = verdict_of("do-not-use", "nowhere", ("D is not positive definite", -1), ("few samples", 0))
     document = document_of(model_of(CASES["paper"]), verdict=verdict, complete=False)
     assert document["complete"] is False
     assert document["verdict"]["label"] == "do-not-use"

@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque, not_positive_definite, why_unphysical
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
-from cpfls_cli.identification.axes import axis_evidence
+from cpfls_cli.identification.excitation import axis_evidence
 from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import body_rate, generalised_torque
 

@@ -6,7 +6,7 @@ import pytest
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
-from cpfls_cli.identification.search_run import SearchRun
+from cpfls_cli.identification.search import SearchRun
 from cpfls_cli.identification.settings import LocalSearchSettings, RidgeSettings
 from cpfls_cli.regressor import Motion
 

@@ -1,11 +1,14 @@
-"""Scores worked by hand."""
+"""Scores worked by hand, baselines, and the spread of replicates beside the standard library's."""
+
+import statistics
 
 import numpy as np
 import pytest
 
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification import TorqueData
-from cpfls_cli.identification.judge import score, score_of
+from cpfls_cli.identification.judge import constant_inertia_columns, fit_baselines, score, score_of, spread
 from cpfls_cli.regressor import Motion
 
 
@@ -87,3 +90,72 @@ def test_data_that_do_not_fit_are_refused(torque, samples, message):
     zero = np.zeros((samples, 3))
     with pytest.raises(ComputationError, match=message):
         TorqueData(np.arange(samples), Motion(zero, zero, zero), torque)
+
+
+PARAMETERS = np.array([0.6, 0.7, 1.2, 0.05, -0.08, 0.1])
+
+
+def tensor(parameters):
+    xx, yy, zz, xy, xz, yz = parameters
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def motion(samples=200):
+    rng = np.random.default_rng(17)
+    return Motion(rng.uniform(-1, 1, (samples, 3)), *rng.standard_normal((2, samples, 3)))
+
+
+def fitted(torque):
+    """Baselines by name."""
+    baselines = fit_baselines(TorqueData(np.arange(200.0), motion(), torque), np.array([1.0, 2.0, 5.0]), 1e-10)
+    return {baseline.name: baseline for baseline in baselines}
+
+
+def test_columns_of_constant_inertia():
+    expected = motion().acceleration @ tensor(PARAMETERS)
+    np.testing.assert_allclose(constant_inertia_columns(motion()) @ PARAMETERS, expected, atol=1e-14)
+
+
+def test_six_inertia_parameters_come_back_exactly():
+    m = motion()
+    torque = newton_euler_torque(m.attitude, m.rate, m.acceleration, tensor(PARAMETERS))
+    by_name = fitted(torque)
+    assert list(by_name) == ["rigid-body", "constant-inertia", "torque-zero"]
+    np.testing.assert_allclose(by_name["rigid-body"].parameters, PARAMETERS, atol=1e-12)
+    np.testing.assert_allclose(by_name["rigid-body"].torque(m), torque, atol=1e-12)
+    assert np.abs(by_name["constant-inertia"].torque(m) - torque).max() > 0.1 * np.abs(torque).max()
+    np.testing.assert_array_equal(by_name["torque-zero"].torque(m), np.zeros_like(torque))
+
+
+def test_constant_inertia_comes_back_when_that_is_what_moved():
+    by_name = fitted(motion().acceleration @ tensor(PARAMETERS))
+    np.testing.assert_allclose(by_name["constant-inertia"].parameters, PARAMETERS, atol=1e-12)
+
+
+def test_rows_are_weighted_by_axis():
+    torque = np.random.default_rng(18).standard_normal((200, 3))
+    scale = np.repeat([[1.0, 2.0, 5.0]], 200, axis=0)
+    columns = constant_inertia_columns(motion())
+    expected = np.linalg.lstsq((columns * scale[:, :, None]).reshape(-1, 6), (torque * scale).ravel(), rcond=None)[0]
+    np.testing.assert_allclose(fitted(torque)["constant-inertia"].parameters, expected, atol=1e-12)
+
+
+VALUES = [0.0012, 0.0009, 0.0031, 0.0010]
+
+
+def test_mean_and_variance():
+    found = spread(np.array(VALUES))
+    assert found.count == len(VALUES)
+    assert found.mean == pytest.approx(statistics.mean(VALUES))
+    assert found.variance == pytest.approx(statistics.variance(VALUES))
+    assert found.deviation == pytest.approx(statistics.stdev(VALUES))
+
+
+def test_what_is_not_known_does_not_count():
+    assert spread(np.array([*VALUES, np.nan, np.inf])) == spread(np.array(VALUES))
+
+
+def test_too_few():
+    one, none = spread(np.array([3.0])), spread(np.array([]))
+    assert (one.count, one.mean) == (1, 3.0)
+    assert np.isnan([one.variance, one.deviation, none.mean, none.variance]).all()

@@ -1,7 +1,16 @@
+"""Least squares from rows, and normal equations against a singular value decomposition of their columns."""
+
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.least_squares import Triangle, solve
+from cpfls_cli.identification.least_squares import (
+    SMALLEST_SINGULAR_SHARE,
+    NormalEquations,
+    Triangle,
+    quick_solution,
+    solve,
+    solve_normal,
+)
 
 RNG_SEED = 12
 
@@ -68,3 +77,129 @@ def test_penalty_below_is_that_of_the_ridge_problem():
 def test_no_rows_at_all_are_an_error():
     with pytest.raises(ValueError, match="no rows"):
         Triangle.of([])
+
+
+PARAMETERS = 40
+
+
+def columns(singular_values, rows=200, seed=32):
+    """A matrix of given singular values, a right-hand side, and the parameters behind it."""
+    rng = np.random.default_rng(seed)
+    U, V = (np.linalg.qr(rng.standard_normal((n, len(singular_values))))[0] for n in (rows, len(singular_values)))
+    A, x = (U * singular_values) @ V.T, rng.standard_normal(len(singular_values))
+    return A, A @ x + 1e-3 * rng.standard_normal(rows), x
+
+
+def solved(A, y, penalty=None, rank_tolerance=1e-10):
+    def project(x, directions):
+        along = A @ directions
+        return along.T @ along, A.T @ (y - A @ x)
+
+    penalty = np.zeros(A.shape[1]) if penalty is None else penalty
+    return solve_normal(NormalEquations(A.T @ A, A.T @ y, penalty), rank_tolerance, project)
+
+
+def decay(condition, kind, scale=1.0):
+    """Singular values in three shapes: even on a logarithm, all but the last near one, a cluster of small ones."""
+    if kind == "even":
+        return scale * np.geomspace(1.0, 1.0 / condition, PARAMETERS)
+    values = np.linspace(1.0, 0.5, PARAMETERS)
+    last = 1 if kind == "one" else 6
+    values[-last:] = np.linspace(1.0, 1.2, last) / condition
+    return scale * values
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e6, 1e-6])
+@pytest.mark.parametrize("kind", ["even", "one", "cluster"])
+@pytest.mark.parametrize("condition", [3.0, 5e3, 2e4, 1e5, 1e6])
+def test_condition_number_has_six_digits(condition, kind, scale):
+    A, y, _ = columns(decay(condition, kind, scale))
+    found = solved(A, y).conditioning
+    assert found == pytest.approx(np.linalg.cond(A), rel=1e-6)
+    assert found == pytest.approx(condition, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["even", "one", "cluster"])
+@pytest.mark.parametrize("condition", [3.0, 5e3, 2e4, 1e5, 1e6])
+def test_residual_is_that_of_the_decomposition(condition, kind):
+    A, y, _ = columns(decay(condition, kind))
+    best = y - A @ np.linalg.lstsq(A, y, rcond=None)[0]
+    residual = y - A @ solved(A, y).parameters
+    assert np.mean(residual**2) == pytest.approx(np.mean(best**2), rel=1e-9)
+    np.testing.assert_allclose(residual, best, atol=1e-7 * np.abs(best).max())
+
+
+@pytest.mark.parametrize("condition", [3.0, 2e4, 1e6])
+def test_penalised_system_is_solved_with_its_penalty(condition):
+    A, y, _ = columns(decay(condition, "even"))
+    penalty = np.where(np.arange(PARAMETERS) < 6, 0.0, 1e-9)
+    stacked = np.vstack([A, np.diag(np.sqrt(penalty))])
+    expected = np.linalg.lstsq(stacked, np.append(y, np.zeros(PARAMETERS)), rcond=None)[0]
+    found = solved(A, y, penalty)
+    np.testing.assert_allclose(A @ found.parameters, A @ expected, atol=1e-9)
+    assert found.conditioning == pytest.approx(np.linalg.cond(stacked), rel=1e-6)
+
+
+def test_losing_rank_never_improves_the_conditioning():
+    """Systems whose last singular value falls through the tolerance: conditioning only rises."""
+    tolerance = 1e-6
+    found = [
+        solved(columns([8.0, 4.0, third, last])[0], np.ones(200), rank_tolerance=tolerance).conditioning
+        for third, last in ((2, 1), (2, 1e-9), (0, 0))
+    ]
+    assert found == pytest.approx([8, 2e6, 3e6])
+
+
+@pytest.mark.parametrize("rank_tolerance", [1e-10, 1e-6, 1e-4])
+@pytest.mark.parametrize("seed", range(3))
+def test_conditioning_is_ordered_to_the_end(rank_tolerance, seed):
+    """Whatever the condition number, more of it is never better, nor is one more dependent column."""
+    conditions = np.geomspace(10, 1e18, 60)
+    worse = [
+        solved(*columns(decay(condition, "one"), seed=seed)[:2], rank_tolerance=rank_tolerance).conditioning
+        for condition in conditions
+    ]
+    assert np.isfinite(worse).all()
+    assert np.all(np.diff(worse) >= -1e-6 * np.array(worse[1:]))
+    assert worse[-1] >= 2 / max(rank_tolerance, SMALLEST_SINGULAR_SHARE)
+    fewer = decay(10.0, "one")
+    fewer[-2:] = 0.0
+    assert solved(*columns(fewer, seed=seed)[:2], rank_tolerance=rank_tolerance).conditioning > worse[-1]
+
+
+def test_dependent_columns_get_the_parameters_of_smallest_norm():
+    values = np.geomspace(1.0, 0.1, PARAMETERS)
+    values[-5:] = 0.0
+    A, y, _ = columns(values)
+    found = solved(A, y)
+    np.testing.assert_allclose(found.parameters, np.linalg.pinv(A, rcond=1e-10) @ y, atol=1e-9)
+    assert found.conditioning == pytest.approx(6 / SMALLEST_SINGULAR_SHARE)
+
+
+def test_normal_equations_without_any_excitation():
+    found = solved(np.zeros((6, 3)), np.ones(6))
+    assert found.conditioning == np.inf
+    np.testing.assert_array_equal(found.parameters, np.zeros(3))
+
+
+@pytest.mark.parametrize("condition", [3.0, 1e3])
+def test_quick_solution(condition):
+    A, y, _ = columns(decay(condition, "even"))
+    A = A * np.geomspace(1e-3, 1e3, PARAMETERS)
+    penalty = np.full(PARAMETERS, 1e-3)
+    equations = NormalEquations(A.T @ A, A.T @ y, penalty)
+    parameters, (factor, lower), scale = quick_solution(equations)
+    expected = np.linalg.solve(A.T @ A + np.diag(penalty), A.T @ y)
+    np.testing.assert_allclose(A @ parameters, A @ expected, atol=1e-5 * np.abs(y).max())
+    triangle = np.tril(factor) if lower else np.triu(factor).T
+    unscaled = (triangle @ triangle.T) / scale / scale[:, None]
+    np.testing.assert_allclose(unscaled, equations.matrix, rtol=1e-6, atol=1e-9 * np.max(equations.matrix))
+
+
+def test_quick_solution_of_dependent_columns_is_finite():
+    A, y, _ = columns(decay(3.0, "even"))
+    A[:, 3], A[:, 7] = A[:, 2], 0.0
+    parameters, _, _ = quick_solution(NormalEquations(A.T @ A, A.T @ y, np.zeros(PARAMETERS)))
+    assert np.isfinite(parameters).all()
+    best = np.linalg.lstsq(A, y, rcond=None)[0]
+    np.testing.assert_allclose(A @ parameters, A @ best, atol=1e-5 * np.abs(y).max())

@@ -7,10 +7,9 @@ import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
-from cpfls_cli.identification.chromosome import LARGEST_GENE, decode
+from cpfls_cli.identification.evaluator import LARGEST_GENE, decode, refine
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.local_search import refine
-from cpfls_cli.identification.normal_equations import SMALLEST_SINGULAR_SHARE
+from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.reference import ReferenceEvaluator
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure

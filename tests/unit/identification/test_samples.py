@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data
-from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.identification.cross_validation import contiguous_blocks
-from cpfls_cli.identification.folds import with_folds
+from cpfls_cli.identification.cross_validation import contiguous_blocks, with_folds
+from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import RidgeSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, torque_sensitivity
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
 
 SETTINGS = IdentificationSettings(consequents="seesaw", products="additive", membership_functions=(1, 2, 3, 4, 3, 2))
 STRUCTURE = model_structure(SETTINGS)

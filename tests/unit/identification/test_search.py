@@ -1,17 +1,20 @@
-"""The search over a made-up evaluator: watched, stopped in the middle and continued."""
+"""The search over a made-up evaluator, watched, stopped in the middle and continued; and the choice of a member."""
 
 import copy
 from contextlib import contextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.dynamics.rigid_body import newton_euler_torque
+from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.identification.search import NothingFoundError, search
-from cpfls_cli.identification.search_run import SearchRun
-from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.identification import TorqueData, identify
+from cpfls_cli.identification.search import NothingFoundError, SearchRun, choose, search
+from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
+from cpfls_cli.regressor import Motion
 from cpfls_cli.regressor.structure import model_structure
 
 SETTINGS = IdentificationSettings(
@@ -158,3 +161,86 @@ def test_progress_goes_on_where_it_was():
     assert np.all(np.diff(done) > 0)
     assert done[-1] == 7.0
     np.testing.assert_array_equal(steps[0].best, kept[3].history.best[-1])
+
+
+# Mean squared error, largest error, condition number; the median condition number is 300.
+FRONT = np.array([[1.0, 5.0, 900.0], [2.0, 1.0, 400.0], [3.0, 4.0, 300.0], [4.0, 3.0, 200.0], [5.0, 2.0, 100.0]])
+KEPT = np.array([4.0, np.inf, 2.0, 1.0, 3.0])
+
+
+@pytest.mark.parametrize(("rule", "member"), [("mse", 0), ("max-error", 1), ("mse-below-median-condition", 2)])
+def test_rules(rule, member):
+    assert choose(FRONT, rule) == member
+    assert choose(FRONT[::-1], rule) == 4 - member
+    assert choose(FRONT[:1], rule) == 0
+
+
+def test_held_out_errors_decide_alone():
+    assert choose(FRONT, "held-out", KEPT) == 3
+    assert choose(FRONT[::-1], "held-out", KEPT[::-1]) == 1
+
+
+@pytest.mark.parametrize(("rule", "kept", "said"), [("held-out", None, "add --choose-on"), ("mse", KEPT, "held-out")])
+def test_rule_and_kept_flights_go_together(rule, kept, said):
+    with pytest.raises(SettingError, match=said) as caught:
+        choose(FRONT, rule, kept)
+    assert caught.value.key == "choice"
+
+
+FLIGHT = IdentificationSettings(
+    population=10,
+    generations=2,
+    local_search=LocalSearchSettings(evaluations=2),
+    consequents="seesaw",
+    products="additive",
+    membership_functions=3,
+    base="none",
+)
+
+
+def flight(seed, samples=120, noise=0.3):
+    rng = np.random.default_rng(seed)
+    motion = Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
+    torque = newton_euler_torque(*vars(motion).values(), np.diag([0.6, 0.7, 1.2]))
+    return TorqueData(0.01 * np.arange(samples), motion, torque + noise * rng.standard_normal(torque.shape))
+
+
+def found(base="none", kept=None, choice="held-out", **parts):
+    settings = replace(FLIGHT, base=base, choice=choice)
+    training = flight(1)
+    return identify(training, training, parts, settings, np.random.default_rng(3), kept=kept)
+
+
+@pytest.mark.parametrize("base", ["none", "rigid-body"])
+def test_errors_are_those_of_the_members_on_the_kept_flight(base):
+    """The chosen member is judged as if its flight had been given to judge, axes scaled as the solver scales them."""
+    kept = flight(5)
+    result = found(base, kept, judged=kept)
+    front = result.front
+    assert front.held_out.shape == (len(front.objectives),)
+    assert front.held_out[front.chosen] == front.held_out.min()
+    error = np.mean(result.scores["judged"]["model"].mse * result.fit.row_scale**2)
+    assert front.held_out[front.chosen] == pytest.approx(error, rel=1e-9)
+
+
+def test_the_choice_differs_between_flights_and_from_that_on_the_training_part():
+    """All come from the same search, so that only the flight that is chosen on can make the difference."""
+    fronts = [found(kept=flight(seed)).front for seed in range(5, 15)] + [found(choice="mse").front]
+    for front in fronts:
+        np.testing.assert_array_equal(front.chromosomes, fronts[0].chromosomes)
+    assert len({front.chosen for front in fronts}) > 1
+    assert fronts[-1].held_out is None
+
+
+@pytest.mark.parametrize(("choice", "kept"), [("held-out", None), ("mse", flight(5))])
+def test_a_choice_that_its_flights_do_not_fit_is_refused_before_the_search(choice, kept):
+    with pytest.raises(SettingError) as caught:
+        found(choice=choice, kept=kept)
+    assert caught.value.key == "choice"
+
+
+def test_a_structure_without_genes_has_one_member_to_choose():
+    training = flight(1)
+    settings = replace(FLIGHT, consequents="harmonic", products="tensor", membership_functions=1, choice="held-out")
+    result = identify(training, training, {}, settings, np.random.default_rng(3), kept=flight(5))
+    assert result.front.held_out.shape == (1,)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification import IdentificationSettings, TorqueData, data, dense, identify, samples
-from cpfls_cli.identification.axes import axis_evidence
-from cpfls_cli.identification.chromosome import decode
+from cpfls_cli.identification import IdentificationSettings, TorqueData, data, identify, samples, solver
 from cpfls_cli.identification.data import Flights, gathered, joined, sample_times
+from cpfls_cli.identification.evaluator import decode
+from cpfls_cli.identification.excitation import axis_evidence
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score, score_of
-from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges
+from cpfls_cli.regressor.motion import rigid_columns
 
 SETTINGS = {
     "consequents": "seesaw",
@@ -178,7 +178,7 @@ def written_out(evaluate, partitions, fit):
 @pytest.mark.parametrize("case", ["none", "rigid-body", "off"])
 def test_final_model_is_that_of_all_rows_at_once(monkeypatch, case, block):
     """The decomposition of blocks against numpy's least squares over the dense rows, the ridge below them."""
-    monkeypatch.setattr(dense, "_BLOCK", block)
+    monkeypatch.setattr(solver, "_BLOCK", block)
     source = flight()
     if case == "off":
         source = TorqueData(

@@ -13,7 +13,7 @@ from cpfls_cli.reduction import (
     reduce_streamed,
     survey,
 )
-from cpfls_cli.reduction.pool import draw_pool
+from cpfls_cli.reduction.training_set import draw_pool
 
 
 def regressor(samples=3000, columns=7, seed=0):

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution import Evaluation, start, step
-from cpfls_cli.identification.search_run import Unfinished
+from cpfls_cli.identification.search import Unfinished
 from cpfls_cli.search.checkpoint import Checkpoint
 
 INPUTS = {"flight": InputFile("f.h5", "a" * 64, "cpfls/flight"), "validate-1": InputFile("v.h5", "b" * 64, "csv")}

@@ -8,14 +8,14 @@ from scipy import linalg
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data
-from cpfls_cli.identification.baselines import fit_baselines
-from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import axis_scale
+from cpfls_cli.identification.evaluator import decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.rigid_columns import RIGID, rigid_columns
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor
+from cpfls_cli.regressor.motion import RIGID, rigid_columns
 from cpfls_cli.validation.bootstrap import bootstrap
 
 DRAWS = 30

@@ -11,9 +11,9 @@ from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.cross_validation import contiguous_blocks
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.rigid_columns import rigid_columns
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor.motion import rigid_columns
 from cpfls_cli.validation.structures import RIGID_BODY_NAME, candidate_structures, compare_structures, structure_name
 
 OWN = [

@@ -1,6 +1,7 @@
 """Evaluation by a real Dask scheduler and worker processes on the loopback."""
 
 import importlib
+import logging
 import os
 import re
 import socket
@@ -19,7 +20,8 @@ from tests.unit.workers.evaluators import POISON, Failing, Loading, Logging, Rep
 pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cpfls[dask]'")
 pytest.importorskip("threadpoolctl", reason="threadpoolctl is not installed: pip install 'cpfls[dask]'")
 
-cluster = importlib.import_module("cpfls_cli.workers.cluster").cluster
+_module = importlib.import_module("cpfls_cli.workers.cluster")
+cluster, quiet = _module.cluster, _module.quiet
 
 ROOT = Path(__file__).parents[3]
 GENES = np.random.default_rng(5).integers(0, 32768, (40, 6))
@@ -159,3 +161,13 @@ def test_an_address_where_nothing_answers_is_an_error_in_words(capfd):
     ):
         pass
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("name", ["distributed.core", "distributed.client", "tornado.application", "asyncio"])
+def test_nothing_is_logged_within_and_all_is_as_before_after(name):
+    logger = logging.getLogger(name)
+    before = logger.getEffectiveLevel()
+    with quiet():
+        assert not logger.isEnabledFor(logging.CRITICAL)
+    assert logger.isEnabledFor(logging.CRITICAL)
+    assert logger.getEffectiveLevel() == before

@@ -9,9 +9,8 @@ import pytest
 
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.workers import employ
-from cpfls_cli.workers.address import require_address
-from cpfls_cli.workers.processor import Processor, processor
-from cpfls_cli.workers.same_versions import require_same_processor, require_same_versions
+from cpfls_cli.workers.compatibility import Processor, processor, require_same_processor, require_same_versions
+from cpfls_cli.workers.employ import require_address
 
 
 class Client:

@@ -124,7 +124,7 @@ def test_an_evaluator_that_cannot_be_loaded_is_an_error_in_words():
 PARENT = """
 import sys
 import time
-from cpfls_cli.cli.threads import use_one_thread
+from cpfls_cli.cli.main import use_one_thread
 if __name__ == "__main__":
     use_one_thread()
     import numpy as np

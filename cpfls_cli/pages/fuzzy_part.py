@@ -1,0 +1,199 @@
+"""The fuzzy part of models: its input (Figure 1), partitions (Figure 6) and coefficients, and the rules excited."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.model import ModelGroup, ModelRecord
+from cpfls_cli.fuzzy.inputs import seesaw
+from cpfls_cli.fuzzy.membership import join_ends, memberships
+from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.pages.printed import PRINTED_SEESAW
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.report.canvas import line, plot, style_of
+from cpfls_cli.report.content import Block, Facts, Folded, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.numbers import count, number, percent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_POINTS = np.linspace(0.0, 1.0, 401)
+_COLUMNS = 2
+_CLOSE = 0.05
+
+
+def partitions_section(sources: Sources) -> Section | None:
+    """Show the partitions of the models and their parameters.
+
+    Returns
+    -------
+    Section or None
+        None where no model was given.
+
+    References
+    ----------
+    Figure 6 and section 10 of the paper.
+    """
+    return section_of_each("partitions", "Partitions and parameters", sources.models, _partitions)
+
+
+def rules_section(sources: Sources) -> Section | None:
+    """Show what of the models the data determine.
+
+    Returns
+    -------
+    Section or None
+        None where no model was given.
+    """
+    return section_of_each("rules", "Excitation of the rules", sources.models, _rules)
+
+
+def _partitions(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+    record = model.record
+    if record.fuzzy_part_off:
+        yield Text(f"The fuzzy part of {model.label} is off: no membership function takes part in it.", "note")
+    elif max(len(peaks) for peaks in _breakpoints(record.model).values()) > 1:
+        yield partitions_figure(f"figure-6-partitions-{index}", model)
+    else:
+        yield Text(f"{model.label} has one rule per input: its one membership function is 1 everywhere.", "note")
+    tables = [_chromosome_table(record, index), _inertia_table(record, index), _coefficients_table(record, index)]
+    yield Folded(f"Chromosome, breakpoints, inertia and coefficients of {model.label}", tables)
+
+
+def _breakpoints(model: ModelGroup) -> dict[str, Array]:
+    """Group the breakpoints of a model by partition."""
+    names = np.array(model.partition)
+    return {name: model.breakpoints[names == name] for name in dict.fromkeys(model.partition)}
+
+
+def _chromosome_table(record: ModelRecord, index: int) -> Table:
+    weights = [count(weight) for weight in record.model.weights]
+    rows = []
+    for name, peaks in _breakpoints(record.model).items():
+        own, weights = weights[: len(peaks) - 1], weights[len(peaks) - 1 :]
+        rows.append([name, " ".join(own), " ".join(number(float(peak), 5) for peak in peaks)])
+    header = ("Partition", "Weights (16 bit)", "Breakpoints")
+    return Table(f"chromosome-{index}", "Chromosome and the partitions that it encodes.", header, rows)
+
+
+def _inertia_table(record: ModelRecord, index: int) -> Table:
+    rows = [
+        [name, number(float(under)) if record.on_rigid_body else "none", number(float(alone))]
+        for name, under, alone in zip(
+            INERTIA_PARAMETERS, record.model.rigid_body, record.baselines.rigid_body, strict=True
+        )
+    ]
+    header = ("kg m²", "Under the fuzzy part", "Rigid body alone")
+    return Table(f"inertia-{index}", "Inertia found by least squares.", header, rows)
+
+
+def _coefficients_table(record: ModelRecord, index: int) -> Table:
+    pairs = zip(record.model.parameter, record.model.coefficients, strict=True)
+    rows = [[name, number(float(value), 5)] for name, value in pairs]
+    return Table(
+        f"coefficients-{index}", "Coefficients of the rule consequents, kg m².", ("Coefficient", "Value"), rows
+    )
+
+
+def _rules(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+    rules, solve = model.record.rules, model.record.solve
+    yield Heading(model.label)
+    yield Facts(
+        [
+            ("Rules excited", f"{int(np.sum(rules.excited))} of {len(rules.name)}"),
+            ("Rank of the solved system", f"{solve.rank} of {len(solve.singular_values)}"),
+            ("Condition number", f"{number(solve.condition_number, 5)} over the kept singular values"),
+        ]
+    )
+    if rules.excited.all():
+        yield Text("Every rule fires in training, and the data determine most of its coefficients.")
+        return
+    rows = [
+        [rules.name[rule], number(float(rules.firing[rule]), 3), percent(float(rules.determined[rule]))]
+        for rule in np.flatnonzero(~rules.excited)
+    ]
+    caption = (
+        "Rules that are not excited: largest firing strength in training, and the share of the rule's coefficients "
+        "that the data determine. What the model says there is not learned."
+    )
+    if model.record.fuzzy_part_off:
+        caption += " The fuzzy part is off, so the model uses none of them."
+    yield Table(f"silent-rules-{index}", caption, ("Rule", "Largest firing", "Determined"), rows)
+
+
+def seesaw_figure(name: str) -> Plot:
+    """Draw the piecewise linear seesaw over two turns, with the values that the paper prints.
+
+    References
+    ----------
+    Figure 1 and equation (11) of the paper.
+    """
+    half_turns = np.linspace(-1.0, 3.0, 801)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        line(axes, half_turns, seesaw(np.pi * half_turns)[0], **style_of(0))
+        axes.plot(list(PRINTED_SEESAW), list(PRINTED_SEESAW.values()), "o", color=style_of(1)["color"])
+        axes.set_xlabel("angle, π rad")
+        axes.set_ylabel("seesaw")
+
+    caption = (
+        "Figure 1. The seesaw of equation (11) over two turns: equal where an angle and 2π meet. Dots: the values that "
+        "the equation prints at the quarters of a turn. It takes each value twice in a turn."
+    )
+    return plot(name, caption, "A triangle wave between -1 and 1 over two turns", 2.3, draw)
+
+
+def partitions_figure(name: str, model: Source[ModelRecord]) -> Plot:
+    """Draw the membership functions of all partitions, side by side.
+
+    References
+    ----------
+    Figure 6 of the paper; equation (8).
+    """
+    partitions = _breakpoints(model.record.model)
+    joined = model.config["identification"]["structure"] == "cpfls"
+    rows = -(-len(partitions) // _COLUMNS)
+
+    def draw(figure: Figure) -> None:
+        panels = figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
+        for axes, (title, peaks) in zip(panels.flat, partitions.items(), strict=False):
+            _draw_partition(axes, peaks, joined)
+            axes.set_title(title)
+        for axes in panels.flat[len(partitions) :]:
+            axes.set_axis_off()
+        for axes in panels[:, 0]:
+            axes.set_ylabel("membership")
+        for axes in panels[-1]:
+            axes.set_xlabel("input, scaled to 0 .. 1")
+
+    circle = "; the first and the last are one function (1), which closes the circle" if joined else ""
+    caption = f"Figure 6. Membership functions of the partitions of {model.label}, numbered at their peaks{circle}."
+    return plot(name, caption, "Membership functions of each fuzzy partition on the interval 0 to 1", 1.75 * rows, draw)
+
+
+def _draw_partition(axes: Axes, peaks: Array, joined: bool) -> None:
+    # The peaks themselves belong to the grid, or a narrow function would lose its top.
+    points = np.union1d(_POINTS, peaks)
+    values = memberships(points, peaks).value
+    values = join_ends(values) if joined else values
+    for function in range(values.shape[1]):
+        axes.plot(points, values[:, function], **style_of(function))
+    axes.set_ylim(0.0, 1.18)
+    axes.set_yticks([0.0, 0.5, 1.0])
+    for index, peak in enumerate(peaks):
+        function_number = index % values.shape[1] + 1
+        colour = style_of(function_number - 1)["color"]
+        axes.text(peak, 1.03, str(function_number), ha=_side(peaks, index), fontsize=8, color=colour)
+
+
+def _side(peaks: Array, index: int) -> Literal["left", "center", "right"]:
+    """Keep the numbers of two close peaks apart."""
+    if index + 1 < len(peaks) and peaks[index + 1] - peaks[index] < _CLOSE:
+        return "right"
+    return "left" if index > 0 and peaks[index] - peaks[index - 1] < _CLOSE else "center"

@@ -1,0 +1,238 @@
+"""How models were identified: Table 5 beside the paper's, the baselines by axis, the search and its Pareto front."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup
+from cpfls_cli.pages.model import MODELS, SQUARED_TORQUE, TORQUE
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.swept import repeats_table_5
+from cpfls_cli.pages.table_5 import PRINTED, RELATIVE_ERROR, SMALLEST_MAX_ERROR, PrintedColumn
+from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
+from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.numbers import UNKNOWN, count, number, percent, r_squared
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_ROWS = (
+    "system",
+    "training points",
+    "population",
+    "generations",
+    "evaluations",
+    f"MSE of the chosen model, {SQUARED_TORQUE}",
+    f"largest error of the chosen model, {TORQUE}",
+    "its condition number",
+    "relative error",
+)
+_RELATIVE_BOUND = 0.1
+_MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
+    ("mse", f"MSE, {SQUARED_TORQUE}", lambda value: number(value, 3)),
+    ("max_error", f"Largest error, {TORQUE}", lambda value: number(value, 3)),
+    ("relative_error", "Relative error", percent),
+    ("r2", "R²", r_squared),
+    ("r2_body", "R² of body torque", r_squared),
+)
+
+
+def identification_section(sources: Sources) -> Section | None:
+    """Show the models beside each other, the paper's, and their baselines.
+
+    Returns
+    -------
+    Section or None
+        None where no model was given.
+
+    References
+    ----------
+    Table 5 of the paper.
+    """
+    if not sources.models:
+        return None
+    blocks: list[Block] = [_table(sources)]
+    if sources.settings.paper:
+        blocks.append(Text(_scale_sentence(sources), "note"))
+    for index, model in enumerate(sources.models, start=1):
+        blocks += _baselines(model, index)
+    return Section("identification", "Identification", blocks)
+
+
+def _table(sources: Sources) -> Table:
+    columns = [_column(model) for model in sources.models]
+    header = ["Quantity", *(model.label for model in sources.models)]
+    elsewhere = repeats_table_5(sources.sweeps)
+    if sources.settings.paper and not elsewhere:
+        columns += [_printed(column) for column in PRINTED]
+        header += ["Paper"] * len(PRINTED)
+    rows = [[name, *(column[index] for column in columns)] for index, name in enumerate(_ROWS)]
+    caption = (
+        "Results of the identification on the whole training part: mean squared error over the axes, largest error and "
+        "condition number of the selected model, and its largest error over the largest torque (worst axis)."
+    )
+    numbered = caption if elsewhere else f"Table 5. {caption}"
+    return Table("table-5-identification", numbered, header, rows, sentences=frozenset(range(1, len(header))))
+
+
+def _column(model: Source[ModelRecord]) -> list[str]:
+    record, settings, judged = model.record, model.config["identification"], model.record.judged
+    return [
+        {"cpfls": "cpFLS", "fls": "FLS"}[settings["structure"]] + (" on rigid body" if record.on_rigid_body else ""),
+        str(len(record.training_indices)),
+        str(settings["population"]) if record.searched else "no search",
+        str(settings["generations"]) if record.searched else "no search",
+        count(record.history.evaluations[-1]),
+        number(float(np.mean(judged.of_axes("mse", MODEL, TRAINING))), 3),
+        number(float(np.max(judged.of_axes("max_error", MODEL, TRAINING))), 3),
+        number(record.solve.condition_number, 5),
+        percent(judged.worst(MODEL, TRAINING)[0]),
+    ]
+
+
+def _printed(column: PrintedColumn) -> list[str]:
+    size = [str(value) for value in (column.samples, column.population, column.generations)]
+    return [column.system, *size, UNKNOWN, column.mse, column.max_error, column.condition_number, RELATIVE_ERROR]
+
+
+def _scale_sentence(sources: Sources) -> str:
+    """Compare the size of the torques: the paper prints absolute errors, and its torques must have been larger."""
+    ours = max(_largest_torque(model.record.judged) for model in sources.models)
+    theirs = SMALLEST_MAX_ERROR / _RELATIVE_BOUND
+    return (
+        f"Compare the relative errors, not MSE and largest error: the largest torque here is {number(ours, 2)} N m, "
+        f"whereas an error of {SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in "
+        "the paper. Its condition numbers belong to its own training path, which it does not define in full."
+    )
+
+
+def _largest_torque(judged: JudgedGroup) -> float:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        torque = judged.of_axes("max_error", MODEL, TRAINING) / judged.of_axes("relative_error", MODEL, TRAINING)
+    return float(np.max(torque[np.isfinite(torque)], initial=0.0))
+
+
+def _baselines(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+    judged = model.record.judged
+    yield Heading(f"{model.label} and its baselines")
+    yield Text(
+        "By axis of the Euler angles; the last column is about the axes of the body. All are fitted to the same "
+        "samples. Marked: the rigid body has the smaller mean squared error there."
+    )
+    header = ("Model", "Axis", *(title for _, title, _ in _MEASURES))
+    for part_number, part in enumerate(judged.parts, start=1):
+        rows = [row for name in judged.models for row in _rows(judged, part, name)]
+        caption = f"{model.label} on {part}, {judged.samples_of(part)} samples."
+        yield Table(f"baselines-{index}-{part_number}", caption, header, rows, frozenset({0, 1}))
+    lost = [part for part in judged.parts if "rigid-body" in judged.winners(part)]
+    if lost:
+        yield Text(
+            f"The rigid body beats {model.label} about at least one axis on: {', '.join(lost)}. Where it does, use the "
+            "rigid body.",
+            "warning",
+        )
+
+
+def _rows(judged: JudgedGroup, part: str, name: str) -> Iterator[list[str | Cell]]:
+    for axis, axis_name in enumerate(AXES):
+        values = [Cell(shown(float(judged.of_axes(measure, name, part)[axis]))) for measure, _, shown in _MEASURES]
+        if name == RIGID_BODY and judged.winner(part, axis) == "rigid-body":
+            values[0] = Cell(f"{values[0].text} ◂", "warning")
+        yield [MODELS.get(name, name) if axis == 0 else "", axis_name, *values]
+
+
+def search_section(sources: Sources) -> Section | None:
+    """Show how the models were found.
+
+    Returns
+    -------
+    Section or None
+        None where no model was given.
+    """
+    return section_of_each("search", "Search", sources.models, _search)
+
+
+def _search(model: Source[ModelRecord], index: int) -> Iterator[Block]:
+    if not model.record.searched:
+        yield Text(
+            f"No search: one chromosome. {model.label} has one rule per input, so there is no partition to search for.",
+            "note",
+        )
+        return
+    if model.record.fuzzy_part_off:
+        yield Text(
+            f"The fuzzy part of {model.label} is off, so all chromosomes may give one and the same model, and the "
+            "search decides nothing.",
+            "note",
+        )
+    yield convergence_figure(f"convergence-{index}", model)
+    yield front_figure(f"pareto-front-{index}", model)
+
+
+def convergence_figure(name: str, model: Source[ModelRecord]) -> Plot:
+    """Draw the best of each objective found so far, by generation."""
+    history = model.record.history
+    generation = np.arange(len(history.best))
+    error, unit = _first_objective(model.record)
+    titles = (f"smallest {error}", "smallest largest error", "smallest condition number")
+    units = (unit, "N m", "pure number")
+
+    def draw(figure: Figure) -> None:
+        from matplotlib.ticker import MaxNLocator
+
+        panels = stacked(figure, len(titles))
+        for axes, title, unit, best in zip(panels, titles, units, history.best.T, strict=True):
+            axes.plot(generation, np.where(np.isfinite(best), best, np.nan), marker="o", markersize=3, **style_of(0))
+            axes.set_title(title)
+            axes.set_ylabel(unit)
+            plain_ticks(axes.yaxis)
+        panels[-1].set_xlabel("generation")
+        panels[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+
+    caption = (
+        f"Search of {model.label}: the best value of each objective found so far, each possibly by another chromosome; "
+        f"{history.evaluations[-1]} chromosomes were evaluated."
+    )
+    return plot(name, caption, f"Best {error}, largest error and condition number by generation", 4.6, draw)
+
+
+def front_figure(name: str, model: Source[ModelRecord]) -> Plot:
+    """Draw the members of the Pareto front and mark the chosen one."""
+    objectives, chosen = model.record.front.objectives, model.record.front.chosen
+    error, unit = _first_objective(model.record)
+    others = np.arange(len(objectives)) != chosen
+    mark: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "markeredgewidth": 2}
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        shown = objectives[others]
+        axes.plot(shown[:, 2], shown[:, 0], "o", color=style_of(0)["color"], markersize=5, label="not dominated")
+        axes.plot(*objectives[chosen, [2, 0]], "D", color=style_of(1)["color"], label="chosen", **mark)
+        axes.set_xlabel("condition number")
+        axes.set_ylabel(f"{error}, {unit}")
+        plain_ticks(axes.yaxis)
+        axes.set_xscale("log")
+        legend_above(axes)
+
+    members = f"{len(objectives)} member{'s' if len(objectives) > 1 else ''}"
+    rule = model.config["identification"]["choice"]
+    caption = (
+        f"Pareto front of {model.label}, {members}: {error} against condition number, as the search saw "
+        f"them. The third objective, the largest error, is not shown, so a member may look dominated "
+        f"here. The chosen one follows the rule {rule}."
+    )
+    return plot(name, caption, f"Scatter of {error} against condition number, the chosen member marked", 3.0, draw)
+
+
+def _first_objective(record: ModelRecord) -> tuple[str, str]:
+    """Name the error that the search minimised, and its unit.
+
+    Over a rigid body it is the error on blocks left out in turn, every axis divided by its own scale.
+    """
+    if record.on_rigid_body:
+        return "cross-validated error", "scaled torque²"
+    return "mean squared error", "(N m)²"

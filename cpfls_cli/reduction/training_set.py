@@ -1,0 +1,340 @@
+"""Reduce a training set, held in memory or read in chunks: by a criterion, or at random as the baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.reduction.criteria import EXCHANGE_INFORMATION, make_criterion
+from cpfls_cli.reduction.exchange import exchange_samples
+from cpfls_cli.reduction.factor import TriangularFactor
+from cpfls_cli.reduction.limits import sample_limit, starting_samples, stop_reason
+from cpfls_cli.reduction.selection import Run, Selection, Subset
+from cpfls_cli.reduction.settings import ReductionSettings
+from cpfls_cli.reduction.survey import RowSpace, Survey, row_space, space_of, survey
+
+Progress = Callable[[int, int], None]
+
+# Of a sample without leverage; places not yet taken have less.
+_LOWEST_KEY = -np.finfo(float).max
+
+# Rows wait until so many samples are together, because a QR factorisation of few rows costs as much as of many.
+_WAITING_SAMPLES = 256
+
+
+def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
+    """Choose samples one by one, each the best next one by the criterion, or all of them by exchanges.
+
+    All criteria but the printed rule begin with the fewest samples that reach the full rank. Where all samples
+    together are rank deficient, the selection works in their row space. Samples chosen by exchanges are returned, and
+    traced, in the order in which the criterion D takes them.
+
+    Parameters
+    ----------
+    Q : array, shape (samples, 3, parameters)
+        Regressor, three rows per sample.
+    settings : ReductionSettings
+    progress : callable, optional
+        Called with the samples chosen and the most there can be.
+
+    Raises
+    ------
+    ComputationError
+        If Q has the wrong shape or a value that is not finite, or is zero everywhere.
+    SettingError
+        If the size is larger than the number of samples or too small for the rank.
+
+    References
+    ----------
+    Paper, section 8, eq. (19); method.md, section 6.
+    """
+    return choose(row_space(Q, settings.rank_tolerance), settings, progress)
+
+
+def check_reducible(Q: Array, settings: ReductionSettings) -> None:
+    """Refuse what `reduce` would refuse, without the work of choosing.
+
+    Parameters
+    ----------
+    Q : array, shape (samples, 3, parameters)
+    settings : ReductionSettings
+
+    Raises
+    ------
+    ComputationError, SettingError
+        See `reduce`.
+    """
+    check_space(row_space(Q, settings.rank_tolerance), settings)
+
+
+def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
+    """Choose samples of a row space as `reduce` does.
+
+    Raises
+    ------
+    SettingError
+        See `reduce`.
+    """
+    limit = sample_limit(space, settings)
+    start = starting_samples(space, settings.criterion, limit)
+    if settings.criterion in EXCHANGE_INFORMATION:
+        return _exchanged(space, start, limit, settings, progress)
+    criterion = make_criterion(space, settings.criterion)
+    return _one_by_one(Run(space, criterion, start), limit, settings, progress)
+
+
+def check_space(space: RowSpace, settings: ReductionSettings) -> None:
+    """Refuse what `choose` would refuse, without the work of choosing.
+
+    Raises
+    ------
+    SettingError
+        See `reduce`.
+    """
+    starting_samples(space, settings.criterion, sample_limit(space, settings))
+
+
+def _exchanged(
+    space: RowSpace, start: IntArray, limit: int, settings: ReductionSettings, progress: Progress | None
+) -> Selection:
+    """Exchange samples, then put those chosen in the D-optimal order, and stop there as for every criterion."""
+    information = EXCHANGE_INFORMATION[settings.criterion]
+    exchanged = exchange_samples(space, start, limit, information, settings.condition_number)
+    chosen = replace(space, rows=space.rows[exchanged.indices])
+    run = Run(chosen, make_criterion(chosen, "D"), starting_samples(chosen, "D", chosen.samples))
+    selection = _one_by_one(run, chosen.samples, settings, progress)
+    indices = exchanged.indices[selection.indices]
+    return replace(selection, indices=indices, exchanges=exchanged.exchanges)
+
+
+def _one_by_one(run: Run, limit: int, settings: ReductionSettings, progress: Progress | None) -> Selection:
+    while not (reason := stop_reason(run, settings, limit)):
+        run.step()
+        if progress is not None:
+            progress(len(run.indices), limit)
+    return run.selection(settings.criterion, reason)
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Samples held in memory out of all those surveyed.
+
+    Attributes
+    ----------
+    indices : array of int, shape (pool,)
+        Which samples they are, ascending.
+    space : RowSpace
+        Their rows.
+    """
+
+    indices: IntArray
+    space: RowSpace
+
+
+def draw_pool(surveyed: Survey, size: int, rng: np.random.Generator) -> Pool:
+    """Hold all samples where they fit, else draw some without replacement by their leverage, in one pass.
+
+    The leverage ``h_i = trace(R_i (Q^T Q)^-1 R_i^T)`` says how much of what all samples determine rests on sample
+    i: one that alone determines a direction has 1 or more. Sample i gets the key ``log(u_i) / h_i`` with u_i
+    uniform, and the largest keys are kept.
+
+    Parameters
+    ----------
+    surveyed : Survey
+    size : int
+        Samples to hold at most.
+    rng : numpy.random.Generator
+        One number per sample is drawn, in order, and none where all samples fit.
+
+    Raises
+    ------
+    ComputationError
+        If the samples drawn do not determine all that the whole regressor determines.
+
+    References
+    ----------
+    Efraimidis, Spirakis 2006: Weighted random sampling with a reservoir.
+    """
+    if surveyed.samples <= size:
+        rows = np.concatenate(list(surveyed.projected()))
+        return Pool(np.arange(len(rows)), space_of(surveyed, rows))
+    reservoir = _Reservoir(size, surveyed.rank)
+    for rows in surveyed.projected():
+        leverage = np.sum((rows / surveyed.singular_values) ** 2, axis=(1, 2))
+        with np.errstate(divide="ignore"):
+            keys = np.log(rng.random(len(rows))) / leverage
+        reservoir.offer(np.maximum(keys, _LOWEST_KEY), rows)
+    order = np.argsort(reservoir.indices)
+    pool = Pool(reservoir.indices[order], space_of(surveyed, reservoir.rows[order]))
+    _require_rank(pool.space, size)
+    return pool
+
+
+class _Reservoir:
+    """The rows with the largest keys so far."""
+
+    def __init__(self, size: int, columns: int) -> None:
+        self._keys = np.full(size, -np.inf)
+        self.indices: IntArray = np.full(size, -1, dtype=np.int64)
+        self.rows: Array = np.zeros((size, 3, columns))
+        self._offered = 0
+
+    def offer(self, keys: Array, rows: Array) -> None:
+        size = len(self._keys)
+        kept = np.zeros(size + len(keys), dtype=bool)
+        kept[np.argpartition(np.concatenate([self._keys, keys]), len(keys))[-size:]] = True
+        entering = np.flatnonzero(kept[size:])
+        leaving = np.flatnonzero(~kept[:size])
+        self._keys[leaving], self.rows[leaving] = keys[entering], rows[entering]
+        self.indices[leaving] = self._offered + entering
+        self._offered += len(keys)
+
+
+def _require_rank(space: RowSpace, size: int) -> None:
+    factor = TriangularFactor(space.rank, space.rank_tolerance)
+    factor.add(space.rows.reshape(-1, space.rank))
+    if not factor.full_rank:
+        raise ComputationError(
+            f"reduction.pool = {size}: samples drawn have rank {factor.rank}, all samples {space.rank}; raise it"
+        )
+
+
+def reduce_streamed(
+    surveyed: Survey, settings: ReductionSettings, rng: np.random.Generator, progress: Progress | None = None
+) -> Selection:
+    """Choose samples of a surveyed regressor, in one more pass.
+
+    Where all samples fit in the pool, the choice is that of `reduce`. Else it is made from a pool drawn by leverage;
+    rank and condition number of the full set are of all samples all the same.
+
+    Parameters
+    ----------
+    surveyed : Survey
+        Made with the settings' rank tolerance.
+    settings : ReductionSettings
+    rng : numpy.random.Generator
+        Not used where all samples fit in the pool.
+    progress : callable, optional
+        Called with the samples chosen and the most there can be.
+
+    Returns
+    -------
+    Selection
+        With indices into all samples.
+
+    Raises
+    ------
+    ComputationError
+        If the samples of the pool do not determine all that the whole regressor determines.
+    SettingError
+        See `reduce`.
+
+    References
+    ----------
+    method.md, section 6.
+    """
+    pool = draw_pool(surveyed, settings.pool, rng)
+    selection = choose(pool.space, settings, progress)
+    exhausted = selection.stop_reason == "all-samples" and len(pool.indices) < surveyed.samples
+    reason = "pool" if exhausted else selection.stop_reason
+    return replace(selection, indices=pool.indices[selection.indices], stop_reason=reason)
+
+
+def check_streamed(surveyed: Survey, settings: ReductionSettings, rng: np.random.Generator) -> None:
+    """Refuse what `reduce_streamed` would refuse, without the work of choosing.
+
+    Raises
+    ------
+    ComputationError, SettingError
+        See `reduce_streamed`.
+    """
+    check_space(draw_pool(surveyed, settings.pool, rng).space, settings)
+
+
+def random_selections(
+    Q: Array, size: int, count: int, rng: np.random.Generator, rank_tolerance: float = 1e-10
+) -> tuple[Subset, ...]:
+    """Choose samples at random, each with the same probability and none twice, several times over.
+
+    Parameters
+    ----------
+    Q : array, shape (samples, 3, parameters)
+    size : int
+        Samples to choose.
+    count : int
+        Subsets to choose, independently of each other.
+    rng : numpy.random.Generator
+    rank_tolerance : float
+        Singular values below this fraction of the largest count as zero.
+
+    Raises
+    ------
+    ComputationError
+        If Q has the wrong shape or a value that is not finite, or if the size is not between 1 and the number
+        of samples.
+    """
+    return random_streamed(survey(lambda: [Q], rank_tolerance), size, count, rng)
+
+
+def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Generator) -> tuple[Subset, ...]:
+    """Choose samples of a surveyed regressor at random as `random_selections` does, in one pass.
+
+    Parameters
+    ----------
+    surveyed : Survey
+    size : int
+        Samples to choose.
+    count : int
+        Subsets to choose, independently of each other.
+    rng : numpy.random.Generator
+
+    Raises
+    ------
+    ComputationError
+        If the size is not between 1 and the number of samples.
+    """
+    if not 1 <= size <= surveyed.samples:
+        raise ComputationError(f"size = {size}: expected 1 to {surveyed.samples}, the number of samples")
+    draws = [_Draw(rng.choice(surveyed.samples, size, replace=False), surveyed) for _ in range(count)]
+    first = 0
+    for rows in surveyed.projected():
+        for draw in draws:
+            draw.take(first, rows)
+        first += len(rows)
+    return tuple(draw.subset() for draw in draws)
+
+
+class _Draw:
+    """One random choice, its rows taken from passing blocks."""
+
+    def __init__(self, indices: IntArray, surveyed: Survey) -> None:
+        self._indices, self._surveyed = indices, surveyed
+        self._ascending = np.sort(indices)
+        self._factor = TriangularFactor(surveyed.rank, surveyed.rank_tolerance)
+        self._waiting: list[Array] = []
+
+    def take(self, first: int, rows: Array) -> None:
+        begin, end = np.searchsorted(self._ascending, [first, first + len(rows)])
+        self._waiting.append(rows[self._ascending[begin:end] - first])
+        if sum(map(len, self._waiting)) >= _WAITING_SAMPLES:
+            self._add_waiting()
+
+    def _add_waiting(self) -> None:
+        self._factor.add(np.concatenate(self._waiting).reshape(-1, self._surveyed.rank))
+        self._waiting = []
+
+    def subset(self) -> Subset:
+        if self._waiting:
+            self._add_waiting()
+        return Subset(
+            criterion="random",
+            indices=self._indices,
+            condition_number=self._factor.condition_number,
+            condition_number_full=self._surveyed.condition_number,
+            rank=self._factor.rank,
+            rank_full=self._surveyed.rank,
+        )

@@ -1,0 +1,135 @@
+"""The membership function and its copies, which `cpfls_cli.fuzzy.membership` lists, at the same points.
+
+A model of one function of roll whose rules have the coefficients 0, 1, 0, 1 ... gives the memberships themselves:
+with the Euler rates (0, 2, 0) and the accelerations (0, 1, 0) its torque is minus twice their slope about roll, and
+their value about pitch. Derivatives by the breakpoints are compared in `tests/unit/regressor/test_kernels.py`.
+"""
+
+import re
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.export import c_source, python_source, reference_points
+from cpfls_cli.export.json_form import HOW_TO_EVALUATE
+from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
+from cpfls_cli.regressor import Motion, Regressor, kernels
+from cpfls_cli.regressor.table import padded_breakpoints, structure_table
+from tests.unit.export.cases import Case, model_of, sheet_of
+from tests.unit.export.compiled import evaluate, require_gcc, written
+
+METHOD = Path(__file__).parents[3] / "docs/method.md"
+FUNCTIONS = 6
+STRUCTURES = {
+    "circular": {"membership_functions": FUNCTIONS},
+    "classic": {"membership_functions": FUNCTIONS, "structure": "fls", "consequents": "seesaw"},
+}
+MIDDLE = [np.nextafter(0.5, 0), 0.5, np.nextafter(0.5, 1)]
+
+
+@pytest.fixture(params=STRUCTURES)
+def case(request):
+    """A model that gives memberships, states at which it does, and what its torque is by the definition."""
+    model = model_of(Case({**STRUCTURES[request.param], "input_map": "full-circle"}), seed=4)
+    block = next(block for block in model.structure.blocks if block.function.name == "D22")
+    peaks = model.partitions[block.partitions[0]]
+    coefficients = np.zeros(model.structure.parameters)
+    # The first feature of a rule is the constant 1.
+    coefficients[block.columns] = np.outer(np.arange(block.rules) % 2, np.arange(block.features) == 0).ravel()
+    u = np.append(np.linspace(0.01, 0.99, 37), MIDDLE)
+    x = (peaks[:-1, None] + np.diff(peaks)[:, None] * u).ravel()
+    seam = 0.0 if model.structure.circular else 0.5
+    attitude = np.column_stack([2 * np.pi * (x - seam), np.zeros((len(x), 2))])
+    return SimpleNamespace(
+        model=replace(model, coefficients=coefficients),
+        motion=Motion(attitude, np.tile([0.0, 2.0, 0.0], (len(x), 1)), np.tile([0.0, 1.0, 0.0], (len(x), 1))),
+        expected=by_definition(x, peaks, model.structure.circular),
+    )
+
+
+def by_definition(x, peaks, circular):
+    """Torque of the model by Zadeh's function alone, interval by interval."""
+    torque = np.zeros((len(x), 3))
+    for row, value in enumerate(x):
+        left = np.flatnonzero(peaks[:-1] <= value)[-1]
+        right = 0 if circular and left + 2 == len(peaks) else left + 1
+        width = peaks[left + 1] - peaks[left]
+        u = (value - peaks[left]) / width
+        falling, slope = (1 - 2 * u**2, -4 * u) if u < 0.5 else (2 * (1 - u) ** 2, -4 * (1 - u))
+        degree = falling * (left % 2) + (1 - falling) * (right % 2)
+        by_roll = (left % 2 - right % 2) * slope / width / (2 * np.pi)
+        torque[row] = -2 * by_roll, degree, 0.0
+    return torque
+
+
+def assert_same(torque, case):
+    assert case.expected.any(axis=0).tolist() == [True, True, False]
+    # A position u next to the middle may fall on either side of it; both formulas meet there.
+    np.testing.assert_allclose(torque, case.expected, rtol=0, atol=1e-12 * np.max(np.abs(case.expected)))
+
+
+def test_the_library(case):
+    assert_same(case.model.torque(case.motion), case)
+
+
+def test_the_compiled_loops(case):
+    """Three columns of ones, one for each axis, make the sums of a sample its rows of the regressor."""
+    structure, samples = case.model.structure, len(case.motion)
+    gram = np.zeros((samples, structure.parameters, structure.parameters))
+    rows = np.zeros((samples, structure.parameters, 3))
+    chunk = kernels.Chunk(*vars(case.motion).values(), np.tile(np.eye(3), (samples, 1, 1)))
+    breakpoints = padded_breakpoints(case.model.partitions)
+    table = structure_table(structure, case.model.ranges)
+    kernels.add_gram(table, breakpoints, chunk, np.ones(3), np.arange(samples), gram, rows)
+    assert_same(rows.swapaxes(1, 2) @ case.model.coefficients, case)
+    dense = Regressor(structure, case.motion, case.model.ranges).matrix(case.model.partitions)
+    np.testing.assert_allclose(rows.swapaxes(1, 2), dense, rtol=0, atol=1e-12 * np.max(np.abs(dense)))
+
+
+def test_the_exported_c(case, tmp_path):
+    require_gcc(tmp_path)
+    points = reference_points(case.model, np.random.default_rng(3))
+    written(tmp_path, "vehicle", c_source(sheet_of(case.model), points, "vehicle"))
+    assert_same(evaluate(tmp_path, "vehicle", "vehicle", case.motion)["torque"], case)
+
+
+def test_the_exported_python(case):
+    points, names = reference_points(case.model, np.random.default_rng(3)), {"__name__": "vehicle"}
+    exec(python_source(sheet_of(case.model), points, "vehicle.py"), names)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torque, _ = names["torque"](*vars(case.motion).values())
+    assert_same(torque, case)
+
+
+def formula(words):
+    """Make a function of what words say: one term up to the middle, another one after it."""
+    plain = " ".join(words.replace("`", "").replace("²", "^2").split()).replace("^", "**")
+    terms = re.search(r"(\S.*?) up to (?:u = 1/2|the middle) and (.+?) after it", plain).groups()
+    left, right = (re.sub(r"(?<=\d) ?(?=[u(])", " * ", term) for term in terms)
+    return lambda u: eval(left if u < 0.5 else right, {"u": u})
+
+
+@pytest.mark.parametrize("page", ["json", "method.md"])
+def test_the_words(page):
+    words = next(line for line in HOW_TO_EVALUATE if Z_FUNCTION in line) if page == "json" else METHOD.read_text()
+    said = formula(words[words.index("1 - 2") :])
+    u = np.append(np.linspace(0, 1, 41), MIDDLE)
+    np.testing.assert_allclose([said(value) for value in u], z_function(u)[0], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(memberships(u, np.array([0.0, 1.0])).value[:, 0], z_function(u)[0], rtol=0, atol=1e-15)
+
+
+def test_what_the_formula_must_satisfy():
+    """The ends give a continuous torque; the derivatives are those of the value."""
+    value, first, second = z_function(np.array([0.0, 0.5, 1.0]))
+    assert value.tolist() == [1.0, 0.5, 0.0]
+    assert [first[0], first[-1]] == [0.0, 0.0]
+    assert second[0] == -second[-1]
+    u, step = np.linspace(0.02, 0.98, 16), 1e-6
+    for k in (0, 1):
+        slope = (z_function(u + step)[k] - z_function(u - step)[k]) / (2 * step)
+        np.testing.assert_allclose(z_function(u)[k + 1], slope, atol=1e-8)
