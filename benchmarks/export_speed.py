@@ -26,7 +26,7 @@ from cpfls_cli.fuzzy import InputRange
 from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
-from tests.unit.export.cases import sheet_of
+from tests.builders.exported_models import sheet_of
 
 BATCH, PASSES, SINGLES = 4096, 50, 50
 BUDGET_NS = 10_000

@@ -29,10 +29,11 @@ import numpy as np
 
 from benchmarks.shared.studies import CONFIG, paper_flight, paper_study
 from cpfls_cli import __version__
+from cpfls_cli.artifacts.flight import MOTION
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
 from cpfls_cli.artifacts.store import text_sha256
 from cpfls_cli.config.study import resolved_yaml
-from cpfls_cli.flights.flight_source import MOTION, flight_source
+from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import LARGEST_GENE, refine
 from cpfls_cli.identification.identify import model_evaluator

@@ -29,7 +29,7 @@ from benchmarks.shared.studies import paper_flight, paper_study, regressor_matri
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.reference import ReferenceEvaluator
-from cpfls_cli.pages.claims.timing import line_through
+from cpfls_cli.pages.claims import line_through
 
 SIZES = (343, 485, 685, 970, 1170, 1940, 2743, 3880, 5487)
 COLUMNS = ("samples", "svd_s", "evaluation_s", "compiled_s")

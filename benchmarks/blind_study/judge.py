@@ -6,12 +6,12 @@ import time
 from pathlib import Path
 
 from benchmarks.blind_study.baselines import baselines
-from cpfls_cli.commands.plain_json import plain
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import generator
 from cpfls_cli.errors import CpflsError
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.gap.diagnose import diagnose
+from cpfls_cli.report.outcome import plain
 
 
 def judge(folder, compared=False):

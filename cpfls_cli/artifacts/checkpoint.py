@@ -2,10 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+
+if TYPE_CHECKING:
+    # What searches loads compiled kernels, which nobody waits for who only reads an artifact.
+    from cpfls_cli.evolution.archive import Evaluation
+    from cpfls_cli.evolution.state import EvolutionState
+    from cpfls_cli.identification.search import Unfinished
+
+_BEFORE_ALL = -1
+_NO_GENERATOR = "null"
+
+
+@dataclass(frozen=True)
+class StoppedSearch:
+    """What a stopped search leaves behind.
+
+    Attributes
+    ----------
+    state : EvolutionState or None
+        After its last generation; None if not even the initial population was evaluated.
+    unfinished : Unfinished
+        What was evaluated of the generation after it.
+    """
+
+    state: EvolutionState | None
+    unfinished: Unfinished
 
 
 @record
@@ -90,3 +120,100 @@ class CheckpointRecord(Record):
     history: HistoryGroup = group("history")
     unfinished: UnfinishedGroup = group("unfinished")
     sha256: str = dataset("sha256", "of the bytes of all datasets above, in this order")
+
+    @classmethod
+    def of_state(cls, state: EvolutionState) -> Self:
+        """Arrange the state of a search after a generation."""
+        population = PopulationGroup(
+            genes=state.genes.astype(np.uint16), objectives=state.objectives, subpopulation=state.subpopulations
+        )
+        none, submitted, results = state.genes[:0], state.archive.submitted, state.archive.results
+        unsealed = cls(
+            generation=state.index,
+            generator=json.dumps(state.rng.bit_generator.state),
+            population=population,
+            archive=ArchiveGroup(**_stored(submitted, results.genes, results.objectives)),
+            history=HistoryGroup(**vars(state.history)),
+            unfinished=UnfinishedGroup(**_stored(none, none, state.objectives[:0])),
+            sha256="",
+        )
+        return unsealed._sealed()
+
+    @classmethod
+    def of_nothing(cls, unfinished: Unfinished) -> Self:
+        """Arrange a search that has not evaluated its whole initial population, only this part of it."""
+        from cpfls_cli.evolution.state import History
+
+        none, objectives = unfinished.submitted[:0], unfinished.evaluation.objectives[:0]
+        empty = cls(
+            generation=_BEFORE_ALL,
+            generator=_NO_GENERATOR,
+            population=PopulationGroup(genes=none.astype(np.uint16), objectives=objectives, subpopulation=np.arange(0)),
+            archive=ArchiveGroup(**_stored(none, none, objectives)),
+            history=HistoryGroup(**vars(History.empty(objectives.shape[1]))),
+            unfinished=UnfinishedGroup(**_stored(none, none, objectives)),
+            sha256="",
+        )
+        return empty.with_unfinished(unfinished)
+
+    def with_unfinished(self, unfinished: Unfinished) -> Self:
+        """Replace what was evaluated of the next generation."""
+        evaluation = unfinished.evaluation
+        stored = _stored(unfinished.submitted, evaluation.genes, evaluation.objectives)
+        return replace(self, unfinished=UnfinishedGroup(**stored))._sealed()
+
+    def stopped_search(self) -> StoppedSearch:
+        """Rebuild what the search left, equal to what was stored down to the last bit.
+
+        Raises
+        ------
+        ValueError
+            If the datasets are not those that were written.
+        """
+        if self.sha256 != self._seal():
+            raise ValueError("its datasets were changed after it was written (sha256 differs)")
+        from cpfls_cli.identification.search import Unfinished
+
+        unfinished = Unfinished(*_evaluated(self.unfinished))
+        return StoppedSearch(self._state() if self.generation > _BEFORE_ALL else None, unfinished)
+
+    def _state(self) -> EvolutionState:
+        from cpfls_cli.evolution.archive import Archive
+        from cpfls_cli.evolution.state import EvolutionState, History
+
+        rng = np.random.default_rng()
+        rng.bit_generator.state = json.loads(self.generator)
+        return EvolutionState(
+            self.generation,
+            _genes(self.population.genes),
+            self.population.objectives,
+            self.population.subpopulation,
+            Archive.of(*_evaluated(self.archive)),
+            History(**vars(self.history)),
+            rng,
+        )
+
+    def _sealed(self) -> Self:
+        return replace(self, sha256=self._seal())
+
+    def _seal(self) -> str:
+        """Hash the datasets in the order of the format."""
+        digest, seal = hashlib.sha256(), self.path("sha256")
+        for path, value in self.data.items():
+            if path != seal:
+                digest.update(str(value).encode() if value.ndim == 0 else value.tobytes())
+        return digest.hexdigest()
+
+
+def _stored(submitted: IntArray, genes: IntArray, objectives: Array) -> dict[str, Any]:
+    return {"submitted": submitted.astype(np.uint16), "genes": genes.astype(np.uint16), "objectives": objectives}
+
+
+def _evaluated(stored: ArchiveGroup | UnfinishedGroup) -> tuple[IntArray, Evaluation]:
+    from cpfls_cli.evolution.archive import Evaluation
+
+    return _genes(stored.submitted), Evaluation(_genes(stored.genes), stored.objectives)
+
+
+def _genes(stored: Any) -> IntArray:
+    return np.asarray(stored, dtype=np.int64)

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
+
+if TYPE_CHECKING:
+    from cpfls_cli.control import Plan, Scores
+    from cpfls_cli.flightlog.results import ImportedFlight
+    from cpfls_cli.identification.model import Model
+    from cpfls_cli.regressor.motion import Motion
+    from cpfls_cli.simulation import SimulatedEffects
+
+MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
+"""Fields of trajectories and flights that hold Euler angles and their derivatives."""
 
 
 @record
@@ -18,6 +32,24 @@ class QualityGroup:
     count: IntArray | None = dataset("count", "rows, gaps or values by reason", "reason", default=None)
     warning: tuple[str, ...] | None = dataset("warning", "what to know about the log", "warning", default=None)
 
+    @classmethod
+    def of(cls, findings: Mapping[str, int], warnings: Sequence[str]) -> Self | None:
+        """Arrange what was found in a log, with how often, and the warnings; None where there is neither."""
+        if not findings and not warnings:
+            return None
+        return cls(
+            reason=tuple(findings) if findings else None,
+            count=np.array(list(findings.values()), dtype=np.int64) if findings else None,
+            warning=tuple(warnings) if warnings else None,
+        )
+
+    @property
+    def findings(self) -> dict[str, int]:
+        """What was found and done, with how often."""
+        if self.reason is None or self.count is None:
+            return {}
+        return dict(zip(self.reason, self.count.tolist(), strict=True))
+
 
 @record
 class DelayGroup:
@@ -27,6 +59,11 @@ class DelayGroup:
     tried: Array | None = dataset("tried", "delays tried by the estimate", "tried", units="s", default=None)
     r2: Array | None = dataset("r2", "R2 of the rigid body by delay, axes together", "tried", default=None)
 
+    @property
+    def best_r2(self) -> float | None:
+        """R2 of the rigid body at the delay that was estimated; None where the config states the delay."""
+        return None if self.r2 is None else float(np.max(self.r2, initial=-np.inf))
+
 
 @record
 class NoiseGroup:
@@ -35,6 +72,18 @@ class NoiseGroup:
     signal: tuple[str, ...] = dataset("signal", "signals with added noise", "noisy")
     std: Array = dataset("std", "standard deviation added", "noisy", "axis", units="SI")
 
+    @classmethod
+    def of(cls, std: Mapping[str, Array]) -> Self | None:
+        """Arrange the noise of the signals with three axes; None where none is noisy.
+
+        Parameters
+        ----------
+        std : mapping of str to array
+            Standard deviation of the noise of each channel, by signal.
+        """
+        names = [name for name, deviations in std.items() if np.shape(deviations) == (3,)]
+        return cls(signal=tuple(names), std=np.array([std[name] for name in names])) if names else None
+
 
 @record
 class FlownEffectsGroup:
@@ -42,6 +91,24 @@ class FlownEffectsGroup:
 
     name: tuple[str, ...] = dataset("name", "what was flown beyond the model, by value", "flown")
     value: Array = dataset("value", "the true value of each", "flown", units="SI")
+
+    @classmethod
+    def of(cls, effects: SimulatedEffects) -> Self | None:
+        """Arrange the effects of a flight; None where it has none."""
+        values = dict(_effect_values(effects))
+        return cls(name=tuple(values), value=np.array(list(values.values()))) if values else None
+
+    @property
+    def by_name(self) -> dict[str, float]:
+        """The true values by ``effect.coefficient``."""
+        return dict(zip(self.name, self.value.tolist(), strict=True))
+
+
+def _effect_values(effects: SimulatedEffects) -> Iterator[tuple[str, float]]:
+    for flown in effects.listed:
+        name = flown.effect.name
+        # An effect without numbers is there once.
+        yield from [(f"{name}.{entry}", value) for entry, value in flown.values.items()] or [(name, 1.0)]
 
 
 @record
@@ -86,6 +153,77 @@ class TrackingGroup:
     control_rate: float = dataset("control_rate", "commands in a second", units="1/s")
     outside: BoolArray = dataset("outside", "1 where the flight leaves what the model's training visited", "time")
     not_positive_definite: int = dataset("not_positive_definite", "samples of the flight where no body has the D(q)")
+
+    @classmethod
+    def of(cls, plan: Plan, controllers: Sequence[str], scores: Scores, model: Model, attitude: Array) -> Self:
+        """Arrange a comparison.
+
+        Parameters
+        ----------
+        controllers : sequence of str
+            Their names.
+        attitude : array, shape (time, 3), rad
+            Of the flight under the model's controller.
+        """
+        from cpfls_cli.dynamics.rigid_body import not_positive_definite
+
+        return cls(
+            controller=tuple(controllers),
+            time=plan.time[:: plan.parts],
+            error=scores.error,
+            settled_from=scores.settled_from,
+            rms=scores.rms,
+            settled_rms=scores.settled_rms,
+            max_error=scores.largest,
+            settled_max=scores.settled_largest,
+            torque_rms=scores.effort,
+            clipped=scores.clipped,
+            lost_at=scores.lost,
+            control_rate=1 / plan.period,
+            outside=model.outside(attitude),
+            not_positive_definite=int(np.sum(not_positive_definite(model.inertia(attitude).value, attitude))),
+        )
+
+    @property
+    def outside_count(self) -> int:
+        """Samples of the flight outside the attitudes that training visited."""
+        return int(np.sum(self.outside))
+
+    def lost(self, controller: str) -> bool:
+        """Tell whether a controller lost the vehicle."""
+        return bool(np.isfinite(self.lost_at[self.controller.index(controller)]))
+
+    def ratio(self, other: str) -> Array | None:
+        """Divide the settled error of the model's controller by that of another one.
+
+        Returns
+        -------
+        array, shape (3,), or None
+            None where the model's lost the vehicle, or the other one leaves no error to divide by.
+        """
+        model, reference = (self.settled_rms[self.controller.index(name)] for name in ("model", other))
+        return model / reference if np.isfinite(model).all() and np.all(reference > 0) else None
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The comparison for machines."""
+        return {
+            "outside": self.outside_count,
+            "not_positive_definite": self.not_positive_definite,
+            "controllers": [self._of_controller(index) for index in range(len(self.controller))],
+        }
+
+    def _of_controller(self, index: int) -> dict[str, Any]:
+        values = {
+            "rms_rad": self.rms,
+            "settled_rms_rad": self.settled_rms,
+            "max_rad": self.max_error,
+            "settled_max_rad": self.settled_max,
+            "torque_rms_n_m": self.torque_rms,
+            "clipped": self.clipped,
+            "lost_at_s": self.lost_at,
+        }
+        return {"name": self.controller[index], **{key: value[index].tolist() for key, value in values.items()}}
 
 
 @record
@@ -157,3 +295,111 @@ class FlightRecord(Record):
     noise: NoiseGroup | None = group("noise", default=None)
     effects: FlownEffectsGroup | None = group("effects", default=None)
     tracking: TrackingGroup | None = group("tracking", default=None)
+
+    @classmethod
+    def of_simulation(
+        cls,
+        signals: Mapping[str, Array],
+        noise_std: Mapping[str, Array],
+        effects: SimulatedEffects | None = None,
+        tracking: TrackingGroup | None = None,
+    ) -> Self:
+        """Arrange a simulated flight.
+
+        Parameters
+        ----------
+        signals : mapping of str to array
+            By the names of the fields.
+        noise_std : mapping of str to array
+            Standard deviation of the noise of each channel, by signal.
+        """
+        named: Mapping[str, Any] = signals
+        return cls(
+            **named,
+            noise=NoiseGroup.of(noise_std),
+            effects=None if effects is None else FlownEffectsGroup.of(effects),
+            tracking=tracking,
+        )
+
+    @classmethod
+    def of_import(cls, flight: ImportedFlight, findings: Mapping[str, int]) -> Self:
+        """Arrange an imported flight.
+
+        Parameters
+        ----------
+        findings : mapping of str to int
+            What was found in the log and done about it, with how often.
+        """
+        report = flight.report
+        estimate = report.delay
+        signals = {name: values for name in cls._signal_names() if (values := getattr(flight, name)) is not None}
+        return cls(
+            **signals,
+            quality=QualityGroup.of(findings, report.warnings),
+            delay=DelayGroup(
+                value=report.delay_s,
+                tried=None if estimate is None else estimate.delays,
+                r2=None if estimate is None else estimate.curve,
+            ),
+        )
+
+    def with_warnings(self, warnings: Sequence[str]) -> Self:
+        """Add to what is to be known about the log."""
+        if not warnings:
+            return self
+        quality = self.quality or QualityGroup()
+        return replace(self, quality=replace(quality, warning=(*(quality.warning or ()), *warnings)))
+
+    @classmethod
+    def _signal_names(cls) -> list[str]:
+        return [spec.path for spec in cls.spec().datasets if "/" not in spec.path]
+
+    @property
+    def signals(self) -> dict[str, Array]:
+        """Time and the signals that it holds, by the names of the fields."""
+        return {name: values for name in self._signal_names() if (values := getattr(self, name)) is not None}
+
+    @property
+    def motion(self) -> Motion:
+        """Euler angles and their derivatives, of a flight that was read with all of `MOTION`."""
+        from cpfls_cli.regressor.motion import Motion
+
+        assert self.attitude is not None, "the flight has no attitude"
+        assert self.attitude_rate is not None, "the flight has no Euler rates"
+        assert self.attitude_acceleration is not None, "the flight has no Euler accelerations"
+        return Motion(self.attitude, self.attitude_rate, self.attitude_acceleration)
+
+    @property
+    def largest_torque(self) -> list[float]:
+        """Largest generalised torque on roll, pitch and yaw, N m; empty where it holds no torque."""
+        return [] if self.torque is None else np.max(np.abs(self.torque), axis=0).tolist()
+
+    @property
+    def turns(self) -> bool:
+        """Whether roll or pitch goes round the circle."""
+        if self.attitude is None or self.attitude_rate is None:
+            return False
+        return bool(np.ptp(self.attitude[:, :2], axis=0).max() > 2 * np.pi)
+
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """What later commands will miss: ``attitude``, ``rotation`` (of any kind), ``torque``."""
+        missing = {
+            "attitude": self.attitude is None,
+            "rotation": self.attitude is None and self.body_rate is None,
+            "torque": self.torque is None and self.body_torque is None,
+        }
+        return tuple(name for name, lacking in missing.items() if lacking)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The flight, and the controllers that were compared on it, for machines."""
+        summary = {"samples": len(self.time), "max_torque": self.largest_torque}
+        if self.tracking is None:
+            return summary
+        return summary | {
+            "control_rate_hz": self.tracking.control_rate,
+            "settled_from_s": self.tracking.settled_from,
+            "rotor_speed": self.rotor_speed is not None,
+            **self.tracking.summary,
+        }

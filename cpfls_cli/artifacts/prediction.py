@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.spec import BODY, EULER, Format, Record, dataset, record
+
+if TYPE_CHECKING:
+    from cpfls_cli.identification.judge import Score
+    from cpfls_cli.identification.model import Model
+    from cpfls_cli.regressor.motion import Motion
+    from cpfls_cli.validation.bootstrap import Draws
 
 
 @record
@@ -58,3 +67,82 @@ class PredictionRecord(Record):
         "coriolis", "C(q, qd) by Christoffel symbols", "time", "axis", "axis", units="kg m^2/s", frame=EULER
     )
     outside: BoolArray = dataset("outside", "1 where the attitude lies outside the excited region", "time")
+
+    @classmethod
+    def of(cls, model: Model, time: Array, motion: Motion, measured: Array | None, draws: Draws | None) -> Self:
+        """Predict along a flight.
+
+        Parameters
+        ----------
+        time : array, shape (time,), s
+        measured : array, shape (time, 3), N m, or None
+            Generalised torque of the flight; None where it holds none.
+        draws : Draws or None
+            Of the bootstrap; None for a model without bands.
+        """
+        from cpfls_cli.rotations import body_torque
+        from cpfls_cli.validation.bands import inertia_band, torque_band
+
+        torque = model.torque(motion)
+        inertia_low, inertia_high = (None, None) if draws is None else inertia_band(model, draws, motion.attitude)
+        torque_low, torque_high = (None, None) if draws is None else torque_band(model, draws, motion)
+        return cls(
+            time=time,
+            attitude=motion.attitude,
+            torque=torque,
+            body_torque=body_torque(motion.attitude, torque),
+            measured_torque=measured,
+            error=None if measured is None else measured - torque,
+            inertia=model.inertia(motion.attitude).value,
+            inertia_low=inertia_low,
+            inertia_high=inertia_high,
+            torque_low=torque_low,
+            torque_high=torque_high,
+            coriolis=model.coriolis(motion.attitude, motion.rate),
+            outside=model.outside(motion.attitude),
+        )
+
+    @property
+    def outside_count(self) -> int:
+        """Samples outside the attitudes that training visited."""
+        return int(np.sum(self.outside))
+
+    @property
+    def vertical_count(self) -> int:
+        """Samples near a vertical pitch, at which body torque is not judged."""
+        from cpfls_cli.dynamics.rigid_body import vertical
+
+        return int(np.sum(vertical(self.attitude)))
+
+    @cached_property
+    def not_positive_definite(self) -> int:
+        """Samples at which no body has the inertia matrix."""
+        from cpfls_cli.dynamics.rigid_body import not_positive_definite
+
+        return int(np.sum(not_positive_definite(self.inertia, self.attitude)))
+
+    @cached_property
+    def score(self) -> Score | None:
+        """How well the torque of the flight is predicted; None where the flight holds none."""
+        from cpfls_cli.identification.data import TorqueData
+        from cpfls_cli.identification.judge import score
+        from cpfls_cli.regressor.motion import Motion
+
+        if self.measured_torque is None:
+            return None
+        # A score looks at attitude and torque only.
+        nothing = np.zeros_like(self.attitude)
+        return score(TorqueData(self.time, Motion(self.attitude, nothing, nothing), self.measured_torque), self.torque)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The prediction for machines."""
+        score = self.score
+        summary: dict[str, Any] = {
+            "samples": len(self.time),
+            "mse": None if score is None else float(np.mean(score.mse)),
+            "relative_error": None if score is None else score.worst_relative_error,
+            "outside": self.outside_count,
+            "not_positive_definite": self.not_positive_definite,
+        }
+        return summary if score is None else summary | {"r2": score.r2.tolist(), "r2_body": score.r2_body.tolist()}

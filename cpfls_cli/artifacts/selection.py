@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
-from cpfls_cli.reduction.selection import Selection
+
+if TYPE_CHECKING:
+    from cpfls_cli.reduction.selection import Selection
 
 
 @record

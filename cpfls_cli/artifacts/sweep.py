@@ -1,11 +1,27 @@
-"""The artifact of a sweep: one row for each run."""
+"""The artifact of a sweep: one row for each run, and the runs of each setting."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+
+if TYPE_CHECKING:
+    from cpfls_cli.identification.identify import Identification
+
+ALL_SAMPLES = "all"
+"""The criterion of a setting that learns from all samples."""
+
+_NO_GENE = -1
+_MEASURES = ("mse", "max_error", "relative_error")
 
 
 @record
@@ -47,7 +63,182 @@ class RunGroup:
         "relative_error", "largest error over largest torque, worst axis", "run", "part", gaps=True
     )
     condition_number: Array = dataset("condition_number", "over the kept singular values", "run", gaps=True)
-    chromosome: IntArray = dataset("chromosome", "chosen 16-bit weights; -1 beyond those of the setting", "run", "gene")
+    chromosome: npt.NDArray[np.int32] = dataset(
+        "chromosome", "chosen 16-bit weights; -1 beyond those of the setting", "run", "gene"
+    )
+
+    def __len__(self) -> int:
+        """Count the finished runs."""
+        return len(self.seed)
+
+    @classmethod
+    def none(cls, parts: int, genes: int) -> Self:
+        """Begin a sweep of which no run is finished.
+
+        Parameters
+        ----------
+        parts : int
+            How many parts of data models are judged on.
+        genes : int
+            Weights of the longest chromosome of the sweep.
+        """
+        whole, scores = np.zeros(0, dtype=np.int64), np.zeros((0, parts))
+        return cls(
+            setting=whole,
+            seed=whole,
+            generations=whole,
+            evaluations=whole,
+            mse=scores,
+            max_error=scores,
+            relative_error=scores,
+            condition_number=np.zeros(0),
+            chromosome=np.zeros((0, genes), dtype=np.int32),
+        )
+
+    def followed_by(self, other: Self) -> Self:
+        """Add runs after these."""
+        pairs = {f.name: (getattr(self, f.name), getattr(other, f.name)) for f in fields(self)}
+        return type(self)(**{name: np.concatenate(pair) for name, pair in pairs.items()})
+
+    def with_run(self, setting: int, seed: int, parts: Sequence[str], result: Identification | None) -> Self:
+        """Add a run.
+
+        Parameters
+        ----------
+        setting : int
+            Its index.
+        parts : sequence of str
+            What models are judged on.
+        result : Identification or None
+            None where no chromosome gave a finite model.
+        """
+        chromosome = np.full(self.chromosome.shape[1], _NO_GENE, dtype=np.int32)
+        condition_number, generations, evaluations = np.nan, 0, 0
+        if result is not None:
+            chosen = result.front.chromosomes[result.front.chosen]
+            chromosome[: len(chosen)] = chosen
+            condition_number = result.system.condition_number
+            generations, evaluations = len(result.history.evaluations) - 1, int(result.history.evaluations[-1])
+        mse, max_error, relative_error = np.array([_scores(result, part) for part in parts]).T
+        run = type(self)(
+            setting=np.array([setting]),
+            seed=np.array([seed]),
+            generations=np.array([generations]),
+            evaluations=np.array([evaluations]),
+            mse=mse[None],
+            max_error=max_error[None],
+            relative_error=relative_error[None],
+            condition_number=np.array([condition_number]),
+            chromosome=chromosome[None],
+        )
+        return self.followed_by(run)
+
+
+def _scores(result: Identification | None, part: str) -> tuple[float, float, float]:
+    """Mean squared, largest and relative error of a model on a part; NaN where it was not judged."""
+    if result is None or part not in result.scores:
+        return np.nan, np.nan, np.nan
+    score = result.scores[part]["model"]
+    return float(np.mean(score.mse)), float(np.max(score.max_error)), score.worst_relative_error
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A measure over replicates.
+
+    Attributes
+    ----------
+    count : int
+        Replicates that have a value.
+    mean : float
+        NaN without any.
+    variance : float
+        Unbiased; NaN for fewer than two.
+    """
+
+    count: int
+    mean: float
+    variance: float
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation."""
+        return float(np.sqrt(self.variance))
+
+
+def spread(values: Array) -> Spread:
+    """Measure how far replicates lie apart: ``s^2 = sum (x - mean x)^2 / (n - 1)``.
+
+    Parameters
+    ----------
+    values : array, shape (replicates,)
+        Not finite where a replicate found nothing.
+    """
+    known = values[np.isfinite(values)]
+    mean = float(np.mean(known)) if len(known) else float("nan")
+    variance = float(np.var(known, ddof=1)) if len(known) > 1 else float("nan")
+    return Spread(len(known), mean, variance)
+
+
+@dataclass(frozen=True)
+class SettingRuns:
+    """One setting of a sweep with its finished runs.
+
+    Attributes
+    ----------
+    criterion : str
+        What chose its samples; ``all`` where nothing did.
+    seeds, evaluations : array of int, shape (runs,)
+    mse, max_error, relative_error : array, shape (runs, parts)
+        Not finite where a run found no model.
+    condition_number : array, shape (runs,)
+    """
+
+    name: str
+    structure: str
+    criterion: str
+    samples: int
+    population: int
+    generations: int
+    seeds: IntArray
+    evaluations: IntArray
+    mse: Array
+    max_error: Array
+    relative_error: Array
+    condition_number: Array
+
+    @property
+    def runs(self) -> int:
+        """Number of finished runs."""
+        return len(self.condition_number)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Population and generations."""
+        return self.population, self.generations
+
+    @property
+    def best(self) -> int | None:
+        """The run with the smallest mean squared error; None where no run found a model."""
+        return int(np.nanargmin(self.mse[:, 0])) if np.isfinite(self.mse[:, 0]).any() else None
+
+    def best_of(self, values: Array) -> float:
+        """Pick the value of the best run."""
+        return float("nan") if self.best is None else float(values[self.best])
+
+    def spreads(self, part: int) -> dict[str, dict[str, float]]:
+        """Mean, variance and smallest value of each error over the runs, on a part by its index."""
+        return {name: _spread(getattr(self, name)[:, part]) for name in _MEASURES}
+
+
+def _spread(values: Array) -> dict[str, float]:
+    over_runs = spread(values)
+    return {
+        "mean": over_runs.mean,
+        "variance": over_runs.variance,
+        "standard_deviation": over_runs.deviation,
+        "smallest": float(np.nanmin(values)) if over_runs.count else float("nan"),
+    }
 
 
 @record
@@ -67,3 +258,72 @@ class SweepRecord(Record):
     )
     run: RunGroup = group("run")
     complete: bool = dataset("complete", "1 where every run is finished, 0 where `--resume` goes on")
+
+    @property
+    def without_model(self) -> int:
+        """Runs that found no finite model."""
+        return int(np.sum(np.isnan(self.run.mse[:, 0])))
+
+    @cached_property
+    def settings(self) -> list[SettingRuns]:
+        """The settings with their runs, in the order of the config."""
+        return [self._setting(index) for index in range(len(self.setting.name))]
+
+    def _setting(self, index: int) -> SettingRuns:
+        setting, run = self.setting, self.run
+        chosen = run.setting == index
+        return SettingRuns(
+            setting.name[index],
+            setting.structure[index],
+            setting.criterion[index],
+            int(setting.samples[index]),
+            int(setting.population[index]),
+            int(setting.generations[index]),
+            run.seed[chosen],
+            run.evaluations[chosen],
+            run.mse[chosen],
+            run.max_error[chosen],
+            run.relative_error[chosen],
+            run.condition_number[chosen],
+        )
+
+    def differing_settings(self, other: SweepRecord) -> list[str]:
+        """List the datasets in which its settings are not those of another sweep."""
+        names = [f.name for f in fields(SettingGroup)]
+        one, two = self.setting, other.setting
+        return [f"setting/{name}" for name in names if not np.array_equal(getattr(one, name), getattr(two, name))]
+
+    def joins(self, other: SweepRecord) -> bool:
+        """Tell whether another sweep does the same from the same inputs, with none of these seeds."""
+        inputs, others = (
+            sorted((role, file.sha256) for role, file in sweep.origin.inputs.items()) for sweep in (self, other)
+        )
+        same = inputs == others and self.part == other.part and not self.differing_settings(other)
+        return same and not np.isin(self.run.seed, other.run.seed).any()
+
+    def joined(self, other: SweepRecord) -> SweepRecord:
+        """Take the runs of both sweeps as those of one, which begins at the smaller of their seeds."""
+        header = replace(self.origin, seed=min(self.origin.seed, other.origin.seed))
+        complete = self.complete and other.complete
+        return replace(self, run=self.run.followed_by(other.run), complete=complete, header=header)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The sweep for machines."""
+        settings = [self._summary(index, setting) for index, setting in enumerate(self.settings)]
+        return {"runs": len(self.run), "complete": self.complete, "settings": settings}
+
+    def _summary(self, index: int, setting: SettingRuns) -> dict[str, Any]:
+        return {
+            "name": setting.name,
+            "overrides": json.loads(self.setting.overrides[index]),
+            "structure": setting.structure,
+            "samples": setting.samples,
+            "population": setting.population,
+            "generations": setting.generations,
+            "runs": setting.runs,
+            "seeds": setting.seeds.tolist(),
+            **setting.spreads(0),
+            "condition_number": _spread(setting.condition_number),
+            "held_out": {part: setting.spreads(number) for number, part in enumerate(self.part) if number},
+        }

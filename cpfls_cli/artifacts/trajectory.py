@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
+
+if TYPE_CHECKING:
+    from cpfls_cli.trajectory.legs import Leg
+    from cpfls_cli.trajectory.planning import PlannedRotation
+
+DERIVATIVES = ("pop", "crackle", "snap", "jerk", "acceleration", "velocity", "displacement")
+"""Derivatives of the displacement, from the sixth down to itself."""
 
 
 @record
@@ -18,6 +29,31 @@ class LegGroup:
     limited_by: tuple[str, ...] = dataset(
         "limited_by", "derivatives that reach their limit; empty where a move was not planned under limits", "leg"
     )
+
+    @classmethod
+    def of(cls, legs: Sequence[Leg]) -> Self:
+        """Arrange the moves of a plan."""
+        return cls(
+            begin=np.array([leg.begin for leg in legs]),
+            end=np.array([leg.end for leg in legs]),
+            displacement=np.array([leg.vector for leg in legs]),
+            limited_by=tuple(" ".join(leg.limited_by) for leg in legs),
+        )
+
+
+@dataclass(frozen=True)
+class FirstLeg:
+    """Motion along the line of the first move.
+
+    Attributes
+    ----------
+    time : array, shape (samples,), s
+    curves : dict of str to array, shape (samples,)
+        By name of the derivative, signed along the move.
+    """
+
+    time: Array
+    curves: dict[str, Array]
 
 
 @record
@@ -62,3 +98,66 @@ class TrajectoryRecord(Record):
     )
     body_rate: Array = dataset("body_rate", "body rates p, q, r", "time", "axis", units="rad/s", frame=BODY)
     leg: LegGroup | None = group("leg", default=None)
+
+    @classmethod
+    def of(cls, planned: PlannedRotation) -> Self:
+        """Arrange a plan."""
+        sampled = vars(planned)
+        signals = {name: sampled[name] for name in cls.__dataclass_fields__ if name in sampled}
+        return cls(**signals, leg=LegGroup.of(sampled["legs"]) if "legs" in sampled else None)
+
+    @property
+    def held(self) -> bool:
+        """Whether the vehicle is held at its centre of mass and only turns."""
+        return self.position is None
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The samples of the path for machines."""
+        return {
+            "samples": len(self.time),
+            "dt_s": float(self.time[1]),
+            "max_rate_rad_s": _largest(self.attitude_rate),
+            "max_body_rate_rad_s": _largest(self.body_rate),
+            "max_acceleration_rad_s2": _largest(self.attitude_acceleration),
+        }
+
+    def derivative(self, name: str) -> Array:
+        """Get a derivative of the displacement from the start.
+
+        Parameters
+        ----------
+        name : str
+            One of `DERIVATIVES`.
+
+        Returns
+        -------
+        array, shape (time, 3), m and s, world frame
+        """
+        values: Array | None = self.position if name == "displacement" else getattr(self, name)
+        assert values is not None, "a held vehicle has no displacement"
+        return values - values[0] if name == "displacement" else values
+
+    def first_leg(self) -> FirstLeg:
+        """Take the first move, from rest to rest; the whole path where the file does not tell its moves."""
+        part, direction = self._first_move()
+        return FirstLeg(self.time[part], {name: self.derivative(name)[part] @ direction for name in DERIVATIVES})
+
+    def _first_move(self) -> tuple[slice, Array]:
+        """Find its samples and its direction."""
+        if self.leg is not None:
+            first, last = np.searchsorted(self.time, [self.leg.begin[0], self.leg.end[0]])
+            # Divided by the largest component first: the square of a tiny one is zero.
+            along = self.leg.displacement[0] / np.abs(self.leg.displacement[0]).max()
+            return slice(int(first), int(last) + 1), along / np.linalg.norm(along)
+        away = self.derivative("displacement")
+        farthest = away[np.argmax(np.linalg.norm(away, axis=1))]
+        return slice(None), farthest / (np.linalg.norm(farthest) or 1.0)
+
+    def peaks(self) -> dict[str, float]:
+        """Find the largest length of every derivative at the samples of the whole path."""
+        return {name: float(np.linalg.norm(self.derivative(name), axis=1).max()) for name in DERIVATIVES}
+
+
+def _largest(values: Array) -> list[float]:
+    return [float(value) for value in np.abs(values).max(axis=0)]

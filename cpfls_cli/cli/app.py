@@ -158,9 +158,9 @@ def trajectory(
         common = replace(common, overrides=[*(common.overrides or []), "trajectory.path=waypoints"])
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import trajectory as stage
+        from cpfls_cli.commands import trajectory as command
 
-        return stage.run(job, waypoints, plot)
+        return command.run(job, waypoints, plot)
 
     _run("trajectory", config, output, common, call)
 
@@ -204,14 +204,14 @@ def simulate(
 ) -> None:
     """Fly a trajectory: exactly, in closed loop with effects that a model lacks, or with a model that controls it."""
     with messages_for_errors():
-        from cpfls_cli.commands.effect_options import simulation_overrides
+        from cpfls_cli.commands.simulate import option_overrides
 
-        common = replace(common, overrides=[*(common.overrides or []), *simulation_overrides(mode, effect or [])])
+        common = replace(common, overrides=[*(common.overrides or []), *option_overrides(mode, effect or [])])
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import simulate as stage
+        from cpfls_cli.commands import simulate as command
 
-        return stage.run(job, trajectory, model, mode)
+        return command.run(job, trajectory, model, mode)
 
     _run("simulate", config, output, common, call)
 
@@ -222,9 +222,9 @@ def import_(config: ConfigArgument, log: LogArgument, output: OutputOption, *, c
     """Turn a flight log into a flight."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import import_log as stage
+        from cpfls_cli.commands import import_log as command
 
-        return stage.run(job, log)
+        return command.run(job, log)
 
     _run("import", config, output, common, call)
 
@@ -235,9 +235,9 @@ def reduce(config: ConfigArgument, flights: TrainingArgument, output: OutputOpti
     """Pick the samples of flights that are worth learning from."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import reduce as stage
+        from cpfls_cli.commands import reduce as command
 
-        return stage.run(job, flights)
+        return command.run(job, flights)
 
     _run("reduce", config, output, common, call)
 
@@ -266,11 +266,11 @@ def identify(
     """Identify a model from one or more flights and judge it beside its baselines."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import identify as stage
+        from cpfls_cli.commands import identify as command
         from cpfls_cli.search.resumable import SearchOptions
 
         options = SearchOptions(resume, time_limit, workers, scheduler)
-        return stage.run(job, flights, selection, validate or [], options, choose_on or [])
+        return command.run(job, flights, selection, validate or [], options, choose_on or [])
 
     _run("identify", config, output, common, call)
 
@@ -293,11 +293,11 @@ def sweep(
     """Identify with several settings, and with several seeds each."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import sweep as stage
+        from cpfls_cli.commands import sweep as command
         from cpfls_cli.search.resumable import SearchOptions
 
         options = SearchOptions(resume, time_limit, workers, scheduler)
-        return stage.run(job, flights, validate or [], options, choose_on or [])
+        return command.run(job, flights, validate or [], options, choose_on or [])
 
     _run("sweep", config, output, common, call)
 
@@ -310,9 +310,9 @@ def predict(
     """Predict torque, inertia and Coriolis matrices of a model along a flight."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import predict as stage
+        from cpfls_cli.commands import predict as command
 
-        return stage.run(job, model, flight)
+        return command.run(job, model, flight)
 
     _run("predict", config, output, common, call)
 
@@ -333,9 +333,9 @@ def report(
     """Write one self-contained page about artifacts (html, md or json); models that are given together are compared."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import report as stage
+        from cpfls_cli.commands import report as command
 
-        return stage.run(job, artifacts, form)
+        return command.run(job, artifacts, form)
 
     _run("report", config, output, common, call)
 
@@ -348,9 +348,9 @@ def compare(
     """Find where a model and flights disagree."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import compare as stage
+        from cpfls_cli.commands import compare as command
 
-        return stage.run(job, flights, model)
+        return command.run(job, flights, model)
 
     _run("compare", config, output, common, call)
 
@@ -368,9 +368,9 @@ def diagnose(
     """Name the physical effect that a model misses."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import diagnose as stage
+        from cpfls_cli.commands import diagnose as command
 
-        return stage.run(job, disagreement, held_out or [])
+        return command.run(job, disagreement, held_out or [])
 
     _run("diagnose", config, output, common, call)
 
@@ -388,9 +388,9 @@ def extend(
     """Put the named effects into the model, and show that the gap shrinks."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import extend as stage
+        from cpfls_cli.commands import extend as command
 
-        return stage.run(job, diagnosis, model)
+        return command.run(job, diagnosis, model)
 
     _run("extend", config, output, common, call)
 
@@ -409,9 +409,9 @@ def gap(
     """Compare, diagnose and extend in one go, with a report."""
 
     def call(job: Job) -> Outcome:
-        from cpfls_cli.commands import gap as stage
+        from cpfls_cli.commands import gap as command
 
-        return stage.run(job, flights, held_out or [], model)
+        return command.run(job, flights, held_out or [], model)
 
     _run("gap", config, output, common, call)
 
@@ -443,13 +443,13 @@ def export(
     """Write a model as JSON, C or Python that computes torque, D(q) and C(q, qd) without this program."""
     with messages_for_errors():
         from cpfls_cli.artifacts.job import Job
-        from cpfls_cli.commands import export as stage
+        from cpfls_cli.commands import export as command
         from cpfls_cli.config.load import validate
 
         narration = Narration("export", common.verbose and not common.quiet)
         with progress_bar("export", common) as progress:
             job = Job(validate({}, "default"), output, common.force, common.dry_run, progress, narration.reads)
-            outcome = stage.run(job, model, form and form.value, name)
+            outcome = command.run(job, model, form and form.value, name)
         if not common.dry_run:
             narration.wrote(output)
         tell(outcome, common)
@@ -460,9 +460,9 @@ def export(
 def info(file: FileArgument, *, common: Common) -> None:
     """Show what an artifact holds and where it comes from."""
     with messages_for_errors():
-        from cpfls_cli.commands.inspect import info as describe
+        from cpfls_cli.commands import show
 
-        tell(describe(file), common)
+        tell(show.info(file), common)
 
 
 @app.command()
@@ -470,12 +470,9 @@ def info(file: FileArgument, *, common: Common) -> None:
 def check(file: FileArgument, *, common: Common) -> None:
     """Check an artifact against its format; exit code 1 where it does not keep to it."""
     with messages_for_errors():
-        from cpfls_cli.commands.inspect import check as examine
+        from cpfls_cli.commands import show
 
-        outcome, good = examine(file)
-        tell(outcome, common)
-        if not good:
-            raise typer.Exit(1)
+        tell(show.check(file), common)
 
 
 @app.command("config")
@@ -490,9 +487,9 @@ def config_(
 ) -> None:
     """Print the resolved config; without CONFIG, a commented default."""
     with messages_for_errors():
-        from cpfls_cli.commands.config import show
+        from cpfls_cli.commands import show
 
-        tell(show(config, section or [], common.overrides or [], common.seed), common)
+        tell(show.config(config, section or [], common.overrides or [], common.seed), common)
 
 
 @app.command()
@@ -506,13 +503,13 @@ def effects(
 ) -> None:
     """Show the effects that a model can miss, and the flights that tell them apart."""
     with messages_for_errors():
-        from cpfls_cli.commands.effects import show
+        from cpfls_cli.commands import show
 
-        tell(show(name), common)
+        tell(show.effects(name), common)
 
 
 def _run(title: str, config: Path, output: Path, common: Common, call: Callable[[Job], Outcome]) -> None:
-    """Load the study, run one stage with a progress bar, and print what it says."""
+    """Load the study, run one command with a progress bar, and print what it says."""
     with messages_for_errors():
         from cpfls_cli.artifacts.job import Job
 
@@ -525,5 +522,3 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
         if not common.dry_run:
             narration.wrote(output)
         tell(outcome, common)
-        if outcome.exit_code:
-            raise typer.Exit(outcome.exit_code)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import shutil
@@ -16,7 +17,6 @@ from typing import TYPE_CHECKING
 import typer
 
 from cpfls_cli.cli.options import Common
-from cpfls_cli.commands.plain_json import plain
 from cpfls_cli.errors import CpflsError, InputError
 
 if TYPE_CHECKING:
@@ -52,16 +52,22 @@ def messages_for_errors() -> Iterator[None]:
 
 
 def tell(outcome: Outcome, common: Common) -> None:
-    """Print what a stage has to say."""
+    """Print what a command has to say, and end with its exit code."""
+    from cpfls_cli.report.outcome import plain
+    from cpfls_cli.report.terminal import warnings_of
+
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # An encoding without a degree sign must not end a command that has done its work.
+        sys.stdout.reconfigure(errors="replace")
     if common.as_json:
         print(json.dumps(plain(outcome.summary), allow_nan=False), flush=True)
     elif not common.quiet:
         print("\n".join(_lines(outcome)), flush=True)
     if not common.quiet:
-        from cpfls_cli.report.terminal import warnings_of
-
         for warning in (*warnings_of(outcome.blocks), *outcome.warnings):
             _complain(warning, "note")
+    if outcome.exit_code:
+        raise typer.Exit(outcome.exit_code)
 
 
 def _lines(outcome: Outcome) -> Iterator[str]:

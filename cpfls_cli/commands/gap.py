@@ -13,22 +13,20 @@ from cpfls_cli.artifacts.disagreement_file import disagreement_data
 from cpfls_cli.artifacts.flights_file import flights_data
 from cpfls_cli.artifacts.formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
 from cpfls_cli.artifacts.job import Job, finish_data, input_file, take_inputs
-from cpfls_cli.artifacts.output import write_text
+from cpfls_cli.artifacts.output import check_folder, filled_folder, write_text
 from cpfls_cli.artifacts.spec import ArtifactSpec, InputFile
 from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.commands import report
 from cpfls_cli.commands.compare import check_ignored, compared, flight_roles, progress_of
 from cpfls_cli.commands.diagnose import Answer, answered
 from cpfls_cli.commands.extend import Grown, extended, require_named
-from cpfls_cli.commands.output_folder import check_folder, filled_folder
-from cpfls_cli.commands.plain_json import plain
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.recordings import Flights, read_flights
 from cpfls_cli.flights.split import Split, seen_twice, split_flights
 from cpfls_cli.gap.compare import Disagreement
 from cpfls_cli.gap.extended import plain as without_effects
 from cpfls_cli.pages.disagreement_words import disagreement_summary, where_lines
-from cpfls_cli.report.outcome import Outcome
+from cpfls_cli.report.outcome import Outcome, plain
 
 FILES = ("disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json")
 """What a folder holds in the end; no extended.h5 where the extension was refused."""

@@ -11,8 +11,7 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.commands.stopped import not_judged, stopped, without_model
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.choosing import choosing_source
-from cpfls_cli.flights.judging import held_out_parts, input_roles
+from cpfls_cli.flights.inputs import choosing_source, held_out_parts, input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.flights.training import TrainingData, read_training
 from cpfls_cli.identification.data import TorqueSource

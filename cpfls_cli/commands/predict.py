@@ -1,109 +1,90 @@
-"""Stage `predict`: torque, inertia and Coriolis matrices of a stored model along a flight."""
+"""Command `predict`: torque, inertia and Coriolis matrices of a stored model along a flight."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from cpfls_cli import rotations
-from cpfls_cli.artifacts.extended_file import is_extended
-from cpfls_cli.artifacts.formats import FLIGHT, MODEL, PREDICTION
-from cpfls_cli.artifacts.job import Job, begin, finish_data
-from cpfls_cli.artifacts.model_file import read_model
-from cpfls_cli.artifacts.store import Artifact
-from cpfls_cli.artifacts.validation_file import read_draws
-from cpfls_cli.commands.predict_extended import extended_prediction
-from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
-from cpfls_cli.flights.flight_source import MOTION, flight_motion
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.extended_file import is_extended, read_extended
+from cpfls_cli.artifacts.flight import MOTION, FlightRecord
+from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.config.study import Study
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
+from cpfls_cli.errors import InputError
+from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.flights.same_vehicle import other_vehicles
-from cpfls_cli.flights.sources import read_good, read_with
-from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.judge import score
 from cpfls_cli.identification.model import Model
-from cpfls_cli.pages.trust import trust_notes
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.pages.model import trust_notes
+from cpfls_cli.pages.prediction import answer
+from cpfls_cli.regressor.regressor import InertiaValues
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.validation.bands import inertia_band, torque_band
-from cpfls_cli.validation.bootstrap import Draws
-
-_NO_TRUST = "do not trust the model there"
-_WELL_CONDITIONED = 100.0
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:
-    """Predict along a flight and write it."""
+    """Predict along a flight and write it.
+
+    Parameters
+    ----------
+    model : Path
+        Identified, or one with effects.
+    """
     inputs = begin(job, {"model": model, "flight": flight})
     if is_extended(model):
-        data = extended_prediction(model, flight, job.study)
+        prediction = _with_effects(model, flight, job.study)
         if job.dry_run:
             return nothing_written(job)
-        finish_data(job, PREDICTION, data, inputs)
-        return _outcome(data)
-    artifact = read_good(model, MODEL)
-    identified = read_model(artifact, model)
-    source = read_with(flight, FLIGHT, "time", *MOTION)
+        record = finish(job, prediction, inputs)
+        return Outcome(record.summary, tuple(answer(record, None)))
+    identified = read_record(model, ModelRecord)
+    rebuilt = identified.rebuilt(model)
+    flown = read_record(flight, FlightRecord, "time", *MOTION)
     if job.dry_run:
         return nothing_written(job)
-    data = _predict(identified, source, read_draws(artifact))
-    finish_data(job, PREDICTION, data, inputs)
-    outcome = _outcome(data, _trust_outside(identified, artifact))
-    notes = (*trust_notes(artifact, model), *other_vehicles([flight], job.study))
-    return replace(outcome, warnings=(*notes, *outcome.warnings))
+    prediction = PredictionRecord.of(rebuilt, flown.time, flown.motion, flown.torque, identified.draws())
+    record = finish(job, prediction, inputs)
+    other = (Text(sentence, "warning") for sentence in other_vehicles([flight], job.study))
+    return Outcome(record.summary, (*trust_notes(identified, model), *other, *answer(record, identified)))
 
 
-def _predict(model: Model, flight: Artifact, draws: Draws | None) -> dict[str, Any]:
-    motion = flight_motion(flight)
-    torque = model.torque(motion)
-    data = {
-        "time": flight.array("time"),
-        "attitude": motion.attitude,
-        "torque": torque,
-        "body_torque": rotations.body_torque(motion.attitude, torque),
-        "inertia": model.inertia(motion.attitude).value,
-        "coriolis": model.coriolis(motion.attitude, motion.rate),
-        "outside": model.outside(motion.attitude).astype(np.uint8),
-    }
-    if draws is not None:
-        data["inertia_low"], data["inertia_high"] = inertia_band(model, draws, motion.attitude)
-        data["torque_low"], data["torque_high"] = torque_band(model, draws, motion)
-    if "torque" in flight.data:
-        data |= {"measured_torque": flight.array("torque"), "error": flight.array("torque") - torque}
-    return data
+def _with_effects(path: Path, flight: Path, study: Study) -> PredictionRecord:
+    """Predict the rotors' torque of a model with effects: what is measured less that is the gap that remains.
+
+    Raises
+    ------
+    InputError
+        If the flight lacks the attitude or a signal that an effect needs.
+    """
+    model = read_extended(path, study)
+    logged = read_flights([flight], study).recordings[0].signals
+    if logged.attitude is None or logged.torque is None:
+        raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
+    signals, attitude = model.repaired(logged), logged.attitude
+    body_torque = model.rotor_torque(signals)
+    torque = rotations.generalised_torque(attitude, body_torque)
+    measured = rotations.generalised_torque(attitude, logged.torque)
+    inertia = _inertia(model.inertia(signals), attitude)
+    return PredictionRecord(
+        time=signals.time,
+        attitude=attitude,
+        torque=torque,
+        body_torque=body_torque,
+        measured_torque=measured,
+        error=measured - torque,
+        inertia=inertia.value,
+        coriolis=coriolis_matrix(inertia, rotations.attitude_rate(attitude, signals.body_rate)),
+        outside=model.base.outside(attitude) if isinstance(model.base, Model) else np.zeros(len(attitude), dtype=bool),
+    )
 
 
-def _trust_outside(model: Model, artifact: Artifact) -> str:
-    """Say what the model is worth at attitudes that training did not visit."""
-    rank, parameters, condition = (artifact.number(f"solve/{n}") for n in ("rank", "parameters", "condition_number"))
-    if model.same_everywhere and rank == parameters and condition <= _WELL_CONDITIONED:
-        return f"the same coefficients hold there, if the structure does, and all are known (condition {condition:.3g})"
-    return _NO_TRUST
-
-
-def _outcome(data: dict[str, Any], trust_outside: str = _NO_TRUST) -> Outcome:
-    samples, outside = len(data["time"]), int(np.sum(data["outside"]))
-    indefinite = int(np.sum(not_positive_definite(data["inertia"], data["attitude"])))
-    summary: dict[str, Any] = {"samples": samples, "mse": None, "relative_error": None, "outside": outside}
-    summary["not_positive_definite"] = indefinite
-    lines = [f"{samples} samples, {outside} outside the region that the training data visited"]
-    warnings = []
-    if outside:
-        visited = f"{outside} of {samples} samples lie outside the attitudes that training visited"
-        warnings.append(f"{visited}: {trust_outside}")
-    if indefinite:
-        warnings.append(f"D(q) is not positive definite at {indefinite} of {samples} samples: no body moves like that")
-    if "error" in data:
-        # A score looks at attitude and torque only.
-        attitude = data["attitude"]
-        motion = Motion(attitude, np.zeros_like(attitude), np.zeros_like(attitude))
-        measured = TorqueData(data["time"], motion, data["measured_torque"])
-        judged = score(measured, data["torque"])
-        summary |= {"mse": float(np.mean(judged.mse)), "relative_error": judged.worst_relative_error}
-        summary |= {"r2": judged.r2.tolist(), "r2_body": judged.r2_body.tolist()}
-        lines.append(f"MSE {summary['mse']:.4g} (N m)^2, relative error {judged.worst_relative_error:.3%} (worst axis)")
-        r2, left_out = " ".join(f"{value:.4f}" for value in judged.r2_body), int(np.sum(vertical(attitude)))
-        without = f" (without {left_out} samples near a vertical pitch)" if left_out else ""
-        lines.append(f"R2 of body torque, roll pitch yaw: {r2}{without}")
-    return Outcome(summary, tuple(lines), tuple(warnings))
+def _inertia(inertia: Array | InertiaModel, attitude: Array) -> InertiaValues:
+    if isinstance(inertia, np.ndarray):
+        return InertiaValues(inertia_matrix(attitude, inertia), inertia_matrix_gradient(attitude, inertia))
+    return inertia.inertia(attitude)

@@ -1,4 +1,4 @@
-"""Stage `report`: one self-contained page about artifacts."""
+"""Command `report`: one self-contained page about artifacts."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.pages.page import Page, report_page
 from cpfls_cli.pages.source import Source, Sources, unique_labels
 from cpfls_cli.regressor.structure import model_structure
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.forms import Form, form_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
@@ -72,7 +73,7 @@ def _outcome(output: Path, page: Page, repeated: Sequence[str]) -> Outcome:
         "missing": list(page.missing),
         "bytes": size,
     }
-    lines = [f"{len(page.sections)} sections, {len(page.figures)} figures, {len(page.tables)} tables, {size} bytes"]
-    if page.missing:
-        lines.append(f"not given: {', '.join(page.missing)}")
-    return Outcome(summary, tuple(lines), tuple(repeated))
+    counts = f"{len(page.sections)} sections, {len(page.figures)} figures, {len(page.tables)} tables, {size} bytes"
+    lacks = [Text(f"not given: {', '.join(page.missing)}")] if page.missing else []
+    warnings = (Text(sentence, "warning") for sentence in repeated)
+    return Outcome(summary, (Text(counts), *lacks, *warnings))

@@ -1,26 +1,35 @@
-"""Stage `simulate`: fly a trajectory, with the exact vehicle, in closed loop, or with a model that controls it."""
+"""Command `simulate`: fly a trajectory, with the exact vehicle, in closed loop, or with a model that controls it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.formats import FLIGHT, TRAJECTORY
-from cpfls_cli.artifacts.job import Job, begin, finish_data
+from cpfls_cli.artifacts.flight import MOTION, FlightRecord
+from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.commands import tracking
 from cpfls_cli.commands.model_in_flight import model_in_flight
 from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flights.sources import read_with
-from cpfls_cli.pages.flown import closed_loop_outcome, effect_record, exact_outcome, noise_record, violation_sentence
+from cpfls_cli.pages.flight import answer, autopilot_text
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.trajectory import violation_sentence
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.simulation import SimulatedModel, measure, simulate, simulated_effects
+from cpfls_cli.simulation import MeasuredFlight, SimulatedFlight, SimulatedModel, measure, simulate, simulated_effects
 
-_TURNED = ("attitude", "attitude_rate", "attitude_acceleration")
 _MOVED = ("position", "velocity", "acceleration")
+_EFFECT_FORM = "write NAME=VALUE[,VALUE...] or NAME.coefficient=VALUE, see `cpfls effects NAME`"
 
 
 def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None = None) -> Outcome:
@@ -80,16 +89,16 @@ def _required(model: Path | None) -> Path:
 
 def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:
     """Read times and signals of a plan; without any translation the vehicle is held at its centre of mass."""
-    source = read_with(trajectory, TRAJECTORY, "time", *_TURNED)
-    held = not any(name in source.data for name in _MOVED)
+    source = read_record(trajectory, TrajectoryRecord, "time", *MOTION)
+    held = all(getattr(source, name) is None for name in _MOVED)
     if held and closed:
         raise InputError(
             f"{trajectory}: turns a vehicle that is held at its centre of mass; no autopilot flies it. Leave mode "
             "closed-loop out, or plan a path in space"
         )
-    needed = _TURNED if held else _TURNED + _MOVED
-    source = read_with(trajectory, TRAJECTORY, "time", *needed)
-    return source.array("time"), {name: source.array(name) for name in needed}
+    needed = MOTION if held else MOTION + _MOVED
+    source = read_record(trajectory, TrajectoryRecord, "time", *needed)
+    return source.time, {name: getattr(source, name) for name in needed}
 
 
 def _inverse(
@@ -97,12 +106,13 @@ def _inverse(
 ) -> Outcome:
     with settings_of("simulation", job.study):
         flight = simulate(planned, job.study.vehicle, job.study.simulation, generator(job.study, "simulate"))
-    problems = tuple(violation_sentence(violation, time) for violation in flight.violations)
+    problems = [violation_sentence(violation, time) for violation in flight.violations]
     if problems and job.study.simulation.infeasible == "stop":
         remedy = "fly gentler, change the vehicle, or set simulation.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
-    finish_data(job, FLIGHT, {"time": time, **flight.signals, **noise_record(flight.noise_std)}, inputs)
-    return exact_outcome(flight, time, problems)
+    record = finish(job, FlightRecord.of_simulation({"time": time, **flight.signals}, flight.noise_std), inputs)
+    warnings = (Text(problem, "warning") for problem in problems)
+    return Outcome(_summary(flight, record), (*answer(source_of(job, record)), *warnings))
 
 
 def _closed_loop(
@@ -110,6 +120,85 @@ def _closed_loop(
 ) -> Outcome:
     rng = generator(job.study, "simulate")
     flight = measure(time, planned, job.study.vehicle, job.study.simulation, rng, job.progress, model)
-    records = {**noise_record(flight.noise_std), **effect_record(flight.effects)}
-    finish_data(job, FLIGHT, {"time": time, **flight.signals, **records}, inputs)
-    return closed_loop_outcome(flight, time)
+    signals = {"time": time, **flight.signals}
+    record = finish(job, FlightRecord.of_simulation(signals, flight.noise_std, flight.effects), inputs)
+    errors = _path_errors(flight)
+    effects = {} if record.effects is None else record.effects.by_name
+    clipped = (Text(f"{violation_sentence(one, time)}; clipped", "warning") for one in flight.violations)
+    return Outcome(
+        _summary(flight, record) | {"tracking": errors, "effects": effects},
+        (autopilot_text(**errors), *answer(source_of(job, record)), *clipped),
+    )
+
+
+def _summary(flight: SimulatedFlight | MeasuredFlight, record: FlightRecord) -> dict[str, Any]:
+    infeasible = [
+        {"rotor": v.rotor + 1, "kind": v.kind, "first_s": float(record.time[v.first]), "samples": v.count}
+        for v in flight.violations
+    ]
+    noise = sorted(flight.noise_std)
+    return {"samples": len(record.time), "noise": noise, "infeasible": infeasible, **record.summary}
+
+
+def _path_errors(flight: MeasuredFlight) -> dict[str, Any]:
+    away = np.linalg.norm(flight.position_error, axis=1)
+    return {
+        "position_rms_m": _rms(away),
+        "position_max_m": float(away.max()),
+        "attitude_rms_rad": [_rms(error) for error in flight.attitude_error.T],
+    }
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def option_overrides(mode: str | None, effects: Sequence[str]) -> list[str]:
+    """Write ``--mode`` and ``--effect`` as overrides of the config, so that the artifact's config has them too.
+
+    Parameters
+    ----------
+    mode : str or None
+        None keeps that of the config.
+    effects : sequence of str
+        ``NAME=VALUE[,VALUE...]`` or ``NAME.coefficient=VALUE`` each.
+
+    Returns
+    -------
+    list of str
+        ``section.key=value`` each.
+
+    Raises
+    ------
+    InputError
+        If an effect is malformed, unknown, or given twice.
+    """
+    given: dict[str, list[float] | dict[str, float]] = {}
+    for text in effects:
+        _add_effect(text, given)
+    chosen = [] if mode is None else [f"simulation.mode={mode}"]
+    # JSON is YAML, and numbers keep all their digits.
+    return [*chosen, *(f"simulation.closed_loop.effects.{name}={json.dumps(value)}" for name, value in given.items())]
+
+
+def _add_effect(text: str, given: dict[str, list[float] | dict[str, float]]) -> None:
+    key, _, written = text.partition("=")
+    name, dot, entry = key.strip().partition(".")
+    find(name)
+    values = _numbers(text, written)
+    before = given.get(name)
+    if not dot and before is None:
+        given[name] = values
+        return
+    if not dot or isinstance(before, list) or entry in (before or {}):
+        raise InputError(f"--effect {text}: {name} is given twice; {_EFFECT_FORM}")
+    if len(values) != 1 or not entry:
+        raise InputError(f"--effect {text}: a coefficient takes one value; {_EFFECT_FORM}")
+    given[name] = {**(before or {}), entry: values[0]}
+
+
+def _numbers(text: str, written: str) -> list[float]:
+    try:
+        return [float(value) for value in written.split(",")] if written.strip() else []
+    except ValueError:
+        raise InputError(f"--effect {text}: {written} is not a number; {_EFFECT_FORM}") from None

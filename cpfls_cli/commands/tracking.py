@@ -1,29 +1,49 @@
-"""Stage `simulate` in mode computed-torque: attitude control by an identified model, beside other controllers."""
+"""Command `simulate` in mode computed-torque: attitude control by an identified model, beside other controllers."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.artifacts.base_file import model_base
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.extended_file import is_extended
-from cpfls_cli.artifacts.formats import FLIGHT, TRAJECTORY
-from cpfls_cli.artifacts.job import Job, begin, finish_data
-from cpfls_cli.artifacts.model_file import read_model
-from cpfls_cli.artifacts.store import Artifact
-from cpfls_cli.artifacts.tracking_file import logged_signals, tracking_data
-from cpfls_cli.commands.tracking_setup import controllers_of, loop_of, planned_torque
+from cpfls_cli.artifacts.flight import MOTION, FlightRecord, TrackingGroup
+from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.store import Artifact, read_record
+from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.control import Plan, flown_signals, plan_of, scores, start_of, track
+from cpfls_cli.control import (
+    AttitudeLoop,
+    Controller,
+    Plan,
+    Sensing,
+    TorqueActuators,
+    computed_torque,
+    flown_signals,
+    gains,
+    plan_of,
+    proportional_derivative,
+    scores,
+    start_of,
+    track,
+)
+from cpfls_cli.dynamics.equations_of_motion import RigidBody, TorqueModel, model_plant, rigid_plant
+from cpfls_cli.dynamics.rigid_body import body_torque, inertia_matrix, inertia_tensor
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flights.sources import read_with
-from cpfls_cli.pages.flown import noise_record
-from cpfls_cli.pages.tracking_words import tracking_outcome
-from cpfls_cli.pages.trust import trust_notes
+from cpfls_cli.flights.same_vehicle import require_vehicle_of
+from cpfls_cli.inertia import symmetric
+from cpfls_cli.pages.model import trust_notes
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.tracking import answer
 from cpfls_cli.report.outcome import Outcome, nothing_written
-
-_TURNED = ("attitude", "attitude_rate", "attitude_acceleration")
+from cpfls_cli.simulation import ComputedTorqueSettings
+from cpfls_cli.simulation.measured import noisy
+from cpfls_cli.vehicle.rotors import rotor_demand
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def run(job: Job, trajectory: Path, model: Path) -> Outcome:
@@ -44,43 +64,95 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
         If the planned pitch comes near the vertical.
     """
     inputs = begin(job, {"trajectory": trajectory, "model": model})
-    artifact = _identified(model, job.study)
-    identified = read_model(artifact, model)
+    identified = _identified(model, job.study)
+    rebuilt = identified.rebuilt(model)
     plan = _plan(trajectory, job.study)
     if job.dry_run:
         return nothing_written(job)
     settings, vehicle = job.study.simulation.computed_torque, job.study.vehicle
     rng = generator(job.study, "simulate")
-    controllers = controllers_of(plan, identified, artifact.array("baselines/rigid_body"), vehicle)
-    loop = loop_of(plan, settings, identified, vehicle, rng)
+    controllers = _controllers(plan, rebuilt, identified.baselines.rigid_body, vehicle)
+    loop = _loop(plan, settings, rebuilt, vehicle, rng)
     error = np.array(settings.initial_error_rad)
-    tracked = track(plan, controllers, loop, error, planned_torque(plan, vehicle), job.progress)
+    tracked = track(plan, controllers, loop, error, _planned_torque(plan, vehicle), job.progress)
     names = [controller.name for controller in controllers]
     exact = flown_signals(plan, tracked, names.index("model"), loop.plant)
-    record = tracking_data(plan, names, scores(plan, tracked, loop.gains.settling_time), identified, exact["attitude"])
-    signals, noise = logged_signals(exact, job.study, rng)
-    finish_data(job, FLIGHT, {**signals, **noise_record(noise), **record}, inputs)
-    notes = trust_notes(artifact, model)
-    return tracking_outcome(signals, sorted(noise), record, notes, identified.same_everywhere)
+    found = scores(plan, tracked, loop.gains.settling_time)
+    comparison = TrackingGroup.of(plan, names, found, rebuilt, exact["attitude"])
+    signals, noise = _logged(exact, job.study, rng)
+    record = finish(job, FlightRecord.of_simulation(signals, noise, tracking=comparison), inputs)
+    summary = {"samples": len(record.time), "noise": sorted(noise), **record.summary}
+    return Outcome(summary, (*trust_notes(identified, model), *answer(source_of(job, record), identified)))
 
 
-def _identified(path: Path, study: Study) -> Artifact:
+def _identified(path: Path, study: Study) -> ModelRecord:
     if is_extended(path):
         raise InputError(
             f"{path}: a model with effects is flown in closed loop only; add --mode closed-loop, or give a model that "
             "`cpfls identify` made"
         )
-    return model_base(path, study)
+    model = read_record(path, ModelRecord)
+    require_vehicle_of(path, Artifact(model.spec(), model.origin, {}), study)
+    return model
 
 
 def _plan(trajectory: Path, study: Study) -> Plan:
-    source = read_with(trajectory, TRAJECTORY, "time", *_TURNED)
-    planned = {name: source.array(name) for name in _TURNED}
+    source = read_record(trajectory, TrajectoryRecord, "time", *MOTION)
+    planned = {name: getattr(source, name) for name in MOTION}
     with settings_of("simulation", study):
         settings = study.simulation.computed_torque
         try:
-            plan = plan_of(source.array("time"), planned, settings.control_rate_hz)
+            plan = plan_of(source.time, planned, settings.control_rate_hz)
             start_of(plan, np.array(settings.initial_error_rad))
             return plan
         except ComputationError as error:
             raise ComputationError(f"{trajectory}: {error}") from None
+
+
+def _controllers(plan: Plan, model: TorqueModel, rigid_body: Array, vehicle: VehicleSettings) -> list[Controller]:
+    """List the controllers that are compared.
+
+    The D_ii of the rigid body that fits the same samples scale the feedback of the controller without a model. No other
+    controller can beat the one with the exact inertia, where the vehicle of the config is what is controlled.
+    """
+    tensor = symmetric(rigid_body)
+    return [
+        Controller("model", computed_torque(model)),
+        Controller("rigid-body", computed_torque(RigidBody(tensor))),
+        Controller("pd", proportional_derivative(np.diagonal(inertia_matrix(plan.attitude[:1], tensor)[0]))),
+        Controller("vehicle", computed_torque(RigidBody(inertia_tensor(vehicle)))),
+    ]
+
+
+def _loop(
+    plan: Plan, settings: ComputedTorqueSettings, model: TorqueModel, vehicle: VehicleSettings, rng: np.random.Generator
+) -> AttitudeLoop:
+    """Arrange what closes the loop; the generator gives the noise that the controllers measure."""
+    limit, noise = settings.torque_max_n_m, (settings.attitude_noise_rad, settings.body_rate_noise_rad_s)
+    measured = (std * rng.standard_normal(plan.attitude.shape) for std in noise)
+    return AttitudeLoop(
+        plant=model_plant(model) if settings.plant == "model" else rigid_plant(inertia_tensor(vehicle)),
+        gains=gains(settings.natural_frequency_hz, settings.damping),
+        actuators=TorqueActuators(settings.rotor_time_constant_s, None if limit is None else np.array(limit)),
+        sensing=Sensing(*measured) if any(noise) else None,
+        integration_rate=settings.integration_rate_hz,
+    )
+
+
+def _planned_torque(plan: Plan, vehicle: VehicleSettings) -> Array:
+    """Compute the body torque that the exact vehicle needs at the start of the plan, shape (3,), N m."""
+    start = (plan.attitude[:1], plan.rate[:1], plan.acceleration[:1])
+    return np.asarray(body_torque(*start, inertia_tensor(vehicle))[0])
+
+
+def _logged(
+    exact: Mapping[str, Array], study: Study, rng: np.random.Generator
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Log a flight: rotor speeds where hover thrust lets all rotors do it, and noise, with its standard deviations."""
+    weight = np.full(len(exact["time"]), study.vehicle.mass_kg * study.vehicle.gravity_m_s2)
+    demand = rotor_demand(study.vehicle, weight, exact["body_torque"])
+    rotors = {} if demand.violations else {"rotor_speed": demand.speed}
+    signals, std = noisy({**exact, **rotors}, study.simulation, rng)
+    if {"attitude", "torque"} & std.keys():
+        signals["body_torque"] = rotations.body_torque(signals["attitude"], signals["torque"])
+    return signals, std

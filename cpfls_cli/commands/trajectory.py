@@ -1,37 +1,49 @@
-"""Stage `trajectory`: plan a path in space, or the rotations of a vehicle that is held."""
+"""Command `trajectory`: plan a path in space or the rotations of a held vehicle, and check it against the vehicle."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, replace
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.job import Job, begin, header_of
-from cpfls_cli.artifacts.store import write_record
+from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.output import check_output, write_text
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.artifacts.trajectory_file import trajectory_data, trajectory_outcome, with_excitation
-from cpfls_cli.commands.flyable_check import PlanAt, checked_plan, remedy
-from cpfls_cli.commands.path_figures import check_figures, write_figures
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
 from cpfls_cli.excitation import Excitation, optimised_rotation
 from cpfls_cli.logs.csv_log import read_csv, row_lines
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.trajectory import absolute_jerk, answer, demand_sentences, figure_names, path_figures
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
 from cpfls_cli.trajectory import (
+    PlannedRotation,
     RotationPath,
+    Trajectory,
     TrajectorySettings,
     full_rotation,
     held_rotation,
     plan,
 )
 from cpfls_cli.trajectory.consistency import check_waypoints
+from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.settings import WaypointSettings
+
+PlanAt = Callable[[float], PlannedRotation]
+"""Samples a plan with a sample time in s."""
 
 _POSITION_COLUMNS = ("x_m", "y_m", "z_m")
 _OPTIONAL_COLUMNS = ("yaw_rad", "pause_s")
+# Samples in the shortest part of a move, and how many in all are looked at.
+_SAMPLES_IN_A_PART = 8
+_MOST_SAMPLES = 1_000_000
 
 
 def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
@@ -51,24 +63,28 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
     """
     inputs = begin(job, {"waypoints": waypoints} if waypoints else {})
     settings = _settings(job.study, waypoints)
-    if plot:
-        check_figures(job, settings.held)
+    figures = _figure_paths(job, figure_names(held=settings.held) if plot else ())
+    for path in figures:
+        check_output(path, job.force)
     # To optimise takes long; what else can go wrong shows only when it is planned.
     if job.dry_run and settings.path == "optimised":
         return nothing_written(job)
     with settings_of("trajectory", job.study):
         at, excitation = _plan(job, settings)
         planned = at(settings.sample_time_s)
-        checked = checked_plan(job.study, settings, planned, at)
-    if checked.problems and settings.infeasible == "stop":
-        change = f"{remedy(job.study, settings)}, change the vehicle, or set trajectory.infeasible: report"
-        raise ComputationError("\n".join([*checked.problems, f"{job.output}: no path was written; {change}"]))
+        demand, problems = _demand(job.study, settings, planned, at)
+    if problems and settings.infeasible == "stop":
+        change = f"{_remedy(job.study, settings)}, change the vehicle, or set trajectory.infeasible: report"
+        raise ComputationError("\n".join([*problems, f"{job.output}: no path was written; {change}"]))
     if job.dry_run:
         return nothing_written(job)
-    record = TrajectoryRecord.of_data(header_of(job.study, inputs), trajectory_data(planned))
-    write_record(job.output, record)
-    figures = write_figures(job, record) if plot else ()
-    return with_excitation(trajectory_outcome(planned, checked, figures), excitation)
+    source = source_of(job, finish(job, TrajectoryRecord.of(planned), inputs))
+    for path, drawn in zip(figures, path_figures(source) if figures else (), strict=True):
+        write_text(path, drawn.svg)
+    blocks = [*answer(source, planned, demand, excitation), *(Text(problem, "warning") for problem in problems)]
+    if figures:
+        blocks.append(Text(f"drawn: {', '.join(map(str, figures))}"))
+    return Outcome(_summary(source.record, planned, demand, excitation, figures), tuple(blocks))
 
 
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
@@ -100,8 +116,8 @@ def _rotation(job: Job, settings: TrajectorySettings) -> tuple[RotationPath, Exc
     if settings.path == "full-rotation":
         return full_rotation(settings.rotation, settings.duration_s, rng, vehicle.inertia_kg_m2), None
     structure = job.study.identification
-    found = optimised_rotation(settings.rotation, settings.duration_s, structure, vehicle, rng, job.progress)
-    return found.path, found
+    excitation = optimised_rotation(settings.rotation, settings.duration_s, structure, vehicle, rng, job.progress)
+    return excitation.path, excitation
 
 
 def _read_waypoints(path: Path, paused: bool) -> tuple[WaypointSettings, ...]:
@@ -160,3 +176,109 @@ def _line_and_column(key: str, lines: list[int]) -> str:
         return ""
     column = {"position_m": ", ".join(_POSITION_COLUMNS)}.get(parts[2], parts[2])
     return f":{lines[int(parts[1])]}: {column}"
+
+
+def _demand(
+    study: Study, settings: TrajectorySettings, planned: PlannedRotation, at: PlanAt
+) -> tuple[Flyability, tuple[str, ...]]:
+    """Find what a plan asks of its vehicle, sampled anew where a part of a move may lie between two samples.
+
+    The sentences say what is asked for beyond what the vehicle has.
+
+    Raises
+    ------
+    SettingError
+        If the moves are too short to be looked at between the samples.
+    """
+    shortest = _shortest_part(planned, settings)
+    step = shortest / _SAMPLES_IN_A_PART
+    if step < settings.sample_time_s:
+        if planned.duration > _MOST_SAMPLES * step:
+            message = f"moves have parts of {shortest:.3g} s, too short to be checked between samples; lower it"
+            raise SettingError("sample_time_s", f"{message}, or plan longer moves")
+        planned = at(step)
+    signals = {name: value for name, value in vars(planned).items() if isinstance(value, np.ndarray)}
+    demand = flyability(signals, study.vehicle, settings.tilt_max_rad)
+    return demand, demand_sentences(demand, planned)
+
+
+def _shortest_part(planned: PlannedRotation, settings: TrajectorySettings) -> float:
+    """Shortest wave or hold of any move, or half a period of the fastest harmonic."""
+    if not isinstance(planned, Trajectory):
+        return 0.5 / settings.rotation.frequency_max_hz
+    profiles = [profile for leg in planned.legs for profile in leg.profiles]
+    parts = (part for profile in profiles for part in (profile.period, *astuple(profile.holds)))
+    return min(float(part) for part in parts if part > 0)
+
+
+def _remedy(study: Study, settings: TrajectorySettings) -> str:
+    """Say which key to change about a plan that asks for too much."""
+    if settings.held:
+        alone = " ".join(f"{torque:.3g}" for torque in single_axis_torque(study.vehicle))
+        return f"set trajectory.rotation.torque_max_n_m (about one axis at a time the rotors give up to {alone} N m)"
+    if _turns(settings) and not _still_too_much(study, _without_turn(settings)):
+        by_points = any(point.yaw_rad is not None for point in settings.waypoints)
+        key = "waypoints: their yaw_rad" if by_points else f"yaw_turn_rad = {settings.yaw_turn:.4g}"
+        return f"it is the turn in yaw: lower trajectory.{key}, or take longer over it"
+    slower = "lower trajectory.limits" if settings.limits.given else "raise trajectory.period_s"
+    return slower if settings.tilt_max_rad is None else f"{slower}, raise trajectory.tilt_max_rad"
+
+
+def _turns(settings: TrajectorySettings) -> bool:
+    return bool(settings.yaw_turn) or any(point.yaw_rad for point in settings.waypoints)
+
+
+def _without_turn(settings: TrajectorySettings) -> TrajectorySettings:
+    points = tuple(replace(point, yaw_rad=None) for point in settings.waypoints)
+    return replace(settings, yaw_turn_rad=0.0, waypoints=points)
+
+
+def _still_too_much(study: Study, settings: TrajectorySettings) -> bool:
+    def at(sample_time: float) -> Trajectory:
+        return plan(replace(settings, sample_time_s=sample_time), study.vehicle.gravity_m_s2)
+
+    _, problems = _demand(study, settings, at(settings.sample_time_s), at)
+    return bool(problems)
+
+
+def _figure_paths(job: Job, names: Sequence[str]) -> tuple[Path, ...]:
+    """Name the figures of a path, beside its artifact."""
+    return tuple(job.output.with_name(f"{job.output.stem}-{name}.svg") for name in names)
+
+
+def _summary(
+    record: TrajectoryRecord,
+    planned: PlannedRotation,
+    demand: Flyability,
+    excitation: Excitation | None,
+    figures: Sequence[Path],
+) -> dict[str, Any]:
+    """Describe a plan for machines: its artifact holds samples, the plan is known exactly."""
+    summary: dict[str, Any] = {
+        "figures": [str(path) for path in figures],
+        "samples": len(planned.time),
+        "duration_s": planned.duration,
+        **record.summary,
+        "max_thrust_n": float(demand.thrust.max()),
+    }
+    if isinstance(planned, Trajectory):
+        summary |= {
+            "max_tilt_rad": float(demand.tilt.max()),
+            "max": {**planned.maxima, "position": planned.maxima["displacement"]},
+            "legs": [_leg_summary(leg) for leg in planned.legs],
+        }
+    if excitation is not None:
+        random = {"best": float(excitation.random.min()), "median": float(np.median(excitation.random))}
+        summary |= {"condition_number": excitation.condition_number, "random": random}
+        summary["evaluations"] = excitation.evaluations
+    return summary
+
+
+def _leg_summary(leg: Leg) -> dict[str, Any]:
+    return {
+        "begin_s": leg.begin,
+        "duration_s": leg.duration,
+        "displacement_m": leg.vector.tolist(),
+        "limited_by": list(leg.limited_by),
+        "jerk_integral_m_s2": absolute_jerk(leg),
+    }

@@ -9,26 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.formats import FLIGHT
-from cpfls_cli.artifacts.rows import check_rows, count_rows, read_rows
-from cpfls_cli.artifacts.store import Artifact
+from cpfls_cli.artifacts.flight import MOTION, FlightRecord
+from cpfls_cli.artifacts.store import check_rows, count_rows, read_record, read_rows
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.sources import read_with
 from cpfls_cli.identification.data import CHUNK, TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
 
-MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
 _NEEDED = ("time", *MOTION)
 _TORQUE = "torque"
 
 IN_MEMORY = 500_000
 """Samples of a flight that are held in memory, 52 MB of motion and torque."""
-
-
-def flight_motion(flight: Artifact) -> Motion:
-    """Take the motion of a flight that was read whole."""
-    attitude, rate, acceleration = (flight.array(name) for name in MOTION)
-    return Motion(attitude, rate, acceleration)
 
 
 @dataclass(frozen=True)
@@ -40,7 +31,7 @@ class FlightFile:
     path : Path
         Absolute, because workers may read it too.
     names : tuple of str
-        Datasets: time, motion and, where it is asked for, torque.
+        Paths of datasets: time, motion and, where it is asked for, torque.
     start, stop : int
         First sample, and the one after the last.
     size_bytes, rows : int
@@ -72,15 +63,15 @@ class FlightFile:
 
     def _require_same_file(self) -> None:
         if not self.path.is_file():
-            found = "no such file"
+            fault = "no such file"
         elif (size := self.path.stat().st_size) != self.size_bytes:
-            found = f"another file, of {size} bytes instead of {self.size_bytes}"
-        elif (rows := count_rows(self.path, FLIGHT, self.names[0])) != self.rows:
-            found = f"another file, with {rows or 'no'} samples instead of {self.rows}"
+            fault = f"another file, of {size} bytes instead of {self.size_bytes}"
+        elif (rows := count_rows(self.path, FlightRecord.spec(), self.names[0])) != self.rows:
+            fault = f"another file, with {rows or 'no'} samples instead of {self.rows}"
         else:
             return
         raise InputError(
-            f"{self.path}: {found}; a flight of more than {IN_MEMORY} samples is read from its file also by the "
+            f"{self.path}: {fault}; a flight of more than {IN_MEMORY} samples is read from its file also by the "
             "workers of a scheduler: put the same file there on each of their machines, and leave it alone"
         )
 
@@ -99,12 +90,13 @@ def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
         If it is no flight, lacks a signal or breaks its format.
     """
     names = (*_NEEDED, _TORQUE) if torque else _NEEDED
-    samples = count_rows(path, FLIGHT, names[0])
+    paths = tuple(FlightRecord.path(name) for name in names)
+    samples = count_rows(path, FlightRecord.spec(), paths[0])
     if samples is None or samples <= IN_MEMORY:
-        flight = read_with(path, FLIGHT, *names)
-        return _torque_data([flight.array(name) for name in names])
-    check_rows(path, FLIGHT, names, CHUNK)
-    return FlightFile(path.resolve(), names, 0, samples, path.stat().st_size, samples)
+        flight = read_record(path, FlightRecord, *names)
+        return _torque_data([getattr(flight, name) for name in names])
+    check_rows(path, FlightRecord.spec(), paths, CHUNK)
+    return FlightFile(path.resolve(), paths, 0, samples, path.stat().st_size, samples)
 
 
 def _torque_data(rows: Sequence[Array]) -> TorqueData:

@@ -11,15 +11,14 @@ import numpy as np
 from scipy.ndimage import find_objects, label
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.formats import FLIGHT
-from cpfls_cli.commands.import_log import flight_signals, imported
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.smoothing import body_rate_of
-from cpfls_cli.flights.log_quality import found_and_done
-from cpfls_cli.flights.rotor_torque import commanded_speed
+from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.flights.sources import read_good
 from cpfls_cli.gap.balance.windows import Recording
@@ -69,8 +68,10 @@ def read_flights(paths: Sequence[Path], study: Study) -> Flights:
 
 def _log(path: Path, study: Study) -> _Source:
     flight = imported(path, study)
-    done = tuple(f"{what} ({count})" for what, count in found_and_done(flight.report).items())
-    return _Source(path.name, flight_signals(flight), _units(study), (*done, *flight.report.warnings))
+    done = tuple(f"{what} ({count})" for what, count in log_findings(flight.report).items())
+    return _Source(
+        path.name, FlightRecord.of_import(flight, {}).signals, _units(study), (*done, *flight.report.warnings)
+    )
 
 
 def _artifact(path: Path, study: Study) -> _Source:

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.formats import SELECTION
+from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import Artifact, file_sha256
+from cpfls_cli.artifacts.store import file_sha256, read_record
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight_source import flight_source, part_of
-from cpfls_cli.flights.sources import read_good
 from cpfls_cli.identification.data import Split, TorqueSource, gathered, joined, sample_times, split_flight
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, joined_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
@@ -150,10 +149,10 @@ def _refuse_twice(flights: Sequence[Path], inputs: Mapping[str, InputFile] | Non
 
 
 def _selected(flights: Mapping[Path, str], selection: Path, candidates: IntArray) -> IntArray:
-    artifact = read_good(selection, SELECTION)
-    _require_made_from(flights, selection, artifact)
-    indices = np.unique(artifact.array("indices").astype(np.int64))
-    if len(indices) == 0 or indices[0] < 0 or len(indices) != len(artifact.array("indices")):
+    record = read_record(selection, SelectionRecord)
+    _require_made_from(flights, selection, record)
+    indices = np.unique(record.indices)
+    if len(indices) == 0 or indices[0] < 0 or len(indices) != len(record.indices):
         raise InputError(f"{selection}: indices is empty, negative or repeats itself; run `cpfls reduce` again")
     if not np.isin(indices, candidates).all():
         raise InputError(
@@ -163,8 +162,8 @@ def _selected(flights: Mapping[Path, str], selection: Path, candidates: IntArray
     return indices
 
 
-def _require_made_from(flights: Mapping[Path, str], selection: Path, artifact: Artifact) -> None:
-    sources = {role: source for role, source in artifact.header.inputs.items() if role.startswith("flight")}
+def _require_made_from(flights: Mapping[Path, str], selection: Path, record: SelectionRecord) -> None:
+    sources = {role: source for role, source in record.origin.inputs.items() if role.startswith("flight")}
     roles = flight_roles(list(flights))
     names = " ".join(str(path) for path in flights)
     if len(sources) != len(roles):

@@ -14,7 +14,7 @@ from cpfls_cli.gap.diagnose import DiagnosisRun
 from cpfls_cli.gap.naming.results import Alternative, Diagnosis, Estimate, GapSize, GapVerdict, NamedEffect, Unexplained
 from cpfls_cli.pages.disagreement_words import UNITS, gap_summary, replay_lines, replay_summary, unseen_lines
 from cpfls_cli.pages.gap_words import whole_percent
-from cpfls_cli.report.rounded import with_interval
+from cpfls_cli.report.numbers import with_interval
 
 _ENERGY = {
     "feeds": "; it feeds energy into the rotation",

@@ -10,9 +10,9 @@ import numpy as np
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup
 from cpfls_cli.pages.model import MODELS, SQUARED_TORQUE, TORQUE
+from cpfls_cli.pages.printed import RELATIVE_ERROR, SMALLEST_MAX_ERROR, TABLE_5, PrintedColumn
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.pages.swept import repeats_table_5
-from cpfls_cli.pages.table_5 import PRINTED, RELATIVE_ERROR, SMALLEST_MAX_ERROR, PrintedColumn
+from cpfls_cli.pages.sweep import repeats_table_5
 from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, count, number, percent, r_squared
@@ -68,8 +68,8 @@ def _table(sources: Sources) -> Table:
     header = ["Quantity", *(model.label for model in sources.models)]
     elsewhere = repeats_table_5(sources.sweeps)
     if sources.settings.paper and not elsewhere:
-        columns += [_printed(column) for column in PRINTED]
-        header += ["Paper"] * len(PRINTED)
+        columns += [_printed(column) for column in TABLE_5]
+        header += ["Paper"] * len(TABLE_5)
     rows = [[name, *(column[index] for column in columns)] for index, name in enumerate(_ROWS)]
     caption = (
         "Results of the identification on the whole training part: mean squared error over the axes, largest error and "

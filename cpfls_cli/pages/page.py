@@ -6,26 +6,24 @@ from dataclasses import dataclass
 
 from cpfls_cli.pages.comparison import comparison_section
 from cpfls_cli.pages.evidence import steps_section, validation_section
+from cpfls_cli.pages.flight import flight_section, vehicle_section
 from cpfls_cli.pages.fuzzy_part import partitions_section, rules_section
 from cpfls_cli.pages.identification import identification_section, search_section
-from cpfls_cli.pages.missing import missing
+from cpfls_cli.pages.prediction import prediction_section
+from cpfls_cli.pages.provenance import missing, provenance_section
+from cpfls_cli.pages.reproduction import reproduction_section
 from cpfls_cli.pages.residuals import residuals_section
 from cpfls_cli.pages.sections.diagnosis import diagnosis_section
 from cpfls_cli.pages.sections.disagreement import disagreement_section
 from cpfls_cli.pages.sections.extension import extension_section
-from cpfls_cli.pages.sections.flight import flight_section
-from cpfls_cli.pages.sections.path import path_section
-from cpfls_cli.pages.sections.prediction import prediction_section
-from cpfls_cli.pages.sections.provenance import provenance_section
-from cpfls_cli.pages.sections.replicates import replicates_section
-from cpfls_cli.pages.sections.reproduction import reproduction_section
 from cpfls_cli.pages.sections.sensors import sensors_section
-from cpfls_cli.pages.sections.tracking import tracking_section
 from cpfls_cli.pages.sections.unseen import unseen_section
-from cpfls_cli.pages.sections.vehicle import vehicle_section
 from cpfls_cli.pages.selection import reduction_section
 from cpfls_cli.pages.source import Sources
 from cpfls_cli.pages.summary import models_section, summary_section
+from cpfls_cli.pages.sweep import replicates_section
+from cpfls_cli.pages.tracking import tracking_section
+from cpfls_cli.pages.trajectory import path_section
 from cpfls_cli.pages.uncertainty import uncertainty_section
 from cpfls_cli.report.content import Document
 from cpfls_cli.report.forms import Form

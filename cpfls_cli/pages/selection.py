@@ -109,7 +109,7 @@ def _undetermined(selection: Source[SelectionRecord]) -> Iterator[Text]:
 def _table(sources: Sources) -> Table:
     ours = [row for selection in sources.selections for row in _rows(selection)]
     # Selections from one flight share its full set, which then stands once.
-    ours = [row for place, row in enumerate(ours) if row not in ours[:place]]
+    ours = [row for index, row in enumerate(ours) if row not in ours[:index]]
     rows = _beside_the_paper(ours) if sources.settings.paper else ours
     caption = (
         "Table 4. Condition number of the regressor with uniform partitions, all samples against reduced sets. Change "
@@ -122,13 +122,13 @@ def _table(sources: Sources) -> Table:
 def _beside_the_paper(ours: list[_Row]) -> list[_Row]:
     """Add the printed columns by number of samples, largest sets first; those that nobody repeats stand alone."""
     printed = {str(column.samples): [str(column.condition_number), change(column.change)] for column in TABLE_4}
-    found = {_samples(row) for row in ours}
+    shown = {_samples(row) for row in ours}
     rows = [[*row, *printed.get(_samples(row), ["", ""])] for row in ours]
     full = TABLE_4[0].samples
     rows += [
         [f"Paper, {'full set' if int(samples) == full else 'reduced'}", samples, percent(int(samples) / full), "", "",
          "", "", *columns]
-        for samples, columns in printed.items() if samples not in found
+        for samples, columns in printed.items() if samples not in shown
     ]  # fmt: skip
     return sorted(rows, key=lambda row: -int(_samples(row)))
 

@@ -13,11 +13,9 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.figures.before_after import legend_over
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import BASELINE, band, plain_ticks, plot, style_of
+from cpfls_cli.report.canvas import BASELINE, band, plain_ticks, plot, runs, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.decimation import runs
-from cpfls_cli.report.numbers import number, percent
-from cpfls_cli.report.rounded import printed, with_interval
+from cpfls_cli.report.numbers import number, percent, printed, with_interval
 from cpfls_cli.validation.bands import band as interval
 
 if TYPE_CHECKING:

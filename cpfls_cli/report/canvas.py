@@ -1,15 +1,17 @@
-"""One style for all figures, and the one way to draw them."""
+"""One style for all figures, and the one way to draw them: long curves thinned out, written as SVG inside a page."""
 
 from __future__ import annotations
 
+import io
+import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.report.content import Plot
-from cpfls_cli.report.decimation import evenly_spread, kept_samples
 from cpfls_cli.report.numbers import plain
 
 if TYPE_CHECKING:
@@ -59,6 +61,15 @@ _STYLE: dict[str, Any] = {
     "ytick.color": "#333333",
 }
 
+_NAMESPACE = "http://www.w3.org/2000/svg"
+_COORDINATES = {"d", "x", "y"}
+_LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}(?!\d*e)")
+_REFERENCE = re.compile(r"url\(#([^)]+)\)")
+
+_LARGEST = 1500
+_ROWS = 25
+"""Of a table of the data of a figure, at most."""
+
 
 def plot(name: str, caption: str, description: str, height: float, draw: Callable[[Figure], None]) -> Plot:
     """Draw a figure.
@@ -78,7 +89,6 @@ def plot(name: str, caption: str, description: str, height: float, draw: Callabl
     from matplotlib.figure import Figure
 
     from cpfls_cli.report.collect import panels_of
-    from cpfls_cli.report.svg import inline_svg
 
     style: Any = {**_STYLE, "svg.hashsalt": name}
     with matplotlib.rc_context():
@@ -87,7 +97,7 @@ def plot(name: str, caption: str, description: str, height: float, draw: Callabl
         matplotlib.rcParams.update(style)
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         draw(figure)
-        return Plot(name, caption, inline_svg(figure, name, description), description, panels_of(figure))
+        return Plot(name, caption, _inline_svg(figure, name, description), description, panels_of(figure))
 
 
 def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
@@ -99,7 +109,7 @@ def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:
     **style
         As `Axes.plot` takes it.
     """
-    from cpfls_cli.report.collect_artists import SPREAD
+    from cpfls_cli.report.collect import SPREAD
 
     kept, shown = kept_samples(y), evenly_spread(len(y))
     for curve in axes.plot(x[kept], y[kept], **style):
@@ -147,3 +157,122 @@ def plain_ticks(axis: Axis) -> None:
 def style_of(index: int) -> dict[str, Any]:
     """Get the style of the curve with this number; styles repeat after six."""
     return STYLES[index % len(STYLES)]
+
+
+def kept_samples(values: Array, largest: int = _LARGEST) -> IntArray:
+    """Choose the samples that draw a curve: the lowest and the highest of every stretch, and both ends.
+
+    Parameters
+    ----------
+    values : array, shape (samples,)
+    largest : int
+        About how many samples to keep; a shorter curve is kept whole.
+
+    Returns
+    -------
+    array of int
+        Ascending indices.
+    """
+    samples = len(values)
+    if samples <= largest:
+        return np.arange(samples)
+    stretch = np.arange(samples) * (largest // 2) // samples
+    order = np.lexsort((values, stretch))
+    ends = np.searchsorted(stretch[order], np.arange(largest // 2), side="right")
+    starts = np.concatenate([[0], ends[:-1]])
+    return np.unique(np.concatenate([order[starts], order[ends - 1], [0, samples - 1]]))
+
+
+def evenly_spread(samples: int, rows: int = _ROWS) -> IntArray:
+    """Choose the samples of a curve that a table shows: both ends and some between.
+
+    Parameters
+    ----------
+    rows : int
+        At most so many.
+
+    Returns
+    -------
+    array of int
+        Ascending indices.
+    """
+    return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, rows)).round().astype(int))
+
+
+def runs(marked: Array | BoolArray) -> list[tuple[int, int]]:
+    """Find stretches of marked samples.
+
+    Parameters
+    ----------
+    marked : array, shape (samples,)
+        Other than zero where marked.
+
+    Returns
+    -------
+    list of (int, int)
+        First and last index of each.
+    """
+    edges = np.diff(np.concatenate([[0], (np.asarray(marked) != 0).astype(int), [0]]))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
+
+
+def _inline_svg(figure: Figure, name: str, description: str) -> str:
+    """Write a figure as an ``svg`` element for an HTML page.
+
+    Parameters
+    ----------
+    name : str
+        Unique on the page; ids inside the figure start with it.
+    description : str
+        What the figure shows, for those who do not see it.
+    """
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", metadata={"Date": None})
+    root = ElementTree.fromstring(stream.getvalue())
+    _strip(root)
+    _rename_ids(root, name)
+    _shorten(root)
+    for attribute in ("width", "height", "version"):
+        root.attrib.pop(attribute, None)
+    root.attrib |= {"xmlns": _NAMESPACE, "role": "img", "aria-label": description}
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _strip(element: ElementTree.Element) -> None:
+    """Drop metadata, style sheets (they would rule the whole page) and name spaces, which HTML does not know."""
+    element.tag = element.tag.rsplit("}", 1)[-1]
+    for key in list(element.attrib):
+        element.set(key.rsplit("}", 1)[-1], element.attrib.pop(key))
+    for child in list(element):
+        if child.tag.rsplit("}", 1)[-1] in {"metadata", "style"}:
+            element.remove(child)
+        else:
+            _strip(child)
+
+
+def _rename_ids(root: ElementTree.Element, name: str) -> None:
+    """Keep only the ids that something refers to, each with the name of the figure before it."""
+    used = {reference for element in root.iter() for reference in _references(element)}
+    for element in root.iter():
+        identifier = element.attrib.pop("id", None)
+        if identifier in used:
+            element.set("id", f"{name}-{identifier}")
+        for key, value in element.attrib.items():
+            if key == "href" and value.startswith("#"):
+                element.set(key, f"#{name}-{value[1:]}")
+            elif "url(#" in value:
+                element.set(key, _REFERENCE.sub(rf"url(#{name}-\1)", value))
+
+
+def _shorten(root: ElementTree.Element) -> None:
+    """Write coordinates with two decimals, a fiftieth of a pixel on a screen: most of a page would be digits else."""
+    for element in root.iter():
+        for key in _COORDINATES & set(element.attrib):
+            words = " ".join(element.attrib[key].split())
+            element.set(key, _LONG_NUMBER.sub(lambda digits: f"{float(digits[0]):.2f}", words))
+
+
+def _references(element: ElementTree.Element) -> list[str]:
+    references = [match for value in element.attrib.values() for match in _REFERENCE.findall(value)]
+    target = element.get("href", "")
+    return [*references, target[1:]] if target.startswith("#") else references

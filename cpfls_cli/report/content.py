@@ -1,18 +1,19 @@
-"""What a page is made of: sections of text, facts, tables, plots and details."""
+"""What a page is made of: sections of text, facts, tables, figures with the numbers behind them, and details."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import text_sha256
-from cpfls_cli.report.drawn import Panel
 
 HASH_SHOWN = 12
 
 Tone = Literal["plain", "note", "good", "warning"]
+Drawn = Literal["line", "points", "bars", "band", "map", "mark"]
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Facts:
-    """Terms and what they are here.
+    """Terms with their values.
 
     Attributes
     ----------
@@ -83,6 +84,55 @@ class Table:
     def cells(self) -> list[list[Cell]]:
         """All rows with every entry as a cell."""
         return [[entry if isinstance(entry, Cell) else Cell(entry) for entry in row] for row in self.rows]
+
+
+@dataclass(frozen=True)
+class Series:
+    """One curve, set of points, bars, band, map or mark of a figure.
+
+    Attributes
+    ----------
+    label : str
+        As in the legend; empty where it has none.
+    form : {"line", "points", "bars", "band", "map", "mark"}
+        A mark is a level or a span: ends of x and of y, infinite where it goes from edge to edge.
+    x, y : array, shape (points,)
+    low, high : array, shape (points,), or None
+        Ends of a band or of error bars.
+    value : array, shape (points,), or None
+        Colour of a map.
+    spread : tuple of (array, array), or None
+        Samples evenly spread over a curve of which only the extremes are drawn.
+    """
+
+    label: str
+    form: Drawn
+    x: Array
+    y: Array
+    low: Array | None = None
+    high: Array | None = None
+    value: Array | None = None
+    spread: tuple[Array, Array] | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One set of axes of a figure.
+
+    Attributes
+    ----------
+    title, x_label, y_label : str
+        Labels with units.
+    x_names, y_names : mapping of float to str
+        Words that stand at positions of an axis in place of numbers.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    series: Sequence[Series]
+    x_names: Mapping[float, str] = field(default_factory=dict)
+    y_names: Mapping[float, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,26 @@
-"""A report as one HTML page that needs nothing else."""
+"""A report as one HTML page that needs nothing else; each figure with small tables of its data."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from cpfls_cli.report.content import Document
-from cpfls_cli.report.figure_tables import figure_tables
+from cpfls_cli.arrays import Array
+from cpfls_cli.report.canvas import evenly_spread
+from cpfls_cli.report.content import Document, Panel, Series, Table
+from cpfls_cli.report.numbers import number, plain
+
+_COLUMNS = 12
+_DIGITS = 4
+_SMALL = 1e-4
 
 
 def html_page(document: Document) -> str:
-    """Write sections as HTML."""
+    """Write a document as HTML."""
     environment = Environment(
         loader=PackageLoader("cpfls_cli.report", "templates"),
         autoescape=True,
@@ -23,3 +33,108 @@ def html_page(document: Document) -> str:
     environment.filters["figure_tables"] = figure_tables
     template = environment.get_template("page.html")
     return template.render(document=document)
+
+
+@dataclass
+class _Side:
+    """Curves over the same x, side by side."""
+
+    panel: Panel
+    x: Array
+    titles: list[str] = field(default_factory=list)
+    columns: list[list[str]] = field(default_factory=list)
+    drawn: list[int] = field(default_factory=list)
+
+    def takes(self, panel: Panel, x: Array, more: int) -> bool:
+        """Tell whether a curve over this x belongs here too."""
+        same_axis = panel.x_label == self.panel.x_label and panel.x_names == self.panel.x_names
+        return same_axis and len(self.columns) + more <= _COLUMNS and np.array_equal(x, self.x)
+
+
+def figure_tables(panels: Sequence[Panel]) -> list[Table]:
+    """Write the data of a figure as tables of at most 25 rows, curves over the same x side by side.
+
+    Returns
+    -------
+    list of Table
+        Their captions say how many points are drawn.
+    """
+    sides: list[_Side] = []
+    for panel in panels:
+        data = [series for series in panel.series if series.form != "mark"]
+        for index, series in enumerate(data):
+            name = series.label or (f"curve {index + 1}" if len(data) > 1 else "")
+            _place(sides, panel, series, name)
+    marks = [row for panel in panels for row in _marks(panel)]
+    return [_table(side) for side in sides] + ([_levels(marks)] if marks else [])
+
+
+def _place(sides: list[_Side], panel: Panel, series: Series, name: str) -> None:
+    x, columns = _shown(series)
+    side = next((side for side in sides if side.takes(panel, x, len(columns))), None)
+    if side is None:
+        side = _Side(panel, x)
+        sides.append(side)
+    side.titles += [", ".join(filter(None, (panel.title, *words))) for words in _words(panel, series, name)]
+    side.columns += [[_word(value, panel.y_names) for value in column] for column in columns]
+    side.drawn.append(len(series.x))
+
+
+def _shown(series: Series) -> tuple[Array, list[Array]]:
+    """Pick the rows of a table: x, and the columns of this series."""
+    if series.spread is not None and series.form == "line":
+        rows = evenly_spread(len(series.spread[0]))
+        return series.spread[0][rows], [series.spread[1][rows]]
+    rows = evenly_spread(len(series.x))
+    columns = (None if series.form == "band" else series.y, series.low, series.high, series.value)
+    return series.x[rows], [column[rows] for column in columns if column is not None]
+
+
+def _words(panel: Panel, series: Series, name: str) -> Iterator[tuple[str, ...]]:
+    if series.form != "band":
+        yield (name, panel.y_label)
+    for end in ("low", "high") if series.low is not None else ():
+        yield (name, end, panel.y_label)
+    if series.value is not None:
+        yield ("value",)
+
+
+def _table(side: _Side) -> Table:
+    rows = [
+        [side.panel.x_names.get(float(x)) or plain(_positive(x), smallest=_SMALL), *cells]
+        for x, *cells in zip(side.x, *side.columns, strict=True)
+    ]
+    fewest, most = min(side.drawn), max(side.drawn)
+    drawn = f"{most}" if fewest == most else f"{fewest} to {most}"
+    caption = f"{len(rows)} of {drawn} points that are drawn of each curve." if most > len(rows) else ""
+    return Table("", caption, [side.panel.x_label or "x", *side.titles], rows)
+
+
+def _marks(panel: Panel) -> Iterator[list[str]]:
+    for mark in panel.series:
+        # A zero line without a name says nothing.
+        if mark.form == "mark" and (mark.label or np.any(mark.y[np.isfinite(mark.y)]) or np.isfinite(mark.x).all()):
+            x, y = (_range(ends, names) for ends, names in ((mark.x, panel.x_names), (mark.y, panel.y_names)))
+            yield [panel.title or panel.y_label, mark.label, x, y]
+
+
+def _levels(marks: Sequence[list[str]]) -> Table:
+    shown = [marks[index] for index in evenly_spread(len(marks))]
+    more = f": {len(shown)} of {len(marks)}" if len(shown) < len(marks) else ""
+    return Table("", f"Levels and spans{more}.", ("Panel", "What", "x", "y"), shown)
+
+
+def _range(ends: Array, names: Mapping[float, str]) -> str:
+    if np.isinf(ends).any():
+        return "edge to edge"
+    low, high = _word(ends[0], names), _word(ends[-1], names)
+    return low if low == high else f"{low} … {high}"
+
+
+def _word(value: float, names: Mapping[float, str]) -> str:
+    return names.get(float(value)) or number(_positive(value), _DIGITS)
+
+
+def _positive(value: float) -> float:
+    """Drop the sign of a zero."""
+    return float(value) + 0.0

@@ -10,19 +10,13 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.report.content import Block, Document, Facts, Folded, Origin, Plot, Table
-from cpfls_cli.report.drawn import Panel, Series
+from cpfls_cli.report.content import Block, Document, Facts, Folded, Origin, Panel, Plot, Series, Table
 
 _DIGITS = 6
 
 
 def json_page(document: Document) -> str:
-    """Write sections as one JSON object.
-
-    Parameters
-    ----------
-    version : str
-        Of the program.
+    """Write a document as one JSON object.
 
     Returns
     -------
@@ -77,7 +71,7 @@ def _table(table: Table) -> dict[str, Any]:
 
 def _panel(panel: Panel) -> dict[str, Any]:
     named: Mapping[str, Any] = {
-        key: [{"at": _rounded(place), "word": word} for place, word in names.items()]
+        key: [{"at": _rounded(at), "word": word} for at, word in names.items()]
         for key, names in (("x_names", panel.x_names), ("y_names", panel.y_names))
         if names
     }

@@ -13,12 +13,7 @@ _TONES: dict[Tone, str] = {"note": "Note", "good": "Good", "warning": "Warning"}
 
 
 def markdown_page(document: Document) -> str:
-    """Write sections as GitHub-flavoured Markdown.
-
-    Parameters
-    ----------
-    version : str
-        Of the program.
+    """Write a document as GitHub-flavoured Markdown.
 
     Returns
     -------

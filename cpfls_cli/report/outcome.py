@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -36,3 +37,20 @@ def nothing_written(job: Job) -> Outcome:
     """Say that all is good, where that is all that is asked for (``--dry-run``)."""
     line = Text(f"{job.output}: would be written; the config and all inputs are good")
     return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
+
+
+def plain(value: Any) -> Any:
+    """Replace what JSON has no word for: numbers that are not finite become null.
+
+    Parameters
+    ----------
+    value : object
+        Nested mappings, lists and tuples of numbers and text.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return plain(value.item()) if hasattr(value, "item") else value

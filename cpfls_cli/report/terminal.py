@@ -40,7 +40,7 @@ def terminal_lines(blocks: Iterable[Block | str], width: int | None = None, *, c
                 yield f"{block.label}: {block.title}"
                 yield from (f"  {sentence}" for sentence in block.sentences)
             case Facts():
-                yield from _facts(block)
+                yield from _facts(block, width, colour)
             case Table():
                 yield from _table(block, width, colour)
             case Listing():
@@ -54,19 +54,43 @@ def warnings_of(blocks: Iterable[Block | str]) -> tuple[str, ...]:
     return tuple(block.text for block in blocks if isinstance(block, Text) and block.tone == "warning")
 
 
-def _facts(facts: Facts) -> Iterator[str]:
+def _facts(facts: Facts, width: int | None, colour: bool) -> Iterator[str]:
+    drawn = _grid(colour, header=False)
+    drawn.add_column(no_wrap=True)
+    drawn.add_column(no_wrap=width is None)
     for term, value in facts.rows:
-        yield f"{term}: {value}"
+        drawn.add_row(RichText(term), RichText(value))
+    yield from _printed(drawn, width, colour)
 
 
 def _table(table: Table, width: int | None, colour: bool) -> Iterator[str]:
-    drawn = RichTable(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold" if colour else "")
+    if table.caption:
+        yield table.caption
+    drawn = _grid(colour, header=any(table.header))
     for column, title in enumerate(table.header):
         left = column in table.words or column in table.sentences
-        drawn.add_column(RichText(title), justify="left" if left else "right", no_wrap=width is None)
+        texts = [title, *(row[column].text for row in table.cells)]
+        drawn.add_column(
+            RichText(title),
+            justify="left" if left else "right",
+            no_wrap=width is None,
+            min_width=max((len(word) for text in texts for word in text.split()), default=0),
+        )
     for row in table.cells:
         drawn.add_row(*(RichText(cell.text, _STYLES[cell.tone] if colour else "") for cell in row))
-    yield from _printed(drawn, width, colour)
+    lines = _printed(drawn, width, colour)
+    # No word is broken; what that takes beyond the width, other columns have to give.
+    excess = max(map(_columns, lines), default=0) - (width or _UNLIMITED)
+    yield from _printed(drawn, width - excess, colour) if width and excess > 0 else lines
+
+
+def _columns(line: str) -> int:
+    return RichText.from_ansi(line).cell_len
+
+
+def _grid(colour: bool, *, header: bool) -> RichTable:
+    style = "bold" if colour else ""
+    return RichTable(box=None, pad_edge=False, padding=(0, 1), show_header=header, header_style=style)
 
 
 def _printed(drawn: RichTable, width: int | None, colour: bool) -> Sequence[str]:
@@ -80,5 +104,5 @@ def _printed(drawn: RichTable, width: int | None, colour: bool) -> Sequence[str]
         emoji=False,
         highlight=False,
     )
-    console.print(drawn)
+    console.print(drawn, crop=False)
     return [line.rstrip() for line in stream.getvalue().splitlines()]

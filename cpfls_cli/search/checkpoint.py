@@ -1,50 +1,141 @@
-"""The checkpoint of a search: written beside the output after every generation, and continued from."""
+"""What a stopped search or sweep leaves beside its output, and whether a command may go on from it."""
 
 from __future__ import annotations
 
 import glob
-from collections.abc import Iterator, Mapping
+import json
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Self, TypeVar
 
-from cpfls_cli.artifacts.formats import CHECKPOINT, MODEL
-from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.state_file import StoppedSearch, nothing_data, state_data, stopped_search, with_unfinished
-from cpfls_cli.artifacts.store import Artifact, write_artifact
+from cpfls_cli.artifacts.checkpoint import CheckpointRecord, StoppedSearch
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.spec import Header, Record
+from cpfls_cli.artifacts.store import format_name, read_any, read_record, write_record
+from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.config.load import parse_config
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.evolution.state import EvolutionState
-from cpfls_cli.flights.sources import read_good
 from cpfls_cli.identification.search import Unfinished
-from cpfls_cli.search.resuming import differences, nothing_to_resume, require_same
+
+R = TypeVar("R", bound=Record)
 
 _SECTION = "identification"
 _GENERATIONS = f"{_SECTION}.generations"
+_LONGEST = 120
+_START_AGAIN = "--force without --resume starts again"
 
 
 @dataclass(frozen=True)
-class Checkpoint:
-    """Where a search leaves its state.
+class Leftover:
+    """A file beside the output from which a stopped command can go on.
 
     Attributes
     ----------
     header : Header
-        Of the search that is run now: its config, seed and inputs.
+        Of the command that is run now: its config, seed and inputs.
     """
 
     path: Path
     header: Header
+    WORK: ClassVar[str]
+    SUFFIX: ClassVar[str]
+    OUTPUT: ClassVar[type[ModelRecord | SweepRecord]]
 
     @classmethod
-    def beside(cls, output: Path, header: Header) -> Checkpoint:
-        """Name the checkpoint of an output: ``model.h5.checkpoint`` of ``model.h5``."""
-        return cls(output.with_name(f"{output.name}.checkpoint"), header)
+    def beside(cls, output: Path, header: Header) -> Self:
+        """Name what is left of an output, such as ``model.h5.checkpoint`` of ``model.h5``."""
+        return cls(output.with_name(f"{output.name}{cls.SUFFIX}"), header)
 
     @property
     def output(self) -> Path:
-        """What the search is for."""
+        """What the command is for."""
         return self.path.with_suffix("")
+
+    def require_permission(self, *, force: bool) -> None:
+        """Refuse to give up what is left, unless that is allowed.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.path.exists() and not force:
+            raise InputError(
+                f"{self.path}: a {self.WORK} for {self.output} was stopped here; --resume continues it, --force "
+                "starts again"
+            )
+
+    def output_may_be_replaced(self) -> bool:
+        """Tell whether the output is what the stopped command left: incomplete, or complete and not tidied up."""
+        written = self._written()
+        return written is not None and (not written.complete or written.origin == self.header)
+
+    def remove(self) -> None:
+        """Remove what is left, if there is anything."""
+        self.path.unlink(missing_ok=True)
+
+    def tidy(self) -> None:
+        """Remove what a killed command left half-written of this file and of its output."""
+        for name in (self.path.name, self.output.name):
+            for part in self.path.parent.glob(f".{glob.escape(name)}.????????.part"):
+                part.unlink(missing_ok=True)
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Add to whatever fails inside that the command can go on nevertheless."""
+        try:
+            yield
+        except (ComputationError, OutputError) as error:
+            if self.path.exists():
+                error.add_note(f"{self.path}: is intact; the same command with --resume goes on")
+            raise
+
+    def _read(self, wanted: type[R]) -> R:
+        """Read what is left.
+
+        Raises
+        ------
+        InputError
+            If there is nothing, or if it is damaged.
+        """
+        if not self.path.exists():
+            written = self._written()
+            if written is not None and written.complete:
+                raise InputError(f"{self.output}: is complete; nothing to resume")
+            raise InputError(f"{self.path}: no such file, so nothing to resume; start without --resume")
+        try:
+            return read_record(self.path, wanted)
+        except InputError as error:
+            raise InputError(f"{error}; {_START_AGAIN}") from None
+
+    def _written(self) -> ModelRecord | SweepRecord | None:
+        """Read the output; None where there is none, or another file."""
+        if not self.output.is_file() or format_name(self.output) != self.OUTPUT.FORMAT.name:
+            return None
+        written = read_any(self.output)
+        assert isinstance(written, self.OUTPUT)
+        return written
+
+    def _require_same(self, differing: Iterable[str]) -> None:
+        """Refuse what is left of another command."""
+        listed = "; ".join(differing)
+        if listed:
+            raise InputError(
+                f"{self.path}: is of another {self.WORK}: {listed}. Repeat the command as it was, with --resume, or "
+                "start again with --force alone"
+            )
+
+
+@dataclass(frozen=True)
+class Checkpoint(Leftover):
+    """Where a search leaves its state after every generation."""
+
+    WORK: ClassVar = "search"
+    SUFFIX: ClassVar = ".checkpoint"
+    OUTPUT: ClassVar = ModelRecord
 
     def write(self, state: EvolutionState) -> None:
         """Replace what was there by this state, or leave it as it was.
@@ -54,7 +145,7 @@ class Checkpoint:
         OutputError
             If it cannot be written.
         """
-        write_artifact(self.path, Artifact(CHECKPOINT, self.header, state_data(state)))
+        write_record(self.path, CheckpointRecord.of_state(state).with_header(self.header))
 
     def add(self, unfinished: Unfinished) -> None:
         """Add what was evaluated of the next generation, so that it need not be done again.
@@ -64,10 +155,11 @@ class Checkpoint:
         OutputError
             If it cannot be written; what was there is left as it was.
         """
-        data = nothing_data(unfinished)
         if self.path.exists():
-            data = with_unfinished(read_good(self.path, CHECKPOINT).data, unfinished)
-        write_artifact(self.path, Artifact(CHECKPOINT, self.header, data))
+            record = read_record(self.path, CheckpointRecord).with_unfinished(unfinished)
+        else:
+            record = CheckpointRecord.of_nothing(unfinished)
+        write_record(self.path, record.with_header(self.header))
 
     def read(self) -> StoppedSearch:
         """Take up what was left.
@@ -77,27 +169,13 @@ class Checkpoint:
         InputError
             If there is none, if it is damaged, or if it is of another search.
         """
-        if not self.path.exists():
-            raise nothing_to_resume(self.path, self.output, MODEL)
         try:
-            artifact = read_good(self.path, CHECKPOINT)
-            stopped = stopped_search(artifact)
-        except InputError as error:
-            raise InputError(f"{error}; --force without --resume starts again") from None
+            record = self._read(CheckpointRecord)
+            stopped = record.stopped_search()
         except (ValueError, LookupError, TypeError) as error:
-            raise InputError(f"{self.path}: damaged: {error}; --force without --resume starts again") from None
-        self._require_same_search(artifact.header, 0 if stopped.state is None else stopped.state.index)
+            raise InputError(f"{self.path}: damaged: {error}; {_START_AGAIN}") from None
+        self._require_same_search(record.origin, 0 if stopped.state is None else stopped.state.index)
         return stopped
-
-    def remove(self) -> None:
-        """Remove the checkpoint, if there is one."""
-        self.path.unlink(missing_ok=True)
-
-    def tidy(self) -> None:
-        """Remove what a killed search left half-written of the checkpoint and of its output."""
-        for name in (self.path.name, self.output.name):
-            for part in self.path.parent.glob(f".{glob.escape(name)}.????????.part"):
-                part.unlink(missing_ok=True)
 
     def _require_same_search(self, then: Header, generation: int) -> None:
         old, new = ({key: value for key, value in _keys(h).items() if key != _GENERATIONS} for h in (then, self.header))
@@ -105,7 +183,7 @@ class Checkpoint:
         generations = _keys(self.header)[_GENERATIONS]
         if generation > generations:
             differing.append(f"{_GENERATIONS} = {generations}, but it has come to generation {generation}")
-        require_same(self.path, "search", differing)
+        self._require_same(differing)
 
 
 def _keys(header: Header) -> dict[str, Any]:
@@ -120,3 +198,33 @@ def _flat(prefix: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
             yield from _flat(f"{prefix}.{key}", value)
         else:
             yield f"{prefix}.{key}", value
+
+
+def differences(
+    then: Header, now: Header, old: Mapping[str, Any], new: Mapping[str, Any], unimportant: str | None = None
+) -> Iterator[str]:
+    """List the keys and inputs that differ between a command that was stopped and the one that is to go on from it.
+
+    Parameters
+    ----------
+    old, new : mapping of str to object
+        The keys that the result depends on, with dots.
+    unimportant : str, optional
+        What the roles of inputs begin with that the result does not depend on.
+    """
+    if then.version != now.version:
+        yield f"written by cpfls {then.version}, this is {now.version}"
+    for key in sorted(old.keys() | new.keys()):
+        if old.get(key) != new.get(key):
+            yield f"{key} = {_short(old.get(key))} there, {_short(new.get(key))} here"
+    for role in sorted(then.inputs.keys() | now.inputs.keys()):
+        files = [header.inputs.get(role) for header in (then, now)]
+        first, second = (file.sha256 if file else None for file in files)
+        if first != second and not (unimportant and role.startswith(unimportant)):
+            names = [f"{file.name} ({file.sha256[:12]})" if file else "none" for file in files]
+            yield f"{role} = {names[0]} there, {names[1]} here"
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False) if isinstance(value, Mapping | list) else str(value)
+    return textwrap.shorten(text, _LONGEST, placeholder=" ...")

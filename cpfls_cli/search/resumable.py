@@ -8,13 +8,11 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.artifacts.checkpoint import StoppedSearch
 from cpfls_cli.artifacts.job import Interrupted, Job, header_of, take_inputs
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.spec import Header, InputFile
-from cpfls_cli.artifacts.state_file import StoppedSearch
-from cpfls_cli.artifacts.store import format_name, read_artifact
-from cpfls_cli.errors import ComputationError, InputError, OutputError
+from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.identification.search import SearchRun, SearchStep, Stop, StopReason, is_end
 from cpfls_cli.search.checkpoint import Checkpoint
@@ -44,12 +42,12 @@ class SearchOptions:
     scheduler: str | None = None
 
     @property
-    def place(self) -> str:
-        """The option that says who evaluates."""
+    def workers_option(self) -> str:
+        """The option that names the workers, as it is typed."""
         return f"--workers {self.workers}" if self.scheduler is None else f"--scheduler {self.scheduler}"
 
     def employed(self, evaluate: Evaluate) -> AbstractContextManager[Workforce]:
-        """Employ who evaluates."""
+        """Employ the workers that evaluate."""
         return employ(evaluate, count=self.workers, scheduler=self.scheduler)
 
     def require_one_place(self) -> None:
@@ -64,7 +62,7 @@ class SearchOptions:
 
 
 class Watch:
-    """Knows when a search has to stop: at an interrupt, or when its time is over.
+    """Decides when a search has to stop: at an interrupt, or at its time limit.
 
     Parameters
     ----------
@@ -84,12 +82,12 @@ class Watch:
 
     @contextmanager
     def deferring(self) -> Iterator[None]:
-        """Take an interrupt for a wish to stop, as long as the work inside looks at this watch."""
+        """Turn an interrupt into a request to stop, for work inside that asks this watch."""
         with self._job.deferred_interrupts() as self._interrupted:
             yield
 
     def should_stop(self) -> Stop | None:
-        """Tell why to stop, or None."""
+        """Give the reason to stop now, or None."""
         if self.signal is not None:
             return "interrupted"
         return "time-limit" if self._end is not None and time.monotonic() >= self._end else None
@@ -109,7 +107,7 @@ class Resumable:
     stopped: StoppedSearch | None
 
     def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
-        """Say how the search is run; from here on a checkpoint that is not resumed is given up.
+        """Arrange how the search is run; from here on a checkpoint that is not resumed is given up.
 
         Returns
         -------
@@ -126,7 +124,7 @@ class Resumable:
                 with watch.deferring(), options.employed(evaluate) as workforce:
                     yield workforce
             except WorkerError as error:
-                raise WorkerError(f"{options.place}: {error}") from None
+                raise WorkerError(f"{options.workers_option}: {error}") from None
 
         return SearchRun(
             resumed=self.stopped.state if self.stopped else None,
@@ -138,15 +136,9 @@ class Resumable:
             should_stop=watch.should_stop,
         )
 
-    @contextmanager
-    def kept(self) -> Iterator[None]:
-        """Say of whatever fails inside that the search can go on nevertheless."""
-        try:
-            yield
-        except (ComputationError, OutputError) as error:
-            if self.checkpoint.path.exists():
-                error.add_note(f"{self.checkpoint.path}: is intact; the same command with --resume goes on")
-            raise
+    def kept(self) -> AbstractContextManager[None]:
+        """Add to whatever fails inside that the search can go on nevertheless."""
+        return self.checkpoint.kept()
 
     def end(self, reason: StopReason) -> None:
         """Remove the checkpoint of a search that came to its end, after what it found is written.
@@ -173,13 +165,13 @@ def begin_search(
     Raises
     ------
     InputError
-        As `begin`; also if there is a checkpoint that nothing is said of, or none that can be resumed.
+        As `begin`; also if there is a checkpoint and neither --resume nor --force, or none that can be resumed.
     """
     options.require_one_place()
     files = take_inputs(job, inputs)
     header = header_of(job.study, files)
     search = resumable(job.output, header, resume=options.resume, force=job.force)
-    check_output(job.output, job.force or (options.resume and _may_be_replaced(job.output, header)))
+    check_output(job.output, job.force or (options.resume and search.checkpoint.output_may_be_replaced()))
     return files, search
 
 
@@ -198,22 +190,10 @@ def resumable(output: Path, header: Header, *, resume: bool, force: bool) -> Res
     Raises
     ------
     InputError
-        If there is a checkpoint and neither is said, or none that can be resumed.
+        If there is a checkpoint and neither is asked for, or none that can be resumed.
     """
     checkpoint = Checkpoint.beside(output, header)
     if resume:
         return Resumable(checkpoint, checkpoint.read())
-    if checkpoint.path.exists() and not force:
-        raise InputError(
-            f"{checkpoint.path}: a search for {output} was stopped here; --resume continues it, --force starts again"
-        )
+    checkpoint.require_permission(force=force)
     return Resumable(checkpoint, None)
-
-
-def _may_be_replaced(output: Path, header: Header) -> bool:
-    """Tell whether an output is what a stopped search left: incomplete, or complete with its checkpoint still there."""
-    if not output.is_file() or format_name(output) != MODEL.format:
-        return False
-    model = read_artifact(output, MODEL)
-    complete = "search/complete" not in model.data or bool(model.data["search/complete"])
-    return not complete or model.header == header

@@ -1,30 +1,87 @@
-"""What a sweep runs: settings, the samples of each, seeds, and their order."""
+"""What a sweep runs: settings, the samples that each learns from, seeds, and their order."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
-from cpfls_cli.artifacts.formats import SELECTION
+import numpy as np
+
 from cpfls_cli.artifacts.job import Job
+from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.sweep import ALL_SAMPLES, RunGroup, SettingGroup, SweepRecord
 from cpfls_cli.config.overrides import Variant, variants
-from cpfls_cli.config.study import Study, settings_of
+from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError
-from cpfls_cli.flights.choosing import choosing_source
-from cpfls_cli.flights.judging import held_out_parts
-from cpfls_cli.flights.training import TrainingData
-from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.flights.inputs import choosing_source, held_out_parts
+from cpfls_cli.flights.training import SplitFlights, TrainingData, split_training, uniform_regressor
+from cpfls_cli.identification.data import TorqueSource, gathered
 from cpfls_cli.identification.identify import TRAINING
 from cpfls_cli.identification.search import require_flights
-from cpfls_cli.regressor.structure import model_structure
-from cpfls_cli.search.sweep_samples import SweepSamples
+from cpfls_cli.reduction.survey import survey
+from cpfls_cli.reduction.training_set import check_streamed, reduce_streamed
+from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 # Work of an evaluation that does not grow with the samples, in samples.
 _FIXED_WORK = 1000
+
+
+class SweepSamples:
+    """Training data by setting; what two settings have in common is made once.
+
+    Parameters
+    ----------
+    job : Job
+        A dry run only checks that samples could be chosen.
+    inputs : mapping of str to InputFile
+        By role; the flights among them.
+    """
+
+    def __init__(self, job: Job, flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> None:
+        self._job, self._flights, self._inputs = job, flights, inputs
+        self._splits: dict[Any, SplitFlights] = {}
+        self._data: dict[Any, TrainingData] = {}
+
+    def of(self, variant: Variant) -> TrainingData:
+        """Choose the samples of a setting, as `cpfls reduce` would.
+
+        Raises
+        ------
+        ComputationError, ConfigError
+            See `cpfls_cli.reduction`.
+        """
+        study = variant.study
+        cut = (study.identification.training_share, study.identification.embargo_s)
+        if cut not in self._splits:
+            self._splits[cut] = split_training(self._flights, study, self._inputs)
+        split = self._splits[cut]
+        if not variant.reduced:
+            training = split.training
+            return TrainingData(training, training, split.rests, split.training_indices)
+        key = (*cut, study.reduction, *(getattr(study.identification, f.name) for f in fields(StructureSettings)))
+        if key not in self._data:
+            self._data[key] = self._reduced(split, study, variant.name)
+        return self._data[key]
+
+    def _shown(self, name: str) -> Callable[[int, int], None]:
+        """Show how many samples are chosen; the bar is for the searches."""
+        return lambda done, most: self._job.progress(0, 1, f"choosing samples: {name}, {done} of {most}")
+
+    def _reduced(self, split: SplitFlights, study: Study, name: str) -> TrainingData:
+        training, settings, rng = split.training, study.reduction, generator(study, "reduce")
+        with settings_of("reduction", study):
+            surveyed = survey(uniform_regressor(training, study), settings.rank_tolerance)
+            if self._job.dry_run:
+                check_streamed(surveyed, settings, rng)
+                return TrainingData(training, training, split.rests, split.training_indices)
+            chosen = np.sort(reduce_streamed(surveyed, settings, rng, self._shown(name)).indices)
+        return TrainingData(training, gathered(training, chosen), split.rests, split.training_indices[chosen])
 
 
 @dataclass(frozen=True)
@@ -45,10 +102,15 @@ class SweptSetting:
     kept: TorqueSource | None
 
     @property
+    def criterion(self) -> str:
+        """What chooses its samples."""
+        return self.variant.study.reduction.criterion if self.variant.reduced else ALL_SAMPLES
+
+    @property
     def selection(self) -> InputFile:
         """The samples learned from, as if they were a file."""
         digest = hashlib.sha256(self.data.indices.astype("<i8").tobytes())
-        return InputFile(f"samples of '{self.variant.name}'", digest.hexdigest(), SELECTION.format)
+        return InputFile(f"samples of '{self.variant.name}'", digest.hexdigest(), SelectionRecord.FORMAT.name)
 
     @property
     def genes(self) -> int:
@@ -94,13 +156,33 @@ class SweepPlan:
         """Give the study of a run."""
         return self.setting(run).variant.study.model_copy(update={"seed": self.seed(run)})
 
+    @property
+    def no_runs(self) -> RunGroup:
+        """Its runs before the first is finished."""
+        return RunGroup.none(len(self.parts), max(setting.genes for setting in self.settings))
+
+    def record(self, runs: RunGroup) -> SweepRecord:
+        """Arrange the sweep with the runs that are finished."""
+        studies = [setting.variant.study for setting in self.settings]
+        columns = SettingGroup(
+            name=tuple(setting.variant.name for setting in self.settings),
+            overrides=tuple(json.dumps(list(s.variant.overrides), ensure_ascii=False) for s in self.settings),
+            structure=tuple(study.identification.structure for study in studies),
+            samples=np.array([len(setting.data.learned) for setting in self.settings]),
+            criterion=tuple(setting.criterion for setting in self.settings),
+            selection=tuple(setting.selection.sha256 for setting in self.settings),
+            population=np.array([study.identification.population for study in studies]),
+            generations=np.array([study.identification.generations for study in studies]),
+        )
+        return SweepRecord(setting=columns, part=self.parts, run=runs, complete=len(runs) == self.runs)
+
     def work(self, runs: int) -> int:
         """Tell roughly how long so many runs take."""
         return sum(self.setting(run).work for run in range(runs))
 
     @contextmanager
     def naming(self, run: int) -> Iterator[None]:
-        """Say in which run something failed."""
+        """Name the run in which something failed."""
         with naming(f"sweep setting '{self.setting(run).variant.name}', seed {self.seed(run)}"):
             yield
 
@@ -145,15 +227,15 @@ def sweep_plan(
 
 def _kept(variant: Variant, kept: TorqueSource | None) -> TorqueSource | None:
     choice = variant.study.identification.choice
-    own = kept if choice == "held-out" else None
+    chosen_on = kept if choice == "held-out" else None
     with settings_of("identification", variant.study):
-        require_flights(choice, given=own is not None)
-    return own
+        require_flights(choice, given=chosen_on is not None)
+    return chosen_on
 
 
 @contextmanager
 def naming(what: str) -> Iterator[None]:
-    """Say where something failed."""
+    """Name the part of a sweep in which something failed."""
     try:
         yield
     except (ComputationError, ConfigError) as error:

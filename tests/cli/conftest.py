@@ -1,17 +1,13 @@
 """The command line as a function, and a tiny study taken through every stage once."""
 
-import itertools
 import json
-import os
-import signal
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from typer.testing import CliRunner
 
-from cpfls_cli.cli.app import app
-from cpfls_cli.workers import employ
+from tests.builders import command_line
 
 TINY = """\
 seed: 1
@@ -27,21 +23,14 @@ identification:
   population: 10
   generations: 1
   local_search: {enabled: false}
+  validation: {draws: 20, windows: 20, horizon_samples: 20}
 """
 
 
 @pytest.fixture(scope="session")
 def cpfls():
     """Run a command; anything but an exit is a bug and is raised."""
-    runner = CliRunner()
-
-    def call(*words):
-        result = runner.invoke(app, [str(word) for word in words])
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        return result
-
-    return call
+    return command_line.run
 
 
 @pytest.fixture
@@ -107,24 +96,10 @@ def configs():
 def at_evaluation(monkeypatch):
     """Do something when so many chromosomes are evaluated, over all searches of a command."""
 
-    def arrange(number, action):
-        count = itertools.count(1)
-
-        def counting(evaluate, **options):
-            def evaluate_and_count(genes):
-                evaluation = evaluate(genes)
-                if next(count) == number:
-                    action()
-                return evaluation
-
-            return employ(evaluate_and_count, **options)
-
-        monkeypatch.setattr("cpfls_cli.search.resumable.employ", counting)
-
-    return arrange
+    return partial(command_line.act_at_evaluation, monkeypatch)
 
 
 @pytest.fixture
 def interrupt_at(at_evaluation):
     """Send this very process an interrupt when so many chromosomes are evaluated."""
-    return lambda number: at_evaluation(number, lambda: os.kill(os.getpid(), signal.SIGINT))
+    return lambda number: at_evaluation(number, command_line.interrupt_this_process)

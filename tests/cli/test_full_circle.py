@@ -22,14 +22,14 @@ SHORT = (
 def fly(cpfls, tmp_path_factory):
     folder = tmp_path_factory.mktemp("circle")
 
-    def flight(seed):
+    def call(seed):
         path, flight = (folder / f"{name}-{seed}.h5" for name in ("path", "flight"))
         for words in (("trajectory", CONFIG, *SHORT, "-o", path), ("simulate", CONFIG, path, "-o", flight)):
             result = cpfls(*words, "--seed", seed)
             assert result.exit_code == 0, result.stderr
         return flight
 
-    return flight
+    return call
 
 
 @pytest.fixture(scope="module")

@@ -1,23 +1,21 @@
 """The shipped study of a real flight, through the commands: what is learned from one log holds on its rest."""
 
 import json
-import os
 from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from cpfls_cli.cli.app import app
+from tests.builders.command_line import run
+from tests.builders.recorded_flights import path_of_log
 
-FOLDER = Path(os.environ.get("CPFLS_FLIGHTS", "../shared/data")) / "real" / "crazyswarm2_lee"
 CONFIG = Path(__file__).parents[2] / "configs" / "crazyflie.yaml"
 
 
-def run(*words):
-    result = CliRunner().invoke(app, [str(word) for word in words])
+def summary_of(*words):
+    result = run(*words)
     assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)
 
@@ -25,20 +23,17 @@ def run(*words):
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """Every file of the study, and what the commands printed; the search is small, the rest as shipped."""
-    logs = {name: FOLDER / f"{name}.csv" for name in ("log119", "log149")}
-    for path in logs.values():
-        if not path.exists():
-            pytest.skip(f"{path} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
+    logs = {name: path_of_log("real/crazyswarm2_lee", name) for name in ("log119", "log149")}
     folder = tmp_path_factory.mktemp("crazyflie")
     f119, f149, selection, model = (folder / name for name in ("f119.h5", "f149.h5", "selection.h5", "model.h5"))
     imported = {
-        "log119": run("import", CONFIG, logs["log119"], "-o", f119, "--json"),
-        "log149": run("import", CONFIG, logs["log149"], "-o", f149, "--json"),
+        "log119": summary_of("import", CONFIG, logs["log119"], "-o", f119, "--json"),
+        "log149": summary_of("import", CONFIG, logs["log149"], "-o", f149, "--json"),
     }
-    run("reduce", CONFIG, f119, "-o", selection, "--json")
+    summary_of("reduce", CONFIG, f119, "-o", selection, "--json")
     words = ("identify", CONFIG, f119, "--selection", selection, "--validate", f149, "-o", model, "--json")
     small = ("--set", "identification.population=10", "--set", "identification.generations=1")
-    return SimpleNamespace(imported=imported, identified=run(*words, *small), flight=f119)
+    return SimpleNamespace(imported=imported, identified=summary_of(*words, *small), flight=f119)
 
 
 def test_the_delay_is_the_one_that_was_found_by_hand(study):
@@ -62,7 +57,7 @@ def test_the_file_tells_what_was_done_about_the_gap(study):
 
 def test_the_page_tells_it_too(study):
     page = study.flight.with_name("page.html")
-    result = CliRunner().invoke(app, ["report", str(CONFIG), str(study.flight), "-o", str(page)])
+    result = run("report", CONFIG, study.flight, "-o", page)
     assert result.exit_code == 0, result.stderr
     assert "gaps in the time stamps, up to 0.0595 s: interpolated" in page.read_text()
 

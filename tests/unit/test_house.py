@@ -9,8 +9,10 @@ from statistics import median
 import pytest
 
 import cpfls_cli
+from cpfls_cli.artifacts.formats import RECORDS
 
 PACKAGE = Path(cpfls_cli.__file__).parent
+TESTS = Path(__file__).parents[1]
 MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 60
 
@@ -105,3 +107,65 @@ def test_docstrings_do_not_repeat_signatures():
 def test_package_files_only_re_export(path):
     allowed = (ast.Expr, ast.Import, ast.ImportFrom, ast.Assign)
     assert all(isinstance(node, allowed) for node in ast.parse(path.read_text(encoding="utf-8")).body)
+
+
+# Shows and checks artifacts of all formats alike, dataset by dataset.
+OF_ALL_FORMATS = {"commands/inspect.py"}
+GENERIC = {"Artifact", "read_artifact", "write_artifact", "finish_data"}
+PATHS = {spec.path for record in RECORDS for spec in record.spec().datasets if "/" in spec.path}
+GROUPS = tuple(f"{group}/" for group in sorted({path.split("/")[0] for path in PATHS}))
+
+
+def looked_up(node):
+    """Give the dataset that a piece of code looks up by its path, or the way to do so; None for other code."""
+    match node:
+        case ast.Constant(value=str(text)) if text in PATHS:
+            return text
+        case ast.JoinedStr(values=[ast.Constant(value=str(text)), *_]) if text.startswith(GROUPS):
+            return f"{text}..."
+        case ast.Call(func=ast.Attribute(attr="array" | "number" | "text" | "texts"), args=[ast.Constant(str(text))]):
+            return text
+        case ast.Subscript(value=ast.Attribute(attr="data"), slice=ast.Constant(str(text))):
+            return text
+        case ast.Compare(left=ast.Constant(str(text)), comparators=[ast.Attribute(attr="data")]):
+            return text
+        case ast.alias(name=name) if name in GENERIC:
+            return name
+    return None
+
+
+@pytest.mark.xfail(strict=True, reason="not every artifact is a record yet")
+def test_a_dataset_is_looked_up_by_its_path_in_artifacts_only():
+    """A path is written once, at a field of a record; everything else reads the field."""
+    lookups = {}
+    for path in MODULES:
+        name = path.relative_to(PACKAGE).as_posix()
+        if not name.startswith("artifacts/") and name not in OF_ALL_FORMATS:
+            nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            lookups[name] = [text for node in nodes if (text := looked_up(node)) is not None]
+    assert {name: texts for name, texts in lookups.items() if texts} == {}
+
+
+def imported_tests(path):
+    """Names below `tests` that a module imports, wherever in it the import stands."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            yield from ["relative import"] * (node.level > 0)
+            if node.module == "tests":
+                yield from (f"tests.{alias.name}" for alias in node.names)
+            elif (node.module or "").startswith("tests."):
+                yield node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.partition(".")[0] == "tests")
+
+
+def test_tests_import_from_shared_builders_alone():
+    """What tests of several packages build stands in `tests/builders`, which holds no tests."""
+    wrong = [
+        f"{path.relative_to(TESTS)}: {name}"
+        for path in sorted(TESTS.rglob("*.py"))
+        for name in imported_tests(path)
+        if not f"{name}.".startswith("tests.builders.")
+    ]
+    assert wrong == []
+    assert [path.name for path in TESTS.glob("builders/test_*.py")] == []

@@ -18,8 +18,7 @@ from cpfls_cli.pages.gap_words import (
 )
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.content import Cell, Table
-from cpfls_cli.report.numbers import UNKNOWN, number
-from cpfls_cli.report.rounded import printed, with_interval
+from cpfls_cli.report.numbers import UNKNOWN, number, printed, with_interval
 
 _GROWN = 1.05
 _NUMBERS = {

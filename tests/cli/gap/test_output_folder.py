@@ -2,7 +2,7 @@
 
 import pytest
 
-from cpfls_cli.commands.output_folder import filled_folder
+from cpfls_cli.artifacts.output import filled_folder
 
 
 def fill(folder, error=None):

@@ -1,15 +1,27 @@
 """When a search may go on, start again, or replace what lies there."""
 
+import shutil
+
 import h5py
 import pytest
 
+from tests.builders.command_line import act_at_evaluation, interrupt_this_process
+
+
+@pytest.fixture(scope="module")
+def stopped_once(cpfls, words, tmp_path_factory):
+    """The folder of an incomplete model with its checkpoint; nobody writes into it."""
+    folder = tmp_path_factory.mktemp("stopped")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        act_at_evaluation(monkeypatch, 33, interrupt_this_process)
+        assert cpfls(*words, "-o", folder / "model.h5").exit_code == 130
+    return folder
+
 
 @pytest.fixture
-def stopped(cpfls, words, tmp_path, interrupt_at, monkeypatch):
+def stopped(stopped_once, tmp_path):
     """An incomplete model with its checkpoint."""
-    interrupt_at(33)
-    assert cpfls(*words, "-o", tmp_path / "model.h5").exit_code == 130
-    monkeypatch.undo()
+    shutil.copytree(stopped_once, tmp_path, dirs_exist_ok=True)
     return tmp_path / "model.h5"
 
 

@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from cpfls_cli.evolution import engine
+from tests.builders.dask_cluster import dask_cluster
 
 CONFIGS = {
     "rigid-body base, local search": ("base=rigid-body", "local_search.enabled=true", "population=10", "generations=1"),
@@ -31,9 +32,7 @@ def test_two_processes_and_a_cluster_give_the_same_bytes(cpfls, words, tmp_path,
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    from tests.unit.workers.test_cluster import dask
-
-    with dask(tmp_path_factory.mktemp("dask"), workers=2) as (address, _, _):
+    with dask_cluster(tmp_path_factory.mktemp("dask"), workers=2) as (address, _, _):
         yield address
 
 

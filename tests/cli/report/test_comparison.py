@@ -9,7 +9,7 @@ import pytest
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.pages.comparison import differences
-from tests.cli.report.evidence_artifacts import curves, steps, verdict
+from tests.builders.evidence_artifacts import curves, steps, verdict
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
-from tests.cli.report.evidence_artifacts import REASONS, with_evidence
+from tests.builders.evidence_artifacts import REASONS, with_evidence
 
 EVIDENCE = ["validation", "residuals", "uncertainty", "steps"]
 FIGURES = [

@@ -8,12 +8,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.store import file_sha256, write_artifact
-from cpfls_cli.cli.app import app
-from tests.cli.report import gap_artifacts as made
+from tests.builders import gap_artifacts as made
+from tests.builders.command_line import run
 
 FIGURES = [
     "free-runs-1", "gap-picture-1", "gap-sizes-1", "prediction-error-1", "whiteness-1", "intervals-1",
@@ -29,9 +28,7 @@ def shown(folder, *artifacts, options=()):
     for path, artifact in zip(paths, artifacts, strict=True):
         assert check_artifact(artifact) == []
         write_artifact(path, artifact)
-    result = CliRunner().invoke(
-        app, ["report", str(config), *map(str, paths), "-o", str(output), "--json", "--force", *options]
-    )
+    result = run("report", config, *paths, "-o", output, "--json", "--force", *options)
     assert result.exit_code == 0, result.output
     html = output.read_text(encoding="utf-8")
     body = re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", html, flags=re.DOTALL)

@@ -9,10 +9,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
-from cpfls_cli.cli.app import app
+from tests.builders.command_line import run
 
 CONFIG = """
 seed: 3
@@ -69,7 +68,7 @@ class Page(HTMLParser):
 
 
 def cpfls(*arguments, code=0):
-    result = CliRunner().invoke(app, [*map(str, arguments)])
+    result = run(*arguments)
     assert result.exit_code == code, result.output
     return result
 

@@ -6,11 +6,8 @@ import re
 import pytest
 
 from cpfls_cli.artifacts.store import read_artifact
-from cpfls_cli.config.study import ReportSettings
-from cpfls_cli.pages.source import Sources
-from cpfls_cli.report.content import Listing, Section
+from cpfls_cli.report.content import Document, Listing, Section
 from cpfls_cli.report.markdown import markdown_page
-from cpfls_cli.vehicle.settings import VehicleSettings
 
 HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"
 
@@ -121,6 +118,5 @@ def test_hostile_words_stay_words_in_markdown(report):
 
 
 def test_a_listing_cannot_end_its_own_fence():
-    sources = Sources([], VehicleSettings(), ReportSettings())
-    page = markdown_page([Section("a", "A", [Listing("B", "``` ````\n# c")])], sources, "1")
+    page = markdown_page(Document("T", "1", [Section("a", "A", [Listing("B", "``` ````\n# c")])], []))
     assert page.count("`````text\n``` ````\n# c\n`````\n") == 1

@@ -33,7 +33,7 @@ def sweep(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def flight(cpfls, sweep):
+def sweep_flight(cpfls, sweep):
     """A flight of the study."""
     trajectory, flight = sweep.with_name("trajectory.h5"), sweep.with_name("flight.h5")
     assert cpfls("trajectory", sweep, "-o", trajectory).exit_code == 0
@@ -42,9 +42,9 @@ def flight(cpfls, sweep):
 
 
 @pytest.fixture(scope="session")
-def words(sweep, flight):
+def words(sweep, sweep_flight):
     """The command, without its output."""
-    return ("sweep", sweep, flight)
+    return ("sweep", sweep, sweep_flight)
 
 
 @pytest.fixture(scope="session")

@@ -32,7 +32,7 @@ def test_artifact_keeps_to_its_format(whole):
 
 @pytest.mark.parametrize(("setting", "seed"), [(0, 6), (1, 6), (2, 5)])
 def test_each_run_is_that_of_identify_with_the_overrides_and_the_seed(
-    cpfls, whole, sweep, flight, tmp_path, setting, seed
+    cpfls, whole, sweep, sweep_flight, tmp_path, setting, seed
 ):
     artifact = read_artifact(whole)
     texts = json.loads(artifact.texts("setting/overrides")[setting])
@@ -40,9 +40,9 @@ def test_each_run_is_that_of_identify_with_the_overrides_and_the_seed(
     selection, model = tmp_path / "selection.h5", tmp_path / "model.h5"
     options = []
     if "reduction.size=null" not in texts:
-        assert cpfls("reduce", sweep, flight, "-o", selection, *overrides).exit_code == 0
+        assert cpfls("reduce", sweep, sweep_flight, "-o", selection, *overrides).exit_code == 0
         options = ["--selection", selection]
-    result = cpfls("identify", sweep, flight, *options, "-o", model, *overrides, "--seed", seed, "--json")
+    result = cpfls("identify", sweep, sweep_flight, *options, "-o", model, *overrides, "--seed", seed, "--json")
     assert result.exit_code == 0, result.stderr
     run = (seed - 5) * SETTINGS + setting
     found = json.loads(result.stdout)
@@ -73,7 +73,7 @@ def test_printed_means_and_variances_are_those_of_the_runs(cpfls, words, whole, 
         assert said["seeds"] == [5, 6]
     table = cpfls(*words, "-o", tmp_path / "table.h5").stdout.splitlines()
     assert table[0] == "6 of 6 runs, 3 settings; mean and standard deviation of the training part"
-    assert [line.split("  ")[0] for line in table[1:]] == ["setting", *(s["name"] for s in summary["settings"])]
+    assert [line.split("  ")[0] for line in table[1:]] == ["Setting", *(s["name"] for s in summary["settings"])]
 
 
 def test_without_settings_the_study_itself_is_repeated(cpfls, words, tmp_path):
@@ -86,10 +86,10 @@ def test_without_settings_the_study_itself_is_repeated(cpfls, words, tmp_path):
     assert sweep.array("setting/population").tolist() == [8]
 
 
-def test_held_out_parts_and_other_flights_are_judged(cpfls, words, sweep, flight, tmp_path):
+def test_held_out_parts_and_other_flights_are_judged(cpfls, words, sweep, sweep_flight, tmp_path):
     other, output = tmp_path / "other.h5", tmp_path / "sweep.h5"
     noise = ("--set", "simulation.relative_noise={torque: 0.05}")
-    assert cpfls("simulate", sweep, flight.with_name("trajectory.h5"), "-o", other, *noise).exit_code == 0
+    assert cpfls("simulate", sweep, sweep_flight.with_name("trajectory.h5"), "-o", other, *noise).exit_code == 0
     settings = "[{name: split, set: {identification.training_share: 0.7}}, {name: whole}]"
     options = ("--set", f"sweep.settings={settings}", "--set", "sweep.seeds=1", "--validate", other)
     assert cpfls(*words, "-o", output, *options).exit_code == 0
@@ -113,10 +113,10 @@ def test_workers_find_the_same(cpfls, words, tmp_path):
 
 
 def test_run_that_finds_nothing_is_told_and_counts_for_no_mean(cpfls, words, tmp_path, monkeypatch):
-    from cpfls_cli.commands import sweep as stage
     from cpfls_cli.identification.search import NothingFoundError
+    from cpfls_cli.search import sweep_runs
 
-    calls, identify = [], stage.identify
+    calls, identify = [], sweep_runs.identify
 
     def sometimes(*arguments):
         calls.append(arguments)
@@ -124,7 +124,7 @@ def test_run_that_finds_nothing_is_told_and_counts_for_no_mean(cpfls, words, tmp
             raise NothingFoundError("generations")
         return identify(*arguments)
 
-    monkeypatch.setattr(stage, "identify", sometimes)
+    monkeypatch.setattr(sweep_runs, "identify", sometimes)
     result = cpfls(*words, "-o", tmp_path / "sweep.h5", "--json")
     assert result.exit_code == 0
     assert result.stderr == "cpfls: note: 1 of 6 runs found no finite model; they count for no mean\n"

@@ -1,14 +1,26 @@
 """When a sweep may go on, start again, or replace what lies there; and settings that are wrong."""
 
+import shutil
+
 import pytest
+
+from tests.builders.command_line import act_at_evaluation, interrupt_this_process
+
+
+@pytest.fixture(scope="module")
+def stopped_once(cpfls, words, tmp_path_factory):
+    """The folder of an incomplete sweep with its first runs; nobody writes into it."""
+    folder = tmp_path_factory.mktemp("stopped")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        act_at_evaluation(monkeypatch, 60, interrupt_this_process)
+        assert cpfls(*words, "-o", folder / "sweep.h5").exit_code == 130
+    return folder
 
 
 @pytest.fixture
-def stopped(cpfls, words, tmp_path, interrupt_at, monkeypatch):
+def stopped(stopped_once, tmp_path):
     """An incomplete sweep with its first runs."""
-    interrupt_at(60)
-    assert cpfls(*words, "-o", tmp_path / "sweep.h5").exit_code == 130
-    monkeypatch.undo()
+    shutil.copytree(stopped_once, tmp_path, dirs_exist_ok=True)
     return tmp_path / "sweep.h5"
 
 
@@ -58,10 +70,10 @@ def test_fewer_seeds_than_are_finished(cpfls, refuse, words, tmp_path, interrupt
     assert "sweep.seeds = 1, but " in line
 
 
-def test_other_flight(cpfls, refuse, sweep, flight, stopped, tmp_path):
+def test_other_flight(cpfls, refuse, sweep, sweep_flight, stopped, tmp_path):
     other = tmp_path / "other.h5"
     noise = ("--set", "simulation.relative_noise={torque: 0.05}")
-    assert cpfls("simulate", sweep, flight.with_name("trajectory.h5"), "-o", other, *noise).exit_code == 0
+    assert cpfls("simulate", sweep, sweep_flight.with_name("trajectory.h5"), "-o", other, *noise).exit_code == 0
     (line,) = refuse("sweep", sweep, other, "-o", stopped, "--resume")
     assert "flight = flight.h5 (" in line
     assert "other.h5 (" in line
@@ -91,24 +103,24 @@ def test_samples_that_cannot_be_chosen_name_the_setting(refuse, words, tmp_path)
     assert line.startswith("sweep setting 'tiny': reduction.size = 3: ")
 
 
-def test_a_flight_that_trains_cannot_judge(refuse, words, flight, tmp_path):
-    (line,) = refuse(*words, "-o", tmp_path / "x.h5", "--validate", flight)
+def test_a_flight_that_trains_cannot_judge(refuse, words, sweep_flight, tmp_path):
+    (line,) = refuse(*words, "-o", tmp_path / "x.h5", "--validate", sweep_flight)
     assert "is the flight that trains" in line
 
 
 MISFIT = ("--set", "identification.subpopulations=5")
 
 
-def test_a_setting_that_does_not_fit_stops_only_what_sweeps(cpfls, refuse, words, sweep, flight, tmp_path):
+def test_a_setting_that_does_not_fit_stops_only_what_sweeps(cpfls, refuse, words, sweep, sweep_flight, tmp_path):
     said = f"{sweep}: sweep.set: identification.population = 8: 8 individuals cannot fill 5 subpopulations"
     assert refuse(*words, "-o", tmp_path / "x.h5", *MISFIT)[0].startswith(said)
     assert refuse("config", sweep, *MISFIT)[0].startswith(said)
     model, selection = tmp_path / "model.h5", tmp_path / "selection.h5"
     for command in (
         ("trajectory", sweep, "-o", tmp_path / "trajectory.h5"),
-        ("reduce", sweep, flight, "-o", selection),
-        ("identify", sweep, flight, "--selection", selection, "-o", model),
-        ("predict", sweep, model, flight, "-o", tmp_path / "prediction.h5"),
+        ("reduce", sweep, sweep_flight, "-o", selection),
+        ("identify", sweep, sweep_flight, "--selection", selection, "-o", model),
+        ("predict", sweep, model, sweep_flight, "-o", tmp_path / "prediction.h5"),
     ):
         result = cpfls(*command, *MISFIT)
         assert result.exit_code == 0, result.stderr

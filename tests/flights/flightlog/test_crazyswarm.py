@@ -1,25 +1,15 @@
 """Flights of a real Crazyflie whose Lee controller commanded the logged torques (crazyswarm2-tools, MIT)."""
 
-import csv
-import os
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
 
 from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
 from cpfls_cli.flightlog.smoothing import derivative
+from tests.builders.recorded_flights import columns_of_log
 
-FOLDER = Path(os.environ.get("CPFLS_FLIGHTS", "../shared/data")) / "real" / "crazyswarm2_lee"
-
-
-def columns_of(name):
-    path = FOLDER / f"{name}.csv"
-    if not path.exists():
-        pytest.skip(f"{path} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
-    with path.open() as stream:
-        header, *rows = csv.reader(stream)
-    return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+columns_of = partial(columns_of_log, "real/crazyswarm2_lee")
 
 
 def imported(name, **changes):

@@ -1,18 +1,15 @@
 """Flights of others through the import command and the shipped configs: nothing is lost that a comparison needs."""
 
-import csv
 import json
-import os
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from cpfls_cli.cli.app import app
+from tests.builders.command_line import run
+from tests.builders.recorded_flights import columns_of_log, path_of_log
 
-FLIGHTS = Path(os.environ.get("CPFLS_FLIGHTS", "../shared/data"))
 CONFIGS = Path(__file__).parents[3] / "configs" / "gap"
 SAMPLED = {"time", "rotor_command"}
 RAW = SAMPLED | {"body_rate", "position", "velocity", "acceleration", "rotor_speed"}
@@ -32,27 +29,14 @@ CASES = (
 )
 
 
-def path_of(folder, name):
-    path = FLIGHTS / folder / f"{name}.csv"
-    if not path.exists():
-        pytest.skip(f"{path} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
-    return path
-
-
-def columns_of(path):
-    with path.open() as stream:
-        header, *rows = csv.reader(stream)
-    return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
-
-
 @pytest.fixture
 def imported(tmp_path):
     """Import a flight; give the summary and the sampled signals."""
 
     def call(config, folder, name):
         flight = tmp_path / f"{config}_{name}.h5"
-        words = ("import", CONFIGS / f"{config}.yaml", path_of(folder, name), "-o", flight, "--json")
-        result = CliRunner().invoke(app, [str(word) for word in words])
+        words = ("import", CONFIGS / f"{config}.yaml", path_of_log(folder, name), "-o", flight, "--json")
+        result = run(*words)
         assert result.exit_code == 0, result.stderr
         with h5py.File(flight) as file:
             found = {key: file[key][:] for key in file if isinstance(file[key], h5py.Dataset) and key != "config"}
@@ -70,7 +54,7 @@ def test_the_flight_holds_every_signal_of_the_log(imported, config, folder, name
 
 
 def test_a_simulated_flight_comes_back_as_it_was_logged(imported):
-    columns = columns_of(path_of("rotorpy", "none"))
+    columns = columns_of_log("rotorpy", "none")
     _, found = imported("rotorpy", "rotorpy", "none")
     for name, prefix, parts in (
         ("rotor_speed", "om", "1234"),
@@ -90,7 +74,7 @@ def test_the_accelerometer_of_a_parked_crazyflie_senses_gravity_upward(imported)
 
 
 def test_commands_and_thrust_of_a_crazyflie_are_those_of_the_log(imported):
-    columns = columns_of(path_of("real/crazyswarm2_lee", "log119"))
+    columns = columns_of_log("real/crazyswarm2_lee", "log119")
     summary, found = imported("crazyswarm2", "real/crazyswarm2_lee", "log119")
     at = columns["t"][0] + summary["span_s"][0] + found["time"]
     np.testing.assert_allclose(found["thrust"], np.interp(at, columns["t"], columns["ctrlLee_thrustSi"]), rtol=1e-6)

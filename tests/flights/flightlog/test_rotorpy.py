@@ -1,16 +1,12 @@
 """A flight of the simulator RotorPy, whose vehicle is known: the other team's equations close on ours."""
 
-import csv
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
 from cpfls_cli.flightlog.smoothing import derivative
+from tests.builders.recorded_flights import columns_of_log
 
-PATH = Path(os.environ.get("CPFLS_FLIGHTS", "../shared/data")) / "rotorpy" / "none.csv"
 INERTIA = np.array([0.00365, 0.00368, 0.00703])
 ARM, THRUST, DRAG = 0.1202081528, 5.57e-6, 1.36e-7
 MIXER = np.array([[1, -1, -1, 1], [-1, -1, 1, 1], [1, -1, 1, -1]]) * [[THRUST * ARM], [THRUST * ARM], [DRAG]]
@@ -22,11 +18,7 @@ def body_torque(signals):
 
 
 def imported(source, **changes):
-    if not PATH.exists():
-        pytest.skip(f"{PATH} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
-    with PATH.open() as stream:
-        header, *rows = csv.reader(stream)
-    columns = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+    columns = columns_of_log("rotorpy", "none")
     rotors = {"rotor-speed": ("rotor_speed", "om"), "rotor-command": ("rotor_command", "omcmd")}
     name, column = rotors[source]
     signals = {

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from cpfls_cli.export import c_source, json_text, python_source, reference_points
 from cpfls_cli.export.text import checked_identifier, comment_text, identifier, number
-from tests.unit.export.cases import CASES, model_of, sheet_of, verdict_of
+from tests.builders.exported_models import CASES, model_of, sheet_of, verdict_of
 
 MODEL = model_of(CASES["seesaw, one function"])
 POINTS = reference_points(MODEL, np.random.default_rng(1))

@@ -7,7 +7,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli.export import python_source, reference_points
-from tests.unit.export.cases import Case, errors, model_of, sheet_of, states, wanted_of
+from tests.builders.exported_models import Case, errors, model_of, sheet_of, states, wanted_of
 
 functions = st.integers(1, 15)
 structures = st.fixed_dictionaries(

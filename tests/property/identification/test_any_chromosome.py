@@ -7,12 +7,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.evaluator import LARGEST_GENE, decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import LocalSearchSettings
-from cpfls_cli.regressor import Motion
+from tests.builders.flights import random_motion, rigid_torque
 
 SEESAW = {"consequents": "seesaw", "products": "additive"}
 MODELS = {
@@ -28,9 +27,8 @@ any_chromosome = st.lists(any_gene, min_size=GENES, max_size=GENES).map(np.array
 
 @cache
 def evaluator(model, refining):
-    rng = np.random.default_rng(38)
-    motion = Motion(rng.uniform(-1.0, 1.0, (60, 3)), *rng.standard_normal((2, 60, 3)))
-    torque = newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, np.diag([0.6, 0.7, 1.2]))
+    motion = random_motion(np.random.default_rng(38), 60, limit=1.0)
+    torque = rigid_torque()(motion)
     torque[:, 1] += 0.1 * np.exp(motion.attitude[:, 0]) * motion.acceleration[:, 1]
     data = TorqueData(0.02 * np.arange(60), motion, torque)
     search = LocalSearchSettings(enabled=refining, evaluations=2)

@@ -13,10 +13,10 @@ from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import ValidationSettings
-from cpfls_cli.regressor import Motion
 from cpfls_cli.validation import bands
 from cpfls_cli.validation.bands import band, inertia_band, torque_band
 from cpfls_cli.validation.bootstrap import bootstrap
+from tests.builders.flights import random_motion
 
 SAMPLES = 240
 STRUCTURES = [
@@ -27,14 +27,10 @@ STRUCTURES = [
 ]
 
 
-def motion(rng):
-    return Motion(rng.uniform(-np.pi, np.pi, (SAMPLES, 3)), *rng.standard_normal((2, SAMPLES, 3)))
-
-
 def case(keys, base, seed, noise):
     """Fit a random model of a structure to its own torque and noise."""
     rng = np.random.default_rng(seed)
-    chosen, m = IdentificationSettings(**keys, base=base), motion(rng)
+    chosen, m = IdentificationSettings(**keys, base=base), random_motion(rng, SAMPLES)
     shape = model_evaluator(data := TorqueData(0.01 * np.arange(SAMPLES), m, np.ones((SAMPLES, 3))), data, chosen)
     partitions = decode(shape.structure, rng.uniform(0.2, 1.0, shape.structure.genes))
     truth = Model(

@@ -8,7 +8,7 @@ INERTIA = np.array([[0.012, 0.001, -0.0005], [0.001, 0.015, 0.0008], [-0.0005, 0
 RATE_HZ = 250
 
 
-def flight(delay, noise=0.0, seconds=20.0, seed=3):
+def delayed_signals(delay, noise=0.0, seconds=20.0, seed=3):
     """Body rates of many tones, and the torque that a rigid body needs, commanded earlier by the delay."""
     rng = np.random.default_rng(seed)
     time = np.arange(int(seconds * RATE_HZ)) / RATE_HZ
@@ -28,14 +28,14 @@ def flight(delay, noise=0.0, seconds=20.0, seed=3):
 
 @pytest.mark.parametrize("delay", [0.0, 0.0133, 0.0671, 0.1505])
 def test_a_known_delay_comes_back_within_a_millisecond_under_noise(delay):
-    estimate = estimate_delay(*flight(delay, noise=0.1), lowpass_hz=8.0)
+    estimate = estimate_delay(*delayed_signals(delay, noise=0.1), lowpass_hz=8.0)
     assert estimate.delay_s == pytest.approx(delay, abs=1e-3)
     assert estimate.pooled_r2 > 0.95
     assert not estimate.at_bound
 
 
 def test_without_noise_delay_and_inertia_come_back_between_the_samples():
-    estimate = estimate_delay(*flight(0.0671))
+    estimate = estimate_delay(*delayed_signals(0.0671))
     assert estimate.delay_s == pytest.approx(0.0671, abs=2e-5)
     upper = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
     np.testing.assert_allclose(estimate.inertia, [INERTIA[entry] for entry in upper], rtol=1e-3)
@@ -43,7 +43,7 @@ def test_without_noise_delay_and_inertia_come_back_between_the_samples():
 
 
 def test_only_the_leading_share_is_looked_at():
-    time, rate, torque = flight(0.05)
+    time, rate, torque = delayed_signals(0.05)
     spoiled = torque.copy()
     spoiled[len(time) // 2 :] = 1e3
     whole = estimate_delay(time, rate, torque, share=0.5)
@@ -51,13 +51,13 @@ def test_only_the_leading_share_is_looked_at():
 
 
 def test_a_delay_beyond_the_longest_one_is_reported_at_the_bound():
-    estimate = estimate_delay(*flight(0.12), delay_max_s=0.1)
+    estimate = estimate_delay(*delayed_signals(0.12), delay_max_s=0.1)
     assert estimate.at_bound
     assert estimate.delay_s == pytest.approx(0.1, abs=1e-4)
 
 
 def test_a_constant_torque_and_a_short_flight_are_refused():
-    time, rate, torque = flight(0.05)
+    time, rate, torque = delayed_signals(0.05)
     with pytest.raises(ComputationError, match="torque is constant"):
         estimate_delay(time, rate, np.ones_like(torque))
     with pytest.raises(SettingError, match="at least 50 must") as caught:

@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.sensors.audit import audit
-from tests.recovery.gap.audit_flights import LEVELS, Faults, flight, flights
+from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight, faulty_flights
 
 WINDOWS = windows(0.01, 0.4, 0.5)
 ALL = Faults(np.array([0.02, -0.01, 0.005]), np.array([0.02, -0.02, 0.01]), np.array([0.03, -0.02, 0.01]), 0.02)
@@ -30,7 +30,7 @@ def names(found):
     ],
 )
 def test_a_single_fault_is_named_alone(faults, name):
-    found = audit(flights(np.random.default_rng(1), faults, level=LEVELS["mid"]), WINDOWS)
+    found = audit(faulty_flights(np.random.default_rng(1), faults, level=LEVELS["mid"]), WINDOWS)
     assert names(found) == {name}
     [own] = found.named
     [(each, value)] = [pair for pair in zip(own.coefficients, _own(faults, name), strict=True) if pair[0].named]
@@ -44,7 +44,7 @@ def _own(faults, name):
 
 
 def test_all_faults_at_once_come_back_within_a_few_standard_errors():
-    found = audit(flights(np.random.default_rng(2), ALL, level=LEVELS["mid"]), WINDOWS)
+    found = audit(faulty_flights(np.random.default_rng(2), ALL, level=LEVELS["mid"]), WINDOWS)
     assert len(found.named) == 4
     apart = np.abs(found.gyro.value - truth(ALL))
     assert np.all(apart < 4 * found.gyro.error + found.gyro.pull)
@@ -54,7 +54,7 @@ def test_all_faults_at_once_come_back_within_a_few_standard_errors():
 
 
 def test_without_noise_the_faults_are_exact_at_any_tilt():
-    made = flights(np.random.default_rng(3), ALL, amplitude=(1.0, 0.4, 2.0))
+    made = faulty_flights(np.random.default_rng(3), ALL, amplitude=(1.0, 0.4, 2.0))
     value = audit(made, WINDOWS).gyro.value
     np.testing.assert_allclose(value, truth(ALL), atol=2e-5)
 
@@ -63,21 +63,21 @@ def test_without_noise_the_faults_are_exact_at_any_tilt():
 @pytest.mark.parametrize("level", LEVELS)
 def test_nothing_wrong_names_nothing(level, coloured):
     for seed in range(5):
-        made = flights(np.random.default_rng(seed), Faults(), level=LEVELS[level], coloured=coloured)
+        made = faulty_flights(np.random.default_rng(seed), Faults(), level=LEVELS[level], coloured=coloured)
         found = audit(made, WINDOWS)
         assert (names(found), found.warnings) == (set(), ())
 
 
 @pytest.mark.parametrize("faults", [Faults(), Faults(scale=np.full(3, 0.05), misalignment=np.full(3, 0.05))])
 def test_a_flight_that_hardly_turns_names_no_scale_and_no_misalignment(faults):
-    made = flights(np.random.default_rng(4), faults, level=LEVELS["mid"], amplitude=(0.002, 0.002, 0.002))
+    made = faulty_flights(np.random.default_rng(4), faults, level=LEVELS["mid"], amplitude=(0.002, 0.002, 0.002))
     found = audit(made, WINDOWS)
     assert names(found) == set()
     assert set(found.untested) == {"gyro_scale", "imu_misalignment", "channel_delay"}
 
 
 def test_an_axis_that_stays_still_is_left_alone():
-    made = flights(np.random.default_rng(5), ALL, level=LEVELS["mid"], amplitude=(0.14, 0.0005, 0.0005))
+    made = faulty_flights(np.random.default_rng(5), ALL, level=LEVELS["mid"], amplitude=(0.14, 0.0005, 0.0005))
     result = audit(made, WINDOWS)
     [scale] = [finding for finding in result.findings if finding.name == "gyro_scale"]
     assert [(each.name, each.named) for each in scale.coefficients] == [("x", True)]
@@ -85,8 +85,8 @@ def test_an_axis_that_stays_still_is_left_alone():
 
 
 def test_a_repaired_flight_passes_the_audit_and_has_the_true_rate():
-    made = flight(np.random.default_rng(6), ALL, duration=60.0)
-    true = flight(np.random.default_rng(6), Faults(), duration=60.0)
+    made = faulty_flight(np.random.default_rng(6), ALL, duration=60.0)
+    true = faulty_flight(np.random.default_rng(6), Faults(), duration=60.0)
     repaired = audit([made], WINDOWS).repaired(made)
     assert len(repaired) == len(made)
     inside = slice(10, -10)
@@ -95,14 +95,14 @@ def test_a_repaired_flight_passes_the_audit_and_has_the_true_rate():
 
 
 def test_faults_that_are_not_named_are_left_alone():
-    made = flights(np.random.default_rng(7), Faults(bias=np.array([0.0005, 0, 0])), level=LEVELS["mid"])
+    made = faulty_flights(np.random.default_rng(7), Faults(bias=np.array([0.0005, 0, 0])), level=LEVELS["mid"])
     found = audit(made, WINDOWS)
     assert found.repaired(made[0]) is made[0]
 
 
 def test_biases_that_differ_between_flights_are_mentioned():
     rng = np.random.default_rng(8)
-    made = [flight(rng, Faults(bias=np.array([0, b, 0])), level=LEVELS["mid"]) for b in (0.0, 0.01, 0.02)]
+    made = [faulty_flight(rng, Faults(bias=np.array([0, b, 0])), level=LEVELS["mid"]) for b in (0.0, 0.01, 0.02)]
     found = audit(made, WINDOWS)
     np.testing.assert_allclose(found.gyro.flight_bias[:, 1], [-0.01, 0.0, 0.01], atol=0.0008)
     assert any("differs between flights" in note for note in found.notes)
@@ -110,7 +110,7 @@ def test_biases_that_differ_between_flights_are_mentioned():
 
 @pytest.mark.parametrize("period", [0.02, 0.004])
 def test_other_sampling_rates(period):
-    made = flights(np.random.default_rng(9), Faults(delay=0.012), level=LEVELS["mid"], period=period)
+    made = faulty_flights(np.random.default_rng(9), Faults(delay=0.012), level=LEVELS["mid"], period=period)
     found = audit(made, windows(period, 0.4, 0.5))
     assert names(found) == {"channel_delay"}
     assert found.gyro.value[12] == pytest.approx(0.012, abs=0.0005)

@@ -31,7 +31,7 @@ def wander(rng, size, smooth_s):
     return size * values / values.std(axis=0)
 
 
-def flight(rng, unknown):
+def wandering_flight(rng, unknown):
     rate = wander(rng, 0.4, 0.25)
     attitude = np.column_stack([wander(rng, 0.15, 0.6)[:, :2], 0.4 * TIME + wander(rng, 1.0, 2.0)[:, 2]])
     position = wander(rng, 0.5, 1.5) + np.array([0, 0, 2.5])
@@ -52,7 +52,7 @@ def flight(rng, unknown):
 @pytest.mark.parametrize("signal", UNKNOWN)
 def test_the_signal_that_an_unknown_torque_follows_is_named(signal):
     rng = np.random.default_rng(7)
-    flights = [flight(rng, UNKNOWN[signal]) for _ in range(3)]
+    flights = [wandering_flight(rng, UNKNOWN[signal]) for _ in range(3)]
     weak = [weak_flight("one", signals, WINDOWS, None, force=False) for signals in flights]
     residual = np.concatenate([w.averaged(w.residual(s)) for w, s in zip(weak, flights, strict=True)])
     flight_index = np.repeat(np.arange(3), [len(w) for w in weak])

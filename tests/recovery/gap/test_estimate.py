@@ -9,7 +9,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.naming.estimate import estimates
 from cpfls_cli.gap.naming.search import block_index
 from cpfls_cli.gap.settings import GapSettings
-from tests.unit.gap.synthetic_flights import candidate, fly, weak
+from tests.builders.gap_flights import candidate, fly, weak
 
 SETTINGS = GapSettings()
 WEIGHT = np.ones(6)

@@ -19,7 +19,7 @@ HOP = WINDOWS.hop * PERIOD
 TURN = 2 * np.pi * 0.91
 
 
-def flight(rng, amplitude, lead):
+def flight_with_periodic_torque(rng, amplitude, lead):
     """A motion of many slow sines, and the torque that makes it together with a 0.91 Hz torque about y."""
     time = PERIOD * np.arange(SAMPLES)
     frequency, phase = rng.uniform(0.1, 0.7, (6, 3)), rng.uniform(0, 2 * np.pi, (6, 3))
@@ -40,7 +40,7 @@ def found(seed, amplitude, lead=0.0):
     rng = np.random.default_rng(seed)
     residual, rates = [], []
     for _ in range(3):
-        signals = flight(rng, amplitude, lead)
+        signals = flight_with_periodic_torque(rng, amplitude, lead)
         weak = weak_flight("one", signals, WINDOWS, None, force=False)
         residual.append(weak.averaged(weak.residual(signals)))
         rates.append(WINDOWS.average(signals.body_rate))

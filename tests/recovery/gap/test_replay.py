@@ -37,7 +37,7 @@ def rigid_torque():
     return alpha @ TENSOR + np.cross(BODY_RATE, BODY_RATE @ TENSOR)
 
 
-def flight(torque, **given):
+def swinging_flight(torque, **given):
     full = {"attitude": ATTITUDE, "body_rate": BODY_RATE} | given
     return Signals(time=TIME, vehicle=VEHICLE, stated_torque=torque, **full)
 
@@ -73,7 +73,7 @@ def bent_torque():
     ids=["tensor", "rigid in Euler coordinates", "bent"],
 )
 def test_the_model_that_made_the_flight_simulates_it(torque, inertia):
-    signals = flight(torque)
+    signals = swinging_flight(torque)
     found = replay(signals, start_samples(signals, 20, HORIZON), HORIZON, ReplayModel(torque, inertia))
     assert found.rate.shape == found.attitude.shape == (HORIZON, 3)
     assert found.rate.max() < 2e-5
@@ -82,14 +82,14 @@ def test_the_model_that_made_the_flight_simulates_it(torque, inertia):
 
 def test_a_wrong_model_is_worse_than_the_right_one():
     torque = bent_torque()
-    signals = flight(torque)
+    signals = swinging_flight(torque)
     starts = start_samples(signals, 20, HORIZON)
     assert replay(signals, starts, HORIZON, rigid_body(signals)).rate[-1, 1] > 0.05
 
 
 def test_a_missing_constant_torque_grows_with_the_horizon_as_it_must():
     missing = np.array([0.0, 0.0, 0.03])
-    signals = flight(rigid_torque() - missing, attitude=None)
+    signals = swinging_flight(rigid_torque() - missing, attitude=None)
     starts = start_samples(signals, 10, HORIZON)
     found = replay(signals, starts, HORIZON, rigid_body(signals))
     expected = np.linalg.norm(np.linalg.solve(TENSOR, missing)) * found.horizon_s
@@ -100,24 +100,24 @@ def test_a_missing_constant_torque_grows_with_the_horizon_as_it_must():
 
 
 def test_the_held_rate_is_wrong_by_what_the_rate_changed():
-    signals = flight(rigid_torque())
+    signals = swinging_flight(rigid_torque())
     starts = start_samples(signals, 10, HORIZON)
     found = held(signals, starts, HORIZON)
     change = BODY_RATE[starts + HORIZON] - BODY_RATE[starts]
     np.testing.assert_allclose(found.rate[-1], np.sqrt(np.mean(change**2, axis=0)), rtol=1e-3)
     assert found.attitude[-1].max() > 100 * replay(signals, starts, HORIZON, rigid_body(signals)).attitude[-1].max()
-    assert held(flight(rigid_torque(), attitude=None), starts, HORIZON).attitude is None
+    assert held(swinging_flight(rigid_torque(), attitude=None), starts, HORIZON).attitude is None
 
 
 def test_a_smoothed_start_has_less_of_the_noise_and_does_not_lag():
     noise = 0.02 * np.random.default_rng(0).standard_normal(BODY_RATE.shape)
-    noisy = start_rate(flight(rigid_torque(), body_rate=BODY_RATE + noise)) - BODY_RATE
+    noisy = start_rate(swinging_flight(rigid_torque(), body_rate=BODY_RATE + noise)) - BODY_RATE
     assert noisy[10:-10].std() < 0.65 * 0.02
-    assert np.abs(start_rate(flight(rigid_torque())) - BODY_RATE).max() < 2e-5
+    assert np.abs(start_rate(swinging_flight(rigid_torque())) - BODY_RATE).max() < 2e-5
 
 
 def test_what_cannot_be_simulated_says_why():
-    signals = flight(rigid_torque(), attitude=None)
+    signals = swinging_flight(rigid_torque(), attitude=None)
     starts = start_samples(signals, 100, HORIZON)
     with pytest.raises(ComputationError, match="needs the attitude"):
         replay(signals, starts, HORIZON, ReplayModel(rigid_torque(), Bent()))
@@ -126,7 +126,7 @@ def test_what_cannot_be_simulated_says_why():
     with pytest.raises(InputError, match="too short"):
         start_samples(signals, 1, len(TIME))
     with pytest.raises(InputError, match="without rotor speeds"):
-        rigid_body(flight(None))
+        rigid_body(swinging_flight(None))
 
 
 def test_the_worst_stretch_is_where_the_torque_is_wrong():
@@ -134,7 +134,7 @@ def test_the_worst_stretch_is_where_the_torque_is_wrong():
     wrong = torque.copy()
     burst = (TIME > 6.2) & (TIME < 7.6)
     wrong[burst, 1] += 0.2
-    signals = flight(torque)
+    signals = swinging_flight(torque)
     found = worst_stretch(signals, ReplayModel(wrong, TENSOR), ReplayModel(torque, TENSOR))
     assert (found.time[0], found.time[-1]) == pytest.approx((6.0, 7.995))
     assert found.restarts == pytest.approx([6.0, 7.0])
@@ -145,7 +145,7 @@ def test_the_worst_stretch_is_where_the_torque_is_wrong():
 
 def test_a_fault_of_the_gyro_shows_in_the_runs_that_start_from_the_log():
     torque, bias = rigid_torque(), np.array([0.0, 0.0, 0.05])
-    signals = flight(torque)
+    signals = swinging_flight(torque)
     logged = replace(signals, body_rate=signals.body_rate + bias)
     model = ReplayModel(torque, TENSOR)
     found = worst_stretch(signals, model, model, logged)

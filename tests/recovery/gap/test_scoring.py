@@ -12,7 +12,7 @@ from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of
 from cpfls_cli.gap.naming.search import block_index, rank_effects
 from cpfls_cli.gap.settings import GapSettings
-from tests.unit.gap.synthetic_flights import candidate, fly, weak
+from tests.builders.gap_flights import candidate, fly, weak
 
 SETTINGS = GapSettings()
 

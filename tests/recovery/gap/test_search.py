@@ -11,7 +11,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.naming.search import SearchStep, acceptable, exchanged, forward_selection, rank_effects
 from cpfls_cli.gap.settings import GapSettings
-from tests.unit.gap.synthetic_flights import candidate, fly, weak
+from tests.builders.gap_flights import candidate, fly, weak
 
 SETTINGS = GapSettings(shifts=99)
 TRIED = [

@@ -3,43 +3,25 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
-from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor import Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.motion import rigid_columns
+from tests.builders.flights import bent_torque, random_motion, rigid_torque
 
 PARAMETERS = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
 SETTINGS = IdentificationSettings(base="rigid-body", harmonic_order=2, products="tensor", membership_functions=1)
 STRUCTURE = model_structure(SETTINGS)
 PARTITIONS = uniform_breakpoints(STRUCTURE)
 TENSOR = np.array([[0.6, 0.03, -0.02], [0.03, 0.7, 0.04], [-0.02, 0.04, 1.2]])
+of_rigid_body, of_bent_body = rigid_torque(TENSOR), bent_torque(TENSOR, 0.3)
 
 
-def motion(seed, samples=400):
+def motion(seed):
     """Full rotations: attitudes anywhere on the circle."""
-    rng = np.random.default_rng(seed)
-    return Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
-
-
-def rigid_torque(m):
-    return newton_euler_torque(m.attitude, m.rate, m.acceleration, TENSOR)
-
-
-def bent_torque(m):
-    """Torque with 0.3 cos(roll) on top of D22, which no rigid body has, worked from its Lagrangian by hand.
-
-    L = 1/2 f(roll) pitch_rate^2 gives -1/2 f' pitch_rate^2 about roll and f pitch_acc + f' roll_rate pitch_rate
-    about pitch.
-    """
-    roll = m.attitude[:, 0]
-    f, slope = 0.3 * np.cos(roll), -0.3 * np.sin(roll)
-    torque = rigid_torque(m)
-    torque[:, 0] -= 0.5 * slope * m.rate[:, 1] ** 2
-    torque[:, 1] += f * m.acceleration[:, 1] + slope * m.rate[:, 0] * m.rate[:, 1]
-    return torque
+    return random_motion(np.random.default_rng(seed), 400)
 
 
 def fitted(torque_of, noise):
@@ -64,14 +46,14 @@ def predicted(fit, m):
 
 
 def test_exact_rigid_data_leave_nothing_to_the_fuzzy_part():
-    fit, data = fitted(rigid_torque, noise=0.0)
+    fit, data = fitted(of_rigid_body, noise=0.0)
     np.testing.assert_allclose(fit.rigid_body, PARAMETERS, atol=1e-9)
     assert np.abs(columns(data.motion) @ fit.coefficients).max() < 1e-9
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.3])
 def test_noisy_rigid_data_switch_the_fuzzy_part_off(noise):
-    fit, data = fitted(rigid_torque, noise)
+    fit, data = fitted(of_rigid_body, noise)
     assert fit.ridge_weight == np.inf
     np.testing.assert_array_equal(fit.coefficients, np.zeros(61))
     rigid = fit_baselines(data, 1 / axis_scale(data), 1e-10)[0]
@@ -80,19 +62,19 @@ def test_noisy_rigid_data_switch_the_fuzzy_part_off(noise):
 
 
 def test_inertia_that_depends_on_attitude_switches_it_on_and_beats_the_rigid_body():
-    fit, data = fitted(bent_torque, noise=0.05)
+    fit, data = fitted(of_bent_body, noise=0.05)
     assert fit.ridge_weight < 0.1
     rigid = fit_baselines(data, 1 / axis_scale(data), 1e-10)[0]
     held_out = motion(29)
     ours, theirs = (
-        np.mean((p - bent_torque(held_out)) ** 2) for p in (predicted(fit, held_out), rigid.torque(held_out))
+        np.mean((p - of_bent_body(held_out)) ** 2) for p in (predicted(fit, held_out), rigid.torque(held_out))
     )
     assert ours < 0.02 * theirs
 
 
 def test_coefficients_solve_the_ridge_problem():
     """Zero gradient of |scaled residual|^2 + weight * rows * sum (size c)^2, written out."""
-    fit, data = fitted(bent_torque, noise=0.05)
+    fit, data = fitted(of_bent_body, noise=0.05)
     scale = 1 / np.sqrt(np.mean(data.torque**2, axis=0))
     residual = ((data.torque - predicted(fit, data.motion)) * scale).ravel()
     fuzzy = (columns(data.motion) * scale[:, None]).reshape(len(residual), -1)
@@ -105,7 +87,7 @@ def test_coefficients_solve_the_ridge_problem():
 def test_what_a_selection_misses_is_judged_all_the_same():
     """A selection that holds still about roll fits anything there; the samples between it know better."""
     m = motion(27)
-    data = TorqueData(0.01 * np.arange(len(m)), m, rigid_torque(m) + 0.05 * rigid_torque(motion(31)))
+    data = TorqueData(0.01 * np.arange(len(m)), m, of_rigid_body(m) + 0.05 * of_rigid_body(motion(31)))
     few = np.flatnonzero(np.abs(m.attitude[:, 0]) < 0.5)
     learned = data[few]
     curve = model_evaluator(data, learned, SETTINGS).solver.curve(PARTITIONS)

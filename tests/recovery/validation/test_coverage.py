@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy import signal
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
@@ -14,6 +13,7 @@ from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure,
 from cpfls_cli.regressor.motion import rigid_columns
 from cpfls_cli.validation.bands import band, inertia_band
 from cpfls_cli.validation.bootstrap import BlockScores, bootstrap
+from tests.builders.flights import coloured_noise
 
 RUNS, SAMPLES, BLOCKS, DRAWS = 200, 2000, 40, 200
 INERTIA = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
@@ -34,11 +34,6 @@ def turning(samples=SAMPLES):
         for k in range(3)
     )
     return Motion(attitude, rate, acceleration)
-
-
-def noise(rng, time_constant, samples=SAMPLES):
-    keep = np.exp(-1 / time_constant) if time_constant else 0.0
-    return signal.lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal((300 + samples, 3)), axis=0)[300:]
 
 
 def columns(which):
@@ -65,7 +60,7 @@ def test_coverage(which, time_constant):
     gram = np.array([rows.T @ rows for rows in by_block])
     truth, inside = rng.standard_normal(A.shape[2]), []
     for _ in range(RUNS):
-        torque = A @ truth + 0.1 * noise(rng, time_constant)
+        torque = A @ truth + 0.1 * coloured_noise(rng, SAMPLES, time_constant)
         x = np.linalg.solve(gram.sum(axis=0), np.einsum("nap,na->p", A, torque))
         residual = torque - A @ x
         score = [rows.T @ residual[label == block].ravel() for block, rows in enumerate(by_block)]
@@ -84,7 +79,9 @@ def test_the_known_inertia_of_a_vehicle_lies_within_its_bands(base):
     exact, rng = newton_euler_torque(m.attitude, m.rate, m.acceleration, TENSOR), np.random.default_rng(9)
     exact = exact if base == "rigid-body" else newton_euler_torque(*vars(m).values(), np.diag([0.6, 0.7, 1.2]))
     truth = INERTIA if base == "rigid-body" else np.array([0.6, 0.7, 1.2, 0, 0, 0])
-    training = TorqueData(0.01 * np.arange(SAMPLES), m, exact + 0.1 * exact.std(axis=0) * noise(rng, 5))
+    training = TorqueData(
+        0.01 * np.arange(SAMPLES), m, exact + 0.1 * exact.std(axis=0) * coloured_noise(rng, SAMPLES, 5)
+    )
     evaluator = model_evaluator(training, training, IdentificationSettings(base=base))
     fit, partitions = evaluator.fit(uniform_chromosome(evaluator.structure)), uniform_breakpoints(evaluator.structure)
     model = Model(

@@ -8,14 +8,12 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.identification import Model, TorqueData
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
-from cpfls_cli.trajectory import full_rotation
-from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.replay import replay_steps
+from tests.builders.flights import rigid_torque, rotating_motion
 
 INERTIA = np.array([0.6, 0.8, 1.2, 0.03, -0.02, 0.04])
 RANGE = InputRange(-1.0, 1.0)
@@ -29,15 +27,13 @@ def bent_model(seed=81, size=0.004):
     return Model(structure, (RANGE, RANGE), uniform_breakpoints(structure), coefficients, INERTIA, visited)
 
 
-def motion(samples, duration=8.0, seed=82):
-    path = full_rotation(RotationSettings(), duration, np.random.default_rng(seed))
-    time = path.times(samples)
-    return time, Motion(*vars(path.sample(time)).values())
+def motion(samples, seed=82):
+    return rotating_motion(seed, samples, duration=8.0)
 
 
 def rigid_flight(samples):
     time, m = motion(samples)
-    return TorqueData(time, m, newton_euler_torque(m.attitude, m.rate, m.acceleration, symmetric(INERTIA)))
+    return TorqueData(time, m, rigid_torque(symmetric(INERTIA))(m))
 
 
 def bent_flight(samples):

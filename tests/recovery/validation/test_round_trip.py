@@ -5,34 +5,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification import IdentificationSettings, TorqueData, data
+from cpfls_cli.identification import IdentificationSettings, data
 from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.excitation import visited_cells
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.model import Model
-from cpfls_cli.regressor import Motion, uniform_breakpoints
+from cpfls_cli.regressor import uniform_breakpoints
 from cpfls_cli.validation.bootstrap import MissedTorque, bootstrap
 from cpfls_cli.validation.curves import SimulatedTorque, curves, round_trip
 from cpfls_cli.validation.timeline import time_blocks
+from tests.builders.flights import bent_torque, random_flight
 
 SAMPLES = 800
 
 
-def flight(noise):
-    rng = np.random.default_rng(113)
-    m = Motion(rng.uniform(-np.pi, np.pi, (SAMPLES, 3)), *rng.standard_normal((2, SAMPLES, 3)))
-    torque = newton_euler_torque(*vars(m).values(), np.diag([0.6, 0.7, 1.2]))
-    roll = m.attitude[:, 0]
-    torque[:, 0] += 0.25 * np.sin(roll) * m.rate[:, 1] ** 2
-    torque[:, 1] += 0.5 * (np.cos(roll) * m.acceleration[:, 1] - np.sin(roll) * m.rate[:, 0] * m.rate[:, 1])
-    return TorqueData(0.01 * np.arange(SAMPLES), m, torque + noise * rng.standard_normal(torque.shape))
+def bending_flight(noise):
+    return random_flight(bent_torque(size=0.5), 113, SAMPLES, noise=noise)
 
 
 def tripped(base, noise, every=1, changed=None):
     settings = IdentificationSettings(base=base)
-    training = flight(noise)
+    training = bending_flight(noise)
     learned = training if every == 1 else training[::every]
     evaluator = model_evaluator(training, learned, settings)
     fit, partitions = evaluator.fit(uniform_chromosome(evaluator.structure)), uniform_breakpoints(evaluator.structure)
@@ -74,7 +68,7 @@ def test_it_tells_where_it_leaves_the_bands():
 
 
 def test_the_noise_is_what_the_model_missed_turned_over_block_by_block(monkeypatch):
-    training = flight(0.05)
+    training = bending_flight(0.05)
     evaluator = model_evaluator(training, training, IdentificationSettings(base="none"))
     fit, partitions = evaluator.fit(uniform_chromosome(evaluator.structure)), uniform_breakpoints(evaluator.structure)
     model = Model(

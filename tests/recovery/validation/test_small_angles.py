@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy import signal
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
@@ -13,6 +11,7 @@ from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.regressor import Motion, uniform_breakpoints
 from cpfls_cli.validation.bands import inertia_band
 from cpfls_cli.validation.bootstrap import bootstrap
+from tests.builders.flights import bent_torque, coloured_noise
 
 RUNS, SAMPLES, NOISE = 40, 1200, 0.05
 TENSOR = np.diag([0.6, 0.8, 1.2])
@@ -30,15 +29,6 @@ def tilting(degrees):
     return Motion(*(share * part for part in motion))
 
 
-def bent_torque(m):
-    """Torque of a rigid body with 0.3 cos(roll) more in D22, from L = f(roll) pitch_rate^2 / 2."""
-    torque = newton_euler_torque(m.attitude, m.rate, m.acceleration, TENSOR)
-    f, slope = 0.3 * np.cos(m.attitude[:, 0]), -0.3 * np.sin(m.attitude[:, 0])
-    torque[:, 0] -= 0.5 * slope * m.rate[:, 1] ** 2
-    torque[:, 1] += f * m.acceleration[:, 1] + slope * m.rate[:, 0] * m.rate[:, 1]
-    return torque
-
-
 def bent_inertia(attitude):
     roll, pitch = attitude[:, 0], attitude[:, 1]
     W = np.eye(3)[None].repeat(len(attitude), axis=0)
@@ -47,11 +37,6 @@ def bent_inertia(attitude):
     inertia = W.swapaxes(1, 2) @ TENSOR @ W
     inertia[:, 1, 1] += 0.3 * np.cos(roll)
     return inertia
-
-
-def noise(rng, time_constant):
-    keep = np.exp(-1 / time_constant) if time_constant else 0.0
-    return signal.lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal((300 + SAMPLES, 3)), axis=0)[300:]
 
 
 def held(m, torque, attitude, rng):
@@ -70,9 +55,12 @@ def held(m, torque, attitude, rng):
 @pytest.mark.parametrize(("tilt", "time_constant"), [(13, 0), (40, 5)], ids=["13-white", "40-coloured"])
 def test_coverage_under_a_ridge(tilt, time_constant):
     m, rng = tilting(tilt), np.random.default_rng(21)
-    exact, visited = bent_torque(m), slice(0, SAMPLES, 60)
+    exact, visited = bent_torque(TENSOR, 0.3)(m), slice(0, SAMPLES, 60)
     attitude = np.vstack([m.attitude[visited], FAR])
-    found = [held(m, exact + NOISE * exact.std(axis=0) * noise(rng, time_constant), attitude, rng) for _ in range(RUNS)]
+    found = [
+        held(m, exact + NOISE * exact.std(axis=0) * coloured_noise(rng, SAMPLES, time_constant), attitude, rng)
+        for _ in range(RUNS)
+    ]
     inside, weights = np.array([share for share, _ in found]), np.array([weight for _, weight in found])
     near, far = (np.mean(inside[:, :, where], axis=(0, 2)) for where in (slice(0, 20), slice(20, None)))
     assert np.median(weights) >= 0.01

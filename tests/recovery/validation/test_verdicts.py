@@ -6,46 +6,29 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor import Motion
-from cpfls_cli.trajectory import full_rotation
-from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.grounds import Grounds
 from cpfls_cli.validation.paired import Comparison, compare_torque
 from cpfls_cli.validation.physical import physical_sense
 from cpfls_cli.validation.replay import replay_steps
 from cpfls_cli.validation.residuals import examine_residuals
 from cpfls_cli.validation.verdict import good_axes, verdict
+from tests.builders.flights import bent_torque, rigid_torque, rotating_motion
 
 INERTIA = symmetric([0.6, 0.8, 1.2])
+rigid, bent = rigid_torque(INERTIA), bent_torque(INERTIA, 0.3)
 UNSEARCHED = {"population": 2, "generations": 0, "local_search": LocalSearchSettings(enabled=False)}
 PAPER = {"consequents": "seesaw", "products": "additive", "membership_functions": 5, "base": "none"}
-
-
-def rigid(m):
-    return newton_euler_torque(m.attitude, m.rate, m.acceleration, INERTIA)
-
-
-def bent(m):
-    """A rigid body with 0.3 cos(roll) on top of D22, which no rigid body has, from its Lagrangian by hand."""
-    f, slope = 0.3 * np.cos(m.attitude[:, 0]), -0.3 * np.sin(m.attitude[:, 0])
-    torque = rigid(m)
-    torque[:, 0] -= 0.5 * slope * m.rate[:, 1] ** 2
-    torque[:, 1] += f * m.acceleration[:, 1] + slope * m.rate[:, 0] * m.rate[:, 1]
-    return torque
 
 
 def mirrored(m):
     return rigid(m) * [1, -1, 1]
 
 
-def flight(torque_of, noise, seed, samples=1200, duration=24.0):
-    path = full_rotation(RotationSettings(), duration, np.random.default_rng(seed))
-    time = path.times(samples)
-    m = Motion(*vars(path.sample(time)).values())
+def rotating_flight(torque_of, noise, seed):
+    time, m = rotating_motion(seed, samples=1200, duration=24.0)
     torque = torque_of(m)
     drawn = np.random.default_rng(seed + 1).standard_normal(torque.shape)
     return TorqueData(time, m, torque + noise * torque.std(axis=0) * drawn)
@@ -54,7 +37,7 @@ def flight(torque_of, noise, seed, samples=1200, duration=24.0):
 @cache
 def grounds(torque_of, noise=0.0, structure=(), *, held_out=True, seeds=(3, 53)):
     """All evidence on a model of a flight, judged on another."""
-    training, other = (flight(torque_of, noise, seed) for seed in seeds)
+    training, other = (rotating_flight(torque_of, noise, seed) for seed in seeds)
     parts = {"other": other} if held_out else {}
     settings = IdentificationSettings(**dict(structure), **UNSEARCHED)
     found = identify(training, training, parts, settings, np.random.default_rng(1))

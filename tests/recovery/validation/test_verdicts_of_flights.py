@@ -4,9 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.identification.settings import LocalSearchSettings, ValidationSettings
 from cpfls_cli.inertia import symmetric
@@ -14,8 +12,12 @@ from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import generalised_torque
 from cpfls_cli.validation.paired import compare_torque
 from cpfls_cli.validation.validate import validate
+from tests.builders.flights import bent_torque, coloured_noise, rigid_torque
 
 INERTIA = symmetric([0.6, 0.8, 1.2])
+rigid, bent = rigid_torque(INERTIA), bent_torque(INERTIA, 0.3)
+as_heavy = rigid_torque(symmetric([0.6, 1.087, 1.2]))
+"""The rigid body that comes closest to the bent vehicle."""
 SETTINGS = IdentificationSettings(
     population=2,
     generations=0,
@@ -36,34 +38,14 @@ def path(seed, samples):
     return time[:, 0], Motion(angle, rate, acceleration)
 
 
-def rigid(m):
-    return newton_euler_torque(m.attitude, m.rate, m.acceleration, INERTIA)
-
-
-def as_heavy(m):
-    """The rigid body that comes closest to the bent vehicle."""
-    return newton_euler_torque(m.attitude, m.rate, m.acceleration, symmetric([0.6, 1.087, 1.2]))
-
-
 def pushed(m):
     """A rigid body and a constant torque."""
     return rigid(m) + generalised_torque(m.attitude, np.tile([0.5, -0.5, 0.25], (len(m), 1)))
 
 
-def bent(m):
-    """A rigid body with 0.3 cos(roll) on top of D22, from its Lagrangian by hand."""
-    f, slope = 0.3 * np.cos(m.attitude[:, 0]), -0.3 * np.sin(m.attitude[:, 0])
-    torque = rigid(m)
-    torque[:, 0] -= 0.5 * slope * m.rate[:, 1] ** 2
-    torque[:, 1] += f * m.acceleration[:, 1] + slope * m.rate[:, 0] * m.rate[:, 1]
-    return torque
-
-
-def flight(torque_of, seed, noise=0.02, samples=1200, memory=0.0):
+def flight_of_sines(torque_of, seed, noise=0.02, samples=1200, memory=0.0):
     time, m = path(seed, samples)
-    share = np.exp(-1 / memory) if memory else 0.0
-    drawn = np.random.default_rng(seed + 1).standard_normal((300 + samples, 3))
-    coloured = lfilter([np.sqrt(1 - share**2)], [1, -share], drawn, axis=0)[300:]
+    coloured = coloured_noise(np.random.default_rng(seed + 1), samples, memory)
     torque = torque_of(m)
     return TorqueData(time, m, torque + noise * torque.std(axis=0) * coloured)
 
@@ -75,7 +57,7 @@ def judged(training, parts: Mapping[str, TorqueData], settings=SETTINGS):
 
 def test_a_constant_torque_is_no_reason_for_a_fuzzy_inertia():
     """The fuzzy part imitates the push and beats a rigid body that has no constant."""
-    training, other = flight(pushed, 10), flight(pushed, 60)
+    training, other = flight_of_sines(pushed, 10), flight_of_sines(pushed, 60)
     found, verdict = judged(training, {"other": other})
     assert compare_torque(other, found.model.torque, found.baselines[0].torque).lower
     assert verdict.label == "not-better-than-rigid-body"
@@ -84,8 +66,8 @@ def test_a_constant_torque_is_no_reason_for_a_fuzzy_inertia():
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_all_parts_are_judged_in_whatever_order(order):
-    training = flight(bent, 10)
-    parts = {"bent": flight(bent, 60), "rigid": flight(as_heavy, 70)}
+    training = flight_of_sines(bent, 10)
+    parts = {"bent": flight_of_sines(bent, 60), "rigid": flight_of_sines(as_heavy, 70)}
     assert judged(training, {"bent": parts["bent"]})[1].label == "good-inside-region"
     _, verdict = judged(training, dict(list(parts.items())[::order]))
     assert verdict.label == "not-better-than-rigid-body"
@@ -96,12 +78,12 @@ def test_all_parts_are_judged_in_whatever_order(order):
 
 @pytest.mark.parametrize("seed", [10, 11, 12])
 def test_a_short_part_with_coloured_noise_proves_nothing(seed):
-    training = flight(rigid, seed, 0.2, memory=20)
-    _, verdict = judged(training, {"other": flight(rigid, seed + 50, 0.2, memory=20)[500:540]})
+    training = flight_of_sines(rigid, seed, 0.2, memory=20)
+    _, verdict = judged(training, {"other": flight_of_sines(rigid, seed + 50, 0.2, memory=20)[500:540]})
     assert verdict.label in ("not-better-than-rigid-body", "do-not-use")
     assert not any("by more than chance over" in text for text in verdict.reason)
 
 
 def test_a_short_part_of_a_bent_vehicle_proves_nothing_either():
-    _, verdict = judged(flight(bent, 10), {"other": flight(bent, 60)[500:550]})
+    _, verdict = judged(flight_of_sines(bent, 10), {"other": flight_of_sines(bent, 60)[500:550]})
     assert verdict.label == "not-better-than-rigid-body"

@@ -13,12 +13,12 @@ def findings(spec=FLIGHT, **data):
     return check_artifact(Artifact(spec, Header("1", 1, ""), {k.replace("__", "/"): v for k, v in data.items()}))
 
 
-def flight(**changes):
+def datasets(**changes):
     return {"time": np.arange(4.0), "attitude": np.zeros((4, 3)), "rotor_speed": np.zeros((4, 6))} | changes
 
 
 def test_good():
-    assert findings(**flight()) == []
+    assert findings(**datasets()) == []
 
 
 @pytest.mark.parametrize(
@@ -38,17 +38,17 @@ def test_good():
     ],
 )
 def test_one_rule_broken(changes, finding):
-    assert findings(**flight(**changes)) == [finding]
+    assert findings(**datasets(**changes)) == [finding]
 
 
 def test_not_finite_counts_samples_and_names_the_first():
     attitude = np.zeros((4, 3))
     attitude[2, 1], attitude[3] = np.nan, np.inf
-    assert findings(**flight(attitude=attitude)) == ["attitude: 2 samples are not finite, the first at index 2"]
+    assert findings(**datasets(attitude=attitude)) == ["attitude: 2 samples are not finite, the first at index 2"]
 
 
 def test_gaps_are_allowed_where_the_format_says_so():
-    assert findings(**flight(rotor_speed=np.full((4, 6), np.nan))) == []
+    assert findings(**datasets(rotor_speed=np.full((4, 6), np.nan))) == []
 
 
 def test_lengths_in_digits_are_fixed():

@@ -8,8 +8,8 @@ import pytest
 from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.export import c_source, reference_points
 from cpfls_cli.regressor import Motion
-from tests.unit.export.cases import CASES, Case, errors, model_of, sheet_of, states, wanted_of
-from tests.unit.export.compiled import CHECKS, build, drive, driver, evaluate, require_gcc, written
+from tests.builders.compiled_c import CHECKS, build, drive, driver, evaluate, require_gcc, written
+from tests.builders.exported_models import CASES, Case, errors, model_of, sheet_of, states, wanted_of
 
 OUTSIDE, NOT_FINITE, VERTICAL = 1, 2, 4
 SAMPLES = {"paper": 50_000, "default": 50_000}

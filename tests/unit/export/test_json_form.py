@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.export import json_text, reference_points
-from tests.unit.export.cases import CASES, model_of, sheet_of, states, verdict_of
+from tests.builders.exported_models import CASES, model_of, sheet_of, states, verdict_of
 
 
 def refuse_constant(name):

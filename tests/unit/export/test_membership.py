@@ -19,8 +19,8 @@ from cpfls_cli.export.json_form import HOW_TO_EVALUATE
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
 from cpfls_cli.regressor import Motion, Regressor, kernels
 from cpfls_cli.regressor.table import padded_breakpoints, structure_table
-from tests.unit.export.cases import Case, model_of, sheet_of
-from tests.unit.export.compiled import evaluate, require_gcc, written
+from tests.builders.compiled_c import evaluate, require_gcc, written
+from tests.builders.exported_models import Case, model_of, sheet_of
 
 METHOD = Path(__file__).parents[3] / "docs/method.md"
 FUNCTIONS = 6

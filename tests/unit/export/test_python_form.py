@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.export import python_source, reference_points
-from tests.unit.export.cases import CASES, errors, model_of, sheet_of, states, wanted_of
+from tests.builders.exported_models import CASES, errors, model_of, sheet_of, states, wanted_of
 
 SAMPLES = {"paper": 20_000, "default": 20_000}
 ALLOWED = 1e-12

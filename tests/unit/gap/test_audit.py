@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.sensors.audit import audit
 from cpfls_cli.vehicle.rotors import body_wrench
-from tests.recovery.gap.audit_flights import LEVELS, Faults, flight
+from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight
 
 WINDOWS = windows(0.01, 0.4, 0.5)
 UP = np.array([0, 0, 9.81])
@@ -18,7 +18,7 @@ FAULTS = {"gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay"}
 
 @pytest.fixture(scope="module")
 def turning():
-    return flight(np.random.default_rng(0), Faults(), LEVELS["mid"], duration=40.0)
+    return faulty_flight(np.random.default_rng(0), Faults(), LEVELS["mid"], duration=40.0)
 
 
 def moved(signals, amplitude=2.0):
@@ -41,7 +41,7 @@ def test_without_attitude_nothing_is_tested(turning):
 
 
 def test_too_short_a_flight_is_not_tested():
-    found = audit([flight(np.random.default_rng(0), Faults(), LEVELS["mid"], duration=5.0)], WINDOWS)
+    found = audit([faulty_flight(np.random.default_rng(0), Faults(), LEVELS["mid"], duration=5.0)], WINDOWS)
     assert found.findings == ()
     assert set(found.untested.values()) == {"the flights are too short"}
 
@@ -131,7 +131,7 @@ def test_constant_clipped_and_rounded_channels_are_named(turning):
 
 def test_a_slow_rounded_gyroscope_is_not_called_clipped():
     for seed in range(20):
-        still = flight(
+        still = faulty_flight(
             np.random.default_rng(seed), Faults(), LEVELS["low"], coloured=True, amplitude=(0.004, 0.004, 0.004)
         )
         assert audit([still], WINDOWS).warnings == ()
@@ -139,7 +139,7 @@ def test_a_slow_rounded_gyroscope_is_not_called_clipped():
 
 @pytest.mark.parametrize(("commanded", "whom"), [(True, "commands"), (False, "measured rotors")])
 def test_the_motion_follows_the_torque(turning, commanded, whom):
-    clean = flight(np.random.default_rng(3), Faults(), duration=20.0)
+    clean = faulty_flight(np.random.default_rng(3), Faults(), duration=20.0)
     inertia = np.diag(clean.vehicle.inertia_kg_m2)
     momentum = clean.body_rate @ inertia
     torque = np.gradient(momentum, clean.time, axis=0) + np.cross(clean.body_rate, momentum)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.gap.balance.balance_system import scatter_size, scatter_variance, system
-from tests.unit.gap.synthetic_flights import candidate, fly, weak
+from tests.builders.gap_flights import candidate, fly, weak
 
 RING = candidate("vertical_descent", sideways=1.0)
 

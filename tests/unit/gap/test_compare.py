@@ -24,7 +24,7 @@ SETTINGS = GapSettings(shifts=39)
 NOISE = 0.002
 
 
-def flight(seed, extra=None, seconds=24.0):
+def recording_of_sines(seed, extra=None, seconds=24.0):
     """Rates of sums of sines; the stated torque is what they take, less `extra`, which the model does not know."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 0.01)
@@ -59,7 +59,7 @@ def with_effect(name, *linear, shape=None):
 
 
 def test_gap_is_the_missing_torque():
-    found = compared([flight(1, bias), flight(2, bias)])
+    found = compared([recording_of_sines(1, bias), recording_of_sines(2, bias)])
     assert found.rms[1] == pytest.approx(0.1, rel=0.02)
     assert (found.rms[[0, 2]] < 0.03).all()
     assert found.floors[1] > 5
@@ -68,14 +68,14 @@ def test_gap_is_the_missing_torque():
 
 
 def test_no_gap_is_about_one_floor():
-    found = compared([flight(1), flight(2)])
+    found = compared([recording_of_sines(1), recording_of_sines(2)])
     assert (found.floors[:3] < 1.4).all()
     assert (found.floors[:3] > 0.7).all()
     assert all(d.p_value > 0.02 or d.r2 < 0.2 for d in found.dependence)
 
 
 def test_gap_follows_the_signal_that_makes_it():
-    found = compared([flight(1, damping), flight(2, damping)])
+    found = compared([recording_of_sines(1, damping), recording_of_sines(2, damping)])
     best = {channel: next(d for d in found.dependence if d.channel == channel) for channel in ("torque x", "torque y")}
     assert [best[channel].signal for channel in best] == ["body rate x", "body rate y"]
     assert all(d.r2 > 0.9 and d.p_value < 0.05 for d in best.values())
@@ -87,34 +87,34 @@ def test_stretch_is_where_the_gap_is():
     def burst(time, _rate):
         return np.column_stack([np.where((time > 10) & (time < 13), 0.2, 0.0), 0 * time, 0 * time])
 
-    first = compared([flight(1), flight(2, burst)]).stretches[0]
+    first = compared([recording_of_sines(1), recording_of_sines(2, burst)]).stretches[0]
     assert (first.flight, first.channel) == (1, "torque x")
     assert first.start_s == pytest.approx(10, abs=0.6)
     assert first.end_s == pytest.approx(13, abs=0.6)
 
 
 def test_effects_without_signals_are_listed():
-    unseen = {each.name: each.reason for each in compared([flight(1)]).not_excited}
+    unseen = {each.name: each.reason for each in compared([recording_of_sines(1)]).not_excited}
     assert "velocity" in unseen["rotor_drag"]
     assert "parameter_error" not in unseen
 
 
 def test_model_with_the_effect_leaves_the_noise():
-    recordings = [flight(1, damping), flight(2, damping)]
+    recordings = [recording_of_sines(1, damping), recording_of_sines(2, damping)]
     found = compared(recordings, with_effect("linear_damping", 0.12, 0.12, 0.12))
     assert (found.floors[:3] < 1.4).all()
     assert (found.replayed.rate[-1] < 0.3 * compared(recordings).replayed.rate[-1]).all()
 
 
 def test_effect_wrench_is_the_torque_by_hand():
-    signals = flight(3).signals
+    signals = recording_of_sines(3).signals
     torque = with_effect("linear_damping", 0.1, 0.2, 0.3).effect_wrench(signals)
     assert torque[:, :3] == pytest.approx(-signals.body_rate * [0.1, 0.2, 0.3])
     assert not torque[:, 3:].any()
 
 
 def test_momentum_of_an_effect_is_differentiated():
-    signals = flight(3).signals
+    signals = recording_of_sines(3).signals
     time = signals.time
     speed = 350 + 20 * np.sin(2 * np.pi * 0.7 * time)[:, None] * [1.0, -1.0, 1.0, -1.0]
     turning = replace(signals, rotor_speed=speed, stated_torque=None)
@@ -125,7 +125,7 @@ def test_momentum_of_an_effect_is_differentiated():
 
 
 def test_required_rotor_torque_is_that_of_the_motion_less_the_effect():
-    recording = flight(4, damping)
+    recording = recording_of_sines(4, damping)
     model = with_effect("linear_damping", 0.12, 0.12, 0.12)
     exact = replace(recording.signals, body_rate=_exact_rate(4))
     inside = slice(10, -10)
@@ -133,7 +133,7 @@ def test_required_rotor_torque_is_that_of_the_motion_less_the_effect():
 
 
 def test_refitted_inertia_changes_the_inertial_torque_in_proportion():
-    signals = replace(flight(5).signals, body_rate=np.zeros((2400, 3)))
+    signals = replace(recording_of_sines(5).signals, body_rate=np.zeros((2400, 3)))
     spun = replace(signals, body_rate=np.column_stack([0.4 * np.sin(2 * signals.time), *[0 * signals.time] * 2]))
     base = plain(None)
     heavier = replace(base, parameters=np.where(np.arange(len(base.parameters)) == 0, 0.1, 0.0))
@@ -144,7 +144,7 @@ def test_refitted_inertia_changes_the_inertial_torque_in_proportion():
 def test_a_missing_signal_is_named():
     model = with_effect("rotor_drag", 1e-3, 5e-5)
     with pytest.raises(InputError, match=r"lacks .*velocity.*, which the model's effect rotor_drag needs"):
-        model.effect_wrench(flight(1).signals)
+        model.effect_wrench(recording_of_sines(1).signals)
 
 
 def named(name):
@@ -152,8 +152,8 @@ def named(name):
 
 
 def extension(names, extra):
-    found = compared([flight(1, extra)])
-    training, held = [flight(1, extra), flight(2, extra)], [flight(3, extra)]
+    found = compared([recording_of_sines(1, extra)])
+    training, held = [recording_of_sines(1, extra), recording_of_sines(2, extra)], [recording_of_sines(3, extra)]
     return extend(training, held, [named(name) for name in names], found.audit, SETTINGS, None), held
 
 
@@ -182,7 +182,7 @@ def test_turned_gyroscope_is_repaired_before_anything_is_compared():
     """An attitude tells the audit that the gyroscope has a constant error, which no torque gets."""
 
     def seen(seed):
-        signals = flight(seed).signals
+        signals = recording_of_sines(seed).signals
         exact = _exact_rate(seed)
         turns = Rotation.identity()
         angles = np.zeros((len(signals), 3))
@@ -212,4 +212,4 @@ def test_plain_model_has_no_effects():
     model = plain(None)
     assert isinstance(model, ExtendedModel)
     assert not model.chosen
-    assert not model.effect_wrench(flight(1).signals).any()
+    assert not model.effect_wrench(recording_of_sines(1).signals).any()

@@ -127,7 +127,7 @@ def test_shifted_residuals_keep_neighbours_together():
     np.testing.assert_allclose(draws.reshape(FLIGHTS, LENGTH, 20).mean(axis=1), 0, atol=1e-12)
 
 
-def flight(**given):
+def windowed_flight(**given):
     rate = np.column_stack([np.sin(TIME), np.cos(TIME), 0.1 * TIME])
     signals = Signals(time=TIME, body_rate=rate, vehicle=VEHICLE, **given)
     return weak_flight("one", signals, windows(0.01, 0.4, 0.5), None, force=False), signals
@@ -136,7 +136,7 @@ def flight(**given):
 def test_a_full_flight_has_every_signal_and_a_bare_one_its_rates():
     turning = np.column_stack([0.1 * np.ones(1000), np.zeros(1000), 0.9 * TIME])
     full = state_signals(
-        *flight(
+        *windowed_flight(
             attitude=turning,
             velocity=np.column_stack([3 + 0 * TIME, 4 + 0 * TIME, 0.5 + 0 * TIME]),
             position=np.column_stack([TIME, TIME, 2 * TIME]),
@@ -149,18 +149,18 @@ def test_a_full_flight_has_every_signal_and_a_bare_one_its_rates():
     assert full["vertical speed"] == pytest.approx(0.5)
     assert full["thrust"] == pytest.approx(4 * 121.5e-6 * 348.0**2)
     assert full["height"] == pytest.approx(2 * (full["time"] + TIME[0]))
-    bare = state_signals(*flight())
+    bare = state_signals(*windowed_flight())
     assert set(bare) == {"time", "body rate x", "body rate y", "body rate z"}
 
 
 def test_a_turn_through_half_a_turn_does_not_average_to_zero():
     yaw = (0.9 * TIME + np.pi) % (2 * np.pi) - np.pi
-    state = state_signals(*flight(attitude=np.column_stack([0 * yaw, 0 * yaw, yaw])))
+    state = state_signals(*windowed_flight(attitude=np.column_stack([0 * yaw, 0 * yaw, yaw])))
     np.testing.assert_allclose(np.exp(1j * state["yaw"]), np.exp(0.9j * (state["time"] + TIME[0])), atol=1e-9)
 
 
 def test_what_a_flight_lacks_is_not_a_number_there():
-    with_voltage, without = state_signals(*flight(voltage=np.ones(1000))), state_signals(*flight())
+    with_voltage, without = state_signals(*windowed_flight(voltage=np.ones(1000))), state_signals(*windowed_flight())
     joined = joined_states([without, with_voltage])
     assert np.isnan(joined["voltage"][: len(without["time"])]).all()
     assert joined["voltage"][len(without["time"]) :] == pytest.approx(1)

@@ -9,7 +9,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.naming.held_out import held_out, share_removed
-from tests.unit.gap.synthetic_flights import candidate, fly, weak
+from tests.builders.gap_flights import candidate, fly, weak
 
 KNOWN = np.tile([True, True, True, False, False, False], (1000, 1))
 

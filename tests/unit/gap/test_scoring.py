@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.scoring import within_bounds
-from tests.unit.gap.synthetic_flights import VEHICLE
+from tests.builders.gap_flights import VEHICLE
 
 DAMPING, OFFSET, WIND = (CATALOGUE[name] for name in ("linear_damping", "com_offset", "wind"))
 SURE = np.full(3, 1e-6)

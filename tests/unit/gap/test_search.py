@@ -12,7 +12,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.scoring import Scored
 from cpfls_cli.gap.naming.search import alternatives, rank_effects, simplest, unbeaten
 from cpfls_cli.gap.settings import GapSettings
-from tests.unit.gap.synthetic_flights import fly, weak
+from tests.builders.gap_flights import fly, weak
 
 SETTINGS = GapSettings()
 

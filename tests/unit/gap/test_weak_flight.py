@@ -15,7 +15,7 @@ from cpfls_cli.gap.balance.weak_flight import actuated, columns_of, rotation_bal
 from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.vehicle.settings import VehicleSettings
-from tests.unit.gap.synthetic_flights import THROUGH, VEHICLE, candidate, effect_wrench, fly, sines, weak
+from tests.builders.gap_flights import THROUGH, VEHICLE, candidate, effect_wrench, fly, sines, weak
 
 EFFECTS = [
     (candidate("products_of_inertia"), [0.03, -0.02, 0.01]),

@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.identification import IdentificationSettings
 from cpfls_cli.identification import evaluator as evaluating
 from cpfls_cli.identification.evaluator import LARGEST_GENE, decode, encode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import LocalSearchSettings
-from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor import Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.motion import RIGID, rigid_columns
+from tests.builders.flights import random_flight, rigid_torque
 
 STRUCTURE = model_structure(StructureSettings(membership_functions=(2, 3, 1, 5, 6, 7)))
 
@@ -53,11 +53,13 @@ STEP = 1e-6
 def problem(structure, base, samples=120):
     """Noisy torque of a rigid body and of an inertia that depends on roll in a way no rigid body's does."""
     rng = np.random.default_rng(14)
-    motion = Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
-    torque = newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, np.diag([0.5, 0.7, 1.1]))
-    torque[:, 1] += np.exp(np.cos(motion.attitude[:, 0])) * motion.acceleration[:, 1]
-    torque += 0.05 * rng.standard_normal(torque.shape)
-    data = TorqueData(0.01 * np.arange(samples), motion, torque)
+
+    def torque_of(motion):
+        torque = rigid_torque(np.diag([0.5, 0.7, 1.1]))(motion)
+        torque[:, 1] += np.exp(np.cos(motion.attitude[:, 0])) * motion.acceleration[:, 1]
+        return torque
+
+    data = random_flight(torque_of, rng, samples, noise=0.05)
     off = LocalSearchSettings(enabled=False)
     settings = IdentificationSettings(**STRUCTURES[structure], base=base, local_search=off)
     return model_evaluator(data, data, settings), rng

@@ -12,7 +12,7 @@ from cpfls_cli.rotations import body_rate, generalised_torque
 INERTIA = np.array([0.6, 0.7, 1.2, 0.0, 0.0, 0.0])
 
 
-def flight(seed=1, samples=300, yaw=1.0, tilt=0.3):
+def small_angle_flight(seed=1, samples=300, yaw=1.0, tilt=0.3):
     """A flight at small angles; `yaw` scales what moves about it."""
     rng = np.random.default_rng(seed)
     scale = np.array([tilt, tilt, 0.3 * yaw])
@@ -33,7 +33,7 @@ def with_torque(data, torque):
 
 def rotations(seed=5, samples=400, tilt=4.0):
     """A flight through complete circles, and so through a vertical pitch."""
-    data = flight(seed, samples, yaw=10.0, tilt=tilt)
+    data = small_angle_flight(seed, samples, yaw=10.0, tilt=tilt)
     motion = data.motion
     torque = newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, np.diag(INERTIA[:3]))
     return with_torque(data, torque)
@@ -48,21 +48,21 @@ def told(data, held_out=None, stated=INERTIA, **changed):
 
 
 def test_a_good_flight_is_only_told_that_the_rigid_body_is_enough():
-    sentences = told(flight())
+    sentences = told(small_angle_flight())
     assert "fuzzy part off" in sentences
     for word in ("positive definite", "constant torque", "hardly", "times those stated", "explains less"):
         assert word not in sentences
 
 
 def test_a_wrong_sign_gives_an_inertia_that_no_body_has():
-    data = flight()
+    data = small_angle_flight()
     sentences = told(with_torque(data, -data.torque))
     assert "not positive definite at 300 of 300 training samples" in sentences
     assert "check signs, axes, frames and units" in sentences
 
 
 def test_a_constant_torque_is_named_with_its_size():
-    data = flight()
+    data = small_angle_flight()
     offset = np.tile([0.0, -0.5, 0.0], (300, 1))
     sentences = told(with_torque(data, data.torque + generalised_torque(data.motion.attitude, offset)))
     assert "pitch: a constant torque of -0.5" in sentences
@@ -71,7 +71,7 @@ def test_a_constant_torque_is_named_with_its_size():
 
 
 def test_an_axis_that_does_not_move_is_called_hardly_excited():
-    data = flight(yaw=0.01, tilt=0.05)
+    data = small_angle_flight(yaw=0.01, tilt=0.05)
     noise = 0.2 * np.random.default_rng(3).standard_normal((300, 3)) * [0, 0, 1]
     sentences = told(with_torque(data, data.torque + noise))
     assert "yaw is hardly excited: motion and a constant explain less than half" in sentences
@@ -79,7 +79,7 @@ def test_an_axis_that_does_not_move_is_called_hardly_excited():
 
 
 def test_torque_on_a_moving_axis_that_is_not_inertia_is_not_called_unexcited():
-    data = flight()
+    data = small_angle_flight()
     wrong = data.torque.copy()
     wrong[:, 1] = np.random.default_rng(4).standard_normal(300)
     sentences = told(with_torque(data, wrong))
@@ -88,14 +88,14 @@ def test_torque_on_a_moving_axis_that_is_not_inertia_is_not_called_unexcited():
 
 
 def test_a_wrong_unit_shows_in_the_ratio_to_the_stated_inertia():
-    data = flight()
+    data = small_angle_flight()
     assert "times those stated" in told(with_torque(data, 57.3 * data.torque))
     assert "times those stated" not in told(with_torque(data, 2.0 * data.torque))
     assert "times those stated" not in told(with_torque(data, 57.3 * data.torque), stated=None)
 
 
 def test_another_vehicle_is_told_on_held_out_flights():
-    data, other = flight(), flight(seed=2)
+    data, other = small_angle_flight(), small_angle_flight(seed=2)
     assert "other: the model explains less than half" in told(data, {"other": with_torque(other, 5 * other.torque)})
     assert "explains less than half" not in told(data, {"other": other})
 
@@ -137,7 +137,7 @@ def test_near_a_vertical_pitch_a_matrix_may_dip_below_zero_by_a_hair(pitch, smal
 def test_a_flight_through_a_vertical_pitch_is_told_what_is_left_out():
     sentences = told(rotations())
     assert "body torque is judged without the samples nearer than 6 degrees to a pitch of +-90 degrees" in sentences
-    assert "nearer than" not in told(flight())
+    assert "nearer than" not in told(small_angle_flight())
 
 
 def test_a_structure_that_fails_on_a_good_flight_is_not_blamed_on_the_log():
@@ -157,7 +157,7 @@ def test_noise_near_a_vertical_pitch_does_not_make_an_axis_badly_explained():
 
 
 def test_constant_and_inertial_torque_are_told_apart():
-    data = flight()
+    data = small_angle_flight()
     offset = np.tile([0.2, -0.5, 0.1], (300, 1))
     evidence = axis_evidence(with_torque(data, data.torque + generalised_torque(data.motion.attitude, offset)), 1e-10)
     np.testing.assert_allclose(evidence.constant, [0.2, -0.5, 0.1], atol=0.01)

@@ -3,27 +3,24 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
 from cpfls_cli.identification.search import SearchRun
 from cpfls_cli.identification.settings import LocalSearchSettings, RidgeSettings
 from cpfls_cli.regressor import Motion
+from tests.builders.flights import random_flight, rigid_torque
 
 SMALL = {"population": 10, "generations": 2, "local_search": LocalSearchSettings(evaluations=2)}
 SEARCHED = {**SMALL, "consequents": "seesaw", "products": "additive", "membership_functions": 3}
 
 
-def flight(samples=100, noise=0.02, seed=22, limit=np.pi):
-    rng = np.random.default_rng(seed)
-    motion = Motion(rng.uniform(-limit, limit, (samples, 3)), *rng.standard_normal((2, samples, 3)))
-    torque = newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, np.diag([0.6, 0.7, 1.2]))
-    return TorqueData(0.01 * np.arange(samples), motion, torque + noise * rng.standard_normal(torque.shape))
+def nearly_rigid_flight(samples=100, noise=0.02, seed=22, limit=np.pi):
+    return random_flight(rigid_torque(), seed, samples, noise=noise, limit=limit)
 
 
 def identified(settings, data=None, progress=None, seed=1):
-    data = flight() if data is None else data
-    held_out = {"held out": flight(seed=23)}
+    data = nearly_rigid_flight() if data is None else data
+    held_out = {"held out": nearly_rigid_flight(seed=23)}
     return identify(
         data,
         data,
@@ -67,7 +64,7 @@ def test_result_hangs_together(base):
     assert set(found.scores) == {"training", "held out"}
     assert {"model", "rigid-body", "constant-inertia", "torque-zero"} <= set(training)
     assert dict(found.samples) == {"training": 100, "held out": 100}
-    error = flight().torque - found.model.torque(flight().motion)
+    error = nearly_rigid_flight().torque - found.model.torque(nearly_rigid_flight().motion)
     np.testing.assert_allclose(training["model"].mse, np.mean(error**2, axis=0), rtol=1e-10)
     assert (found.ridge is None) == (base == "none")
 
@@ -79,7 +76,7 @@ def test_no_member_of_the_front_dominates_another():
 
 
 def test_a_structure_without_genes_needs_no_search():
-    found = identified({**SMALL, "base": "none", "membership_functions": 1}, flight(noise=0.0))
+    found = identified({**SMALL, "base": "none", "membership_functions": 1}, nearly_rigid_flight(noise=0.0))
     assert found.front.chromosomes.shape == (1, 0)
     assert found.history.evaluations.tolist() == [1]
     assert found.model.coefficients.shape == (61,)
@@ -88,7 +85,7 @@ def test_a_structure_without_genes_needs_no_search():
 
 
 def test_rigid_data_leave_the_model_no_worse_than_the_rigid_body():
-    found = identified({**SMALL, "base": "rigid-body"}, flight(noise=0.05))
+    found = identified({**SMALL, "base": "rigid-body"}, nearly_rigid_flight(noise=0.05))
     assert found.fit.ridge_weight == np.inf
     held_out = found.scores["held out"]
     np.testing.assert_allclose(held_out["model"].mse, held_out["rigid-body"].mse, rtol=1e-9)
@@ -96,7 +93,7 @@ def test_rigid_data_leave_the_model_no_worse_than_the_rigid_body():
 
 
 def test_model_learned_from_a_selection_is_judged_on_all_of_training():
-    data, selected = flight(), np.arange(0, 100, 2)
+    data, selected = nearly_rigid_flight(), np.arange(0, 100, 2)
     settings = IdentificationSettings(**{**SMALL, "base": "rigid-body"})
     found = identify(data, data[selected], {}, settings, np.random.default_rng(0))
     assert dict(found.samples) == {"training": 100}
@@ -106,7 +103,7 @@ def test_model_learned_from_a_selection_is_judged_on_all_of_training():
 
 def test_objectives_are_judged_on_all_of_training():
     """Few samples are met exactly by 25 coefficients; what the front counts is the error beside them too."""
-    data, selected = flight(noise=0.05), np.arange(0, 100, 8)
+    data, selected = nearly_rigid_flight(noise=0.05), np.arange(0, 100, 8)
     settings = IdentificationSettings(**{**SEARCHED, "base": "none"})
     found = identify(data, data[selected], {}, settings, np.random.default_rng(0))
     error = data.torque - found.model.torque(data.motion)
@@ -126,7 +123,7 @@ def test_search_that_starts_with_the_uniform_partitions_is_never_worse():
 def test_too_few_samples(samples, message):
     """12 samples of 0.01 s lie wholly within 0.1 s of every block of theirs."""
     with pytest.raises(SettingError, match=message):
-        identified(SMALL, flight(samples))
+        identified(SMALL, nearly_rigid_flight(samples))
 
 
 def test_ridge_weights_must_ascend():
@@ -137,7 +134,7 @@ def test_ridge_weights_must_ascend():
 
 def test_nothing_is_identified_from_a_torque_of_zero():
     # It would be a body without inertia, of which no score, band or verdict makes sense.
-    data = flight()
+    data = nearly_rigid_flight()
     still = TorqueData(data.time, data.motion, np.zeros_like(data.torque))
     for base in ("rigid-body", "none"):
         with pytest.raises(ComputationError, match="the torque is zero at all samples"):
@@ -153,7 +150,7 @@ def test_a_vehicle_that_never_turns_cannot_be_identified():
 
 
 def test_rules_without_excitation_and_rank_are_reported():
-    small_angles = flight(limit=0.2)
+    small_angles = nearly_rigid_flight(limit=0.2)
     found = identified({**SEARCHED, "base": "none", "membership_functions": 5}, small_angles)
     assert any(finding.startswith("rank ") for finding in found.findings)
     assert any("rules not excited" in finding and "D22 rule" in finding for finding in found.findings)

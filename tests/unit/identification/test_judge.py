@@ -1,6 +1,4 @@
-"""Scores worked by hand, baselines, and the spread of replicates beside the standard library's."""
-
-import statistics
+"""Scores worked by hand, and baselines."""
 
 import numpy as np
 import pytest
@@ -8,18 +6,13 @@ import pytest
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification import TorqueData
-from cpfls_cli.identification.judge import constant_inertia_columns, fit_baselines, score, score_of, spread
+from cpfls_cli.identification.judge import constant_inertia_columns, fit_baselines, score, score_of
 from cpfls_cli.regressor import Motion
-
-
-def level(torque, attitude=None):
-    torque = np.asarray(torque, dtype=float)
-    zero = np.zeros_like(torque)
-    return TorqueData(np.arange(len(torque)), Motion(zero if attitude is None else attitude, zero, zero), torque)
+from tests.builders.flights import random_motion, still_flight
 
 
 def test_by_hand():
-    data = level([[1, 0, 2], [3, 0, 2], [5, 0, 2]])
+    data = still_flight([[1, 0, 2], [3, 0, 2], [5, 0, 2]])
     predicted = np.array([[1, 1, 2], [2, 0, 2], [7, 0, 1]])
     judged = score(data, predicted)
     np.testing.assert_allclose(judged.mse, [5 / 3, 1 / 3, 1 / 3])
@@ -32,7 +25,7 @@ def test_by_hand():
 
 def test_variance_accounted_for_forgives_a_constant():
     """Errors of 3, 4 and 5 have the variance of -1, 0 and 1."""
-    data = level([[1, 0, 2], [3, 1, 2], [5, 8, 2]])
+    data = still_flight([[1, 0, 2], [3, 1, 2], [5, 8, 2]])
     judged = score(data, data.torque - [[3, 7, 0], [4, 7, 0], [5, 7, 1]])
     np.testing.assert_allclose(judged.vaf, [1 - 2 / 8, 1.0, np.nan])
     np.testing.assert_allclose(judged.r2, [1 - 50 / 8, 1 - 147 / 38, np.nan])
@@ -41,7 +34,7 @@ def test_variance_accounted_for_forgives_a_constant():
 def test_variances_are_the_same_chunk_by_chunk(monkeypatch):
     rng = np.random.default_rng(9)
     torque, error = rng.standard_normal((2, 50, 3)) + 5.0
-    data = level(torque)
+    data = still_flight(torque)
     monkeypatch.setattr("cpfls_cli.identification.data.CHUNK", 7)
     predicted = [(torque - error)[start : start + 7] for start in range(0, 50, 7)]
     judged = score_of(data, lambda motion: predicted.pop(0)[: len(motion)])
@@ -53,7 +46,7 @@ def test_body_axes():
     """At 90 degrees of roll the Euler pitch torque is the body's negative yaw torque."""
     torque = [[1, 2, 5], [2, -3, 4], [4, 9, 1]]
     rolled = np.tile([np.pi / 2, 0.0, 0.0], (3, 1))
-    judged = score(level(torque, rolled), np.add(torque, [[0, 1, 0], [0, 0, 0], [0, 0, 2]]))
+    judged = score(still_flight(torque, rolled), np.add(torque, [[0, 1, 0], [0, 0, 0], [0, 0, 2]]))
     np.testing.assert_allclose(judged.r2_body, judged.r2[[0, 2, 1]], rtol=1e-12)
 
 
@@ -63,8 +56,8 @@ def test_body_torque_is_judged_where_the_pitch_is_not_vertical():
     attitude, torque, error = rng.uniform(-1.2, 1.2, (40, 3)), *rng.standard_normal((2, 40, 3))
     rest, steep = np.arange(40) != 5, attitude.copy()
     steep[5, 1] = np.pi / 2 - 1e-7
-    judged = score(level(torque, steep), torque + 0.1 * error)
-    others = score(level(torque[rest], steep[rest]), (torque + 0.1 * error)[rest])
+    judged = score(still_flight(torque, steep), torque + 0.1 * error)
+    others = score(still_flight(torque[rest], steep[rest]), (torque + 0.1 * error)[rest])
     np.testing.assert_allclose(judged.r2_body, others.r2_body)
     assert np.all(judged.r2_body > 0.8)
     assert not np.array_equal(judged.mse, others.mse)
@@ -73,7 +66,7 @@ def test_body_torque_is_judged_where_the_pitch_is_not_vertical():
 @pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2 + 0.05, 4.7])
 def test_a_flight_at_a_vertical_pitch_tells_nothing_of_body_torque(pitch):
     torque = np.random.default_rng(8).standard_normal((5, 3))
-    judged = score(level(torque, np.tile([0.3, pitch, 0.0], (5, 1))), 0.9 * torque)
+    judged = score(still_flight(torque, np.tile([0.3, pitch, 0.0], (5, 1))), 0.9 * torque)
     assert np.isnan(judged.r2_body).all()
     assert np.all(judged.r2 > 0.5)
 
@@ -101,8 +94,7 @@ def tensor(parameters):
 
 
 def motion(samples=200):
-    rng = np.random.default_rng(17)
-    return Motion(rng.uniform(-1, 1, (samples, 3)), *rng.standard_normal((2, samples, 3)))
+    return random_motion(np.random.default_rng(17), samples, limit=1.0)
 
 
 def fitted(torque):
@@ -141,21 +133,3 @@ def test_rows_are_weighted_by_axis():
 
 
 VALUES = [0.0012, 0.0009, 0.0031, 0.0010]
-
-
-def test_mean_and_variance():
-    found = spread(np.array(VALUES))
-    assert found.count == len(VALUES)
-    assert found.mean == pytest.approx(statistics.mean(VALUES))
-    assert found.variance == pytest.approx(statistics.variance(VALUES))
-    assert found.deviation == pytest.approx(statistics.stdev(VALUES))
-
-
-def test_what_is_not_known_does_not_count():
-    assert spread(np.array([*VALUES, np.nan, np.inf])) == spread(np.array(VALUES))
-
-
-def test_too_few():
-    one, none = spread(np.array([3.0])), spread(np.array([]))
-    assert (one.count, one.mean) == (1, 3.0)
-    assert np.isnan([one.variance, one.deviation, none.mean, none.variance]).all()

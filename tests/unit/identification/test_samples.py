@@ -7,14 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.identification import IdentificationSettings, TorqueData, data
+from cpfls_cli.identification import IdentificationSettings, data
 from cpfls_cli.identification.cross_validation import contiguous_blocks, with_folds
 from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import RidgeSettings
-from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, torque_sensitivity
+from cpfls_cli.regressor import Regressor, data_ranges, model_structure, torque_sensitivity
 from cpfls_cli.regressor.motion import RIGID, rigid_columns
+from tests.builders.flights import no_torque, random_flight
 
 SETTINGS = IdentificationSettings(consequents="seesaw", products="additive", membership_functions=(1, 2, 3, 4, 3, 2))
 STRUCTURE = model_structure(SETTINGS)
@@ -23,17 +24,15 @@ LABELS = 3
 SCALE = np.array([2.0, 1.0, 0.25])
 
 
-def flight(samples=SAMPLES):
-    rng = np.random.default_rng(46)
-    motion = Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
-    return TorqueData(0.01 * np.arange(samples), motion, rng.standard_normal((samples, 3)))
+def flight_of_noise(samples=SAMPLES):
+    return random_flight(no_torque, 46, samples, noise=1.0)
 
 
 @pytest.fixture(params=[False, True], ids=["none", "rigid-body"])
 def case(request, monkeypatch):
     """Samples in several chunks, and the rows that they stand for."""
     monkeypatch.setattr(data, "CHUNK", 64)
-    source, rng = flight(), np.random.default_rng(47)
+    source, rng = flight_of_noise(), np.random.default_rng(47)
     motion = source.motion
     ranges = data_ranges(STRUCTURE, motion.attitude)
     label = rng.integers(0, LABELS, SAMPLES)
@@ -107,7 +106,7 @@ def test_moved(case):
 @pytest.mark.parametrize("every", [1, 2])
 @pytest.mark.parametrize("folds", [2, 5, 20])
 def test_labels_tell_the_folds_that_samples_are_left_out_of(every, folds):
-    judged = flight(600)
+    judged = flight_of_noise(600)
     learned, settings = judged[::every], RidgeSettings(folds=folds, embargo_s=0.25)
     ranges = data_ranges(STRUCTURE, judged.motion.attitude)
     labelled, choice = with_folds(
@@ -123,7 +122,7 @@ def test_labels_tell_the_folds_that_samples_are_left_out_of(every, folds):
 @pytest.mark.parametrize("every", [1, 2])
 def test_ridge_curve_is_that_of_refits_to_the_rows(every):
     """The whole way from samples to the curve, against a refit of dense rows for each block and weight."""
-    judged = flight()
+    judged = flight_of_noise()
     learned = judged[::every]
     evaluator = model_evaluator(judged, learned, SETTINGS)
     partitions = decode(STRUCTURE, np.random.default_rng(48).uniform(0.2, 1.0, STRUCTURE.genes))
@@ -154,7 +153,7 @@ def test_ridge_curve_is_that_of_refits_to_the_rows(every):
 
 def test_workers_are_sent_the_same_whether_or_not_samples_were_made_ready():
     """What is kept for the compiled loops is made again where it is used."""
-    ready = Ready(flight(), rigid=True)
+    ready = Ready(flight_of_noise(), rigid=True)
     before = pickle.dumps(ready)
     kept = list(ready)
     assert pickle.dumps(ready) == before

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data, identify, samples, solver
 from cpfls_cli.identification.data import Flights, gathered, joined, sample_times
 from cpfls_cli.identification.evaluator import decode
@@ -13,6 +12,7 @@ from cpfls_cli.identification.judge import score, score_of
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges
 from cpfls_cli.regressor.motion import rigid_columns
+from tests.builders.flights import random_flight, rigid_torque
 
 SETTINGS = {
     "consequents": "seesaw",
@@ -27,14 +27,15 @@ BASES = ("none", "rigid-body")
 CHUNKS = (1000, 64, 37, 1)
 
 
-def flight(samples=150, seed=40, start=0.0):
-    """Noisy torque of an inertia that no rigid body has."""
-    rng = np.random.default_rng(seed)
-    motion = Motion(rng.uniform(-1.0, 1.0, (samples, 3)), *rng.standard_normal((2, samples, 3)))
-    torque = newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, np.diag([0.6, 0.7, 1.2]))
+def torque_of_no_body(motion):
+    """Torque of an inertia that no rigid body has."""
+    torque = rigid_torque()(motion)
     torque[:, 1] += 0.5 * np.exp(motion.attitude[:, 0]) * motion.acceleration[:, 1]
-    torque += 0.02 * rng.standard_normal(torque.shape)
-    return TorqueData(start + 0.01 * np.arange(samples), motion, torque)
+    return torque
+
+
+def streamed_flight(samples=150, seed=40, start=0.0):
+    return random_flight(torque_of_no_body, seed, samples, noise=0.02, limit=1.0, start=start)
 
 
 def concatenated(flights):
@@ -75,7 +76,7 @@ def assert_same_model(one, other):
 
 
 def test_flights_come_one_after_the_other():
-    flights = flight(70), flight(50, 42, start=5.0), flight(30, 43)
+    flights = streamed_flight(70), streamed_flight(50, 42, start=5.0), streamed_flight(30, 43)
     time = sample_times(joined(flights))
     assert len(joined(flights)) == 150
     assert np.all(np.diff(time) > 0)
@@ -87,7 +88,7 @@ def test_flights_come_one_after_the_other():
 
 @pytest.mark.parametrize("chunk", CHUNKS)
 def test_gathered_samples_are_those_of_the_whole(monkeypatch, chunk):
-    flights = flight(70), flight(50, 42), flight(30, 43)
+    flights = streamed_flight(70), streamed_flight(50, 42), streamed_flight(30, 43)
     monkeypatch.setattr(data, "CHUNK", chunk)
     whole, chosen = concatenated(flights), np.array([0, 3, 69, 70, 71, 119, 120, 149])
     found = gathered(joined(flights), chosen)
@@ -99,38 +100,38 @@ def test_gathered_samples_are_those_of_the_whole(monkeypatch, chunk):
 
 @pytest.mark.parametrize("base", BASES)
 def test_several_flights_give_the_model_of_their_concatenation(base):
-    flights = flight(), flight(90, 42, start=3.0)
+    flights = streamed_flight(), streamed_flight(90, 42, start=3.0)
     assert_same_model(
-        *(identified(source, base, flight(50, 44)) for source in (concatenated(flights), joined(flights)))
+        *(identified(source, base, streamed_flight(50, 44)) for source in (concatenated(flights), joined(flights)))
     )
 
 
 @pytest.mark.parametrize("base", BASES)
 def test_many_chunks_give_the_model_of_one(monkeypatch, base):
-    whole = identified(flight(), base, flight(50, 44))
+    whole = identified(streamed_flight(), base, streamed_flight(50, 44))
     monkeypatch.setattr(data, "CHUNK", 37)
-    assert_same_model(whole, identified(flight(), base, flight(50, 44)))
+    assert_same_model(whole, identified(streamed_flight(), base, streamed_flight(50, 44)))
 
 
 @pytest.mark.parametrize("chunk", CHUNKS)
 @pytest.mark.parametrize("base", BASES)
 def test_objectives_do_not_depend_on_chunks(monkeypatch, base, chunk):
-    whole = evaluated(flight(), base)
+    whole = evaluated(streamed_flight(), base)
     monkeypatch.setattr(data, "CHUNK", chunk)
-    np.testing.assert_allclose(evaluated(flight(), base), whole, rtol=1e-9)
+    np.testing.assert_allclose(evaluated(streamed_flight(), base), whole, rtol=1e-9)
 
 
 @pytest.mark.parametrize("base", BASES)
 def test_samples_too_many_to_keep_give_the_very_same(monkeypatch, base):
     monkeypatch.setattr(data, "CHUNK", 64)
-    kept = evaluated(flight(), base)
+    kept = evaluated(streamed_flight(), base)
     monkeypatch.setattr(samples, "_KEPT", 0)
-    np.testing.assert_array_equal(evaluated(flight(), base), kept)
+    np.testing.assert_array_equal(evaluated(streamed_flight(), base), kept)
 
 
 @pytest.mark.parametrize("chunk", CHUNKS)
 def test_scores_do_not_depend_on_chunks(monkeypatch, chunk):
-    source = flight()
+    source = streamed_flight()
 
     def predict(motion):
         return rigid_columns(motion) @ np.array([0.6, 0.9, 1.1, 0.0, 0.05, 0.0])
@@ -146,7 +147,7 @@ def test_scores_do_not_depend_on_chunks(monkeypatch, chunk):
 
 def test_score_of_torque_far_from_zero_keeps_its_digits(monkeypatch):
     """Where the mean dwarfs the variance, sums of squares alone would leave nothing of it."""
-    moved = flight()
+    moved = streamed_flight()
     moved = TorqueData(moved.time, moved.motion, moved.torque + 1e7)
     monkeypatch.setattr(data, "CHUNK", 37)
     found = score_of(moved, lambda motion: np.full_like(motion.attitude, 1e7))
@@ -157,9 +158,9 @@ def test_score_of_torque_far_from_zero_keeps_its_digits(monkeypatch):
 
 @pytest.mark.parametrize("chunk", CHUNKS)
 def test_evidence_on_axes_does_not_depend_on_chunks(monkeypatch, chunk):
-    whole = axis_evidence(flight(), 1e-10)
+    whole = axis_evidence(streamed_flight(), 1e-10)
     monkeypatch.setattr(data, "CHUNK", chunk)
-    for key, values in vars(axis_evidence(flight(), 1e-10)).items():
+    for key, values in vars(axis_evidence(streamed_flight(), 1e-10)).items():
         np.testing.assert_allclose(values, getattr(whole, key), rtol=1e-9, atol=1e-12)
 
 
@@ -179,7 +180,7 @@ def written_out(evaluate, partitions, fit):
 def test_final_model_is_that_of_all_rows_at_once(monkeypatch, case, block):
     """The decomposition of blocks against numpy's least squares over the dense rows, the ridge below them."""
     monkeypatch.setattr(solver, "_BLOCK", block)
-    source = flight()
+    source = streamed_flight()
     if case == "off":
         source = TorqueData(
             source.time, source.motion, rigid_columns(source.motion) @ np.array([0.6, 0.7, 1.2, 0, 0, 0])

@@ -5,7 +5,7 @@ from cpfls_cli.pages.gap_verdict import levels, verdict_box
 from cpfls_cli.pages.sections.diagnosis import after_words
 from cpfls_cli.pages.source import Source
 from cpfls_cli.vehicle.settings import VehicleSettings
-from tests.cli.report import gap_artifacts as made
+from tests.builders import gap_artifacts as made
 
 
 def source(artifact):

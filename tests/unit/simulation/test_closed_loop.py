@@ -15,7 +15,7 @@ from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.simulation import SimulationSettings, measure
 from cpfls_cli.vehicle import RotorSettings
-from tests.unit.simulation.closed_loop_flights import PERIOD, VEHICLE, flown, planned, signals_of
+from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, planned, signals_of
 
 
 def typical(name):

@@ -14,7 +14,7 @@ from cpfls_cli.simulation import (
     simulated_model,
 )
 from cpfls_cli.simulation.actuators import mixer
-from cpfls_cli.simulation.autopilot import upright
+from cpfls_cli.simulation.closed_loop import upright
 from cpfls_cli.vehicle import VehicleSettings, body_wrench
 
 VEHICLE = VehicleSettings()

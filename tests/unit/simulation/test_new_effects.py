@@ -11,7 +11,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.sensors import audit as audit_module
 from cpfls_cli.simulation import model
-from tests.unit.simulation.closed_loop_flights import PERIOD, flown, signals_of
+from tests.builders.closed_loop_flights import PERIOD, flown, signals_of
 
 
 def new_effect(**fields):

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification import IdentificationSettings, TorqueData, data
+from cpfls_cli.identification import IdentificationSettings, data
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.evaluator import decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import ValidationSettings
-from cpfls_cli.regressor import Motion, Regressor
+from cpfls_cli.regressor import Regressor
 from cpfls_cli.regressor.motion import RIGID, rigid_columns
 from cpfls_cli.validation.bootstrap import bootstrap
+from tests.builders.flights import bent_torque, random_flight
 
 DRAWS = 30
 VALIDATION = ValidationSettings(draws=DRAWS)
@@ -25,15 +25,9 @@ SAMPLES, BLOCKS = 200, 10
 NOWHERE = np.zeros((72, 72), dtype=bool)
 
 
-def flight(bent, noise=0.05):
-    """Noisy torque of a rigid body, or of one with 0.5 cos(roll) added to D22."""
-    rng = np.random.default_rng(3)
-    m = Motion(rng.uniform(-np.pi, np.pi, (SAMPLES, 3)), *rng.standard_normal((2, SAMPLES, 3)))
-    torque = newton_euler_torque(m.attitude, m.rate, m.acceleration, np.diag([0.6, 0.7, 1.2]))
-    roll = m.attitude[:, 0]
-    torque[:, 0] += bent * 0.25 * np.sin(roll) * m.rate[:, 1] ** 2
-    torque[:, 1] += bent * 0.5 * (np.cos(roll) * m.acceleration[:, 1] - np.sin(roll) * m.rate[:, 0] * m.rate[:, 1])
-    return TorqueData(0.01 * np.arange(SAMPLES), m, torque + noise * rng.standard_normal(torque.shape))
+def bending_flight(bent, noise=0.05):
+    """Torque of a rigid body, or of one with 0.5 cos(roll) added to D22."""
+    return random_flight(bent_torque(size=0.5 * bent), 3, SAMPLES, noise=noise)
 
 
 def fitted(training, learned, base):
@@ -75,7 +69,7 @@ def brute_force(A, penalty, y, label):
 @pytest.mark.parametrize("every", [1, 3], ids=["all", "selection"])
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 def test_draws_are_those_of_all_rows_solved_again(base, every):
-    training = flight(bent=1.0)
+    training = bending_flight(bent=1.0)
     learned = training[::every]
     draws, model, fit = drawn(training, learned, base)
     assert np.isfinite(fit.ridge_weight)
@@ -102,7 +96,7 @@ def test_draws_are_those_of_all_rows_solved_again(base, every):
 
 
 def test_a_fuzzy_part_that_is_off_stays_off():
-    training = flight(bent=0.0, noise=0.2)
+    training = bending_flight(bent=0.0, noise=0.2)
     draws, model, fit = drawn(training, training, "rigid-body")
     assert np.isinf(fit.ridge_weight)
     np.testing.assert_array_equal(draws.coefficients, np.zeros((DRAWS, len(model.coefficients))))
@@ -111,7 +105,7 @@ def test_a_fuzzy_part_that_is_off_stays_off():
 
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 def test_a_seed_gives_the_same_draws_and_chunks_change_nothing(base, monkeypatch):
-    training = flight(bent=1.0)
+    training = bending_flight(bent=1.0)
     once, model, _ = drawn(training, training, base)
     other, _, _ = drawn(training, training, base, seed=5)
     assert np.abs(once.coefficients - other.coefficients).max() > 1e-4
@@ -125,7 +119,7 @@ def test_a_seed_gives_the_same_draws_and_chunks_change_nothing(base, monkeypatch
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 @pytest.mark.parametrize("samples", [12, 45, 200])
 def test_noise_free_data_and_short_flights_give_finite_draws(base, samples):
-    whole = flight(bent=0.0, noise=0.0)
+    whole = bending_flight(bent=0.0, noise=0.0)
     training = whole[:samples]
     settings = IdentificationSettings(**STRUCTURE, base=base)
     settings = replace(settings, ridge=replace(settings.ridge, embargo_s=0.0))

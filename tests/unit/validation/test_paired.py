@@ -19,6 +19,7 @@ from cpfls_cli.validation.paired import (
     non_overlapping,
     with_constant,
 )
+from tests.builders.flights import still_flight
 
 CONSTANT = np.array([0.4, -0.3, 0.2])
 
@@ -94,11 +95,6 @@ def test_windows_apart_do_not_overlap():
     assert len(non_overlapping(start[:0], 10)) == 0
 
 
-def flight(torque, attitude):
-    zero = np.zeros_like(torque)
-    return TorqueData(np.arange(len(torque)), Motion(attitude, zero, zero), torque)
-
-
 def test_torque_is_scaled_by_axis_and_left_out_where_the_pitch_is_vertical():
     rng = np.random.default_rng(63)
     torque = rng.standard_normal((400, 3)) * [10.0, 1.0, 0.1]
@@ -106,7 +102,7 @@ def test_torque_is_scaled_by_axis_and_left_out_where_the_pitch_is_vertical():
     attitude[::7, 1] = np.pi / 2
     told = np.arange(400) % 7 != 0
     found = compare_torque(
-        flight(torque, attitude),
+        still_flight(torque, attitude),
         lambda motion: 0.9 * torque[: len(motion)],
         lambda motion: 0.8 * torque[: len(motion)],
     )
@@ -119,7 +115,7 @@ def test_torque_is_scaled_by_axis_and_left_out_where_the_pitch_is_vertical():
 
 
 def test_a_vertical_pitch_throughout_is_nothing_to_compare():
-    data = flight(np.ones((50, 3)), np.tile([0.0, np.pi / 2, 0.0], (50, 1)))
+    data = still_flight(np.ones((50, 3)), np.tile([0.0, np.pi / 2, 0.0], (50, 1)))
     assert compare_torque(data, lambda motion: motion.rate, lambda motion: motion.rate).blocks == 0
 
 
@@ -136,7 +132,7 @@ def test_errors_that_remember_each_other_seldom_prove_what_is_not_so(samples, me
     rng, proved = np.random.default_rng(65), 0
     for _ in range(200):
         noise, ours, theirs = (coloured(rng, samples, memory) for _ in range(3))
-        data = flight(5 * coloured(rng, samples, memory), np.zeros((samples, 3)))
+        data = still_flight(5 * coloured(rng, samples, memory), np.zeros((samples, 3)))
         found = compare_torque(
             data, lambda _, d=data, e=noise + ours: d.torque + e, lambda _, d=data, e=noise + theirs: d.torque + e
         )

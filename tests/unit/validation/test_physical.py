@@ -8,11 +8,12 @@ import pytest
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification import Model, TorqueData
+from cpfls_cli.identification import Model
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
+from cpfls_cli.regressor import StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.validation.physical import energy_share, one_period_away, physical_sense
+from tests.builders.flights import random_flight
 
 RANGE = InputRange(-1.0, 1.0)
 BODY = np.array([0.6, 0.8, 1.2, 0.05, 0.0, -0.03])
@@ -89,10 +90,8 @@ def random_model(**settings):
     return Model(structure, (RANGE, RANGE), uniform_breakpoints(structure), coefficients, np.ones(6), visited)
 
 
-def flight(torque_of, seed, samples=50):
-    rng = np.random.default_rng(seed)
-    motion = Motion(rng.uniform(-3, 3, (samples, 3)), *rng.standard_normal((2, samples, 3)))
-    return TorqueData(0.01 * np.arange(samples), motion, torque_of(motion))
+def flight_of(torque_of, seed):
+    return random_flight(torque_of, seed, 50, limit=3.0)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +101,8 @@ def flight(torque_of, seed, samples=50):
 )
 def test_a_periodic_model_errs_there_as_it_errs_here(settings):
     known = random_model(**settings)
-    parts = {"one": flight(known.torque, 1), "other": flight(lambda m: known.torque(m) + np.array([0.1, 0.0, -0.3]), 2)}
+    shifted = flight_of(lambda m: known.torque(m) + np.array([0.1, 0.0, -0.3]), 2)
+    parts = {"one": flight_of(known.torque, 1), "other": shifted}
     found = one_period_away(known, parts)
     assert found.parts == ("one", "other")
     np.testing.assert_allclose(found.mse, [[0, 0, 0], [0.01, 0, 0.09]], atol=1e-9)
@@ -114,7 +114,7 @@ def test_the_worse_of_both_turns_is_told():
     straight = SimpleNamespace(
         structure=SimpleNamespace(settings=SimpleNamespace(input_map="full-circle")), torque=lambda m: m.attitude
     )
-    found = one_period_away(straight, {"one": flight(lambda m: m.attitude, 3)})
+    found = one_period_away(straight, {"one": flight_of(lambda m: m.attitude, 3)})
     turn = 2 * np.pi
     np.testing.assert_allclose(found.max_error, [[turn, turn, 0]])
     np.testing.assert_allclose(found.mse, [[turn**2, turn**2, 0]])
@@ -122,4 +122,4 @@ def test_the_worse_of_both_turns_is_told():
 
 def test_inputs_scaled_to_the_data_have_no_period():
     scaled = random_model(input_map="data-range")
-    assert one_period_away(scaled, {"one": flight(scaled.torque, 4)}) is None
+    assert one_period_away(scaled, {"one": flight_of(scaled.torque, 4)}) is None

@@ -5,29 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
 from cpfls_cli.identification.data import TorqueData, joined
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import generalised_torque
-from cpfls_cli.trajectory import full_rotation
-from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.validation.replay import NOTHING_MOVES, replay_steps
+from tests.builders.flights import rigid_torque, rotating_motion, still_flight
 
 INERTIA = np.array([0.6, 0.8, 1.2, 0.0, 0.0, 0.0])
 
 
-def flight(samples=300, duration=6.0, seed=71):
-    path = full_rotation(RotationSettings(), duration, np.random.default_rng(seed))
-    time = path.times(samples)
-    motion = Motion(*vars(path.sample(time)).values())
-    return TorqueData(time, motion, newton_euler_torque(*vars(motion).values(), symmetric(INERTIA)))
+def rotating_flight():
+    time, motion = rotating_motion(71, samples=300, duration=6.0)
+    return TorqueData(time, motion, rigid_torque(symmetric(INERTIA))(motion))
 
 
 def level(samples):
-    """Nothing turns, at a level attitude."""
-    still = np.zeros((samples, 3))
-    return TorqueData(0.01 * np.arange(samples), Motion(still, still, still), still)
+    return still_flight(np.zeros((samples, 3)))
 
 
 def test_nothing_moves_is_off_by_what_moved():
@@ -71,7 +64,7 @@ def test_no_window_at_a_vertical_pitch():
 
 @pytest.mark.parametrize("inertia", [[0.6, -0.8, 1.2, 0, 0, 0], [0.6, 0.8, 0.0, 0, 0, 0], [0.6, 0.8, 1.2, 0.9, 0, 0]])
 def test_a_body_that_is_none_is_told_and_does_not_spoil_the_others(inertia):
-    data = flight()
+    data = rotating_flight()
     found = replay_steps("x", data, {"none": np.array(inertia), "body": INERTIA}, 10, 20)
     np.testing.assert_array_equal(found.lost, np.repeat([[20], [0], [0]], 10, axis=1))
     assert np.isnan(found.attitude[0]).all()
@@ -82,13 +75,13 @@ def test_a_body_that_is_none_is_told_and_does_not_spoil_the_others(inertia):
 
 
 def test_a_body_far_too_light_is_lost_and_nothing_overflows():
-    found = replay_steps("x", flight(), {"light": 1e-9 * INERTIA}, 50, 20)
+    found = replay_steps("x", rotating_flight(), {"light": 1e-9 * INERTIA}, 50, 20)
     assert found.lost[0, -1] == 20
     assert np.all(np.diff(found.lost[0]) >= 0)
 
 
 def test_windows_are_the_same_read_at_once_or_one_by_one(monkeypatch):
-    data = flight()
+    data = rotating_flight()
     at_once = replay_steps("x", data, {"body": 1.1 * INERTIA}, 12, 30)
     monkeypatch.setattr("cpfls_cli.validation.replay._SAMPLES_AT_ONCE", 13)
     by_one = replay_steps("x", data, {"body": 1.1 * INERTIA}, 12, 30)
@@ -98,13 +91,13 @@ def test_windows_are_the_same_read_at_once_or_one_by_one(monkeypatch):
 
 
 def test_errors_by_window_and_by_horizon_are_the_same_errors():
-    found = replay_steps("x", flight(), {"body": 1.1 * INERTIA}, 12, 30)
+    found = replay_steps("x", rotating_flight(), {"body": 1.1 * INERTIA}, 12, 30)
     by_window, by_horizon = np.mean(found.window_error, axis=1), np.mean(found.body_rate**2, axis=1)
     np.testing.assert_allclose(by_window, by_horizon)
 
 
 def test_a_constant_torque_is_taken_off_what_was_measured():
-    data, constant = flight(), np.array([0.3, -0.2, 0.1])
+    data, constant = rotating_flight(), np.array([0.3, -0.2, 0.1])
     pushed = replace(data, torque=data.torque + generalised_torque(data.motion.attitude, np.tile(constant, (300, 1))))
     plain = replay_steps("x", data, {"body": INERTIA, "other": 1.1 * INERTIA}, 12, 30)
     found = replay_steps("x", pushed, {"body": INERTIA, "other": 1.1 * INERTIA}, 12, 30, {"body": constant})

@@ -15,7 +15,7 @@ from cpfls_cli.validation.residuals import examine_residuals
 AXES = 3
 
 
-def flight(errors, seed=0, **motion):
+def flight_of_errors(errors, seed=0, **motion):
     """A flight whose torque is the errors that a model without torque makes."""
     rng = np.random.default_rng(seed)
     parts = {"attitude": 0.3, "rate": 1.0, "acceleration": 2.0}
@@ -36,7 +36,7 @@ def autocorrelation_by_hand(errors, lags):
 def white():
     """A hundred analyses of white noise."""
     rng = np.random.default_rng(41)
-    return [examined(flight(rng.standard_normal((2000, AXES)), seed)) for seed in range(100)]
+    return [examined(flight_of_errors(rng.standard_normal((2000, AXES)), seed)) for seed in range(100)]
 
 
 def test_the_band_flags_one_lag_of_white_noise_in_twenty(white):
@@ -57,7 +57,7 @@ def test_white_noise_passes_the_test_of_ljung_and_box_as_often_as_it_should(whit
 def test_ljung_box_by_its_formula():
     errors = np.cumsum(np.random.default_rng(42).standard_normal((300, AXES)), axis=0) * 0.05
     errors += np.random.default_rng(43).standard_normal(errors.shape)
-    found = examined(flight(errors), lags=12)
+    found = examined(flight_of_errors(errors), lags=12)
     for axis in range(AXES):
         expected = autocorrelation_by_hand(errors[:, axis], 12)
         np.testing.assert_allclose(found.autocorrelation[:, axis], expected, rtol=1e-12, atol=1e-14)
@@ -69,7 +69,7 @@ def test_ljung_box_by_its_formula():
 
 def test_errors_that_remember_are_not_white():
     noise = np.random.default_rng(44).standard_normal((2000, AXES))
-    found = examined(flight(noise + np.roll(noise, 1, axis=0)))
+    found = examined(flight_of_errors(noise + np.roll(noise, 1, axis=0)))
     assert np.all(found.ljung_box < 1e-6)
     np.testing.assert_allclose(found.autocorrelation[0], 0.5, atol=0.05)
 
@@ -77,7 +77,7 @@ def test_errors_that_remember_are_not_white():
 def test_nothing_is_correlated_across_the_pause_between_flights():
     """The second flight is the first again: across the pause the correlation at its length would be one."""
     errors = np.random.default_rng(45).standard_normal((60, AXES))
-    found = examined(joined([flight(errors), flight(errors)]), lags=10)
+    found = examined(joined([flight_of_errors(errors), flight_of_errors(errors)]), lags=10)
     for axis in range(AXES):
         np.testing.assert_allclose(found.autocorrelation[:, axis], autocorrelation_by_hand(errors[:, axis], 10))
     assert found.samples == 120
@@ -90,7 +90,7 @@ def test_an_error_that_follows_an_input_shows_at_its_delay(delay):
     rate[:, 1] = signal
     errors = 1e-3 * np.random.default_rng(48).standard_normal((1500, AXES))
     errors[:, 2] -= 0.02 * np.roll(signal, delay)
-    found = examined(flight(errors, rate=rate), lags=10)
+    found = examined(flight_of_errors(errors, rate=rate), lags=10)
     own = found.correlation[found.input.index("pitch rate"), :, 2]
     assert found.input_lag[np.argmax(np.abs(own))] == pytest.approx(0.01 * delay)
     assert np.min(own) < -0.98
@@ -99,7 +99,7 @@ def test_an_error_that_follows_an_input_shows_at_its_delay(delay):
 
 def test_correlation_without_delay_is_pearson_s():
     errors = np.random.default_rng(49).standard_normal((200, AXES))
-    data = flight(errors)
+    data = flight_of_errors(errors)
     found = examined(data, lags=3)
     expected = np.corrcoef(data.motion.acceleration[:, 0], errors[:, 1])[0, 1]
     assert found.correlation[found.input.index("roll acceleration"), 3, 1] == pytest.approx(expected, rel=1e-12)
@@ -109,7 +109,7 @@ def test_correlation_without_delay_is_pearson_s():
 def test_nothing_follows_an_input_that_stays_what_it_is():
     rate = np.random.default_rng(50).standard_normal((200, AXES))
     rate[:, 2] = 0.7 + 1e-14 * rate[:, 0]
-    found = examined(flight(np.random.default_rng(54).standard_normal((200, AXES)), rate=rate), lags=3)
+    found = examined(flight_of_errors(np.random.default_rng(54).standard_normal((200, AXES)), rate=rate), lags=3)
     constant = np.isnan(found.correlation).all(axis=(1, 2))
     still = {name for name, own in zip(found.input, constant, strict=True) if own}
     assert still == {"yaw rate", *(f"predicted {axis} torque" for axis in ("roll", "pitch", "yaw"))}
@@ -118,7 +118,7 @@ def test_nothing_follows_an_input_that_stays_what_it_is():
 def test_rounding_is_not_called_coloured():
     rng = np.random.default_rng(51)
     torque = rng.standard_normal((500, AXES)) * [5.0, 1.0, 0.1]
-    data = flight(torque)
+    data = flight_of_errors(torque)
     slow = 1e-12 * np.sin(0.01 * np.arange(500))[:, None] * [1.0, 1.0, 0.0]
     found = examine_residuals("x", data, lambda _: torque + slow + [0.0, 0.0, 1.0] * torque, 20)
     np.testing.assert_array_equal(found.exact, [True, True, False])
@@ -129,14 +129,14 @@ def test_rounding_is_not_called_coloured():
 
 
 def test_no_torque_and_no_error_at_all():
-    found = examined(flight(np.zeros((50, AXES))))
+    found = examined(flight_of_errors(np.zeros((50, AXES))))
     assert found.exact.all()
     np.testing.assert_array_equal(found.histogram_count.sum(axis=0), 50)
 
 
 def test_histogram_and_quantiles():
     errors = np.random.default_rng(52).standard_normal((4000, AXES)) * [1.0, 2.0, 0.5]
-    found = examined(flight(errors))
+    found = examined(flight_of_errors(errors))
     np.testing.assert_array_equal(found.histogram_count.sum(axis=0), 4000)
     np.testing.assert_allclose(found.histogram_edge[-1], np.abs(errors).max(axis=0))
     np.testing.assert_allclose(found.histogram_edge, -found.histogram_edge[::-1], atol=1e-12)
@@ -150,7 +150,7 @@ def test_white_noise_stays_white_where_samples_are_missing(missing):
     chances, outside = [], []
     for seed in range(60):
         rng = np.random.default_rng(seed)
-        data = flight(rng.standard_normal((2000, AXES)))
+        data = flight_of_errors(rng.standard_normal((2000, AXES)))
         found = examined(data[np.flatnonzero(rng.random(2000) > missing)], lags=30)
         chances.append(found.ljung_box)
         outside.append(np.abs(found.autocorrelation) > found.band)
@@ -161,7 +161,7 @@ def test_white_noise_stays_white_where_samples_are_missing(missing):
 def test_pairs_across_a_missing_sample_by_hand():
     errors = np.random.default_rng(60).standard_normal((40, AXES))
     kept = np.delete(np.arange(40), [5, 6, 21])
-    found = examined(flight(errors)[kept], lags=4)
+    found = examined(flight_of_errors(errors)[kept], lags=4)
     own = errors[kept, 1] - errors[kept, 1].mean()
     value = dict(zip(kept, own, strict=True))
     for lag in range(1, 5):
@@ -172,12 +172,12 @@ def test_pairs_across_a_missing_sample_by_hand():
 def test_a_bias_shows_in_the_mean_alone():
     noise = 0.1 * np.random.default_rng(61).standard_normal((3000, AXES))
     biased = noise + np.array([1.0, 0.0, 0.0])
-    found = examined(flight(biased))
+    found = examined(flight_of_errors(biased))
     np.testing.assert_allclose(found.mean, biased.mean(axis=0))
     assert np.all(found.ljung_box > 0.01)
     assert found.mean_p[0] < 1e-12
     assert np.all(found.mean_p[1:] > 0.01)
-    assert examined(flight(np.full((100, AXES), 0.5))).mean_p.max() < 1e-12
+    assert examined(flight_of_errors(np.full((100, AXES), 0.5))).mean_p.max() < 1e-12
 
 
 def test_errors_that_remember_do_not_look_biased():
@@ -186,12 +186,12 @@ def test_errors_that_remember_do_not_look_biased():
     for seed in range(200):
         drawn = np.random.default_rng(seed).standard_normal((3200, AXES))
         coloured = signal.lfilter([1.0], [1.0, -np.exp(-0.1)], drawn, axis=0)[200:]
-        chances.append(examined(flight(coloured), lags=1).mean_p)
+        chances.append(examined(flight_of_errors(coloured), lags=1).mean_p)
     assert np.mean(np.array(chances) < 0.01) < 0.03
 
 
 def test_a_mean_of_rounding_or_of_three_samples_is_not_tested():
-    data = flight(np.random.default_rng(62).standard_normal((500, AXES)))
+    data = flight_of_errors(np.random.default_rng(62).standard_normal((500, AXES)))
     exact = examine_residuals("x", data, lambda _: data.torque - 1e-12, 5)
     assert np.isnan(exact.mean_p).all()
     assert np.isnan(examined(data[:3], lags=1).mean_p).all()
@@ -201,7 +201,7 @@ def test_a_perfect_model_with_noise_follows_nothing():
     """The measured torque holds the error: correlated with it, a perfect model would not look perfect."""
     rng = np.random.default_rng(63)
     torque, noise = rng.standard_normal((2, 3000, AXES)) * [[[1.0]], [[0.2]]]
-    data = replace(flight(noise), torque=torque + noise)
+    data = replace(flight_of_errors(noise), torque=torque + noise)
     found = examine_residuals("x", data, lambda _: torque, 10)
     own = found.correlation[found.input.index("predicted roll torque"), 10, 0]
     assert own == pytest.approx(np.corrcoef(torque[:, 0], noise[:, 0])[0, 1], rel=1e-9)
@@ -210,5 +210,5 @@ def test_a_perfect_model_with_noise_follows_nothing():
 
 def test_how_many_of_how_many_were_examined(monkeypatch):
     monkeypatch.setattr(residuals, "_MOST_SAMPLES", 120)
-    found = examined(flight(np.random.default_rng(64).standard_normal((200, AXES))), lags=5)
+    found = examined(flight_of_errors(np.random.default_rng(64).standard_normal((200, AXES))), lags=5)
     assert (found.samples, found.available) == (120, 200)

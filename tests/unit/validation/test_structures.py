@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification import IdentificationSettings, TorqueData
+from cpfls_cli.identification import IdentificationSettings
 from cpfls_cli.identification.cross_validation import contiguous_blocks
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import ValidationSettings
-from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from cpfls_cli.regressor import Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.motion import rigid_columns
 from cpfls_cli.validation.structures import RIGID_BODY_NAME, candidate_structures, compare_structures, structure_name
+from tests.builders.flights import bent_torque, random_flight
 
 OWN = [
     {},
@@ -68,15 +68,9 @@ SAMPLES = 300
 VALIDATION = ValidationSettings(folds=4)
 
 
-def flight(bent=0.0, noise=0.05, samples=SAMPLES):
+def bending_flight(bent=0.0, noise=0.05, samples=SAMPLES):
     """Torque of a rigid body, or of one with 0.5 cos(roll) added to D22."""
-    rng = np.random.default_rng(11)
-    m = Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
-    torque = newton_euler_torque(m.attitude, m.rate, m.acceleration, np.diag([0.6, 0.7, 1.2]))
-    roll = m.attitude[:, 0]
-    torque[:, 0] += bent * 0.25 * np.sin(roll) * m.rate[:, 1] ** 2
-    torque[:, 1] += bent * 0.5 * (np.cos(roll) * m.acceleration[:, 1] - np.sin(roll) * m.rate[:, 0] * m.rate[:, 1])
-    return TorqueData(0.01 * np.arange(samples), m, torque + noise * rng.standard_normal(torque.shape))
+    return random_flight(bent_torque(size=0.5 * bent), 11, samples, noise=noise)
 
 
 def settings(base, **keys):
@@ -85,7 +79,7 @@ def settings(base, **keys):
 
 @pytest.mark.parametrize("every", [1, 2], ids=["all", "selection"])
 def test_without_a_rigid_body_errors_are_those_of_refits(every):
-    training = flight()
+    training = bending_flight()
     learned = training[::every]
     keys = {"harmonic_order": 1, "products": "additive"}
     compared = compare_structures(training, learned, settings("none", **keys))
@@ -116,7 +110,7 @@ def test_without_a_rigid_body_errors_are_those_of_refits(every):
 
 
 def test_over_a_rigid_body_it_is_the_ridge_curve_of_the_structure():
-    training, chosen = flight(bent=1.0), settings("rigid-body", harmonic_order=1)
+    training, chosen = bending_flight(bent=1.0), settings("rigid-body", harmonic_order=1)
     compared = compare_structures(training, training, chosen)
     with_folds = replace(chosen, ridge=replace(chosen.ridge, folds=4))
     evaluator = model_evaluator(training, training, with_folds)
@@ -132,7 +126,7 @@ def test_over_a_rigid_body_it_is_the_ridge_curve_of_the_structure():
 def test_what_the_flight_holds_decides(base):
     """A rigid vehicle leaves nothing to gain; one that bends does, for harmonics of one rule."""
     for bent in (0.0, 1.0):
-        data = flight(bent, samples=1500)
+        data = bending_flight(bent, samples=1500)
         compared = compare_structures(data, data, settings(base))
         best = int(np.argmin(compared.error))
         gain = compared.error[0] - compared.error[best]
@@ -142,24 +136,26 @@ def test_what_the_flight_holds_decides(base):
 
 
 def test_structures_that_the_samples_cannot_tell_are_left_out():
-    compared = compare_structures(flight(samples=60), flight(samples=60), settings("none"))
+    few = bending_flight(samples=60)
+    compared = compare_structures(few, few, settings("none"))
     assert compared.name[0] == RIGID_BODY_NAME
     assert np.max(compared.parameters) <= 3 * 45
     assert np.isfinite(compared.error).all()
-    shipped = compare_structures(flight(), flight(), settings("none", harmonic_order=8, membership_functions=9))
+    data = bending_flight()
+    shipped = compare_structures(data, data, settings("none", harmonic_order=8, membership_functions=9))
     assert not shipped.own.any()
 
 
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 def test_too_few_samples_for_the_folds_compare_nothing(base):
-    few = flight(samples=7)
+    few = bending_flight(samples=7)
     compared = compare_structures(few, few, settings(base))
     assert compared.name == ()
     assert all(len(values) == 0 for values in vars(compared).values())
 
 
 def test_a_long_flight_is_compared_on_pieces_of_it():
-    data = flight(samples=4000)
+    data = bending_flight(samples=4000)
     few = replace(settings("none"), validation=ValidationSettings(samples=400))
     pieces = (np.arange(20)[:, None] * 200 + np.arange(20)).ravel()
     whole, part = compare_structures(data, data, few), compare_structures(data[pieces], data[pieces], few)

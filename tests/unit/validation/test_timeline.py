@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.data import Flights, TorqueData
-from cpfls_cli.regressor import Motion
+from cpfls_cli.identification.data import Flights
 from cpfls_cli.validation.timeline import (
     lagged_pairs,
     leading_samples,
@@ -13,15 +12,15 @@ from cpfls_cli.validation.timeline import (
     stretch_numbers,
     time_blocks,
 )
+from tests.builders.flights import still_flight
 
 
-def flight(samples, step=0.01):
-    still = np.zeros((samples, 3))
-    return TorqueData(step * np.arange(samples), Motion(still, still, still), still)
+def blank_flight(samples):
+    return still_flight(np.zeros((samples, 3)))
 
 
 def test_a_fortieth_of_the_flight_unless_asked_otherwise():
-    data = flight(4000)
+    data = blank_flight(4000)
     blocks = time_blocks(data, None)
     assert blocks.duration == pytest.approx(1.0)
     np.testing.assert_array_equal(blocks.labels(data), np.arange(4000) // 100)
@@ -29,25 +28,25 @@ def test_a_fortieth_of_the_flight_unless_asked_otherwise():
 
 @pytest.mark.parametrize(("asked", "expected"), [(2.0, 20), (0.5, 80), (1e-3, 200), (1e6, 2)])
 def test_blocks_of_a_duration(asked, expected):
-    blocks = time_blocks(flight(4000), asked)
+    blocks = time_blocks(blank_flight(4000), asked)
     assert len(blocks.starts) + 1 == expected
     assert blocks.duration == pytest.approx(40.0 / expected)
 
 
 def test_no_more_than_there_is_memory_for():
-    assert len(time_blocks(flight(4000), None, most=7).starts) == 6
+    assert len(time_blocks(blank_flight(4000), None, most=7).starts) == 6
 
 
 @pytest.mark.parametrize(("samples", "expected"), [(400, 20), (100, 5), (30, 2), (2, 2), (1, 1)])
 def test_a_short_flight_has_fewer(samples, expected):
-    data = flight(samples)
+    data = blank_flight(samples)
     label = time_blocks(data, None).labels(data)
     assert label[0] == 0
     assert label[-1] == expected - 1
 
 
 def test_a_selection_counts_the_blocks_that_it_is_in():
-    data = flight(4000)
+    data = blank_flight(4000)
     blocks = time_blocks(data, None)
     learned = data[np.array([5, 7, 150, 151, 3999])]
     assert blocks.number(learned.time).tolist() == [0, 0, 1, 1, 39]
@@ -55,7 +54,7 @@ def test_a_selection_counts_the_blocks_that_it_is_in():
 
 
 def test_the_pause_between_flights_counts_for_nothing():
-    both = Flights((flight(2000), flight(2000)))
+    both = Flights((blank_flight(2000), blank_flight(2000)))
     blocks = time_blocks(both, None)
     assert blocks.duration == pytest.approx(1.0)
     np.testing.assert_array_equal(blocks.labels(both), np.arange(4000) // 100)
@@ -70,7 +69,7 @@ def test_a_pause_starts_a_stretch_and_jitter_does_not():
 
 
 def test_a_long_source_is_cut():
-    data = flight(30)
+    data = blank_flight(30)
     assert len(leading_samples(data, 12)) == 12
     assert len(leading_samples(data, 100)) == 30
 

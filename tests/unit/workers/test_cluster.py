@@ -3,19 +3,15 @@
 import importlib
 import logging
 import os
-import re
 import socket
-import subprocess
-import sys
-from contextlib import ExitStack, contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.workers import employ
-from tests.unit.workers.evaluators import POISON, Failing, Loading, Logging, Reporting, Uneven
+from tests.builders.dask_cluster import dask_cluster
+from tests.builders.evaluators import POISON, Failing, Loading, Logging, Reporting, Uneven
 
 pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cpfls[dask]'")
 pytest.importorskip("threadpoolctl", reason="threadpoolctl is not installed: pip install 'cpfls[dask]'")
@@ -23,50 +19,13 @@ pytest.importorskip("threadpoolctl", reason="threadpoolctl is not installed: pip
 _module = importlib.import_module("cpfls_cli.workers.cluster")
 cluster, quiet = _module.cluster, _module.quiet
 
-ROOT = Path(__file__).parents[3]
 GENES = np.random.default_rng(5).integers(0, 32768, (40, 6))
 EVALUATOR = Uneven(np.linspace(0, 1, 50))
 
 
-@contextmanager
-def running(folder, *words, announced=None):
-    """A process of Dask that ends with the context, and what it prints after some words."""
-    # A folder for its own temporary files, and the threads that a machine gives by itself.
-    free = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
-    with subprocess.Popen(
-        [sys.executable, "-m", *words, "--no-dashboard"],
-        cwd=folder,
-        env=free | {"PYTHONPATH": str(ROOT)},
-        stderr=subprocess.PIPE if announced else subprocess.DEVNULL,
-        text=True,
-    ) as process:
-        try:
-            yield (
-                process,
-                announced and next(match[1] for line in process.stderr if (match := re.search(announced, line))),
-            )
-        finally:
-            process.kill()
-
-
-@contextmanager
-def dask(folder, workers):
-    from distributed import Client
-
-    scheduler = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show"]
-    with ExitStack() as stack:
-        process, address = stack.enter_context(running(folder, *scheduler, announced=r"Scheduler at:\s+(tcp://\S+)"))
-        worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny"]
-        others = [stack.enter_context(running(folder, *worker))[0] for _ in range(workers)]
-        if workers:
-            with Client(address, set_as_default=False) as client:
-                client.wait_for_workers(workers, timeout=60)
-        yield address, process, others
-
-
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    with dask(tmp_path_factory.mktemp("dask"), workers=2) as (address, _, _):
+    with dask_cluster(tmp_path_factory.mktemp("dask"), workers=2) as (address, _, _):
         yield address
 
 
@@ -115,7 +74,10 @@ def test_a_failing_evaluator_is_an_error_in_words(address, capfd):
 
 def test_a_vanished_worker_is_replaced_by_the_other_until_that_vanishes_too(tmp_path, capfd):
     slow = Uneven(np.linspace(0, 1, 50), longest_s=0.05)
-    with dask(tmp_path, workers=2) as (address, _, (first, second)), cluster(slow, address, patience_s=1.0) as workers:
+    with (
+        dask_cluster(tmp_path, workers=2) as (address, _, (first, second)),
+        cluster(slow, address, patience_s=1.0) as workers,
+    ):
         parts = workers.stream(GENES)
         rows = next(parts)[0].tolist()
         first.kill()
@@ -131,7 +93,7 @@ def test_a_vanished_worker_is_replaced_by_the_other_until_that_vanishes_too(tmp_
 
 def test_a_vanished_scheduler_is_an_error_in_words(tmp_path, capfd):
     with (
-        dask(tmp_path, workers=1) as (address, scheduler, _),
+        dask_cluster(tmp_path, workers=1) as (address, scheduler, _),
         cluster(EVALUATOR, address) as workers,
     ):
         parts = workers.stream(GENES)
@@ -144,7 +106,7 @@ def test_a_vanished_scheduler_is_an_error_in_words(tmp_path, capfd):
 
 def test_a_scheduler_without_workers_is_an_error_in_words(tmp_path, capfd):
     with (
-        dask(tmp_path, workers=0) as (address, _, _),
+        dask_cluster(tmp_path, workers=0) as (address, _, _),
         pytest.raises(ComputationError, match="has no workers: start some with `dask worker tcp://"),
         cluster(EVALUATOR, address, patience_s=0.2),
     ):

@@ -11,7 +11,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.workers import employ
-from tests.unit.workers.evaluators import (
+from tests.builders.evaluators import (
     DEADLY_POISON,
     POISON,
     Failing,
@@ -129,7 +129,7 @@ if __name__ == "__main__":
     use_one_thread()
     import numpy as np
     from cpfls_cli.workers import employ
-    from tests.unit.workers.evaluators import Reporting
+    from tests.builders.evaluators import Reporting
     with employ(Reporting(), count=2) as workers:
         seen = workers(np.ones((40, 2), dtype=int)).objectives
         print(*sorted({int(process) for process in seen[:, 0]}), flush=True)

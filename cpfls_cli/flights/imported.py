@@ -1,0 +1,133 @@
+"""A log imported in memory: read, its body torque taken from the rotors where asked, and what was found in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.config.study import Study, settings_of
+from cpfls_cli.errors import CpflsError, InputError
+from cpfls_cli.flightlog.importing import import_log
+from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
+from cpfls_cli.logs.formats import read_log
+from cpfls_cli.vehicle.rotors import body_wrench
+
+SPEED_UNITS = frozenset({"rad/s", "rpm"})
+"""Units in which a rotor command is a speed."""
+
+_DROPPED: Final = MappingProxyType(
+    {
+        "time_not_finite": "time stamp that is no number: rows dropped",
+        "repeated_time": "repeated time: rows dropped",
+        "backward_time": "backward time: rows dropped",
+        "crop": "outside import.crop_s: rows dropped",
+        "incomplete_ends": "before the first or after the last value of a column: rows dropped",
+        "gap": "beyond a gap longer than import.gap_s: rows dropped",
+    }
+)
+
+
+def imported(log: Path, study: Study) -> ImportedFlight:
+    """Import a log in memory.
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read or lacks columns that the config names.
+    ConfigError
+        If a key of the section `import` does not suit the log; the message names both.
+    """
+    read = read_log(log, study.import_)
+    with _naming(log), settings_of("import", study):
+        flight = import_log(
+            read.columns,
+            study.import_,
+            rotor_torque=_rotor_torque(study),
+            # The delay is a parameter too: the part of the flight that is held out must not choose it.
+            delay_share=study.identification.training_share,
+        )
+    return replace(flight, report=replace(flight.report, warnings=(*flight.report.warnings, *read.warnings)))
+
+
+@contextmanager
+def _naming(log: Path) -> Iterator[None]:
+    try:
+        yield
+    except CpflsError as error:
+        raise type(error)("\n".join(f"{log}: {line}" for line in str(error).splitlines())) from None
+
+
+def log_findings(report: ImportReport) -> dict[str, int]:
+    """Count what was found in a log, by reason and treatment; what was not found is left out.
+
+    Returns
+    -------
+    dict of str to int
+        Rows, then gaps, then values of all columns together.
+    """
+    rows = {_DROPPED[reason]: count for reason, count in report.dropped.items()}
+    gaps = {f"gaps in the time stamps, up to {report.longest_gap_s:.3g} s: interpolated": report.gaps}
+    values = {
+        "missing: values interpolated": report.missing,
+        "spikes: values interpolated": report.spikes,
+        "suspected spikes: values reported only": report.suspected_spikes,
+        "saturated: values reported only": report.saturated,
+    }
+    counts = rows | gaps | {what: sum(by_column.values()) for what, by_column in values.items()}
+    return {what: count for what, count in counts.items() if count}
+
+
+def _rotor_torque(study: Study) -> Callable[[LogSignals], Array]:
+    """Make the body torque of the rotors from their speeds, or from commands taken for speeds."""
+
+    def torque(signals: LogSignals) -> Array:
+        if study.import_.torque_source == "rotor-speed":
+            speed = signals.rotor_speed
+        else:
+            unit = study.import_.signals["rotor_command"].unit
+            speed = commanded_speed(signals.rotor_command, unit, study.vehicle.rotor_speed_max_rad_s)
+        rotors = len(study.vehicle.rotors)
+        if speed is None or speed.shape[1] != rotors:
+            raise InputError(
+                f"import.signals names {0 if speed is None else speed.shape[1]} rotors, vehicle.rotors has {rotors}"
+            )
+        return body_wrench(study.vehicle, speed).body_torque
+
+    return torque
+
+
+def commanded_speed(command: Array | None, unit: str, speed_max: float) -> Array | None:
+    """Take a command in 0..1 as a share of the largest rotor speed; speeds are taken as they are.
+
+    Parameters
+    ----------
+    command : array, shape (time, rotor), or None
+        In the SI unit of `unit`, as a flight holds it.
+    unit : str
+        `import.signals.rotor_command.unit` of the study; a flight carries it in `/config`.
+    speed_max : float
+        `vehicle.rotor_speed_max_rad_s`, rad/s.
+
+    Returns
+    -------
+    array, shape (time, rotor), rad/s, or None
+        None where there is no command.
+
+    Raises
+    ------
+    InputError
+        If the unit is neither a share nor a speed.
+    """
+    if command is None or unit in SPEED_UNITS:
+        return command
+    if unit != "1":
+        raise InputError(
+            f"import.signals.rotor_command.unit = {unit}: torque_source rotor-command needs commands in 0..1 (unit 1, "
+            "with scale and offset) or rotor speeds (rad/s, rpm)"
+        )
+    return command * speed_max

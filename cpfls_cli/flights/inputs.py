@@ -1,0 +1,112 @@
+"""Inputs of an identification: flights that train, flights that a model is chosen on, and what judges it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import chain, count
+from pathlib import Path
+
+from cpfls_cli.artifacts.scores import TRAINING
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import ConfigError, InputError
+from cpfls_cli.flights.flight_source import flight_source
+from cpfls_cli.flights.training import flight_roles
+from cpfls_cli.identification.data import TorqueSource, joined
+
+
+def input_roles(
+    flights: Sequence[Path], selection: Path | None, validate: Sequence[Path], choose_on: Sequence[Path] = ()
+) -> dict[str, Path]:
+    """Give the inputs of an identification their roles.
+
+    Parameters
+    ----------
+    flights : sequence of Path
+        That train.
+    validate : sequence of Path
+        That judge.
+    choose_on : sequence of Path
+        That the model is chosen on.
+    """
+    roles = flight_roles(flights) | ({"selection": selection} if selection else {})
+    return roles | _numbered("choose-on", choose_on) | _numbered("validate", validate)
+
+
+def _numbered(role: str, flights: Sequence[Path]) -> dict[str, Path]:
+    """Give flights of one role numbers: ``choose-on-1``, ``choose-on-2`` and so on."""
+    return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}
+
+
+def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> TorqueSource | None:
+    """Open the flights to choose on.
+
+    Parameters
+    ----------
+    inputs : mapping of str to InputFile
+        All inputs of the command by role.
+
+    Returns
+    -------
+    TorqueSource or None
+        None where there are none.
+
+    Raises
+    ------
+    InputError
+        If one of them is another input too: what was chosen on a flight has been fitted to it.
+    """
+    for role, path in _numbered("choose-on", flights).items():
+        others = {other: file for other, file in inputs.items() if other != role}
+        same = next((other for other, file in others.items() if file.sha256 == inputs[role].sha256), None)
+        if same is not None:
+            raise InputError(f"--choose-on {path}: {_USED[same.partition('-')[0]]}; choose on another flight")
+    return joined([flight_source(path) for path in flights]) if flights else None
+
+
+_USED = {
+    "flight": "is a flight that trains",
+    "selection": "is the selection, no flight",
+    "validate": "judges (--validate)",
+    "choose": "is given twice",
+}
+
+
+def held_out_parts(
+    study: Study, rests: Mapping[str, TorqueSource], inputs: Mapping[str, InputFile], validate: Sequence[Path]
+) -> dict[str, TorqueSource]:
+    """Gather what is judged but not learned from, under names of their own.
+
+    Parameters
+    ----------
+    rests : mapping of str to TorqueSource
+        What of the flights that train is held out.
+    inputs : mapping of str to InputFile
+        By role, see `input_roles`.
+    validate : sequence of Path
+        Other flights.
+
+    Raises
+    ------
+    ConfigError
+        If a part was to be held out, and nothing is left for it.
+    InputError
+        If one of the flights trains too.
+    """
+    if study.identification.training_share < 1 and not rests:
+        raise ConfigError(
+            f"identification.embargo_s = {study.identification.embargo_s:g}: leaves nothing of the flight to be "
+            "held out; lower it, or lower identification.training_share"
+        )
+    parts = dict(rests)
+    learned = {file.sha256 for role, file in inputs.items() if role.startswith("flight")}
+    for role, path in _numbered("validate", validate).items():
+        if inputs[role].sha256 in learned:
+            raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
+        parts[_free_name(path.name, {TRAINING, *parts})] = flight_source(path)
+    return parts
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    numbered = (f"{name} ({number})" for number in count(2))
+    return next(candidate for candidate in chain([name], numbered) if candidate not in taken)

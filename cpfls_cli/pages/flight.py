@@ -1,0 +1,235 @@
+"""The page of a flight: what was flown, what was repaired, what it lacks; and of its vehicle; Figure 4, Table 3."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.artifacts.flight import DelayGroup, FlightRecord
+from cpfls_cli.artifacts.scores import AXES
+from cpfls_cli.flights.imported import SPEED_UNITS
+from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
+from cpfls_cli.report.canvas import line, plot, stacked, style_of
+from cpfls_cli.report.content import Block, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.numbers import UNKNOWN, count, number, plain
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cpfls_cli.flightlog.results import ImportReport
+
+_LACKS = {
+    "attitude": "the flight has no attitude, so reduce, identify and predict will refuse it: map one with"
+    " import.signals.attitude or import.signals.quaternion",
+    "rotation": "the flight has neither attitude nor body rates: only the balance of its rotors where it hovers can be"
+    " read from it",
+    "torque": "the flight has no torque, so identify will refuse it: map one with import.signals.body_torque, or"
+    " rotors with import.signals.rotor_speed or rotor_command, and name it in import.torque_source",
+}
+_ORIGINS = {"trajectory": "simulated along", "log": "imported from", "model": "with"}
+_PAPER_VEHICLE = ("9.81", "6", "4", "0.3", "121.5 × 10⁻⁶", "2.7 × 10⁻⁶", "0.6", "0.6", "1.2")
+_PAPER_DURATION = "55"
+
+
+def answer(flight: Source[FlightRecord], index: int = 1) -> Iterator[Block]:
+    """Say where a flight comes from, how large it is, what was done to it and what it lacks.
+
+    Parameters
+    ----------
+    index : int
+        Number of the flight on its page.
+    """
+    record = flight.record
+    yield Facts(_facts(flight))
+    findings = {} if record.quality is None else record.quality.findings
+    if findings:
+        rows = [[reason, count(times)] for reason, times in findings.items()]
+        caption = f"What was found in the log of {flight.label}."
+        yield Table(f"quality-{index}", caption, ("What: what was done", "Count"), rows)
+    yield from _rotor_torque(flight)
+    yield from _effects(flight)
+    warnings = () if record.quality is None else record.quality.warning or ()
+    for warning in dict.fromkeys((*warnings, *missing_signals(record))):
+        yield Text(warning, "warning")
+
+
+def missing_signals(flight: FlightRecord) -> tuple[str, ...]:
+    """Say which later commands will refuse a flight for what it lacks, and which key of the config would provide it."""
+    return tuple(_LACKS[name] for name in flight.lacks)
+
+
+def import_blocks(report: ImportReport) -> Iterator[Block]:
+    """Say of an import what its flight does not hold: the rows of the log, and how well the delay is determined."""
+    yield Text(f"{report.samples} samples at {report.rate_hz:.4g} Hz from {report.samples_read} rows")
+    if report.delay is not None:
+        r2 = " ".join(f"{value:.3f}" for value in report.delay.r2)
+        yield Text(f"R² of the rigid body about the body axes at the delay that was estimated: {r2}")
+
+
+def autopilot_text(position_rms_m: float, position_max_m: float, attitude_rms_rad: Sequence[float]) -> Text:
+    """Say how far an autopilot was off its path."""
+    degrees = " ".join(f"{np.degrees(rms):.2g}" for rms in attitude_rms_rad)
+    away = f"{position_rms_m:.3g} m rms, {position_max_m:.3g} m at most"
+    return Text(f"off the path by {away}; attitude by {degrees} deg rms (roll pitch yaw)")
+
+
+def _facts(flight: Source[FlightRecord]) -> list[tuple[str, str]]:
+    record = flight.record
+    duration = float(record.time[-1] - record.time[0]) if len(record.time) else 0.0
+    rate = (len(record.time) - 1) / duration if duration > 0 else float("nan")
+    size = f"{len(record.time)} over {duration:.2f} s, {number(rate)} per second"
+    rows = [("Source", _origin(flight)), ("Samples", size)]
+    if record.torque is not None:
+        shown = ", ".join(f"{number(value)} {axis}" for value, axis in zip(record.largest_torque, AXES, strict=True))
+        rows.append(("Largest torque, N m", shown))
+    if record.delay is not None:
+        rows.append(("Delay taken out", _delay(record.delay)))
+    return [*rows, ("Noise added", _noise(flight))]
+
+
+def _origin(flight: Source[FlightRecord]) -> str:
+    inputs = flight.header.inputs.items()
+    return ", ".join(f"{_ORIGINS.get(role, role)} {file.name} (sha256 {file.sha256[:12]})" for role, file in inputs)
+
+
+def _delay(delay: DelayGroup) -> str:
+    taken = f"{1e3 * delay.value:.1f} ms of motion behind command"
+    if delay.best_r2 is None:
+        return f"{taken}, as the config states"
+    return f"{taken}, estimated from this flight (pooled R² of the rigid body there {delay.best_r2:.3f})"
+
+
+def _noise(flight: Source[FlightRecord]) -> str:
+    noise = flight.record.noise
+    if noise is None:
+        return "none" if flight.made_from("trajectory") else "none; this is a recording"
+    words = [f"{name} {' '.join(plain(v) for v in row)}" for name, row in zip(noise.signal, noise.std, strict=True)]
+    return f"{'; '.join(words)} (standard deviation by axis, SI units)"
+
+
+def _rotor_torque(flight: Source[FlightRecord]) -> Iterator[Text]:
+    """Say how the body torque was computed, where an import took it from the rotors."""
+    settings: Mapping[str, Any] = flight.config["import"] if flight.made_from("log") else {"torque_source": None}
+    source = settings["torque_source"]
+    if source == "rotor-speed":
+        yield Text("body torque: of vehicle.rotors at their measured speeds")
+    elif source == "rotor-command" and settings["signals"]["rotor_command"]["unit"] in SPEED_UNITS:
+        yield Text("body torque: of vehicle.rotors, commanded speeds taken for speeds")
+    elif source == "rotor-command":
+        largest = f"{flight.vehicle.rotor_speed_max_rad_s:g} rad/s"
+        yield Text(f"body torque: of vehicle.rotors, speed = command * vehicle.rotor_speed_max_rad_s ({largest})")
+
+
+def _effects(flight: Source[FlightRecord]) -> Iterator[Text]:
+    """List the effects that were flown beyond the model, where a flight in closed loop could have any."""
+    if flight.made_from("trajectory") and flight.config["simulation"]["mode"] == "closed-loop":
+        effects = {} if flight.record.effects is None else flight.record.effects.by_name
+        yield Text(f"effects: {', '.join(f'{name} = {value:g}' for name, value in effects.items()) or 'none'}")
+
+
+def flight_section(sources: Sources) -> Section | None:
+    """Show the flights.
+
+    Returns
+    -------
+    Section or None
+        None where no flight was given.
+    """
+    return section_of_each("flights", "Flights", sources.flights, lambda flight, index: _flight(flight, index, sources))
+
+
+def _flight(flight: Source[FlightRecord], index: int, sources: Sources) -> Iterator[Block]:
+    record = flight.record
+    yield Heading(flight.label)
+    yield from answer(flight, index)
+    if record.attitude is not None and sources.by_hash(flight.made_from("trajectory")) is None:
+        yield _attitude_figure(f"figure-3-flight-{index}", flight.label, record)
+    if record.torque is not None:
+        yield torque_figure(f"figure-4-torque-{index}", flight)
+
+
+def _attitude_figure(name: str, label: str, record: FlightRecord) -> Plot:
+    """Draw angles on the circle where they go round it, since they would run off any other figure."""
+    assert record.attitude is not None, "asked for by the caller"
+    if record.turns and record.attitude_rate is not None:
+        return rotation_figure(name, label, record.time, record.attitude, record.attitude_rate)
+    return attitude_figure(name, label, record.time, record.attitude)
+
+
+def torque_figure(name: str, flight: Source[FlightRecord]) -> Plot:
+    """Draw the generalised torque of a flight, one panel per axis.
+
+    References
+    ----------
+    Figure 4 of the paper.
+    """
+    time, torque = flight.record.time, flight.record.torque
+    assert torque is not None, "the flight holds no torque"
+
+    def draw(figure: Figure) -> None:
+        panels = stacked(figure, 3)
+        for index, (axes, axis) in enumerate(zip(panels, AXES, strict=True)):
+            line(axes, time, torque[:, index], **style_of(0))
+            axes.set_title(f"torque on {axis}")
+            axes.set_ylabel("N m")
+        panels[-1].set_xlabel("time, s")
+
+    caption = f"Figure 4. Generalised torque on the Euler angles along {flight.label}."
+    return plot(name, caption, "Generalised torque on roll, pitch and yaw over time", 4.6, draw)
+
+
+def vehicle_section(sources: Sources) -> Section:
+    """Show the vehicle of the study, beside the paper's where that is asked for.
+
+    References
+    ----------
+    Table 3 of the paper.
+    """
+    paper = sources.settings.paper
+    rows = [[quantity, value, *([printed] if paper else [])] for quantity, value, printed in _vehicle_rows(sources)]
+    header = ("Quantity", "Study", *(("Paper",) if paper else ()))
+    caption = (
+        "Table 3. The vehicle of the study config. A range means that the rotors differ; the arm is the distance of a "
+        "rotor from the z axis."
+    )
+    blocks: list[Block] = [Table("table-3-vehicle", caption, header, rows)]
+    other = [source.label for source in sources.all if source.vehicle != sources.vehicle]
+    if other:
+        blocks.append(Text(f"Made with another vehicle than this one: {', '.join(other)}.", "warning"))
+    return Section("vehicle", "Vehicle", blocks)
+
+
+def _vehicle_rows(sources: Sources) -> list[tuple[str, str, str]]:
+    vehicle = sources.vehicle
+    values = [plain(vehicle.gravity_m_s2), plain(vehicle.mass_kg), *_rotors(vehicle)]
+    values += [plain(moment) for moment in vehicle.inertia_kg_m2]
+    names = ["gravity g, m/s²", "mass m, kg", "rotors", "arm l, m", "thrust factor k, N s²", "drag factor b, N m s²"]
+    names += [f"{name}, kg m²" for name in INERTIA_PARAMETERS[: len(vehicle.inertia_kg_m2)]]
+    printed = [*_PAPER_VEHICLE, *["0"] * (len(values) - len(_PAPER_VEHICLE))]
+    rows = list(zip(names, values, printed, strict=True))
+    return rows if sources.only_gap else [*rows, ("flight time T, s", _durations(sources), _PAPER_DURATION)]
+
+
+def _rotors(vehicle: VehicleSettings) -> list[str]:
+    arms = [float(np.hypot(rotor.position_m[0], rotor.position_m[1])) for rotor in vehicle.rotors]
+    return [
+        str(len(vehicle.rotors)),
+        _range(arms),
+        _range([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors]),
+        _range([rotor.drag_factor_n_m_s2 for rotor in vehicle.rotors]),
+    ]
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = (plain(float(f"{value:.4g}")) for value in (min(values), max(values)))
+    return low if low == high else f"{low} … {high}"
+
+
+def _durations(sources: Sources) -> str:
+    times = [source.record.time for source in sources.flights or sources.trajectories]
+    return _range([float(time[-1] - time[0]) for time in times if len(time)]) if times else UNKNOWN

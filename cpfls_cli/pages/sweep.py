@@ -1,0 +1,291 @@
+"""The page of a sweep: the errors of each setting, how far its seeds lie apart, and Table 5 of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.sweep import SettingRuns, SweepRecord, spread
+from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
+from cpfls_cli.pages.printed import RELATIVE_ERROR, TABLE_5, PrintedColumn
+from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.report.canvas import plain_ticks, plot, style_of
+from cpfls_cli.report.content import Block, Plot, Section, Table, Text
+from cpfls_cli.report.numbers import UNKNOWN, number, percent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_DIGITS = 3
+_DEVIATION = "standard deviation of the"
+_DECADE = 10.0
+_TICKS = 4
+_Row = tuple[str, Callable[[SettingRuns], str], Callable[[PrintedColumn], str] | None]
+
+
+def answer(sweep: Source[SweepRecord]) -> Iterator[Block]:
+    """Say how many runs are finished, mean and spread of each setting, and what to distrust."""
+    record = sweep.record
+    yield Text(f"{_finished(sweep)}, {len(record.settings)} settings; mean and standard deviation of the training part")
+    yield _overview(sweep)
+    if record.without_model:
+        yield Text(
+            f"{record.without_model} of {len(record.run)} runs found no finite model; they count for no mean", "warning"
+        )
+
+
+def _finished(sweep: Source[SweepRecord]) -> str:
+    planned = len(sweep.record.settings) * int(sweep.config["sweep"]["seeds"])
+    return f"{len(sweep.record.run)} of {planned} runs"
+
+
+def _overview(sweep: Source[SweepRecord]) -> Table:
+    """Line up one row for each setting."""
+    rows = [
+        [
+            setting.name,
+            *(str(value) for value in (setting.samples, *setting.size, setting.runs)),
+            *(_both(values) for values in (setting.mse[:, 0], setting.max_error[:, 0], setting.condition_number)),
+        ]
+        for setting in sweep.record.settings
+    ]
+    sizes = ("Setting", "Samples", "Population", "Generations", "Runs")
+    header = (*sizes, f"MSE, {SQUARED_TORQUE}", f"Largest error, {TORQUE}", "Condition number")
+    return Table("settings", "Mean ± standard deviation over the seeds.", header, rows)
+
+
+def replicates_section(sources: Sources) -> Section | None:
+    """Show the settings of sweeps beside each other and beside the paper's.
+
+    Returns
+    -------
+    Section or None
+        None where no sweep was given.
+
+    References
+    ----------
+    Table 5 of the paper.
+    """
+    if not sources.sweeps:
+        return None
+    sweeps, paper = joined_sweeps(sources.sweeps), sources.settings.paper
+    blocks = [block for index, sweep in enumerate(sweeps, start=1) for block in _sweep(sweep, index, paper)]
+    return Section("replicates", "Replicates of the search", blocks)
+
+
+def joined_sweeps(sweeps: Sequence[Source[SweepRecord]]) -> list[Source[SweepRecord]]:
+    """Take sweeps of equal settings and inputs as one, unless a seed stands in both.
+
+    Returns
+    -------
+    list of Source
+        In the order of the first of each.
+    """
+    joined: list[Source[SweepRecord]] = []
+    for sweep in sweeps:
+        index = next((index for index, other in enumerate(joined) if other.record.joins(sweep.record)), None)
+        if index is None:
+            joined.append(sweep)
+        else:
+            joined[index] = _joined(joined[index], sweep)
+    return joined
+
+
+def _joined(first: Source[SweepRecord], second: Source[SweepRecord]) -> Source[SweepRecord]:
+    record = first.record.joined(second.record)
+    label, config = f"{first.label} and {second.label}", _with_seeds_of(first.config, second.config)
+    return replace(first, label=label, header=record.origin, record=record, config=config)
+
+
+def _with_seeds_of(config: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+    """Plan as many seeds as two studies do together."""
+    seeds = int(config["sweep"]["seeds"]) + int(other["sweep"]["seeds"])
+    return {**config, "sweep": {**config["sweep"], "seeds": seeds}}
+
+
+def _sweep(sweep: Source[SweepRecord], index: int, paper: bool) -> Iterator[Block]:
+    # Table 5 holds more than the one that a terminal has room for.
+    yield from (block for block in answer(sweep) if not isinstance(block, Table))
+    if not sweep.record.complete:
+        yield Text(
+            f"Unfinished: {_finished(sweep)} of {sweep.label}. The same command with --resume goes on.", "warning"
+        )
+    yield _table(sweep, index, paper)
+    if paper and _repeats_table_5(sweep.record):
+        yield Text(_PAPER_NOTE, "note")
+    yield replicates_figure(f"replicates-{index}", sweep)
+    yield from _held_out(sweep, index)
+    yield Text(
+        f"Every setting was searched with the same seeds, from {sweep.record.origin.seed} on. "
+        "cpfls reduce and cpfls identify with the overrides of a setting and --seed find each model again."
+    )
+
+
+_PAPER_NOTE = (
+    "Ours above, the paper's below, over ten runs each. It says “variance” where it must mean the standard deviation: "
+    "a variance of 0.0001 about a mean of 0.0008 would be a deviation of 0.01. Compare how figures change from setting "
+    "to setting, and relative errors: its absolute errors belong to torques of more than 1.5 N m, and its condition "
+    "numbers to a path that it does not define in full."
+)
+
+
+def _table(sweep: Source[SweepRecord], index: int, paper: bool) -> Table:
+    settings = sweep.record.settings
+    printed = printed_beside(settings) if paper else [None for _ in settings]
+    rows: list[list[str]] = []
+    for title, ours, theirs in _rows():
+        rows.append([title, *(ours(setting) for setting in settings)])
+        if theirs is not None and any(printed):
+            rows.append(["· paper", *(theirs(column) if column else UNKNOWN for column in printed)])
+    numbered = "Table 5. " if _repeats_table_5(sweep.record) else ""
+    caption = (
+        f"{numbered}Results of {sweep.label} on the whole training part. The best run of a setting is that of the "
+        "smallest mean squared error; mean and standard deviation are over its seeds; the "
+        "variance is the square of the standard deviation shown."
+    )
+    return Table(f"table-5-replicates-{index}", caption, ["Quantity", *(setting.name for setting in settings)], rows)
+
+
+def _rows() -> Iterator[_Row]:
+    yield "system", lambda s: {"cpfls": "cpFLS", "fls": "FLS"}[s.structure], lambda p: p.system
+    yield "training points", lambda s: str(s.samples), lambda p: str(p.samples)
+    yield "population × generations", lambda s: f"{s.population} × {s.generations}", _size
+    yield "runs", lambda s: str(s.runs), lambda _: "10"
+    yield f"best run: MSE, {SQUARED_TORQUE}", lambda s: _best(s, s.mse[:, 0]), lambda p: p.mse
+    yield f"best run: largest error, {TORQUE}", lambda s: _best(s, s.max_error[:, 0]), lambda p: p.max_error
+    yield "best run: condition number", lambda s: _best(s, s.condition_number), lambda p: p.condition_number
+    yield f"mean MSE, {SQUARED_TORQUE}", lambda s: _mean(s.mse[:, 0]), lambda p: p.mse_of_runs[0]
+    yield f"{_DEVIATION} MSE, {SQUARED_TORQUE}", lambda s: _deviation(s.mse[:, 0]), lambda p: p.mse_of_runs[1]
+    yield f"mean largest error, {TORQUE}", lambda s: _mean(s.max_error[:, 0]), lambda p: p.max_error_of_runs[0]
+    yield (
+        f"{_DEVIATION} largest error, {TORQUE}",
+        lambda s: _deviation(s.max_error[:, 0]),
+        lambda p: p.max_error_of_runs[1],
+    )
+    yield "mean condition number", lambda s: _mean(s.condition_number), lambda p: p.condition_number_of_runs[0]
+    yield (
+        f"{_DEVIATION} condition number",
+        lambda s: _deviation(s.condition_number),
+        lambda p: p.condition_number_of_runs[1],
+    )
+    yield "mean relative error", lambda s: percent(spread(s.relative_error[:, 0]).mean), lambda _: RELATIVE_ERROR
+
+
+def _size(column: PrintedColumn) -> str:
+    return f"{column.population} × {column.generations}"
+
+
+def _best(setting: SettingRuns, values: Array) -> str:
+    return number(setting.best_of(values), _DIGITS)
+
+
+def _mean(values: Array) -> str:
+    return number(spread(values).mean, _DIGITS)
+
+
+def _deviation(values: Array) -> str:
+    return number(spread(values).deviation, 2)
+
+
+def _both(values: Array) -> str:
+    return _mean(values) if np.isnan(spread(values).variance) else f"{_mean(values)} ± {_deviation(values)}"
+
+
+def _held_out(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
+    """Show how good the models are on what they were not learned from."""
+    for number_of, part in enumerate(sweep.record.part[1:], start=1):
+        rows = [
+            [
+                setting.name,
+                str(setting.runs),
+                *(_both(values[:, number_of]) for values in (setting.mse, setting.max_error, setting.relative_error)),
+            ]
+            for setting in sweep.record.settings
+        ]
+        header = ("Setting", "Runs", f"MSE, {SQUARED_TORQUE}", f"Largest error, {TORQUE}", "Relative error")
+        caption = f"Models of {sweep.label} on {part}: mean ± standard deviation over the seeds."
+        yield Table(f"held-out-{index}-{number_of}", caption, header, rows)
+
+
+def printed_beside(settings: Sequence[SettingRuns]) -> list[PrintedColumn | None]:
+    """Find the column of the paper that each setting repeats.
+
+    Returns
+    -------
+    list of PrintedColumn or None
+        Of equal structure and samples; of those of equal population and generations too, else the first in order.
+    """
+    columns: dict[int, PrintedColumn] = {}
+    for exact in (True, False):
+        for index, setting in enumerate(settings):
+            free = (column for column in TABLE_5 if column not in columns.values() and _fits(setting, column, exact))
+            if index not in columns and (column := next(free, None)) is not None:
+                columns[index] = column
+    return [columns.get(index) for index in range(len(settings))]
+
+
+def repeats_table_5(sweeps: Sequence[Source[SweepRecord]]) -> bool:
+    """Tell whether sweeps repeat any column of the paper."""
+    return any(_repeats_table_5(sweep.record) for sweep in sweeps)
+
+
+def _repeats_table_5(sweep: SweepRecord) -> bool:
+    return any(printed_beside(sweep.settings))
+
+
+def _fits(setting: SettingRuns, column: PrintedColumn, exact: bool) -> bool:
+    keys = ("structure", "samples", "population", "generations") if exact else ("structure", "samples")
+    return all(getattr(setting, key) == getattr(column, key) for key in keys)
+
+
+def replicates_figure(name: str, sweep: Source[SweepRecord]) -> Plot:
+    """Draw mean squared error and condition number of every run, in a row for each setting."""
+    settings = sweep.record.settings
+
+    def draw(figure: Figure) -> None:
+        errors, conditions = figure.subplots(1, 2, sharey=True)
+        for row, setting in enumerate(reversed(settings)):
+            _dots(errors, row, setting.mse[:, 0])
+            _dots(conditions, row, setting.condition_number)
+        errors.set_yticks(range(len(settings)), [setting.name for setting in reversed(settings)])
+        errors.set_ylim(-0.6, len(settings) - 0.4)
+        errors.set_xlabel("MSE, (N m)²")
+        conditions.set_xlabel("condition number")
+        for axes in (errors, conditions):
+            axes.grid(visible=False, axis="y")
+            axes.tick_params(axis="y", length=0)
+            _scale(axes)
+
+    caption = (
+        f"Runs of {sweep.label}: each circle is the model of one seed, judged on the training part; the upright line "
+        "is the mean of the setting."
+    )
+    description = "Mean squared error and condition number by setting, one circle for each seed"
+    return plot(name, caption, description, 0.9 + 0.36 * len(settings), draw)
+
+
+def _dots(axes: Axes, row: int, values: Array) -> None:
+    """Draw runs side by side in their order, so that equal values do not hide each other."""
+    offsets = np.linspace(0.22, -0.22, len(values)) if len(values) > 1 else np.zeros(len(values))
+    axes.plot(values, row + offsets, "o", markersize=4.5, markerfacecolor="none", color=style_of(0)["color"])
+    mean = spread(values).mean
+    if np.isfinite(mean):
+        axes.vlines(mean, row - 0.34, row + 0.34, color="black", linewidth=2.2, zorder=1)
+
+
+def _scale(axes: Axes) -> None:
+    """Take a logarithmic scale where values differ by more than a decade."""
+    from matplotlib.ticker import MaxNLocator
+
+    values = np.concatenate([line.get_xdata() for line in axes.lines]) if axes.lines else np.zeros(0)
+    known = values[np.isfinite(values) & (values > 0)]
+    if len(known) and known.max() > _DECADE * known.min():
+        axes.set_xscale("log")
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(_TICKS))
+        plain_ticks(axes.xaxis)

@@ -1,0 +1,309 @@
+"""The page of a planned path: its moves and peaks, what it asks of the vehicle, Figures 2 and 3 of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.scores import AXES
+from cpfls_cli.artifacts.trajectory import DERIVATIVES, LegGroup, TrajectoryRecord
+from cpfls_cli.pages.printed import PRINTED_PEAKS
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
+from cpfls_cli.report.content import Block, Plot, Section, Table, Text
+from cpfls_cli.report.numbers import number, plain
+from cpfls_cli.simulation.inverse import Flyability, TooMuch
+from cpfls_cli.trajectory.legs import Leg
+from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
+from cpfls_cli.vehicle.rotors import RotorViolation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cpfls_cli.excitation import Excitation
+
+_UNITS = ("m/s⁶", "m/s⁵", "m/s⁴", "m/s³", "m/s²", "m/s", "m")
+_MOVES_SHOWN = 20
+_TURN = 360.0
+
+
+def answer(
+    trajectory: Source[TrajectoryRecord], planned: PlannedRotation, demand: Flyability, excitation: Excitation | None
+) -> Iterator[Block]:
+    """Say how long a path is and what it asks of the vehicle.
+
+    Parameters
+    ----------
+    planned : PlannedRotation
+        The plan whose samples the artifact holds.
+    demand : Flyability
+        Of the plan on the vehicle.
+    excitation : Excitation or None
+        Of an optimised path.
+    """
+    yield Text(f"{len(planned.time)} samples over {planned.duration:g} s")
+    if isinstance(planned, Trajectory):
+        yield _peaks("peaks", "Largest value of each derivative in any move.", planned.maxima)
+        tilt, thrust = np.degrees(demand.tilt.max()), demand.thrust.max()
+        yield Text(f"largest tilt {tilt:.3g} deg, largest thrust {thrust:.4g} N")
+        if any(leg.limited_by for leg in planned.legs):
+            yield _moves("moves", trajectory, [absolute_jerk(leg) for leg in planned.legs])
+    else:
+        yield from _turns("turns", trajectory)
+    if excitation is not None:
+        yield Text(
+            f"condition number of the model's regressor {excitation.condition_number:.4g}, uniform partitions; of "
+            f"{len(excitation.random)} random paths the best had {excitation.random.min():.4g}, the median "
+            f"{np.median(excitation.random):.4g}"
+        )
+
+
+def absolute_jerk(leg: Leg) -> float:
+    """Integrate the absolute jerk of the axis that has most of it, m/s^2."""
+    return max(profile.integral_of_absolute_jerk for profile in leg.profiles)
+
+
+def demand_sentences(demand: Flyability, planned: PlannedRotation) -> tuple[str, ...]:
+    """Say what a plan asks for beyond what the vehicle has, with its time and place; nothing where it can do it all."""
+    return (
+        *(_too_much(too_much, planned) for too_much in demand.too_much),
+        *(violation_sentence(one, planned.time) + _place(one.first, planned) for one in demand.rotors),
+    )
+
+
+def violation_sentence(violation: RotorViolation, time: Array) -> str:
+    """Say what a rotor was asked for that it cannot do.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+    """
+    start, end = time[violation.first], time[violation.last]
+    return (
+        f"rotor {violation.rotor + 1}: {violation.kind} asked for at {_samples(violation.count)} from {start:.2f} s to "
+        f"{end:.2f} s (worst squared speed {violation.worst:.6g} rad^2/s^2)"
+    )
+
+
+def _too_much(too_much: TooMuch, planned: PlannedRotation) -> str:
+    name, unit = too_much.what.split(", ")
+    worst = f"{too_much.worst:.4g} {unit} at {planned.time[too_much.at]:.2f} s{_place(too_much.at, planned)}"
+    start = f"from {planned.time[too_much.first]:.2f} s, {_samples(too_much.count)}"
+    return f"{name} of up to {worst} asked for; the limit is {too_much.limit:.4g} {unit} (beyond it {start})"
+
+
+def _samples(count: int) -> str:
+    return f"{count} sample{'' if count == 1 else 's'}"
+
+
+def _place(sample: int, planned: PlannedRotation) -> str:
+    if isinstance(planned, Trajectory):
+        return f", at x y z = {_written(planned.position[sample])} m"
+    return f", at roll pitch yaw = {_written(np.degrees(planned.attitude[sample]) % _TURN)} deg"
+
+
+def _written(values: Array) -> str:
+    return " ".join(f"{value:.2f}" for value in values)
+
+
+def path_section(sources: Sources) -> Section | None:
+    """Show the planned paths.
+
+    Returns
+    -------
+    Section or None
+        None where no trajectory was given.
+    """
+    printed = PRINTED_PEAKS if sources.settings.paper else None
+    return section_of_each(
+        "path", "Training path", sources.trajectories, lambda path, index: _path(path, index, printed)
+    )
+
+
+def _path(trajectory: Source[TrajectoryRecord], index: int, printed: Mapping[str, float] | None) -> Iterator[Block]:
+    record = trajectory.record
+    if record.held:
+        yield from _turns(f"turns-{index}", trajectory)
+        yield rotation_figure(
+            f"figure-rotation-{index}", trajectory.label, record.time, record.attitude, record.attitude_rate
+        )
+        return
+    yield derivatives_figure(f"figure-2-derivatives-{index}", trajectory)
+    caption = f"Largest length of each derivative at the samples of {trajectory.label}, along the path."
+    if printed:
+        caption += " The paper prints its maxima for intervals of P = 1 s."
+    yield _peaks(f"peaks-{index}", caption, record.peaks(), printed)
+    if record.leg is not None and any(record.leg.limited_by):
+        yield _moves(f"legs-{index}", trajectory)
+    yield attitude_figure(f"figure-3-attitude-{index}", trajectory.label, record.time, record.attitude)
+
+
+def _peaks(name: str, caption: str, peaks: Mapping[str, float], printed: Mapping[str, float] | None = None) -> Table:
+    rows = [
+        [derivative, unit, _peak(derivative, peaks), *([number(printed[derivative])] if printed else [])]
+        for derivative, unit in zip(DERIVATIVES, _UNITS, strict=True)
+    ]
+    header = ("Derivative", "Unit", "Largest", *(("Paper",) if printed else ()))
+    return Table(name, caption, header, rows, frozenset({0, 1}))
+
+
+def _peak(name: str, peaks: Mapping[str, float]) -> str:
+    """Write a peak; above a snap that jumps there is nothing at the samples, and no bound between them."""
+    jumps = name in ("crackle", "pop") and not peaks[name] and peaks["snap"]
+    return "no bound" if jumps or not np.isfinite(peaks[name]) else number(peaks[name])
+
+
+def _moves(name: str, trajectory: Source[TrajectoryRecord], jerk: Sequence[float] = ()) -> Table:
+    moves = trajectory.record.leg
+    assert moves is not None, "only a path in space has limits"
+    shown = range(min(len(moves.begin), _MOVES_SHOWN))
+    rows = [[*_move(moves, index), *([f"{jerk[index]:.4g}"] if jerk else [])] for index in shown]
+    header = ("Move", "Begins, s", "Takes, s", "Length, m", "Limited by")
+    caption = f"Moves of {trajectory.label} under limits, and the derivatives that reach theirs."
+    if len(moves.begin) > _MOVES_SHOWN:
+        caption += f" The first {_MOVES_SHOWN} of {len(moves.begin)}."
+    return Table(name, caption, (*header, *(("Integral of |jerk|, m/s²",) if jerk else ())), rows, frozenset({0, 4}))
+
+
+def _move(moves: LegGroup, index: int) -> list[str]:
+    begin, length = moves.begin[index], float(np.linalg.norm(moves.displacement[index]))
+    numbers = (begin, moves.end[index] - begin, length)
+    return [str(index + 1), *(plain(value) for value in numbers), moves.limited_by[index].replace(" ", ", ")]
+
+
+def _turns(name: str, trajectory: Source[TrajectoryRecord]) -> Iterator[Block]:
+    record = trajectory.record
+    yield Text("the vehicle is held at its centre of mass and only turns")
+    rows = [
+        [quantity, unit, *(f"{value:.4g}" for value in np.abs(values).max(axis=0))]
+        for quantity, unit, values in (
+            ("Euler rate", "rad/s", record.attitude_rate),
+            ("body rate", "rad/s", record.body_rate),
+            ("Euler acceleration", "rad/s²", record.attitude_acceleration),
+        )
+    ]
+    caption = f"Largest rates and accelerations of {trajectory.label}; of body rates about x, y and z."
+    yield Table(name, caption, ("Quantity", "Unit", *AXES), rows, frozenset({0, 1}))
+
+
+def path_figures(trajectory: Source[TrajectoryRecord]) -> tuple[Plot, ...]:
+    """Draw a path: the derivatives (Figure 2) and the attitude (Figure 3), or the rotations of a held vehicle."""
+    record, label = trajectory.record, trajectory.label
+    if record.held:
+        return (rotation_figure("rotation", label, record.time, record.attitude, record.attitude_rate),)
+    return (
+        derivatives_figure("derivatives", trajectory),
+        attitude_figure("attitude", label, record.time, record.attitude),
+    )
+
+
+def figure_names(*, held: bool) -> tuple[str, ...]:
+    """Name the figures that `path_figures` draws, before the path is planned."""
+    return ("rotation",) if held else ("derivatives", "attitude")
+
+
+def derivatives_figure(name: str, trajectory: Source[TrajectoryRecord]) -> Plot:
+    """Draw pop to displacement over the first leg.
+
+    References
+    ----------
+    Figure 2 of the paper.
+    """
+    leg, limits = trajectory.record.first_leg(), _limits(trajectory)
+
+    def draw(figure: Figure) -> None:
+        panels = stacked(figure, len(DERIVATIVES))
+        for axes, derivative, unit in zip(panels, DERIVATIVES, _UNITS, strict=True):
+            curve = leg.curves[derivative]
+            line(axes, leg.time, curve, **style_of(0))
+            axes.set_title(
+                derivative if np.any(curve) else f"{derivative}: not limited, infinite where the one below jumps"
+            )
+            axes.set_ylabel(unit)
+            axes.axhline(0.0, color="#999999", linewidth=0.6)
+            for limit in limits.get(derivative, ()):
+                axes.axhline(limit, **BASELINE)
+        panels[-1].set_xlabel("time, s")
+
+    caption = (
+        f"Figure 2. Derivatives of the displacement along the first leg of {trajectory.label}, from the sixth (pop) "
+        "down to the displacement itself."
+    )
+    if limits:
+        caption += " Grey: the limits that it was planned under."
+    return plot(name, caption, "Seven curves over time: " + ", ".join(DERIVATIVES), 8.6, draw)
+
+
+def _limits(trajectory: Source[TrajectoryRecord]) -> dict[str, tuple[float, float]]:
+    """Limits along a straight leg, by derivative; those that are stated axis by axis are left out."""
+    settings = trajectory.config.get("trajectory", {})
+    stated = settings.get("limits", {})
+    if settings.get("coordination") != "straight-line" or settings.get("displacement_measure") != "along-path":
+        return {}
+    return {key.split("_")[0]: (-value, value) for key, value in stated.items() if isinstance(value, float)}
+
+
+def attitude_figure(name: str, label: str, time: Array, attitude: Array) -> Plot:
+    """Draw roll and pitch of a path or a flight.
+
+    Parameters
+    ----------
+    time : array, shape (samples,), s
+    attitude : array, shape (samples, 3), rad
+
+    References
+    ----------
+    Figure 3 of the paper.
+    """
+    degrees = np.degrees(attitude)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        for index, axis in enumerate(AXES[:2]):
+            line(axes, time, degrees[:, index], label=axis, **style_of(index))
+        axes.set_xlabel("time, s")
+        axes.set_ylabel("angle, °")
+        legend_above(axes)
+
+    largest = np.abs(degrees[:, :2]).max(axis=0)
+    caption = f"Figure 3. Roll and pitch of {label}; they stay within ±{largest[0]:.1f}° and ±{largest[1]:.1f}°."
+    return plot(name, caption, "Roll and pitch angle over time", 2.7, draw)
+
+
+def rotation_figure(name: str, label: str, time: Array, attitude: Array, rate: Array) -> Plot:
+    """Draw attitude and Euler rates of full rotations, angles on the circle.
+
+    Parameters
+    ----------
+    time : array, shape (samples,), s
+    attitude, rate : array, shape (samples, 3), rad and rad/s
+    """
+    degrees = np.degrees(attitude)
+
+    def draw(figure: Figure) -> None:
+        angles, rates = stacked(figure, 2)
+        for index, axis in enumerate(AXES):
+            style = style_of(index)
+            _on_circle(angles, time, degrees[:, index], axis, style)
+            line(rates, time, rate[:, index], **style)
+        angles.set_yticks([0, 90, 180, 270, 360])
+        angles.set_ylabel("angle on the circle, °")
+        rates.set_ylabel("Euler rate, rad/s")
+        rates.set_xlabel("time, s")
+        legend_above(angles)
+
+    turns = ", ".join(f"{axis} {np.ptp(degrees[:, index]) / _TURN:.1f}" for index, axis in enumerate(AXES))
+    caption = f"Attitude and Euler rates of {label}; range in turns: {turns}."
+    return plot(name, caption, "Roll, pitch and yaw on the circle, and their rates, over time", 4.6, draw)
+
+
+def _on_circle(axes: Axes, time: Array, degrees: Array, label: str, style: dict[str, Any]) -> None:
+    """Draw an angle modulo a turn, without the strokes where it goes round."""
+    wrapped = np.mod(degrees, _TURN)
+    seams = np.flatnonzero(np.abs(np.diff(wrapped)) > _TURN / 2) + 1
+    for part_number, part in enumerate(np.split(np.arange(len(time)), seams)):
+        line(axes, time[part], wrapped[part], label=label if part_number == 0 else None, **style)

@@ -1,0 +1,1 @@
+"""What tests of several packages build: flights, models, artifacts, programs and workers. No tests."""

@@ -1,0 +1,40 @@
+"""Commands in the process of the tests, and what ends their searches too early."""
+
+import itertools
+import os
+import signal
+
+from typer.testing import CliRunner
+
+from cpfls_cli.cli.app import app
+from cpfls_cli.workers import employ
+
+_RUNNER = CliRunner()
+
+
+def run(*words):
+    """Run a command; anything but an exit is a bug and is raised."""
+    result = _RUNNER.invoke(app, [str(word) for word in words])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def act_at_evaluation(monkeypatch, number, action):
+    """Do something when so many chromosomes are evaluated, over all searches of a command."""
+    count = itertools.count(1)
+
+    def counting(evaluate, **options):
+        def evaluate_and_count(genes):
+            evaluation = evaluate(genes)
+            if next(count) == number:
+                action()
+            return evaluation
+
+        return employ(evaluate_and_count, **options)
+
+    monkeypatch.setattr("cpfls_cli.search.resumable.employ", counting)
+
+
+def interrupt_this_process():
+    os.kill(os.getpid(), signal.SIGINT)

@@ -1,0 +1,48 @@
+"""What is loaded: nothing heavy for the version, and no plotting for what is printed."""
+
+import json
+import subprocess
+import sys
+
+HEAVY = {"h5py", "jinja2", "matplotlib", "numba", "numpy", "pydantic", "scipy", "yaml"}
+CODE = """
+import json, sys
+from typer.testing import CliRunner
+from cpfls_cli.cli.app import app
+commands, packages = map(json.loads, sys.argv[1:])
+for words in commands:
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+print(json.dumps(sorted(set(packages) & set(sys.modules))))
+"""
+
+
+def loaded(*commands):
+    """Run commands in a process of their own; give the heavy packages that it has loaded in the end."""
+    words = json.dumps([[str(word) for word in command] for command in commands])
+    arguments = [sys.executable, "-c", CODE, words, json.dumps(sorted(HEAVY))]
+    result = subprocess.run(arguments, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def test_the_version_and_the_help_load_nothing_heavy():
+    assert loaded(("--version",), ("--help",)) == []
+
+
+def test_what_is_printed_loads_no_plotting(pipeline, study, tmp_path):
+    packages = loaded(
+        ("trajectory", study, "-o", tmp_path / "trajectory.h5"),
+        ("simulate", study, pipeline.trajectory, "-o", tmp_path / "flight.h5"),
+        ("simulate", study, pipeline.trajectory, "--mode", "closed-loop", "-o", tmp_path / "closed.h5"),
+        ("reduce", study, pipeline.flight, "-o", tmp_path / "selection.h5"),
+        ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", tmp_path / "model.h5"),
+        ("predict", study, pipeline.model, pipeline.flight, "-o", tmp_path / "prediction.h5"),
+        ("export", pipeline.model, "-o", tmp_path / "model.json"),
+        ("info", pipeline.model),
+        ("check", pipeline.model),
+        ("config", study),
+        ("effects",),
+    )
+    assert "matplotlib" not in packages
+    assert "jinja2" not in packages

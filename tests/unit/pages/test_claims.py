@@ -1,0 +1,213 @@
+"""What counts as a pass, a failure, or neither, for each kind of claim."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from cpfls_cli.artifacts.selection import SelectionRecord, TraceGroup
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.sweep import RunGroup, SettingGroup, SettingRuns, SweepRecord
+from cpfls_cli.config.study import EvaluationTime, ReportSettings
+from cpfls_cli.pages.claims import (
+    CONTRIBUTION_CLAIM,
+    DECOMPOSITION_TIME_CLAIM,
+    EVALUATION_TIME_CLAIM,
+    FLOOR_CLAIM,
+    ClaimVerdict,
+)
+from cpfls_cli.pages.reproduction import partitions_compared, seesaw_compared
+from cpfls_cli.pages.search_claims import AS_GOOD, CLASSIC_CLAIM, REDUCED_CLAIMS, SMALLER_SEARCH_CLAIM, paired_ratio
+from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
+"""What a seed does to all settings alike."""
+
+
+def setting(mse, structure="cpfls", samples=5487, size=(40, 10), seeds=None):
+    values = np.asarray(mse, dtype=float)
+    seeds = np.arange(len(values)) if seeds is None else np.asarray(seeds)
+    criterion = "all" if samples == 5487 else "KD-exchange"
+    errors = values[:, None]
+    return SettingRuns("x", structure, criterion, samples, *size, seeds, seeds, errors, errors, errors, seeds)
+
+
+def sources(*records, times=()):
+    """A report about records."""
+    given = [Source.of("s.h5", "", record.with_header(Header("1", 0, "")), {}, None, 0) for record in records]
+    return Sources(given, VehicleSettings(), ReportSettings(evaluation_times=times))
+
+
+def sweep(*settings):
+    columns = {
+        name: np.array([getattr(s, name) for s in settings]) for name in ("samples", "population", "generations")
+    }
+    texts = {name: tuple(getattr(s, name) for s in settings) for name in ("name", "structure", "criterion")}
+    empty = ("[]",) * len(settings)
+    runs = {name: np.concatenate([getattr(s, name) for s in settings]) for name in MEASURES}
+    places = np.concatenate([np.full(s.runs, place) for place, s in enumerate(settings)])
+    seeds = np.concatenate([s.seeds for s in settings])
+    chromosome = np.zeros((len(seeds), 1), dtype=np.int32)
+    return SweepRecord(
+        setting=SettingGroup(**texts, **columns, overrides=empty, selection=empty),
+        part=("training",),
+        run=RunGroup(setting=places, seed=seeds, generations=seeds, chromosome=chromosome, **runs),
+        complete=True,
+    )
+
+
+MEASURES = ("evaluations", "mse", "max_error", "relative_error", "condition_number")
+
+
+def measured(*sweeps):
+    """Measurements by number: 2743, 1170 and 685 samples, the smaller search, the classic system."""
+    given = sources(*sweeps)
+    return [claim.measure(given) for claim in (*REDUCED_CLAIMS, SMALLER_SEARCH_CLAIM, CLASSIC_CLAIM)]
+
+
+def claims(*settings):
+    return [measurement.verdict for measurement in measured(*([sweep(*settings)] if settings else []))]
+
+
+def test_a_ratio_is_that_of_a_t_test_on_logarithms_of_pairs():
+    rng = np.random.default_rng(8)
+    one, other = np.exp(rng.normal(0.3, 0.5, (2, 9)))
+    shuffled = rng.permutation(9)
+    found = paired_ratio(setting(one), setting(other[shuffled], seeds=shuffled))
+    test = stats.ttest_1samp(np.log(one / other), 0.0).confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx((np.exp(test.low), np.exp(test.high)))
+    assert found.ratio == pytest.approx(stats.gmean(one) / stats.gmean(other))
+    assert found.p_value == pytest.approx(stats.wilcoxon(one, other).pvalue, abs=0.05)
+
+
+def test_only_seeds_of_both_are_paired():
+    found = paired_ratio(setting([2.0, 4.0, 8.0], seeds=[1, 2, 3]), setting([9.0, 2.0, np.nan], seeds=[5, 2, 3]))
+    assert (found.seeds, found.failed, found.reference_failed, found.ratio) == (2, 0, 1, 2.0)
+    assert np.isnan(found.low)
+    assert paired_ratio(setting([1.0]), setting([1.0], seeds=[7])).seeds == 0
+
+
+@pytest.mark.parametrize("failed", [[4], [1, 2, 3, 4, 5, 6, 7]])
+def test_a_seed_without_a_model_is_a_failure_of_its_setting(failed):
+    """Left out, it would let a setting pass that fails often."""
+    lost = NOISE.copy()
+    lost[failed] = np.nan
+    found = paired_ratio(setting(lost), setting(NOISE))
+    assert (found.seeds, found.failed, found.ratio, found.low) == (10, len(failed), np.inf, np.inf)
+    own = measured(sweep(setting(NOISE), setting(lost, samples=685)))[2]
+    assert (own.verdict, own.ours) == (ClaimVerdict.FAIL, f"no model for {len(failed)} of 10 seeds")
+    beside = measured(sweep(setting(lost), setting(NOISE, samples=685)))[2]
+    assert f"No model in {len(failed)} of them with the one beside it" in beside.why
+
+
+def test_a_seed_without_a_model_in_both_is_told_and_decides_nothing():
+    lost = np.where(np.arange(10) == 4, np.nan, NOISE)
+    judged = measured(sweep(setting(lost), setting(lost, samples=685)))[2]
+    assert judged.verdict == ClaimVerdict.PASS
+    assert "No model in 1 of them with this setting." in judged.why
+
+
+def test_the_margin_is_the_largest_that_the_paper_prints_and_calls_no_difference():
+    assert pytest.approx(12 / 9) == AS_GOOD
+
+
+@pytest.mark.parametrize(
+    ("factor", "scatter", "verdict"),
+    [
+        (1.1, 0.05, ClaimVerdict.PASS),
+        (0.5, 0.05, ClaimVerdict.PASS),
+        (2.0, 0.05, ClaimVerdict.FAIL),
+        (1.3, 0.3, ClaimVerdict.UNDECIDED),
+    ],
+)
+def test_reduced_sets_against_the_full_one(factor, scatter, verdict):
+    own = np.exp(scatter * np.array([1, -1, 1, -1, 1, -1, 1, -1, 1, -1]))
+    reduced = [setting(factor * NOISE * own, samples=samples) for samples in (2743, 1170, 685)]
+    assert claims(setting(NOISE), *reduced)[:3] == [verdict] * 3
+
+
+def test_one_seed_decides_nothing_and_unequal_searches_are_not_compared():
+    assert claims(setting([1.0]), setting([9.0], samples=685))[2] == ClaimVerdict.UNDECIDED
+    assert claims(setting(NOISE), setting(NOISE, samples=685, size=(75, 25)))[2] == ClaimVerdict.NOT_MEASURED
+    assert claims() == [ClaimVerdict.NOT_MEASURED] * 5
+
+
+def test_a_smaller_search_needs_a_much_larger_one_beside_it():
+    small = setting(1.05 * NOISE, samples=685, size=(75, 25))
+    assert claims(small, setting(NOISE, samples=685, size=(40, 10)))[3] == ClaimVerdict.NOT_MEASURED
+    assert claims(small, setting(NOISE, samples=685, size=(500, 200)))[3] == ClaimVerdict.PASS
+    assert claims(small, setting(NOISE / 3, samples=685, size=(500, 200)))[3] == ClaimVerdict.FAIL
+    assert claims(small, setting(NOISE, samples=1170, size=(500, 200)))[3] == ClaimVerdict.NOT_MEASURED
+
+
+def test_the_periodic_system_against_the_classic_one():
+    assert claims(setting(3 * NOISE), setting(NOISE, "fls"))[4] == ClaimVerdict.FAIL
+    assert claims(setting(NOISE), setting(3 * NOISE, "fls"))[4] == ClaimVerdict.PASS
+
+
+def test_the_larger_search_decides():
+    small, large = (
+        sweep(setting(factor * NOISE, size=size), setting(NOISE, "fls", size=size))
+        for factor, size in ((3.0, (40, 10)), (1.0, (500, 200)))
+    )
+    assert [measured(*order)[4].verdict for order in ([small, large], [large, small])] == [ClaimVerdict.PASS] * 2
+
+
+def times(evaluation, svd=lambda n: 1e-5 * n):
+    return [
+        EvaluationTime(samples=n, svd_s=svd(n), evaluation_s=evaluation(n), compiled_s=1e-3)
+        for n in (343, 685, 1170, 2743, 5487)
+    ]
+
+
+def timing_claims(given):
+    about = sources(times=given)
+    return [claim.measure(about) for claim in (EVALUATION_TIME_CLAIM, DECOMPOSITION_TIME_CLAIM)]
+
+
+def test_time_in_proportion_to_the_decomposition():
+    assert [c.verdict for c in timing_claims(times(lambda n: 3e-5 * n))] == [ClaimVerdict.PASS, ClaimVerdict.FAIL]
+    assert timing_claims(times(lambda n: 1e-2 + 1e-5 * n))[0].verdict == ClaimVerdict.FAIL
+    assert timing_claims(times(lambda n: 1e-9 * n**2))[0].verdict == ClaimVerdict.FAIL
+    assert timing_claims(times(lambda n: 1e-5 * n, lambda n: np.exp(n / 1e3)))[1].verdict == ClaimVerdict.PASS
+    assert [c.verdict for c in timing_claims(())] == [ClaimVerdict.NOT_MEASURED] * 2
+
+
+def selection(kept, condition, trace, rank=9):
+    values = np.array(trace, dtype=float)
+    return SelectionRecord(
+        indices=np.arange(kept),
+        trace=TraceGroup(condition_number=values, singular_value_min=values, singular_value_max=values),
+        rank=rank,
+        rank_full=9,
+        condition_number=condition,
+        condition_number_full=100.0,
+        candidates=100,
+        criterion="D",
+        stop_reason="size",
+        random_condition_number=np.array([400.0]),
+    )
+
+
+def reduction_claims(selections):
+    given = sources(*selections)
+    return [claim.measure(given) for claim in (CONTRIBUTION_CLAIM, FLOOR_CLAIM)]
+
+
+def test_what_a_fifth_of_the_samples_keeps():
+    contribution, floor = reduction_claims([selection(19, 124.0, [np.inf, 120, 130, 124.9, 124])])
+    assert (contribution.verdict, floor.verdict) == (ClaimVerdict.PASS, ClaimVerdict.PASS)
+    assert "4 samples (4.0 %) already keep 80 %" in contribution.why
+    assert "keeps 25.0 %" in contribution.why
+    contribution, floor = reduction_claims([selection(19, 126.0, [126]), selection(50, 99.0, [99])])
+    assert (contribution.verdict, floor.verdict) == (ClaimVerdict.FAIL, ClaimVerdict.FAIL)
+    assert reduction_claims([selection(19, 7.0, [7], rank=8)])[0].verdict == ClaimVerdict.FAIL
+    assert reduction_claims([selection(20, 100.0, [100])])[0].verdict == ClaimVerdict.NOT_MEASURED
+
+
+def test_the_printed_numbers_are_read_as_the_paper_means_them():
+    """They are held against a decoder: no model, good or bad, has a part in it."""
+    assert seesaw_compared().agreement == "read as printed"
+    assert partitions_compared().agreement == "read as printed"
+    for figure in (seesaw_compared(), partitions_compared()):
+        assert "how the paper is read, not of any model" in figure.why

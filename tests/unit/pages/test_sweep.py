@@ -1,0 +1,38 @@
+"""Which column of the paper a setting stands beside, and which run is the best."""
+
+import numpy as np
+
+from cpfls_cli.artifacts.sweep import SettingRuns
+from cpfls_cli.pages.printed import TABLE_5
+from cpfls_cli.pages.sweep import printed_beside
+
+
+def setting(structure="cpfls", samples=685, population=500, generations=200, mse=(1.0,)):
+    runs = np.arange(len(mse))
+    errors = np.array(mse)[:, None]
+    sizes = (samples, population, generations)
+    return SettingRuns("x", structure, "D", *sizes, runs, runs, errors, errors, errors, runs)
+
+
+def test_the_papers_own_settings_find_their_columns():
+    own = [setting(c.structure, c.samples, c.population, c.generations) for c in TABLE_5]
+    assert printed_beside(own) == list(TABLE_5)
+    assert printed_beside(own[::-1]) == list(TABLE_5)[::-1]
+
+
+def test_smaller_searches_take_the_columns_in_order_but_leave_exact_ones():
+    small, exact = setting(population=20, generations=5), setting(population=75, generations=25)
+    assert printed_beside([small, exact]) == [TABLE_5[4], TABLE_5[5]]
+    assert printed_beside([exact, small]) == [TABLE_5[5], TABLE_5[4]]
+    assert printed_beside([small, exact, small]) == [TABLE_5[4], TABLE_5[5], None]
+
+
+def test_other_settings_have_none():
+    assert printed_beside([setting(samples=80), setting("fls", 685)]) == [None, None]
+
+
+def test_best_run():
+    assert setting(mse=(3.0, np.nan, 1.0)).best == 2
+    assert setting(mse=(3.0, np.nan, 1.0)).best_of(np.array([7.0, 8.0, 9.0])) == 9.0
+    assert setting(mse=(np.nan,)).best is None
+    assert np.isnan(setting(mse=(np.nan,)).best_of(np.array([7.0])))

@@ -1,0 +1,64 @@
+import re
+from xml.etree import ElementTree
+
+import matplotlib
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cpfls_cli.report.canvas import kept_samples, line, plot, runs
+
+
+def draw(figure):
+    axes = figure.subplots()
+    line(axes, np.linspace(0, 1, 9000), np.linspace(0, 1, 9000) ** 2, color="k", marker="o")
+    axes.set_title("a < b & c")
+
+
+def test_equal_figures_are_equal_text_whatever_the_reader_s_settings():
+    first = plot("one", "", "what", 2.0, draw).svg
+    with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "svg.fonttype": "path", "lines.linewidth": 9}):
+        assert plot("one", "", "what", 2.0, draw).svg == first
+        assert matplotlib.rcParams["font.size"] == 30
+
+
+def test_ids_of_two_figures_do_not_meet_and_all_references_resolve():
+    pictures = [plot(name, "", "what", 2.0, draw).svg for name in ("one", "two")]
+    ids = [re.findall(r'\bid="([^"]+)"', svg) for svg in pictures]
+    assert ids[0]
+    assert not set(ids[0]) & set(ids[1])
+    for svg, own in zip(pictures, ids, strict=True):
+        references = re.findall(r'(?:url\(|href=")#([^)"]+)', svg)
+        assert references
+        assert set(references) == set(own)
+
+
+def test_a_figure_is_well_formed_named_and_carries_no_style_sheet():
+    svg = plot("one", "", 'says "what" & <more>', 2.0, draw).svg
+    root = ElementTree.fromstring(svg)
+    assert root.get("aria-label") == 'says "what" & <more>'
+    assert root.get("role") == "img"
+    tags = {element.tag.rsplit("}", 1)[-1] for element in root.iter()}
+    assert not tags & {"style", "metadata", "script", "image"}
+    assert "a < b & c" in "".join(root.itertext())
+
+
+@given(samples=st.integers(2, 6000), largest=st.integers(4, 1500), seed=st.integers(0, 1000))
+def test_thinning_keeps_extremes_and_ends_and_is_short(samples, largest, seed):
+    values = np.random.default_rng(seed).standard_normal(samples)
+    kept = kept_samples(values, largest)
+    assert len(kept) <= max(largest, 2) + 2
+    assert np.all(np.diff(kept) > 0)
+    assert {0, samples - 1, int(np.argmin(values)), int(np.argmax(values))} <= set(kept.tolist())
+
+
+def test_a_lone_spike_survives():
+    values = np.sin(np.linspace(0, 20, 100_000))
+    values[54_321] = 9.0
+    assert 54_321 in kept_samples(values)
+
+
+@given(st.lists(st.booleans(), max_size=60))
+def test_runs_cover_exactly_what_is_marked(marked):
+    covered = [index for first, last in runs(np.array(marked)) for index in range(first, last + 1)]
+    assert covered == [index for index, value in enumerate(marked) if value]

@@ -1,0 +1,71 @@
+"""Blocks as lines of a terminal: what is shown, in how many columns, and in which colours."""
+
+import re
+
+import pytest
+
+from cpfls_cli.report.content import Box, Cell, Facts, Folded, Heading, Listing, Plot, Table, Text
+from cpfls_cli.report.terminal import terminal_lines, warnings_of
+
+TABLE = Table(
+    "errors",
+    "Attitude errors of a flight.",
+    ("Controller", "RMS roll, °", "Largest roll, °", "What it knows"),
+    [
+        ["identified model", "0.0149", Cell("12.5", "warning"), "the torque that a motion takes"],
+        ["PD alone", "1.2", "3", "nothing"],
+    ],
+    words=frozenset({0, 3}),
+)
+
+
+def lines(*blocks, **options):
+    return list(terminal_lines(blocks, **options))
+
+
+def test_where_there_is_no_terminal_no_line_is_broken():
+    assert lines(TABLE) == [
+        "Attitude errors of a flight.",
+        "Controller        RMS roll, °  Largest roll, °  What it knows",
+        "identified model       0.0149             12.5  the torque that a motion takes",
+        "PD alone                  1.2                3  nothing",
+    ]
+
+
+@pytest.mark.parametrize("width", [60, 50])
+def test_a_table_fits_the_terminal_and_loses_nothing(width):
+    shown = lines(TABLE, width=width)[1:]
+    assert max(map(len, shown)) <= width
+    assert "…" not in "".join(shown)
+    for row in TABLE.cells:
+        for word in " ".join(cell.text for cell in row).split():
+            assert any(word in line.split() for line in shown)
+
+
+def test_facts_stand_in_two_columns_and_long_ones_are_broken_under_themselves():
+    facts = Facts([("Source", "simulated along a path with a long name"), ("Samples", "549")])
+    assert lines(facts) == ["Source   simulated along a path with a long name", "Samples  549"]
+    assert lines(facts, width=30) == ["Source   simulated along a", "         path with a long name", "Samples  549"]
+
+
+def test_a_table_without_titles_has_no_header():
+    assert lines(Table("t", "", ("", ""), [["a", "1"], ["bc", "23"]])) == ["a    1", "bc  23"]
+
+
+def test_sentences_stand_as_they_are_and_pictures_stay_on_the_page():
+    plot, folded = Plot("p", "A picture.", "<svg/>"), Folded("More", [TABLE])
+    box = Box("Verdict", "good", ["one reason", "another"])
+    shown = lines(Text("a sentence"), Heading("a heading"), box, Listing("All", "one\ntwo\n"), plot, folded)
+    assert shown == ["a sentence", "a heading", "Verdict: good", "  one reason", "  another", "one", "two"]
+
+
+def test_what_warns_is_apart():
+    blocks = [Text("all is well"), Text("beware", "warning"), Text("note this", "note")]
+    assert lines(*blocks) == ["all is well", "note this"]
+    assert warnings_of(blocks) == ("beware",)
+
+
+def test_colours_only_where_they_are_asked_for():
+    assert not any("\x1b" in line for line in lines(TABLE, width=80))
+    (marked,) = (line for line in lines(TABLE, width=80, colour=True) if "12.5" in line)
+    assert re.search(r"\x1b\[1;31m *12\.5\x1b\[0m", marked)

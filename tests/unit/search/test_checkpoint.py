@@ -1,0 +1,190 @@
+"""Checkpoints: bit by bit what they were, and refused where they are damaged or of another search."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.check import check_artifact
+from cpfls_cli.artifacts.checkpoint import CheckpointRecord
+from cpfls_cli.artifacts.job import header_of
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import read_artifact, write_artifact
+from cpfls_cli.config.load import validate
+from cpfls_cli.errors import InputError
+from cpfls_cli.evolution import Evaluation, start, step
+from cpfls_cli.identification.search import Unfinished
+from cpfls_cli.search.checkpoint import Checkpoint
+
+INPUTS = {"flight": InputFile("f.h5", "a" * 64, "cpfls/flight"), "validate-1": InputFile("v.h5", "b" * 64, "csv")}
+
+
+def header(inputs=INPUTS, seed=1, **keys):
+    settings = {"population": 20, "generations": 9, "subpopulations": 2, **keys}
+    return header_of(validate({"seed": seed, "identification": settings}, "study.yaml"), inputs)
+
+
+def settings():
+    return validate({"identification": {"population": 20, "generations": 9, "subpopulations": 2}}, "s").identification
+
+
+def failing_sometimes(genes):
+    refined = genes // 3 * 3
+    x = refined / 65535
+    objectives = np.column_stack([np.sum((x - place) ** 2, axis=1) / 3 for place in (0.1, 0.5, 0.7)])
+    objectives[genes[:, 0] % 4 == 0] = np.inf
+    return Evaluation(refined, objectives)
+
+
+def evolved(generations=3):
+    state = start(failing_sometimes, 5, settings(), np.random.default_rng(11))
+    for _ in range(generations):
+        state = step(state, failing_sometimes, settings())
+    return state
+
+
+def assert_same(one, other):
+    assert one.index == other.index
+    assert one.rng.bit_generator.state == other.rng.bit_generator.state
+    pairs = [(vars(one), vars(other)), (vars(one.history), vars(other.history))]
+    pairs += [({"submitted": s.archive.submitted, **vars(s.archive.results)} for s in (one, other))]
+    for first, second in pairs:
+        for name in ("genes", "objectives", "subpopulations", "submitted", "evaluations", "best", "front_size"):
+            if name in first:
+                assert first[name].dtype == second[name].dtype
+                np.testing.assert_array_equal(first[name], second[name])
+
+
+@pytest.fixture
+def checkpoint(tmp_path):
+    kept = Checkpoint.beside(tmp_path / "model.h5", header())
+    kept.write(evolved())
+    return kept
+
+
+def test_it_lies_beside_the_output(checkpoint, tmp_path):
+    assert checkpoint.path == tmp_path / "model.h5.checkpoint"
+    assert checkpoint.output == tmp_path / "model.h5"
+    checkpoint.remove()
+    checkpoint.remove()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_state_comes_back_bit_by_bit_and_goes_on_the_same(checkpoint):
+    read, kept = checkpoint.read().state, evolved()
+    assert np.isinf(kept.archive.results.objectives).any()
+    assert_same(read, kept)
+    for _ in range(5):
+        read, kept = step(read, failing_sometimes, settings()), step(kept, failing_sometimes, settings())
+    assert_same(read, kept)
+
+
+def unfinished():
+    genes = np.random.default_rng(12).integers(0, 65536, (7, 5))
+    evaluation = failing_sometimes(genes)
+    evaluation.objectives[2] = np.nan
+    return Unfinished(genes, evaluation)
+
+
+@pytest.mark.parametrize("finished", [True, False], ids=["with a generation", "before the first"])
+def test_what_was_evaluated_of_the_next_generation_comes_back(checkpoint, finished):
+    assert len(checkpoint.read().unfinished.submitted) == 0
+    if not finished:
+        checkpoint.remove()
+    checkpoint.add(unfinished())
+    assert check_artifact(read_artifact(checkpoint.path, CheckpointRecord.spec())) == []
+    stopped = checkpoint.read()
+    for stored, kept in (
+        (stopped.unfinished.submitted, unfinished().submitted),
+        (stopped.unfinished.evaluation.genes, unfinished().evaluation.genes),
+        (stopped.unfinished.evaluation.objectives, unfinished().evaluation.objectives),
+    ):
+        assert stored.dtype == kept.dtype
+        np.testing.assert_array_equal(stored, kept)
+    assert (stopped.state is not None) == finished
+    if stopped.state is not None:
+        assert_same(stopped.state, evolved())
+        checkpoint.write(stopped.state)
+        assert len(checkpoint.read().unfinished.submitted) == 0
+
+
+def test_it_is_a_good_artifact_and_equal_states_are_equal_files(checkpoint, tmp_path):
+    assert check_artifact(read_artifact(checkpoint.path, CheckpointRecord.spec())) == []
+    other = Checkpoint.beside(tmp_path / "other.h5", header())
+    other.write(checkpoint.read().state)
+    assert other.path.read_bytes() == checkpoint.path.read_bytes()
+
+
+def test_none_to_resume(tmp_path):
+    with pytest.raises(InputError, match=r"m\.h5\.checkpoint: no such file, .*start without --resume"):
+        Checkpoint.beside(tmp_path / "m.h5", header()).read()
+
+
+@pytest.mark.parametrize(
+    ("now", "said"),
+    [
+        (header(seed=2), "seed = 1 there, 2 here"),
+        (header(mutated_bits=0.5), "identification.mutated_bits = 0.003 there, 0.5 here"),
+        (header(ridge={"folds": 7}), "identification.ridge.folds = 5 there, 7 here"),
+        (header(generations=2), "identification.generations = 2, but it has come to generation 3"),
+        (
+            header({"flight": replace(INPUTS["flight"], sha256="c" * 64)}),
+            "flight = f.h5 (aaaaaaaaaaaa) there, f.h5 (c",
+        ),
+        (header({**INPUTS, "selection": InputFile("s.h5", "d" * 64, "x")}), "selection = none there, s.h5 (dddddddddd"),
+        (replace(header(), version="9.9"), "this is 9.9"),
+    ],
+)
+def test_checkpoint_of_another_search_names_the_difference(checkpoint, now, said):
+    with pytest.raises(InputError) as error:
+        Checkpoint(checkpoint.path, now).read()
+    assert str(error.value).startswith(f"{checkpoint.path}: is of another search: ")
+    assert said in str(error.value)
+    assert str(error.value).count(" here") <= 1
+    assert "--force" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "now",
+    [
+        header(generations=3),
+        header(generations=500),
+        header({"flight": replace(INPUTS["flight"], name="renamed.h5")}),
+        header({**INPUTS, "validate-1": InputFile("w.h5", "e" * 64, "csv")}),
+    ],
+)
+def test_what_does_not_change_the_search_may_change(checkpoint, now):
+    assert_same(Checkpoint(checkpoint.path, now).read().state, evolved())
+
+
+def test_every_bit_of_the_datasets_counts(checkpoint):
+    checkpoint.add(unfinished())
+    artifact = read_artifact(checkpoint.path, CheckpointRecord.spec())
+    for name, value in artifact.data.items():
+        if np.asarray(value).dtype.kind == "U":
+            continue
+        changed = np.array(value)
+        changed.reshape(-1).view(np.uint8)[-1] ^= 1
+        write_artifact(checkpoint.path, replace(artifact, data={**artifact.data, name: changed}))
+        with pytest.raises(InputError, match=r"model\.h5\.checkpoint: .*--force without --resume starts again"):
+            checkpoint.read()
+
+
+def test_damaged_file_is_refused_with_one_message(checkpoint):
+    content = checkpoint.path.read_bytes()
+    for cut in (0, 100, len(content) // 2, len(content) - 1):
+        checkpoint.path.write_bytes(content[:cut])
+        with pytest.raises(
+            InputError, match=r"model\.h5\.checkpoint: .*--force without --resume starts again"
+        ) as error:
+            checkpoint.read()
+        assert "\n" not in str(error.value)
+
+
+def test_tidying_leaves_all_but_what_was_half_written(checkpoint, tmp_path):
+    half = [tmp_path / f".{name}.ab_12xyz.part" for name in ("model.h5", "model.h5.checkpoint")]
+    kept = [tmp_path / name for name in (".model.h5.old.ab_12xyz.part", ".other.h5.ab_12xyz.part", "model.h5")]
+    for path in (*half, *kept):
+        path.write_text("")
+    checkpoint.tidy()
+    assert sorted(tmp_path.iterdir()) == sorted([*kept, checkpoint.path])
