@@ -18,9 +18,16 @@ from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, scatter_size, scatter_variance, system
-from cpfls_cli.gap.balance.inertial import rotation_balance
 from cpfls_cli.gap.balance.refine import refined
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.gap.balance.weak_flight import (
+    CHANNELS,
+    Candidate,
+    WeakFlight,
+    actuated,
+    columns_of,
+    nuisance,
+    rotation_balance,
+)
 from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen

@@ -1,4 +1,4 @@
-"""A flight as rows of the torque and force balance, six for each window."""
+"""A flight as rows of the torque and force balance, six for each window, with inertia in momentum form."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
+from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.catalogue.parameter_error import shown
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.inertial import Balance, rotation_balance, translation_balance
+from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.noise_floor import noise_floor
 from cpfls_cli.gap.balance.windows import Windows
 
@@ -206,3 +207,78 @@ def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
         if effect.apply is not None and effect.kind == "actuator" and not effect.missing(signals):
             signals = effect.apply(signals, candidate.shape)
     return signals
+
+
+@dataclass(frozen=True)
+class Balance:
+    """One side of a balance, ``d/dt momentum + direct``.
+
+    Attributes
+    ----------
+    momentum, direct : array, shape (time, 3), body axes
+    """
+
+    momentum: Array
+    direct: Array
+
+
+def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Balance:
+    """Compute the inertial body torque in momentum form.
+
+    A rigid body: momentum ``I omega``, direct ``omega x I omega``. A model in Euler coordinates: ``W^-T (d/dt (J qd) -
+    1/2 grad (qd^T J qd))``, with W^-T taken under the derivative.
+
+    Parameters
+    ----------
+    signals : Signals
+    model : InertiaModel or None
+        None for the rigid body of the vehicle.
+
+    Returns
+    -------
+    Balance
+        N m s and N m.
+
+    Raises
+    ------
+    InputError
+        If the model needs an attitude that the flight lacks.
+    """
+    if model is not None:
+        return _euler_balance(signals, model)
+    momentum = signals.body_rate @ inertia_tensor(signals.vehicle)
+    return Balance(momentum, np.cross(signals.body_rate, momentum))
+
+
+def _euler_balance(signals: Signals, model: InertiaModel) -> Balance:
+    attitude = signals.attitude
+    if attitude is None:
+        raise InputError("the model needs the attitude, which the flight lacks")
+    return Balance(*momentum_form(attitude, signals.body_rate, model.inertia(attitude)))
+
+
+def translation_balance(signals: Signals) -> Balance:
+    """Compute mass times specific force in momentum form, body axes.
+
+    From the accelerometer, else from the acceleration, else from the velocity: ``d/dt (m v_b) + m omega x v_b +
+    m g R^T e_z``.
+
+    Parameters
+    ----------
+    signals : Signals
+        With `has_force`.
+
+    Returns
+    -------
+    Balance
+        N s and N.
+    """
+    mass, gravity = signals.vehicle.mass_kg, signals.vehicle.gravity_m_s2
+    if signals.specific_force is not None:
+        return Balance(np.zeros((len(signals), 3)), mass * signals.specific_force)
+    weight = mass * gravity * signals.rotation[:, 2]
+    if signals.acceleration is not None:
+        felt = np.einsum("tji,tj->ti", signals.rotation, signals.acceleration)
+        return Balance(np.zeros((len(signals), 3)), mass * felt + weight)
+    momentum = mass * signals.air_velocity
+    return Balance(momentum, np.cross(signals.body_rate, momentum) + weight)

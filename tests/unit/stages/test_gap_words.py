@@ -11,15 +11,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import worse_axes
-from cpfls_cli.gap.naming.results import (
-    Alternative,
-    Diagnosis,
-    Estimate,
-    GapSize,
-    GapVerdict,
-    NamedEffect,
-    Unexplained,
-)
+from cpfls_cli.gap.naming.results import Alternative, Diagnosis, Estimate, GapSize, GapVerdict, NamedEffect, Unexplained
 from cpfls_cli.gap.replay import Replayed
 from cpfls_cli.pages.diagnosis_words import diagnosis_lines, effect_line, headline
 from cpfls_cli.pages.disagreement_words import replay_lines
