@@ -233,8 +233,8 @@ class ModelRecord(Record):
 
         if self.uncertainty is None:
             return None
-        own = self.uncertainty
-        return Draws(own.coefficients, own.rigid_body, own.best_rigid_body, own.blocks, own.block_duration)
+        drawn = self.uncertainty
+        return Draws(drawn.coefficients, drawn.rigid_body, drawn.best_rigid_body, drawn.blocks, drawn.block_duration)
 
     @property
     def complete(self) -> bool:

@@ -104,5 +104,5 @@ def reference_points(model: Model, rng: np.random.Generator) -> Expected:
 
 def _cells(allowed: BoolArray, rng: np.random.Generator) -> Iterator[tuple[int, int]]:
     places = np.argwhere(allowed)
-    for place in rng.permutation(len(places))[:POINTS]:
-        yield int(places[place, 0]), int(places[place, 1])
+    for index in rng.permutation(len(places))[:POINTS]:
+        yield int(places[index, 0]), int(places[index, 1])

@@ -233,12 +233,12 @@ def _structure_words(structure: ModelStructure) -> dict[str, Any]:
 def _features_text(structure: ModelStructure) -> list[str]:
     settings = structure.settings
     order = settings.harmonic_order
-    own = "s, the triangle wave of the angle, as the inputs of the rules have it"
+    single = "s, the triangle wave of the angle, as the inputs of the rules have it"
     if settings.consequents == "harmonic":
-        own = f"sin q .. sin {order}q, cos q .. cos {order}q" if order > 1 else "sin q, cos q"
+        single = f"sin q .. sin {order}q, cos q .. cos {order}q" if order > 1 else "sin q, cos q"
     elif not structure.circular:
-        own = "x, the angle on the scale of the membership functions"
+        single = "x, the angle on the scale of the membership functions"
     pairs = "1, those of roll, those of pitch"
     if settings.products == "tensor":
         pairs = "all products of (1, those of roll) and (1, those of pitch), pitch running fastest"
-    return comment_lines([f"one input: 1, {own};", f"two inputs: {pairs}."])
+    return comment_lines([f"one input: 1, {single};", f"two inputs: {pairs}."])

@@ -140,13 +140,13 @@ def _alone(parts: Sequence[JudgedOn]) -> str:
     for part in parts:
         by_label.setdefault(part.models[0].label, []).append(part)
     return "; ".join(
-        f"{label} on {joined(part.title for part in own)} ({_hashes_words(sum((part.hashes for part in own), ()))})"
+        f"{label} on {joined(part.title for part in own)} ({_hashes_words(*(part.hashes for part in own))})"
         for label, own in by_label.items()
     )
 
 
-def _hashes_words(flights: Sequence[str]) -> str:
-    return "sha256 " + joined(sha256[:12] for sha256 in flights)
+def _hashes_words(*flights: Sequence[str]) -> str:
+    return "sha256 " + joined(sha256[:12] for hashes in flights for sha256 in hashes)
 
 
 @dataclass(frozen=True)
@@ -164,8 +164,10 @@ def _overall(name: str, part: JudgedOn) -> Table:
         f"All on {part.title} ({_hashes_words(part.hashes)}), the same data for all.{learned} Each rigid body was "
         "fitted to what its model learned from. ◂ marks the best of a column, of models and rigid bodies alike."
     )
-    lines = [_Line(_words(model), *_worst(model, MODEL, own)) for model, own in part.pairs]
-    lines += [_Line((label, "", "6", UNKNOWN), *_worst(model, RIGID_BODY, own)) for label, model, own in _bodies(part)]
+    lines = [_Line(_words(model), *_worst(model, MODEL, name)) for model, name in part.pairs]
+    lines += [
+        _Line((label, "", "6", UNKNOWN), *_worst(model, RIGID_BODY, name)) for label, model, name in _bodies(part)
+    ]
     return Table(name, caption, _OVERALL, _marked(lines), _SENTENCES, _SENTENCES)
 
 
@@ -174,8 +176,8 @@ def _by_axis(name: str, part: JudgedOn) -> Table:
         f"The same by axis: root mean square error of the torque on {part.title}, and in brackets over the standard "
         "deviation of the torque. ◂ as above."
     )
-    lines = [_Line((model.label,), *_axes(model, MODEL, own)) for model, own in part.pairs]
-    lines += [_Line((label,), *_axes(model, RIGID_BODY, own)) for label, model, own in _bodies(part)]
+    lines = [_Line((model.label,), *_axes(model, MODEL, name)) for model, name in part.pairs]
+    lines += [_Line((label,), *_axes(model, RIGID_BODY, name)) for label, model, name in _bodies(part)]
     return Table(name, caption, _BY_AXIS, _marked(lines), frozenset({0}), frozenset({0}))
 
 
@@ -199,9 +201,9 @@ def _words(model: _Model) -> tuple[str, ...]:
 def _bodies(part: JudgedOn) -> list[tuple[str, _Model, str]]:
     """Name each rigid body once: models that learned from the same samples have the same."""
     owners: dict[tuple[str, ...], list[tuple[_Model, str]]] = {}
-    for model, own in part.pairs:
-        shown = (*_worst(model, RIGID_BODY, own)[1], *_axes(model, RIGID_BODY, own)[1])
-        owners.setdefault(shown, []).append((model, own))
+    for model, name in part.pairs:
+        shown = (*_worst(model, RIGID_BODY, name)[1], *_axes(model, RIGID_BODY, name)[1])
+        owners.setdefault(shown, []).append((model, name))
     if len(owners) == 1:
         return [("rigid body", *part.pairs[0])]
     return [(f"rigid body of {joined(model.label for model, _ in who)}", *who[0]) for who in owners.values()]
@@ -256,8 +258,8 @@ def _errors(parts: Sequence[JudgedOn], model: _Model, kind: str, axis: int) -> t
     errors, rows = [], []
     for row, part in enumerate(parts[::-1]):
         if model in part.models:
-            own = part.names[part.models.index(model)]
-            share = float(model.record.judged.nrmse(kind, own)[axis])
+            name = part.names[part.models.index(model)]
+            share = float(model.record.judged.nrmse(kind, name)[axis])
             errors.append(0.0 if share < _FLOOR else 100 * share)
             rows.append(float(row))
     return errors, rows
@@ -301,9 +303,9 @@ def _tick(value: float, floored: bool) -> str:
 
 def _curves(models: Sequence[_Model]) -> Iterator[Block]:
     curves = [(model.label, model.record.curves) for model in models if model.record.curves is not None]
-    names = dict.fromkeys(name for _, own in curves for name in own.name)
+    names = dict.fromkeys(name for _, entries in curves for name in entries.name)
     for index, name in enumerate(names, start=1):
-        compared = [(label, own) for label, own in curves if name in own.name]
+        compared = [(label, entries) for label, entries in curves if name in entries.name]
         if len(compared) > 1:
             yield compared_curves_figure(f"comparison-curves-{index}", compared, name)
 
@@ -337,8 +339,8 @@ def differences(configs: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[st
     """
     flat = [dict(_flat(config)) for config in configs]
     keys = dict.fromkeys(key for one in flat for key in one)
-    values = {key: [one.get(key, _ABSENT) for one in flat] for key in keys}
-    return [(key, list(map(_short, own))) for key, own in values.items() if len(set(map(str, own))) > 1]
+    by_key = {key: [config.get(key, _ABSENT) for config in flat] for key in keys}
+    return [(key, list(map(_short, values))) for key, values in by_key.items() if len(set(map(str, values))) > 1]
 
 
 def _flat(config: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

@@ -75,8 +75,8 @@ def _chromosome_table(record: ModelRecord, index: int) -> Table:
     weights = [count(weight) for weight in record.model.weights]
     rows = []
     for name, peaks in _breakpoints(record.model).items():
-        own, weights = weights[: len(peaks) - 1], weights[len(peaks) - 1 :]
-        rows.append([name, " ".join(own), " ".join(number(float(peak), 5) for peak in peaks)])
+        genes, weights = weights[: len(peaks) - 1], weights[len(peaks) - 1 :]
+        rows.append([name, " ".join(genes), " ".join(number(float(peak), 5) for peak in peaks)])
     header = ("Partition", "Weights (16 bit)", "Breakpoints")
     return Table(f"chromosome-{index}", "Chromosome and the partitions that it encodes.", header, rows)
 

@@ -53,13 +53,13 @@ _SCORES = (
 
 def answer(model: Source[ModelRecord]) -> Iterator[Block]:
     """Say what was found, how good it is beside its baselines, how far to trust it and where, and what to distrust."""
-    yield from found(model)
+    yield from solution(model)
     yield scores_table(model, 1)
     yield from verdict(model)
     yield from (Text(finding, "warning") for finding in model.record.findings)
 
 
-def found(model: Source[ModelRecord]) -> Iterator[Text]:
+def solution(model: Source[ModelRecord]) -> Iterator[Text]:
     """Say how many parameters were found from how much, how the search ended, and the rigid body beside them."""
     record = model.record
     solve, evaluations = record.solve, record.history.evaluations
@@ -145,8 +145,8 @@ def verdict_line(model: Source[ModelRecord]) -> Text:
         "goes on."
     )
     if record.verdict is None or record.verdict.label is None:
-        told = "no verdict, because the evidence was not gathered (identification.validation.enabled)"
-        return Text(f"{model.label}: {told}.{incomplete}", "warning" if incomplete else "note")
+        reason = "no verdict, because the evidence was not gathered (identification.validation.enabled)"
+        return Text(f"{model.label}: {reason}.{incomplete}", "warning" if incomplete else "note")
     words, tone = _verdict_words(record.verdict.label)
     where = f" Region: {record.verdict.region.rstrip('.')}." if record.verdict.region else ""
     return Text(f"{model.label}: {words}.{where}{incomplete}", "warning" if incomplete else tone)

@@ -8,7 +8,7 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
 from cpfls_cli.pages.gap_words import sentence
-from cpfls_cli.pages.model import found, scores_table, verdict_line
+from cpfls_cli.pages.model import scores_table, solution, verdict_line
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.sections.gap_summary import gap_blocks
 from cpfls_cli.pages.source import Source, Sources
@@ -60,7 +60,7 @@ def _model(model: Source[ModelRecord], sources: Sources, index: int) -> Iterator
     record = model.record
     yield Heading(f"Model {model.label}")
     yield Facts(_facts(model))
-    yield from found(model)
+    yield from solution(model)
     yield from _beside_rigid_body(model, sources)
     yield scores_table(model, index)
     yield Heading("Findings")

@@ -147,7 +147,7 @@ def _keep_scale(axes: Axes, shown: Sequence[Array], curves: Sequence[CurvesGroup
     curves : sequence of CurvesGroup
         The whole matrices, so that rounding of an entry that is zero is not drawn large.
     """
-    largest = max(float(np.abs(own.inertia).max(initial=1e-12)) for own in curves)
+    largest = max(float(np.abs(each.inertia).max(initial=1e-12)) for each in curves)
     known = np.concatenate([curve[np.isfinite(curve)] for curve in shown])
     if known.size:
         low, high = float(known.min()), float(known.max())
