@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.gap_groups import (
+from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, ReplayChangeGroup, effect_summary
+from cpfls_cli.artifacts.gap_flights import (
+    HELD_OUT,
+    TRAINING,
     AuditGroup,
     BaseGroup,
     FlightsGroup,
-    GapChangeGroup,
-    NamedEffectsGroup,
     NotExcitedGroup,
-    ReplayChangeGroup,
 )
-from cpfls_cli.artifacts.spec import BODY, Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+
+if TYPE_CHECKING:
+    from cpfls_cli.gap.balance.windows import Recording
+    from cpfls_cli.gap.before_after import BeforeAfter
+    from cpfls_cli.gap.diagnose import DiagnosisRun
+    from cpfls_cli.gap.extended import ExtendedModel
+    from cpfls_cli.gap.naming.held_out import HeldOut
+    from cpfls_cli.gap.naming.results import Alternative, Unexplained
+
+_PHYSICS = ("wrench", "actuator")
+"""Kinds of effects that torque and force show; sensors and numbers of the vehicle are told on other grounds."""
 
 
 @record
@@ -25,6 +39,11 @@ class AlternativeGroup:
     instead_of: tuple[str, ...] = dataset("instead_of", "the named one", "alternative")
     relative_gain: Array = dataset("relative_gain", "what it explains over what the named one explains", "alternative")
     separated_by: tuple[str, ...] = dataset("separated_by", "the flight that would tell", "alternative")
+
+    @classmethod
+    def of(cls, rivals: Sequence[Alternative]) -> Self:
+        """Arrange effects that could be named instead."""
+        return columns_of(cls, rivals)
 
 
 @record
@@ -37,6 +56,23 @@ class UnexplainedGroup:
     share: Array = dataset("share", "share of what is left that signal or narrow band explains", "unexplained")
     frequency: Array = dataset("frequency", "of a narrow band that stands out", "unexplained", units="Hz", gaps=True)
     energy: tuple[str, ...] = dataset("energy", "feeds, drains or neither", "unexplained")
+
+    @classmethod
+    def of(cls, unexplained: Sequence[Unexplained]) -> Self:
+        """Arrange channels whose gap nothing explains."""
+        signals = tuple(each.signal or "" for each in unexplained)
+        frequencies = np.array([each.frequency_hz for each in unexplained], dtype=float)
+        return columns_of(cls, unexplained, signal=signals, frequency=frequencies)
+
+    def unexplained(self) -> list[Unexplained]:
+        """Rebuild what is not explained."""
+        from cpfls_cli.gap.naming.results import Unexplained
+
+        rows = rows_of(self)
+        for row in rows:
+            frequency = row.pop("frequency")
+            row |= {"signal": row["signal"] or None, "frequency_hz": None if np.isnan(frequency) else frequency}
+        return [Unexplained(**row) for row in rows]
 
 
 @record
@@ -61,6 +97,13 @@ class ResidualChangeGroup:
     )
     after: Array = dataset("after", "gap with the effects", "window", "channel", units="SI", frame=BODY, gaps=True)
 
+    @classmethod
+    def of(cls, unseen: HeldOut, change: BeforeAfter) -> Self:
+        """Arrange the gap of held-out windows."""
+        parts = {"before": unseen.before, "parameters": unseen.parameters, "after": unseen.after}
+        known = {name: np.where(unseen.known, rows, np.nan) for name, rows in parts.items()}
+        return cls(time=change.centres, flight=change.flight_index, **known)
+
 
 @record
 class WhitenessGroup:
@@ -73,6 +116,23 @@ class WhitenessGroup:
         "p_value_before", "probability that noise is as correlated, by Ljung and Box", "channel", gaps=True
     )
     p_value_after: Array = dataset("p_value_after", "the same with the effects", "channel", gaps=True)
+
+    @classmethod
+    def of(cls, change: BeforeAfter) -> Self:
+        """Arrange autocorrelations."""
+        before, after = change.white_before, change.white_after
+        return cls(
+            lag=np.asarray(change.lag_s * np.arange(1, len(before.autocorrelation) + 1), dtype=float),
+            before=before.autocorrelation,
+            after=after.autocorrelation,
+            p_value_before=before.p_value,
+            p_value_after=after.p_value,
+        )
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """How white the gap is, for machines."""
+        return {"p_value_before": self.p_value_before.tolist(), "p_value_after": self.p_value_after.tolist()}
 
 
 @record
@@ -88,6 +148,19 @@ class PictureGroup:
     before: Array = dataset("before", "simulated, model as given", "moment", units="SI", frame=BODY)
     after: Array = dataset("after", "simulated, with the effects", "moment", units="SI", frame=BODY)
 
+    @classmethod
+    def of(cls, change: BeforeAfter, held: Sequence[Recording]) -> Self:
+        """Arrange the stretch with the largest gap."""
+        picture = change.picture
+        return cls(
+            flight=held[picture.flight].name,
+            channel=picture.channel,
+            time=picture.time,
+            measured=picture.measured,
+            before=picture.before,
+            after=picture.after,
+        )
+
 
 @record
 class RunGroup:
@@ -100,6 +173,20 @@ class RunGroup:
     measured: Array = dataset("measured", "body rates", "run_sample", "axis", units="rad/s", frame=BODY)
     before: Array = dataset("before", "simulated, model as given", "run_sample", "axis", units="rad/s", frame=BODY)
     after: Array = dataset("after", "simulated, with the effects", "run_sample", "axis", units="rad/s", frame=BODY)
+
+    @classmethod
+    def of(cls, change: BeforeAfter, held: Sequence[Recording]) -> Self:
+        """Arrange the stretch whose free runs went astray most."""
+        run = change.run
+        return cls(
+            flight=held[change.run_flight].name,
+            axis=run.axis,
+            time=run.time,
+            restart=run.restarts,
+            measured=run.measured,
+            before=run.before,
+            after=run.after,
+        )
 
 
 @record
@@ -131,3 +218,89 @@ class DiagnosisRecord(Record):
     note: tuple[str, ...] = dataset("note", "what a reader should know", "note")
     base: BaseGroup = group("base")
     flights: FlightsGroup = group("")
+
+    @classmethod
+    def of(
+        cls,
+        diagnosed: DiagnosisRun,
+        change: BeforeAfter,
+        model: ExtendedModel,
+        training: Sequence[Recording],
+        held: Sequence[Recording],
+        split: str,
+        base: BaseGroup,
+    ) -> Self:
+        """Arrange a diagnosis.
+
+        Parameters
+        ----------
+        model : ExtendedModel
+            That it arrives at.
+        split : str
+            Why these flights trained and those were held out.
+        base : BaseGroup
+            The identified model that misses something, or the vehicle.
+        """
+        diagnosis = diagnosed.diagnosis
+        effects, named = diagnosis.effects or diagnosis.closest, bool(diagnosis.effects)
+        alone = diagnosis.torque_alone
+        return cls(
+            verdict=str(diagnosis.verdict),
+            share=diagnosis.share,
+            split=split,
+            effects=NamedEffectsGroup.of(effects, named, diagnosis.parameters, model.parameters),
+            alternative=AlternativeGroup.of(diagnosis.alternatives),
+            unexplained=UnexplainedGroup.of(diagnosis.unexplained),
+            torque_alone=TorqueAloneGroup(
+                name=tuple(name for name, _ in alone), share=np.fromiter((share for _, share in alone), float)
+            ),
+            gap=GapChangeGroup.of(diagnosis.before, diagnosis.after, diagnosis.floor),
+            replay=ReplayChangeGroup.of(change.before, change.after, change.held),
+            residual=ResidualChangeGroup.of(diagnosed.held_out, change),
+            whiteness=WhitenessGroup.of(change),
+            picture=PictureGroup.of(change, held),
+            run=RunGroup.of(change, held),
+            not_excited=NotExcitedGroup.of(diagnosis.not_excited),
+            audit=AuditGroup.of(diagnosed.audit),
+            note=diagnosis.notes,
+            base=base,
+            flights=FlightsGroup.of([*training, *held], [TRAINING] * len(training) + [HELD_OUT] * len(held)),
+        )
+
+    @property
+    def effects_of_motion(self) -> tuple[str, ...]:
+        """Effects that the verdict names and that torque and force show, by identifier."""
+        return self.effects.names(*_PHYSICS)
+
+    @property
+    def forces_decide(self) -> bool:
+        """Whether the torques alone would name another effect first than torque and force together."""
+        alone, named = self.torque_alone.name, self.effects_of_motion
+        return bool(alone and named and self.gap.has_force and alone[0] not in named)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Notes on the diagnosis itself, without what the sensors say about each other."""
+        return tuple(note for note in self.note if note not in (*self.audit.warning, *self.audit.note))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The diagnosis for machines."""
+        return {
+            "verdict": self.verdict,
+            "share": self.share,
+            "effects": [effect_summary(effect) for effect in self.effects.named],
+            "closest": [effect_summary(effect) for effect in self.effects.closest],
+            "alternatives": rows_of(self.alternative),
+            "unexplained": [vars(each) for each in self.unexplained.unexplained()],
+            "not_excited": self.not_excited.summary,
+            "gap_before": self.gap.summary_before,
+            "gap_after": self.gap.summary_after,
+            "replay": self.replay and self.replay.summary,
+            "whiteness": self.whiteness and self.whiteness.summary,
+            "torque_alone": rows_of(self.torque_alone),
+            "audit": self.audit.summary,
+            "parameters": self.effects.parameter.summary,
+            "split": self.split,
+            "notes": list(self.note),
+        }

@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.gap_groups import AuditGroup, BaseGroup, FlightsGroup, NotExcitedGroup
-from cpfls_cli.artifacts.spec import BODY, Format, Record, dataset, group, record
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.gap_effects import ReplayErrors, above_noise, gap_summary
+from cpfls_cli.artifacts.gap_flights import AuditGroup, BaseGroup, FlightsGroup, NotExcitedGroup
+from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+
+if TYPE_CHECKING:
+    from cpfls_cli.gap.balance.windows import Recording
+    from cpfls_cli.gap.compare import Disagreement, WorstChannel
+    from cpfls_cli.gap.residual.dependence import Dependence
+    from cpfls_cli.gap.residual.views import Stretch
+
+_SIGNIFICANT = 0.05
+"""Probability of chance below which a gap follows a signal."""
 
 
 @record
@@ -26,6 +39,34 @@ class GapGroup:
     share: Array = dataset(
         "share", "gap over the torque or force that moves the vehicle", "channel", frame=BODY, gaps=True
     )
+
+    @classmethod
+    def of(cls, disagreement: Disagreement) -> Self:
+        """Arrange the gap of each channel."""
+        from cpfls_cli.gap.balance.weak_flight import CHANNELS
+
+        return cls(
+            channel=CHANNELS,
+            rms=disagreement.rms,
+            floor=disagreement.floor,
+            floors=disagreement.floors,
+            share=disagreement.rms / disagreement.activity,
+        )
+
+    @property
+    def known(self) -> list[int]:
+        """Indices of the channels whose gap is known."""
+        return np.flatnonzero(np.isfinite(self.floors)).tolist()
+
+    @property
+    def above_noise(self) -> BoolArray:
+        """Channels with a gap above noise, shape (channel,)."""
+        return above_noise(self.floors)
+
+    @property
+    def largest(self) -> int | None:
+        """Index of the channel with the largest gap in floors; None where no gap is known."""
+        return int(np.nanargmax(self.floors)) if self.known else None
 
 
 @record
@@ -51,13 +92,27 @@ class StateGroup:
 class StretchGroup:
     """Stretches of time with the largest gap, largest first."""
 
-    flight: IntArray = dataset(
-        "flight", "index of the flight; stretches of time with the largest gap, first", "stretch"
-    )
+    flight: Array = dataset("flight", "index of the flight; stretches of time with the largest gap, first", "stretch")
     start: Array = dataset("start", "on the clock of the flight", "stretch", units="s")
     end: Array = dataset("end", "on the clock of the flight", "stretch", units="s")
     channel: tuple[str, ...] = dataset("channel", "channel of the gap", "stretch")
     floors: Array = dataset("floors", "root mean square of the gap there, in floors", "stretch")
+
+    @classmethod
+    def of(cls, stretches: Sequence[Stretch]) -> Self:
+        """Arrange stretches of time."""
+        return cls(
+            flight=np.fromiter((stretch.flight for stretch in stretches), float),
+            start=np.fromiter((stretch.start_s for stretch in stretches), float),
+            end=np.fromiter((stretch.end_s for stretch in stretches), float),
+            channel=tuple(stretch.channel for stretch in stretches),
+            floors=np.fromiter((stretch.rms_floors for stretch in stretches), float),
+        )
+
+    def first(self, most: int) -> list[tuple[int, float, float, str, float]]:
+        """List the largest: flight, start and end in s, channel, floors."""
+        columns = (self.flight.astype(int).tolist(), self.start.tolist(), self.end.tolist(), self.channel)
+        return list(zip(*columns, self.floors.tolist(), strict=True))[:most]
 
 
 @record
@@ -68,6 +123,25 @@ class DependenceGroup:
     signal: tuple[str, ...] = dataset("signal", "signal that the gap is explained with, alone", "dependence")
     r2: Array = dataset("r2", "share of the variance explained on blocks that the fit did not see", "dependence")
     p_value: Array = dataset("p_value", "probability that chance does as well with any signal", "dependence")
+
+    @classmethod
+    def of(cls, pairs: Sequence[Dependence]) -> Self:
+        """Arrange pairs of channel and signal."""
+        return columns_of(cls, pairs)
+
+    @property
+    def sure(self) -> BoolArray:
+        """Pairs that are no chance, shape (dependence,)."""
+        return np.asarray((self.p_value < _SIGNIFICANT) & (self.r2 > 0))
+
+    def of_channel(self, channel: str) -> IntArray:
+        """Give the indices of the pairs of one channel, best first."""
+        return np.flatnonzero([name == channel for name in self.channel])
+
+    def followed(self, channel: str) -> list[tuple[str, float]]:
+        """List the signals that the gap of a channel surely follows, with their shares, best first."""
+        sure, shares = self.sure, self.r2.tolist()
+        return [(self.signal[index], shares[index]) for index in self.of_channel(channel) if sure[index]]
 
 
 @record
@@ -81,11 +155,24 @@ class HeatMapGroup:
     mean: Array = dataset(
         "mean", "mean gap in each cell, N m or N", "cell_first", "cell_second", units="SI", frame=BODY, gaps=True
     )
-    count: IntArray = dataset("count", "windows in each cell", "cell_first", "cell_second")
+    count: Array = dataset("count", "windows in each cell", "cell_first", "cell_second")
+
+    @classmethod
+    def of(cls, worst: WorstChannel) -> Self:
+        """Arrange the channel with the largest gap over two signals."""
+        first, second = worst.heat_map.edges
+        return cls(
+            channel=worst.channel,
+            signal=worst.signals,
+            first_edge=first,
+            second_edge=second,
+            mean=worst.heat_map.mean,
+            count=worst.heat_map.count,
+        )
 
 
 @record
-class ReplayGroup:
+class ReplayGroup(ReplayErrors):
     """Errors of replays of the measured rotor speeds by horizon."""
 
     horizon: IntArray = dataset("horizon", "samples over which measured rotor speeds are replayed", "horizon")
@@ -102,6 +189,19 @@ class ReplayGroup:
     attitude_held: Array = dataset(
         "attitude_held", "the same where the rates are held", "horizon", "axis", units="rad", frame=BODY, gaps=True
     )
+
+    @classmethod
+    def of(cls, disagreement: Disagreement) -> Self:
+        """Arrange the replays of a model, and of rates that stay what they are."""
+        model, held = disagreement.replayed, disagreement.held
+        return cls(
+            horizon=np.arange(1, len(held.horizon_s) + 1),
+            horizon_s=held.horizon_s,
+            rate_model=model.rate,
+            rate_held=held.rate,
+            attitude_model=model.attitude,
+            attitude_held=held.attitude,
+        )
 
 
 @record
@@ -127,3 +227,54 @@ class DisagreementRecord(Record):
     warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
     base: BaseGroup = group("base")
     flights: FlightsGroup = group("")
+
+    @classmethod
+    def of(
+        cls, disagreement: Disagreement, recordings: Sequence[Recording], warnings: tuple[str, ...], base: BaseGroup
+    ) -> Self:
+        """Arrange a comparison.
+
+        Parameters
+        ----------
+        warnings : tuple of str
+            What to know about the flights.
+        base : BaseGroup
+            The identified model that was compared, or the vehicle.
+        """
+        return cls(
+            gap=GapGroup.of(disagreement),
+            residual=ResidualGroup(
+                time=disagreement.centres, flight=disagreement.flight_index, value=disagreement.residual
+            ),
+            state=StateGroup(
+                name=tuple(disagreement.states), value=np.column_stack(list(disagreement.states.values()))
+            ),
+            stretch=StretchGroup.of(disagreement.stretches),
+            dependence=DependenceGroup.of(disagreement.dependence),
+            heat_map=None if disagreement.worst is None else HeatMapGroup.of(disagreement.worst),
+            replay=ReplayGroup.of(disagreement),
+            not_excited=NotExcitedGroup.of(disagreement.not_excited),
+            audit=AuditGroup.of(disagreement.audit),
+            warning=warnings,
+            base=base,
+            flights=FlightsGroup.of(recordings, ["given"] * len(recordings)),
+        )
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The comparison for machines."""
+        names = self.flights.names()
+        return {
+            "flights": names,
+            "gap": {**gap_summary(self.gap.rms, self.gap.floors), "share": self.gap.share.tolist()},
+            "stretches": [
+                {"flight": names[flight], "start_s": start, "end_s": end, "channel": channel, "rms_floors": floors}
+                for flight, start, end, channel, floors in self.stretch.first(len(self.stretch.channel))
+            ],
+            "dependence": rows_of(self.dependence),
+            "heat_map": self.heat_map and {"channel": self.heat_map.channel, "signals": list(self.heat_map.signal)},
+            "replay": self.replay and self.replay.summary,
+            "not_excited": self.not_excited.summary,
+            "audit": self.audit.summary,
+            "warnings": list(self.warning),
+        }

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.gap_groups import AuditGroup, BaseGroup, GapChangeGroup, NamedEffectsGroup, ReplayChangeGroup
+from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, ReplayChangeGroup, effect_summary
+from cpfls_cli.artifacts.gap_flights import AuditGroup, BaseGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, dataset, group, record
+from cpfls_cli.inertia import six_parameters
+
+if TYPE_CHECKING:
+    from cpfls_cli.gap.extended import ExtendedModel, Refit
 
 
 @record
@@ -29,3 +37,50 @@ class ExtendedRecord(Record):
     replay: ReplayChangeGroup | None = group("replay", default=None)
     audit: AuditGroup = group("")
     base: BaseGroup = group("base")
+
+    @classmethod
+    def of(cls, refit: Refit, moments: Sequence[float], replay: ReplayChangeGroup, base: BaseGroup) -> Self:
+        """Arrange an refit.
+
+        Parameters
+        ----------
+        moments : sequence of float
+            Of the vehicle: three moments of inertia, or with the three products, kg m^2.
+        replay : ReplayChangeGroup
+            Of held-out flights.
+        base : BaseGroup
+            The identified model that is extended, or the vehicle.
+        """
+        model, unseen = refit.model, refit.unseen
+        assert model.audit is not None, "an refit repairs what the audit found"
+        rigid_body = six_parameters(moments) if model.base is None else np.zeros(6)
+        correction = np.array([*model.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])
+        numbers = {number.name: number for number in refit.estimates.parameters}
+        return cls(
+            inertia=rigid_body + correction,
+            thrust_scale=1.0 + numbers["thrust_scale"].value if "thrust_scale" in numbers else 1.0,
+            effects=NamedEffectsGroup.of(refit.effects, True, numbers, model.parameters),
+            gap=GapChangeGroup.of(unseen.size(unseen.before), unseen.size(unseen.after), unseen.floor),
+            replay=replay,
+            audit=AuditGroup.of(model.audit),
+            base=base,
+        )
+
+    def rebuilt(self, path: object) -> ExtendedModel:
+        """Rebuild the model with its effects.
+
+        Parameters
+        ----------
+        path : Path
+            For messages.
+        """
+        return self.effects.model(self.base.rebuilt(path), self.audit)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The refit for machines."""
+        return {
+            "effects": [effect_summary(effect) for effect in self.effects.named],
+            "gap_before": self.gap.summary_before,
+            "gap_after": self.gap.summary_after,
+        }

@@ -7,7 +7,7 @@ docs/format.md follow from the fields.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cache
 from types import NoneType
@@ -253,6 +253,39 @@ class Record:
     def with_header(self, header: Header) -> Self:
         """Add where it comes from."""
         return replace(self, header=header)
+
+
+def columns_of(kind: type[_Class], rows: Iterable[object], /, **given: Any) -> _Class:
+    """Arrange results as a group of columns: each field holds the attributes of its name, one for each result.
+
+    Parameters
+    ----------
+    kind : type
+        A record whose fields are lists of text or numbers.
+    **given : object
+        Columns that are no attribute of the results, by field.
+    """
+    listed = list(rows)
+    columns = {
+        entry.field.name: _column([getattr(row, entry.field.name) for row in listed], entry.kind)
+        for entry in _entries(kind)  # type: ignore[arg-type]  # classes are hashable
+        if entry.field.name not in given
+    }
+    return kind(**columns, **given)
+
+
+def rows_of(group: object) -> list[dict[str, Any]]:
+    """List the rows of a group of columns, each by field."""
+    columns = {
+        entry.field.name: getattr(group, entry.field.name)
+        for entry in _entries(type(group))  # type: ignore[arg-type]  # classes are hashable
+    }
+    listed = [values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values()]
+    return [dict(zip(columns, row, strict=True)) for row in zip(*listed, strict=True)]
+
+
+def _column(values: list[Any], kind: Any) -> Any:
+    return tuple(values) if kind == tuple[str, ...] else np.array(values, dtype=float)
 
 
 class _Entry(NamedTuple):

@@ -176,6 +176,11 @@ def format_name(path: Path) -> str | None:
         return None
 
 
+def holds(path: Path, wanted: type[Record]) -> bool:
+    """Tell whether a file is an artifact of one format, without reading it whole."""
+    return path.is_file() and format_name(path) == wanted.FORMAT.name
+
+
 def read_header(path: Path) -> Header:
     """Read where an artifact comes from, and none of its data.
 

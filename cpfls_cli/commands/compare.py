@@ -1,4 +1,4 @@
-"""Stage `compare`: where a model and flights disagree."""
+"""Command `compare`: where a model and flights disagree."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
-from cpfls_cli.artifacts.base_file import base_artifact, base_data, base_model, model_base
-from cpfls_cli.artifacts.disagreement_file import disagreement_data
-from cpfls_cli.artifacts.extended_file import is_extended, read_extended
-from cpfls_cli.artifacts.flights_file import flights_data
-from cpfls_cli.artifacts.formats import DISAGREEMENT, EXTENDED
-from cpfls_cli.artifacts.job import Job, Progress, begin, finish_data
-from cpfls_cli.artifacts.store import Artifact
+from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.gap_flights import BaseGroup
+from cpfls_cli.artifacts.job import Job, Progress, begin, finish
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.store import holds
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.recordings import Flights, read_flights
-from cpfls_cli.flights.sources import read_good
-from cpfls_cli.gap.compare import Disagreement, compare
+from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.extended import ExtendedModel, plain
-from cpfls_cli.pages.disagreement_words import disagreement_lines, disagreement_summary
+from cpfls_cli.pages.disagreement import answer
+from cpfls_cli.pages.source import source_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
 
@@ -37,32 +37,50 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     inputs = begin(job, flight_roles("flight", flights) | ({} if model is None else {"model": model}))
     check_ignored(job.study)
     given = read_flights(flights, job.study)
-    own, base = _model(model, job.study)
+    extended, base = _model(model, job.study)
     if job.dry_run:
         return nothing_written(job)
-    found = compared(job.study, given, own, progress_of(job.progress))
-    data = {
-        **disagreement_data(found, given),
-        **base_data(base),
-        **flights_data(given.recordings, ["given"] * len(flights)),
-    }
-    finish_data(job, DISAGREEMENT, data, inputs)
-    return Outcome(disagreement_summary(found, given), tuple(disagreement_lines(found, given)), given.warnings)
+    record = finish(job, compared(job.study, given, extended, base, progress_of(job.progress)), inputs)
+    return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
-def _model(path: Path | None, study: Study) -> tuple[ExtendedModel, Artifact | None]:
+def _model(path: Path | None, study: Study) -> tuple[ExtendedModel, BaseGroup]:
     """Read a model, with or without effects, and the identified model under it."""
-    if path is not None and is_extended(path):
-        return read_extended(path, study), base_artifact(read_good(path, EXTENDED))
-    base = None if path is None else model_base(path, study)
-    return plain(base_model(base, path or Path())), base
+    if path is not None and holds(path, ExtendedRecord):
+        record = read_of_vehicle(path, ExtendedRecord, study)
+        return record.rebuilt(path), record.base
+    base = base_of(path, study)
+    return plain(base.rebuilt(path)), base
+
+
+def base_of(path: Path | None, study: Study) -> BaseGroup:
+    """Read the base of a comparison.
+
+    Parameters
+    ----------
+    path : Path or None
+        An identified model; None for the rigid body of the vehicle.
+
+    Raises
+    ------
+    InputError
+        If it was identified with another vehicle.
+    """
+    return BaseGroup.of(None if path is None else read_of_vehicle(path, ModelRecord, study))
 
 
 def compared(
-    study: Study, given: Flights, model: ExtendedModel, progress: Callable[[float, str], None]
-) -> Disagreement:
-    """Compare a model with flights."""
-    return compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
+    study: Study, given: Flights, model: ExtendedModel, base: BaseGroup, progress: Callable[[float, str], None]
+) -> DisagreementRecord:
+    """Compare a model with flights.
+
+    Parameters
+    ----------
+    base : BaseGroup
+        The identified model under it, or the vehicle.
+    """
+    disagreement = compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
+    return DisagreementRecord.of(disagreement, given.recordings, given.warnings, base)
 
 
 def flight_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:

@@ -1,58 +1,31 @@
-"""Stage `diagnose`: which physical effect a model misses."""
+"""Command `diagnose`: which physical effect a model misses."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from cpfls_cli.artifacts.base_file import base_artifact, base_data, base_model
-from cpfls_cli.artifacts.diagnosis_file import diagnosis_data
-from cpfls_cli.artifacts.flights_file import flights_data, flights_of
-from cpfls_cli.artifacts.formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
-from cpfls_cli.artifacts.job import Job, begin, finish_data
-from cpfls_cli.artifacts.store import Artifact
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.gap_effects import effect_summary, estimate_summary
+from cpfls_cli.artifacts.gap_flights import BaseGroup
+from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.commands.compare import check_ignored, flight_roles, progress_of
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import read_flights
-from cpfls_cli.flights.same_vehicle import require_vehicle_of
-from cpfls_cli.flights.sources import read_good
+from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.flights.split import Split, seen_twice, split_flights
-from cpfls_cli.gap.before_after import BeforeAfter, before_after
-from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
-from cpfls_cli.gap.extended import ExtendedModel
-from cpfls_cli.pages.diagnosis_words import diagnosis_lines, diagnosis_summary
+from cpfls_cli.gap.before_after import before_after
+from cpfls_cli.gap.diagnose import diagnose
+from cpfls_cli.gap.naming.results import Diagnosis
+from cpfls_cli.pages.diagnosis import answer
+from cpfls_cli.pages.effects import closest_sentence
+from cpfls_cli.pages.source import Source, source_of
+from cpfls_cli.report.content import Block, Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
-
-
-@dataclass(frozen=True)
-class Answer:
-    """A diagnosis with all that shows it."""
-
-    found: DiagnosisRun
-    shown: BeforeAfter
-    model: ExtendedModel
-    split: Split
-
-    @property
-    def data(self) -> dict[str, Any]:
-        """Datasets, with the flights."""
-        flights = (*self.split.training, *self.split.held_out)
-        roles = ["training"] * len(self.split.training) + ["held-out"] * len(self.split.held_out)
-        own = diagnosis_data(self.found, self.shown, self.model, self.split)
-        return {**own, **flights_data(flights, roles)}
-
-    @property
-    def lines(self) -> tuple[str, ...]:
-        """The answer for people."""
-        return tuple(diagnosis_lines(self.found, self.shown, self.split.sentence))
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """The answer for machines."""
-        return diagnosis_summary(self.found, self.shown, self.split.sentence)
 
 
 def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
@@ -67,40 +40,58 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     """
     inputs = begin(job, {"disagreement": disagreement} | flight_roles("held-out", held_out))
     check_ignored(job.study)
-    source = read_good(disagreement, DISAGREEMENT)
-    require_vehicle_of(disagreement, source, job.study)
-    if any(file.format == EXTENDED.format for file in source.header.inputs.values()):
+    compared = read_of_vehicle(disagreement, DisagreementRecord, job.study)
+    if any(file.format == ExtendedRecord.FORMAT.name for file in compared.origin.inputs.values()):
         raise InputError(
             f"{disagreement}: was made with a model that has effects already; `cpfls diagnose` names what a base model "
             "misses, so compare without --model, or with an identified model"
         )
     held = read_flights(held_out, job.study)
-    split = split_flights(flights_of(source, job.study), held.recordings, job.study.gap)
-    base = base_artifact(source)
+    split = split_flights(compared.flights.recordings(job.study), held.recordings, job.study.gap)
     if job.dry_run:
         return nothing_written(job)
-    answer = answered(job.study, split, base, disagreement, progress_of(job.progress))
-    finish_data(job, DIAGNOSIS, {**answer.data, **base_data(base)}, inputs)
-    warnings = (*source.texts("warning"), *held.warnings)
-    learned = [file for role, file in source.header.inputs.items() if role.startswith("flight")]
+    diagnosis, record = diagnosed(job.study, split, compared.base, disagreement, progress_of(job.progress))
+    record = finish(job, record, inputs)
+    learned = [file for role, file in compared.origin.inputs.items() if role.startswith("flight")]
     twice = seen_twice(learned, [file for role, file in inputs.items() if role.startswith("held-out")])
-    return Outcome(answer.summary, answer.lines, (*twice, *warnings, *answer.found.audit.warnings))
+    notes = [Text(note, "warning") for note in (*twice, *compared.warning, *held.warnings)]
+    return Outcome(whole_summary(record, diagnosis), (*notes, *whole_answer(source_of(job, record), diagnosis)))
 
 
-def answered(
-    study: Study, split: Split, base: Artifact | None, path: Path, progress: Callable[[float, str], None]
-) -> Answer:
+def diagnosed(
+    study: Study, split: Split, base: BaseGroup, path: Path, progress: Callable[[float, str], None]
+) -> tuple[Diagnosis, DiagnosisRecord]:
     """Diagnose flights.
 
     Parameters
     ----------
-    base : Artifact or None
-        The identified model; None for the rigid body of the vehicle.
+    base : BaseGroup
+        The identified model that misses something, or the vehicle.
     path : Path
-        For messages.
+        Of the file with the base, for messages.
     """
-    model = base_model(base, path)
+    model = base.rebuilt(path)
     rng = generator(study, "diagnose")
-    found = diagnose(split.training, split.held_out, study.gap, rng, model=model, progress=progress)
-    extended = found.model(model)
-    return Answer(found, before_after(split.held_out, found.held_out, extended, study.gap), extended, split)
+    result = diagnose(split.training, split.held_out, study.gap, rng, model=model, progress=progress)
+    extended = result.model(model)
+    change = before_after(split.held_out, result.held_out, extended, study.gap)
+    record = DiagnosisRecord.of(result, change, extended, split.training, split.held_out, split.sentence, base)
+    return result.diagnosis, record
+
+
+def whole_summary(record: DiagnosisRecord, diagnosis: Diagnosis) -> dict[str, Any]:
+    """Give the summary of a diagnosis with what its artifact has no place for.
+
+    That is: the closest effects where faults of sensors are named, and the possible range of the vehicle's numbers.
+    """
+    return record.summary | {
+        "closest": [effect_summary(effect) for effect in diagnosis.closest],
+        "parameters": {name: estimate_summary(number) for name, number in diagnosis.parameters.items()},
+    }
+
+
+def whole_answer(source: Source[DiagnosisRecord], diagnosis: Diagnosis) -> Iterator[Block]:
+    """Give the answer with the closest effects where the artifact has no place for them."""
+    yield from answer(source)
+    if not source.record.effects.closest:
+        yield from (Text(closest_sentence(effect)) for effect in diagnosis.closest)

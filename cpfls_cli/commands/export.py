@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.artifacts.extended_file import is_extended
+from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.job import Job, take_inputs
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import check_output, write_text
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points
@@ -78,7 +78,7 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
 
 
 def _sheet(path: Path, name: str, sha256: str) -> Sheet:
-    if is_extended(path):
+    if holds(path, ExtendedRecord):
         raise InputError(
             f"{path}: is a model with effects (made by `cpfls extend` or `cpfls gap`), which export cannot write; "
             "export the model that was given to that command with --model"

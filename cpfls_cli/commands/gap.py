@@ -1,31 +1,32 @@
-"""Stage `gap`: compare, diagnose and extend in one go, with a report."""
+"""Command `gap`: compare, diagnose and extend in one go, with a report."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from cpfls_cli.artifacts.base_file import base_data, base_model, model_base
-from cpfls_cli.artifacts.disagreement_file import disagreement_data
-from cpfls_cli.artifacts.flights_file import flights_data
-from cpfls_cli.artifacts.formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
-from cpfls_cli.artifacts.job import Job, finish_data, input_file, take_inputs
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.gap_flights import BaseGroup
+from cpfls_cli.artifacts.job import Job, finish, input_file, take_inputs
 from cpfls_cli.artifacts.output import check_folder, filled_folder, write_text
-from cpfls_cli.artifacts.spec import ArtifactSpec, InputFile
-from cpfls_cli.artifacts.store import Artifact
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands import report
-from cpfls_cli.commands.compare import check_ignored, compared, flight_roles, progress_of
-from cpfls_cli.commands.diagnose import Answer, answered
-from cpfls_cli.commands.extend import Grown, extended, require_named
+from cpfls_cli.commands.compare import base_of, check_ignored, compared, flight_roles, progress_of
+from cpfls_cli.commands.diagnose import diagnosed, whole_answer, whole_summary
+from cpfls_cli.commands.extend import extended
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.recordings import Flights, read_flights
 from cpfls_cli.flights.split import Split, seen_twice, split_flights
-from cpfls_cli.gap.compare import Disagreement
 from cpfls_cli.gap.extended import plain as without_effects
-from cpfls_cli.pages.disagreement_words import disagreement_summary, where_lines
+from cpfls_cli.gap.naming.results import Diagnosis
+from cpfls_cli.pages.disagreement import where
+from cpfls_cli.pages.extended import model_with, warnings
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.report.content import Block, Text
 from cpfls_cli.report.outcome import Outcome, plain
 
 FILES = ("disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json")
@@ -38,18 +39,23 @@ class _Given:
 
     flights: Flights
     split: Split
-    base: Artifact | None
+    base: BaseGroup
     path: Path
     inputs: Mapping[str, InputFile]
 
+    def inputs_of(self, role: str) -> dict[str, InputFile]:
+        """Give the inputs whose role begins so."""
+        return {name: file for name, file in self.inputs.items() if name.startswith(role)}
+
 
 @dataclass(frozen=True)
-class _Found:
-    """What it arrives at; `grown` is None where the extension is refused, for the reason."""
+class _Answers:
+    """What it arrives at; `extended` is None where the extension is refused, for the reason."""
 
-    disagreement: Disagreement
-    answer: Answer
-    grown: Grown | None
+    disagreement: DisagreementRecord
+    diagnosis: Diagnosis
+    diagnosed: DiagnosisRecord
+    extended: ExtendedRecord | None
     refused: str
 
 
@@ -71,23 +77,19 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
     """
     given = _begin(job, flights, held_out, model)
     if job.dry_run:
-        line = f"{job.output}: would be filled; the config and all inputs are good"
+        line = Text(f"{job.output}: would be filled; the config and all inputs are good")
         return Outcome({"dry_run": True, "output": str(job.output)}, (line,))
-    found = _find(job, given)
-    summary = {**found.answer.summary, "disagreement": disagreement_summary(found.disagreement, given.flights)}
-    summary["extended"] = {"written": found.grown is not None, "reason": found.refused}
+    answers = _answers(job, given)
+    summary = {**whole_summary(answers.diagnosed, answers.diagnosis), "disagreement": answers.disagreement.summary}
+    summary["extended"] = {"written": answers.extended is not None, "reason": answers.refused}
     with filled_folder(job.output, FILES) as folder:
-        written = _write(job, given, found, folder)
+        answers, written = _written(job, given, answers, folder)
         text = json.dumps(plain(summary), indent=1, allow_nan=False)
         write_text(folder / "gap.json", text + "\n")
         job.progress(0.97, 1, "report")
         report.run(replace(job, output=folder / "report.html", progress=_quiet), written)
     job.progress(1, 1)
-    lines = (*found.answer.lines, *where_lines(found.disagreement, given.flights), _last_line(job, found))
-    warned = () if found.grown is None else tuple(found.grown.warnings)
-    return Outcome(
-        summary, lines, (*_twice(given), *given.flights.warnings, *found.answer.found.audit.warnings, *warned)
-    )
+    return Outcome(summary, tuple(_blocks(job, given, answers)))
 
 
 def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path | None) -> _Given:
@@ -99,66 +101,47 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     read = read_flights([*flights, *held_out], job.study)
     given, held = read.recordings[: len(flights)], read.recordings[len(flights) :]
     split = split_flights(given, held, job.study.gap)
-    base = None if model is None else model_base(model, job.study)
-    return _Given(Flights(given, read.warnings), split, base, model or Path(), inputs)
+    return _Given(Flights(given, read.warnings), split, base_of(model, job.study), model or Path(), inputs)
 
 
-def _twice(given: _Given) -> tuple[str, ...]:
-    learned, held = (
-        [file for role, file in given.inputs.items() if role.startswith(kind)] for kind in ("flight", "held-out")
-    )
-    return seen_twice(learned, held)
-
-
-def _find(job: Job, given: _Given) -> _Found:
-    study, base = job.study, given.base
-    model = without_effects(base_model(base, given.path))
-    disagreement = compared(study, given.flights, model, progress_of(job.progress, 0.0, 0.15))
-    answer = answered(study, given.split, base, given.path, progress_of(job.progress, 0.15, 0.85))
+def _answers(job: Job, given: _Given) -> _Answers:
+    study, base, split = job.study, given.base, given.split
+    model = without_effects(base.rebuilt(given.path))
+    disagreement = compared(study, given.flights, model, base, progress_of(job.progress, 0.0, 0.15))
+    diagnosis, record = diagnosed(study, split, base, given.path, progress_of(job.progress, 0.15, 0.85))
     job.progress(0.85, 1, "extend")
     try:
-        grown, refused = _grown(job, given, answer), ""
+        extension = extended(study, split.training, split.held_out, record, base, given.path)
     except ComputationError as error:
-        grown, refused = None, str(error)
-    return _Found(disagreement, answer, grown, refused)
+        return _Answers(disagreement, diagnosis, record, None, str(error))
+    return _Answers(disagreement, diagnosis, record, extension, "")
 
 
-def _grown(job: Job, given: _Given, answer: Answer) -> Grown:
-    diagnosis = answer.found.diagnosis
-    require_named(diagnosis.verdict, diagnosis.effects)
-    split = given.split
-    audit = answer.found.audit
-    return extended(job.study, split.training, split.held_out, diagnosis.effects, audit, given.base, given.path)
+def _written(job: Job, given: _Given, answers: _Answers, folder: Path) -> tuple[_Answers, list[Path]]:
+    """Write the artifacts, each made from the one before, and give them back with the headers that say so."""
+    paths = [folder / name for name in FILES[:3]]
+    jobs = [replace(job, output=path) for path in paths]
+    first = finish(jobs[0], answers.disagreement, given.inputs_of("flight") | given.inputs_of("model"))
+    inputs = {"disagreement": input_file(paths[0]), **given.inputs_of("held-out")}
+    second = finish(jobs[1], answers.diagnosed, inputs)
+    if answers.extended is None:
+        return replace(answers, disagreement=first, diagnosed=second), paths[:2]
+    third = finish(jobs[2], answers.extended, {"diagnosis": input_file(paths[1])})
+    return replace(answers, disagreement=first, diagnosed=second, extended=third), paths
 
 
-def _write(job: Job, given: _Given, found: _Found, folder: Path) -> list[Path]:
-    base, flights = base_data(given.base), given.flights
-    stored = flights_data(flights.recordings, ["given"] * len(flights.recordings))
-    own = {role: file for role, file in given.inputs.items() if not role.startswith("held-out")}
-    held = {role: file for role, file in given.inputs.items() if role.startswith("held-out")}
-    data = {**disagreement_data(found.disagreement, flights), **base, **stored}
-    first = _artifact(job, folder / "disagreement.h5", DISAGREEMENT, data, own)
-    inputs = {"disagreement": input_file(first), **held}
-    second = _artifact(job, folder / "diagnosis.h5", DIAGNOSIS, {**found.answer.data, **base}, inputs)
-    if found.grown is None:
-        return [first, second]
-    from_diagnosis = {"diagnosis": input_file(second)}
-    third = _artifact(job, folder / "extended.h5", EXTENDED, {**found.grown.data, **base}, from_diagnosis)
-    return [first, second, third]
-
-
-def _artifact(
-    job: Job, path: Path, spec: ArtifactSpec, data: Mapping[str, Any], inputs: Mapping[str, InputFile]
-) -> Path:
-    finish_data(replace(job, output=path), spec, data, inputs)
-    return path
-
-
-def _last_line(job: Job, found: _Found) -> str:
-    if found.grown is None:
-        return found.refused
-    names = ", ".join(effect.name for effect in found.answer.found.diagnosis.effects)
-    return f"{job.output / 'extended.h5'}: the model with {names}"
+def _blocks(job: Job, given: _Given, answers: _Answers) -> Iterator[Block]:
+    disagreement = source_of(replace(job, output=job.output / FILES[0]), answers.disagreement)
+    diagnosis = source_of(replace(job, output=job.output / FILES[1]), answers.diagnosed)
+    twice = seen_twice(given.inputs_of("flight").values(), given.inputs_of("held-out").values())
+    yield from (Text(note, "warning") for note in (*twice, *given.flights.warnings))
+    yield from whole_answer(diagnosis, answers.diagnosis)
+    yield from where(disagreement)
+    if answers.extended is None:
+        yield Text(answers.refused)
+    else:
+        yield from (Text(warning, "warning") for warning in warnings(answers.extended))
+        yield Text(model_with(str(job.output / "extended.h5"), answers.extended))
 
 
 def _quiet(done: float, total: int, note: str = "") -> None:

@@ -8,18 +8,18 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.extended_file import is_extended, read_extended
+from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.config.study import Study
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import read_flights
-from cpfls_cli.flights.same_vehicle import other_vehicles
+from cpfls_cli.flights.same_vehicle import other_vehicles, read_of_vehicle
 from cpfls_cli.identification.model import Model
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
@@ -37,7 +37,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         Identified, or one with effects.
     """
     inputs = begin(job, {"model": model, "flight": flight})
-    if is_extended(model):
+    if holds(model, ExtendedRecord):
         prediction = _with_effects(model, flight, job.study)
         if job.dry_run:
             return nothing_written(job)
@@ -62,7 +62,7 @@ def _with_effects(path: Path, flight: Path, study: Study) -> PredictionRecord:
     InputError
         If the flight lacks the attitude or a signal that an effect needs.
     """
-    model = read_extended(path, study)
+    model = read_of_vehicle(path, ExtendedRecord, study).rebuilt(path)
     logged = read_flights([flight], study).recordings[0].signals
     if logged.attitude is None or logged.torque is None:
         raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")

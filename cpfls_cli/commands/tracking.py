@@ -9,11 +9,11 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.extended_file import is_extended
+from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord, TrackingGroup
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.store import Artifact, read_record
+from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.control import (
@@ -34,7 +34,7 @@ from cpfls_cli.control import (
 from cpfls_cli.dynamics.equations_of_motion import RigidBody, TorqueModel, model_plant, rigid_plant
 from cpfls_cli.dynamics.rigid_body import body_torque, inertia_matrix, inertia_tensor
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flights.same_vehicle import require_vehicle_of
+from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.source import source_of
@@ -86,14 +86,12 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
 
 
 def _identified(path: Path, study: Study) -> ModelRecord:
-    if is_extended(path):
+    if holds(path, ExtendedRecord):
         raise InputError(
             f"{path}: a model with effects is flown in closed loop only; add --mode closed-loop, or give a model that "
             "`cpfls identify` made"
         )
-    model = read_record(path, ModelRecord)
-    require_vehicle_of(path, Artifact(model.spec(), model.origin, {}), study)
-    return model
+    return read_of_vehicle(path, ModelRecord, study)
 
 
 def _plan(trajectory: Path, study: Study) -> Plan:

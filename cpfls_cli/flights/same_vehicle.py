@@ -1,17 +1,20 @@
-"""Flights and models of one vehicle: what differs is said."""
+"""Flights and models of one vehicle: list the keys that differ."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import TypeVar
 
-from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.store import Artifact, read_header
+from cpfls_cli.artifacts.spec import Header, Record
+from cpfls_cli.artifacts.store import read_header, read_record
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
+
+R = TypeVar("R", bound=Record)
 
 
 def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettings) -> None:
@@ -37,14 +40,17 @@ def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettin
         )
 
 
-def require_vehicle_of(path: Path, artifact: Artifact, study: Study) -> None:
-    """Refuse an artifact that was made with another vehicle than that of the config.
+def read_of_vehicle(path: Path, wanted: type[R], study: Study) -> R:
+    """Read an artifact that must have been made with the vehicle of the config.
 
     Raises
     ------
     InputError
+        If it is no good artifact of the format, or was made with another vehicle.
     """
-    require_same_vehicle(path, _vehicle_of(path, artifact.header), study.vehicle)
+    record = read_record(path, wanted)
+    require_same_vehicle(path, _vehicle_of(path, record.origin), study.vehicle)
+    return record
 
 
 def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:

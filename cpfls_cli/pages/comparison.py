@@ -10,14 +10,12 @@ import numpy as np
 
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING
-from cpfls_cli.pages.figures.before_after import legend_over
-from cpfls_cli.pages.gap_words import joined
 from cpfls_cli.pages.model import SHORT_VERDICTS, TORQUE
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.uncertainty import compared_curves_figure
-from cpfls_cli.report.canvas import GREY, plot, style_of
+from cpfls_cli.report.canvas import GREY, legend_over, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import ROUNDING, UNKNOWN, count, number, percent, plain, r_squared
+from cpfls_cli.report.numbers import ROUNDING, UNKNOWN, count, joined, number, percent, plain, r_squared
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,10 +11,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.evidence import PeriodGroup, PhysicsGroup, StepsGroup, StructuresGroup
 from cpfls_cli.artifacts.model import ModelRecord, RidgeGroup
 from cpfls_cli.artifacts.scores import AXES, MODEL
-from cpfls_cli.pages.figures.before_after import HELD, legend_over
 from cpfls_cli.pages.model import TORQUE, verdict
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import BASELINE, legend_above, plain_ticks, plot, style_of
+from cpfls_cli.report.canvas import BASELINE, HELD, legend_above, legend_over, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Facts, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import count, number, percent, plain, r_squared
 

@@ -9,10 +9,9 @@ import numpy as np
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, JudgedGroup
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.gap_words import sentence
 from cpfls_cli.pages.source import Source
 from cpfls_cli.report.content import Block, Box, Cell, Table, Text, Tone
-from cpfls_cli.report.numbers import ROUNDING, number, percent, r_squared
+from cpfls_cli.report.numbers import ROUNDING, number, percent, r_squared, sentence
 
 TORQUE, SQUARED_TORQUE = "N\N{NO-BREAK SPACE}m", "(N\N{NO-BREAK SPACE}m)²"
 """Units that are not torn apart at the end of a line."""

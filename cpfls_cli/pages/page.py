@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cpfls_cli.pages.comparison import comparison_section
+from cpfls_cli.pages.diagnosis import diagnosis_section
+from cpfls_cli.pages.disagreement import disagreement_section
 from cpfls_cli.pages.evidence import steps_section, validation_section
+from cpfls_cli.pages.extended import extension_section
 from cpfls_cli.pages.flight import flight_section, vehicle_section
 from cpfls_cli.pages.fuzzy_part import partitions_section, rules_section
 from cpfls_cli.pages.identification import identification_section, search_section
@@ -13,12 +16,8 @@ from cpfls_cli.pages.prediction import prediction_section
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.reproduction import reproduction_section
 from cpfls_cli.pages.residuals import residuals_section
-from cpfls_cli.pages.sections.diagnosis import diagnosis_section
-from cpfls_cli.pages.sections.disagreement import disagreement_section
-from cpfls_cli.pages.sections.extension import extension_section
-from cpfls_cli.pages.sections.sensors import sensors_section
-from cpfls_cli.pages.sections.unseen import unseen_section
 from cpfls_cli.pages.selection import reduction_section
+from cpfls_cli.pages.sensors import sensors_section, unseen_section
 from cpfls_cli.pages.source import Sources
 from cpfls_cli.pages.summary import models_section, summary_section
 from cpfls_cli.pages.sweep import replicates_section

@@ -17,7 +17,6 @@ from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.pages.gap_words import titles_of
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import HASH_SHOWN, Block, Listing, Section, Table, Text
 
@@ -218,7 +217,7 @@ def _wanted(sources: Sources) -> Iterator[_Lack]:
         yield _SWEEP
     if sources.gap:
         yield from _GAP_LACKS[:2]
-        if any(len(titles_of(diagnosis)) for diagnosis in sources.diagnoses):
+        if any(diagnosis.record.effects.names() for diagnosis in sources.diagnoses):
             yield _GAP_LACKS[2]
 
 

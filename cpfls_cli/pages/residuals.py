@@ -11,12 +11,10 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.evidence import ResidualsGroup
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import AXES
-from cpfls_cli.pages.figures.before_after import legend_over
-from cpfls_cli.pages.gap_words import probability
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import BASELINE, GREY, plain_ticks, plot, stacked, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, number, percent
+from cpfls_cli.report.numbers import UNKNOWN, number, percent, probability
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,13 +7,12 @@ from collections.abc import Iterator, Sequence
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup, Winner
-from cpfls_cli.pages.gap_words import sentence
+from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.model import scores_table, solution, verdict_line
 from cpfls_cli.pages.provenance import missing
-from cpfls_cli.pages.sections.gap_summary import gap_blocks
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
-from cpfls_cli.report.numbers import ROUNDING, percent, plain
+from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
 
 
 def summary_section(sources: Sources) -> Section:

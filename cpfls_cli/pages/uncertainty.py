@@ -11,9 +11,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.evidence import CurvesGroup, RoundTripGroup, UncertaintyGroup
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.figures.before_after import legend_over
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import BASELINE, band, plain_ticks, plot, runs, style_of
+from cpfls_cli.report.canvas import BASELINE, band, legend_over, plain_ticks, plot, runs, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import number, percent, printed, with_interval
 from cpfls_cli.validation.bands import band as interval

@@ -37,6 +37,9 @@ STYLES: tuple[dict[str, Any], ...] = (
 BASELINE: dict[str, Any] = {"color": GREY, "linestyle": (0, (3, 2)), "linewidth": 1.2}
 """Whatever a result is compared with."""
 
+HELD: dict[str, Any] = {"color": GREY, "linestyle": (0, (1, 1.6)), "linewidth": 1.2}
+"""The simplest prediction: that nothing changes."""
+
 _STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
     "font.family": "sans-serif",
@@ -139,6 +142,18 @@ def stacked(figure: Figure, rows: int) -> list[Axes]:
 def legend_above(axes: Axes, columns: int = 4) -> None:
     """Put a legend above a plot, where it hides no curve."""
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1)
+
+
+def legend_over(figure: Figure, axes: Axes) -> None:
+    """Put one legend above a whole figure.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        With the curves.
+    """
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=4)
 
 
 def plain_ticks(axis: Axis) -> None:

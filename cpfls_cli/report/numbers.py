@@ -1,13 +1,14 @@
-"""Numbers as people read them: as many digits as are known, no false zeros, no false ones."""
+"""Numbers and phrases as people read them: as many digits as are known, no false zeros, no false ones."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 UNKNOWN = "—"
 ROUNDING = 1e-12
 _LARGE = 1e6
+_LEAST_P = 1e-6
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DIGITS = 4
 _SMALLEST, _LARGEST = -4, 6
@@ -63,6 +64,20 @@ def percent(share: float, digits: int = 3) -> str:
     if math.isnan(share) or math.isinf(share):
         return number(share)
     return "0 %" if abs(share) < ROUNDING else f"{number(100 * share, digits)} %"
+
+
+def whole_percent(share: float) -> str:
+    """Write a share in whole per cent."""
+    if not math.isfinite(share):
+        return number(share)
+    if 0 < abs(share) < 0.005:
+        return "< 1 %"
+    return "> 99 %" if 0.995 <= share < 1 else f"{100 * share:.0f} %".replace("-", "−")
+
+
+def probability(value: float) -> str:
+    """Write a probability; the smallest ones by a bound."""
+    return "< 10⁻⁶" if value < _LEAST_P else number(value, 2)
 
 
 def change(share: float) -> str:
@@ -133,3 +148,28 @@ def _alone(value: float) -> str:
     if not math.isfinite(value):
         return number(value).replace("−", "-")
     return f"{value:.{_DIGITS}g}" if value else "0"
+
+
+def joined(words: Iterable[str], last: str = "and") -> str:
+    """Join words to a phrase, without repeating one.
+
+    Parameters
+    ----------
+    last : str
+        Before the last word.
+    """
+    *others, final = dict.fromkeys(words)
+    return f"{', '.join(others)} {last} {final}" if others else final
+
+
+def sentence(text: str) -> str:
+    """Write words as a sentence.
+
+    Returns
+    -------
+    str
+        With a capital letter, unless a file name comes first, and a full stop.
+    """
+    first = text.split(" ", 1)[0]
+    start = text if "." in first or "_" in first else f"{text[:1].upper()}{text[1:]}"
+    return start if start.endswith((".", "?", "!")) else f"{start}."

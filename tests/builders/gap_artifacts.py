@@ -197,7 +197,7 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
     return Artifact(DIAGNOSIS, Header("0", 1, "seed: 1\n"), data | changed)
 
 
-def extended(diagnosis_sha256=""):
+def extended(diagnosis_sha256="", **changed):
     data = {
         "inertia": np.array([0.61, 0.6, 1.2, 0.0, 0.0, 0.0]),
         "thrust_scale": 1.0123,
@@ -208,7 +208,7 @@ def extended(diagnosis_sha256=""):
         "base/kind": np.array("rigid-body"),
     }
     source = InputFile("diagnosis.h5", diagnosis_sha256 or "0" * 64, "cpfls/diagnosis")
-    return Artifact(EXTENDED, Header("0", 1, "seed: 1\n", {"diagnosis": source}), data)
+    return Artifact(EXTENDED, Header("0", 1, "seed: 1\n", {"diagnosis": source}), data | changed)
 
 
 def without(artifact, *groups):

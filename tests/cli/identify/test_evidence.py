@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.formats import MODEL
-from cpfls_cli.pages.gap_words import sentence
+from cpfls_cli.report.numbers import sentence
 from cpfls_cli.validation import validate
 
 EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "period", "verdict")

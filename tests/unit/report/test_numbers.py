@@ -6,7 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.report.numbers import change, number, percent, plain, printed, r_squared, with_interval
+from cpfls_cli.report.numbers import (
+    change,
+    joined,
+    number,
+    percent,
+    plain,
+    printed,
+    probability,
+    r_squared,
+    sentence,
+    whole_percent,
+    with_interval,
+)
 
 
 @pytest.mark.parametrize(
@@ -85,3 +97,18 @@ def test_ends_are_told_apart_and_right_to_a_tenth_of_the_width(value, width, sha
 def test_print():
     assert printed("-1.40e-4") == "−1.40 × 10⁻⁴"
     assert printed("0.25") == "0.25"
+
+
+def test_numbers_are_not_rounded_into_certainty():
+    assert [whole_percent(share) for share in (0.0, 0.001, 0.42, 0.9961, 1.0)] == [
+        "0 %", "< 1 %", "42 %", "> 99 %", "100 %",
+    ]  # fmt: skip
+    assert probability(1e-9) == "< 10⁻⁶"
+    assert probability(0.0123) == "0.012"
+
+
+def test_words_become_phrases_and_sentences():
+    assert joined(["a", "b", "c", "a"]) == "a, b and c"
+    assert joined(["a", "b"], "or") == "a or b"
+    assert sentence("no rotors") == "No rotors."
+    assert sentence("log_1.csv: saturated?") == "log_1.csv: saturated?"

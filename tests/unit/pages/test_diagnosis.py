@@ -1,15 +1,14 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.pages.gap_verdict import levels, verdict_box
-from cpfls_cli.pages.sections.diagnosis import after_words
-from cpfls_cli.pages.source import Source
-from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.pages.diagnosis import model_words, verdict_box
 from tests.builders import gap_artifacts as made
 
 
-def source(artifact):
-    return Source("diagnosis.h5", "0" * 64, artifact, {}, VehicleSettings(), 0)
+def diagnosis(**given):
+    artifact = made.diagnosis(**given)
+    return DiagnosisRecord.of_data(artifact.header, artifact.data)
 
 
 @pytest.mark.parametrize(
@@ -48,7 +47,7 @@ def source(artifact):
     ],
 )
 def test_every_verdict_is_said_in_words(given, words):
-    box = verdict_box(source(made.diagnosis(**given)))
+    box = verdict_box(diagnosis(**given))
     summary = " ".join([box.label, box.title, *box.sentences])
     assert box.label == given.get("verdict", "NAMED").replace("_", " ")
     for each in words:
@@ -56,6 +55,40 @@ def test_every_verdict_is_said_in_words(given, words):
     named = [row for row in given.get("named", ({},)) if row.get("named", 1)]
     misses = "What the model misses" in summary
     assert misses == (given.get("verdict", "NAMED") in ("NAMED", "PARTIAL") and named[0].get("kind") is None)
+
+
+def test_what_hangs_on_another_flight_says_so_first():
+    rivals = [("torque_bias", "com_offset", 0.98, "change the thrust")]
+    ambiguous = verdict_box(diagnosis(verdict="AMBIGUOUS", alternatives=rivals)).sentences
+    assert ambiguous[0] == (
+        "It could be constant torque instead of offset of the centre of mass. To tell: change the thrust."
+    )
+    named = verdict_box(diagnosis(alternatives=rivals)).sentences
+    assert named[0].startswith("Offset of the centre of mass (com_offset): ")
+    assert named[1] == ambiguous[0]
+
+
+@pytest.mark.parametrize(
+    ("left", "said"),
+    [
+        (
+            ("torque z", 3.04, "speed", 0.4, np.nan, "drains"),
+            "Left unexplained: torque about z (yaw), 3.0 floors; it follows speed most (40 % of it); it drains energy "
+            "from the motion.",
+        ),
+        (
+            ("torque x", 2.2, "", 0.6, 4.013, "feeds"),
+            "Left unexplained: torque about x (roll), 2.2 floors; it rings at 4.01 Hz (60 % of it); it feeds energy "
+            "into the motion.",
+        ),
+        (
+            ("force z", 2.2, "", 0.0, np.nan, "neither"),
+            "Left unexplained: force along z (up), 2.2 floors; it follows no one signal.",
+        ),
+    ],
+)
+def test_what_is_left_has_an_axis_a_cause_and_a_way_of_energy(left, said):
+    assert said in verdict_box(diagnosis(verdict="UNEXPLAINED", unexplained=[left])).sentences
 
 
 @pytest.mark.parametrize(
@@ -69,7 +102,7 @@ def test_every_verdict_is_said_in_words(given, words):
     ],
 )
 def test_two_names_are_explained_only_where_the_forces_decided(given, said):
-    assert bool(levels(source(made.diagnosis(**given)))) is said
+    assert diagnosis(**given).forces_decide is said
 
 
 @pytest.mark.parametrize(
@@ -81,4 +114,4 @@ def test_two_names_are_explained_only_where_the_forces_decided(given, said):
     ],
 )
 def test_the_second_model_is_said_to_be_what_it_is(named, words):
-    assert after_words(source(made.diagnosis(named=named))) == words
+    assert model_words(diagnosis(named=named)) == words

@@ -1,0 +1,498 @@
+"""What a diagnosis says of a gap, as groups of datasets: effects with their numbers, the gap before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, rows_of
+
+if TYPE_CHECKING:
+    # What fits a gap loads its own numerics, which nobody waits for who only reads of one.
+    from cpfls_cli.artifacts.gap_flights import AuditGroup
+    from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+    from cpfls_cli.gap.extended import ExtendedModel
+    from cpfls_cli.gap.naming.results import Estimate, GapSize, NamedEffect
+    from cpfls_cli.gap.replay import Replayed
+
+CLEAR = 1.5
+"""Floors above which a gap is one: without a gap half of the channels exceed 1, by the scatter of noise and floor."""
+
+_GROWN = 1.05
+"""Ratio of the gaps after and before from which on a channel is marked as worse."""
+
+_EVALUATED = ("wrench", "actuator")
+"""Kinds of effects that are part of a model; faults of sensors are repaired, numbers of the vehicle refitted."""
+
+
+def above_noise(floors: Array) -> BoolArray:
+    """Tell which gaps are above noise.
+
+    Parameters
+    ----------
+    floors : array, shape (channel,)
+        Gaps in noise floors; NaN where unknown, which is not above noise.
+    """
+    return np.asarray(floors > CLEAR)
+
+
+def gap_summary(value: Array, floors: Array) -> dict[str, Any]:
+    """Describe the gap of each channel for machines.
+
+    Parameters
+    ----------
+    value : array, shape (6,), N m and N
+    floors : array, shape (6,)
+
+    Returns
+    -------
+    dict
+        Lists over x, y, z; not finite where unknown.
+    """
+    return {
+        "torque_n_m": [float(v) for v in value[:3]],
+        "floors": [float(v) for v in floors[:3]],
+        "force_n": [float(v) for v in value[3:]],
+        "force_floors": [float(v) for v in floors[3:]],
+    }
+
+
+def effect_summary(effect: NamedEffect) -> dict[str, Any]:
+    """Describe an effect for machines."""
+    return {
+        "name": effect.name,
+        "coefficients": {number.name: estimate_summary(number) for number in effect.coefficients},
+        "p_value": effect.p_value,
+        "share": effect.share,
+        "selection_frequency": effect.selection_frequency,
+        "sentence": effect.sentence,
+    }
+
+
+def estimate_summary(number: Estimate) -> dict[str, Any]:
+    """Describe a coefficient for machines."""
+    return {
+        "value": number.value,
+        "unit": number.unit,
+        "low": number.low,
+        "high": number.high,
+        "plausible": list(number.plausible),
+    }
+
+
+@record
+class EffectGroup:
+    """Effects, largest share first."""
+
+    name: tuple[str, ...] = dataset(
+        "name", "identifier, see `cpfls effects`; largest share first, faults of sensors before", "effect"
+    )
+    kind: tuple[str, ...] = dataset("kind", "wrench, actuator, sensor or parameter", "effect")
+    named: Array = dataset("named", "1 if the verdict names it, 0 if it is only the closest", "effect")
+    p_value: Array = dataset("p_value", "probability that chance explains as much, over the whole catalogue", "effect")
+    share: Array = dataset("share", "part of the gap above the floor that comes back without it", "effect")
+    selection_frequency: Array = dataset(
+        "selection_frequency", "share of the blocks without which it is still the first choice", "effect"
+    )
+    sentence: tuple[str, ...] = dataset("sentence", "what a pilot understands", "effect")
+
+    @classmethod
+    def of(cls, effects: Sequence[NamedEffect], named: bool) -> Self:
+        """Arrange effects that a verdict names, or that are only the closest."""
+        from cpfls_cli.effects.registry import CATALOGUE
+
+        kinds = tuple(CATALOGUE[effect.name].kind for effect in effects)
+        return columns_of(cls, effects, kind=kinds, named=np.full(len(effects), float(named)))
+
+
+@record
+class CoefficientGroup:
+    """Coefficients and shapes of the effects with their intervals."""
+
+    effect: tuple[str, ...] = dataset("effect", "effect that each coefficient belongs to", "coefficient")
+    name: tuple[str, ...] = dataset("name", "name of the coefficient or shape", "coefficient")
+    unit: tuple[str, ...] = dataset("unit", "unit of the coefficient", "coefficient")
+    value: Array = dataset("value", "estimate", "coefficient", units="SI")
+    low: Array = dataset("low", "lower end of the 95 % interval", "coefficient", units="SI", gaps=True)
+    high: Array = dataset("high", "upper end of the 95 % interval", "coefficient", units="SI", gaps=True)
+    plausible_low: Array = dataset(
+        "plausible_low", "least value that is physically possible", "coefficient", units="SI", gaps=True
+    )
+    plausible_high: Array = dataset(
+        "plausible_high", "largest value that is physically possible", "coefficient", units="SI", gaps=True
+    )
+
+    @classmethod
+    def of(cls, effects: Sequence[NamedEffect]) -> Self:
+        """Arrange the numbers of effects."""
+        numbers = [number for effect in effects for number in effect.coefficients]
+        return columns_of(
+            cls,
+            numbers,
+            effect=tuple(effect.name for effect in effects for _ in effect.coefficients),
+            plausible_low=np.fromiter((number.plausible[0] for number in numbers), float),
+            plausible_high=np.fromiter((number.plausible[1] for number in numbers), float),
+        )
+
+    def of_effect(self, effect: str) -> tuple[Estimate, ...]:
+        """Rebuild the numbers of one effect."""
+        from cpfls_cli.gap.naming.results import Estimate
+
+        rows = [row for row in rows_of(self) if row.pop("effect") == effect]
+        ranges = [(row.pop("plausible_low"), row.pop("plausible_high")) for row in rows]
+        return tuple(Estimate(**row, plausible=plausible) for row, plausible in zip(rows, ranges, strict=True))
+
+
+@record
+class LinearGroup:
+    """Linear coefficients of the columns of each effect."""
+
+    effect: tuple[str, ...] = dataset(
+        "effect", "effect that each linear coefficient belongs to, in the order of its columns", "linear"
+    )
+    value: Array = dataset("value", "linear coefficients of the columns of each effect", "linear", units="SI")
+
+    @classmethod
+    def of(cls, effects: Sequence[NamedEffect]) -> Self:
+        """Arrange the linear coefficients of effects."""
+        return cls(
+            effect=tuple(effect.name for effect in effects for _ in effect.linear),
+            value=np.fromiter((value for effect in effects for value in effect.linear), float),
+        )
+
+    def of_effect(self, effect: str) -> Array:
+        """Give those of one effect, shape (coefficient,)."""
+        own = np.array([name == effect for name in self.effect], dtype=bool)
+        return np.asarray(self.value[own])
+
+
+@record
+class ShapeGroup:
+    """Nonlinear shapes of the effects."""
+
+    effect: tuple[str, ...] = dataset("effect", "effect that each shape belongs to", "shape")
+    name: tuple[str, ...] = dataset("name", "what the effect depends on nonlinearly", "shape")
+    value: Array = dataset("value", "value of the shape", "shape", units="SI")
+
+    @classmethod
+    def of(cls, effects: Sequence[NamedEffect]) -> Self:
+        """Arrange the shapes of effects that are part of the model."""
+        shapes = [
+            (effect.name, name, value)
+            for effect in effects
+            if effect.candidate is not None
+            for name, value in effect.candidate.shape.items()
+        ]
+        return cls(
+            effect=tuple(effect for effect, _, _ in shapes),
+            name=tuple(name for _, name, _ in shapes),
+            value=np.fromiter((value for _, _, value in shapes), float),
+        )
+
+    def of_effect(self, effect: str) -> dict[str, float]:
+        """Give those of one effect, by name."""
+        return {row["name"]: row["value"] for row in rows_of(self) if row["effect"] == effect}
+
+
+@record
+class ParameterGroup:
+    """Numbers of the vehicle, refitted with the effects."""
+
+    name: tuple[str, ...] = dataset("name", "numbers of the vehicle, refitted with the effects", "parameter")
+    unit: tuple[str, ...] = dataset("unit", "1 for a relative error: true over that of the model, less 1", "parameter")
+    value: Array = dataset("value", "estimate", "parameter", units="SI")
+    low: Array = dataset("low", "lower end of the 95 % interval", "parameter", units="SI", gaps=True)
+    high: Array = dataset("high", "upper end of the 95 % interval", "parameter", units="SI", gaps=True)
+
+    @classmethod
+    def of(cls, known: Mapping[str, Estimate], linear: Array) -> Self:
+        """Arrange the vehicle's own numbers.
+
+        Parameters
+        ----------
+        known : mapping of str to Estimate
+            Numbers whose interval is known.
+        linear : array, shape (parameter,)
+            All of them, in the order of the catalogue.
+        """
+        from cpfls_cli.effects.registry import VEHICLE_NUMBERS
+
+        coefficients = VEHICLE_NUMBERS.coefficients
+        estimates = [known.get(coefficient.name) for coefficient in coefficients]
+        return cls(
+            name=tuple(coefficient.name for coefficient in coefficients),
+            unit=tuple(coefficient.unit for coefficient in coefficients),
+            value=np.array(linear, dtype=float),
+            low=np.fromiter((np.nan if number is None else number.low for number in estimates), float),
+            high=np.fromiter((np.nan if number is None else number.high for number in estimates), float),
+        )
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Estimates by name."""
+        return dict(zip(self.name, self.value.tolist(), strict=True))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The numbers for machines."""
+        return {row.pop("name"): row for row in rows_of(self)}
+
+
+@record
+class NamedEffectsGroup:
+    """Effects with all their numbers, enough to evaluate them."""
+
+    effect: EffectGroup = group("effect")
+    coefficient: CoefficientGroup = group("coefficient")
+    linear: LinearGroup = group("linear")
+    shape: ShapeGroup = group("shape")
+    parameter: ParameterGroup = group("parameter")
+
+    @classmethod
+    def of(cls, effects: Sequence[NamedEffect], named: bool, known: Mapping[str, Estimate], linear: Array) -> Self:
+        """Arrange effects.
+
+        Parameters
+        ----------
+        named : bool
+            Whether the verdict names them.
+        known : mapping of str to Estimate
+            The vehicle's own numbers, as far as their interval is known.
+        linear : array, shape (parameter,)
+            All of them, in the order of the catalogue.
+        """
+        return cls(
+            effect=EffectGroup.of(effects, named),
+            coefficient=CoefficientGroup.of(effects),
+            linear=LinearGroup.of(effects),
+            shape=ShapeGroup.of(effects),
+            parameter=ParameterGroup.of(known, linear),
+        )
+
+    def effects(self) -> tuple[NamedEffect, ...]:
+        """Rebuild the effects, to evaluate them.
+
+        Raises
+        ------
+        InputError
+            If this program does not know one of them.
+        """
+        from cpfls_cli.effects.registry import effect
+
+        for name in self.effect.name:
+            effect(name)
+        return self.listed
+
+    def model(self, base: InertiaModel | None, audit: AuditGroup) -> ExtendedModel:
+        """Rebuild the model with the effects in it.
+
+        Parameters
+        ----------
+        base : InertiaModel or None
+            None for the rigid body of the vehicle.
+        audit : AuditGroup
+            Faults of the sensors that it repairs.
+        """
+        from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
+
+        fitted = (FittedEffect(each.candidate, each.linear) for each in self.effects() if each.candidate is not None)
+        return ExtendedModel(base, self.parameter.value, tuple(fitted), audit.audit())
+
+    @property
+    def listed(self) -> tuple[NamedEffect, ...]:
+        """Effects, named or closest; what this program does not know cannot be evaluated."""
+        return tuple(self._effect(index) for index in range(len(self.effect.name)))
+
+    @property
+    def named(self) -> tuple[NamedEffect, ...]:
+        """Effects that the verdict names."""
+        return self._chosen(named=True)
+
+    @property
+    def closest(self) -> tuple[NamedEffect, ...]:
+        """Effects that come closest, where the verdict names none."""
+        return self._chosen(named=False)
+
+    def names(self, *kinds: str) -> tuple[str, ...]:
+        """List the effects of these kinds that the verdict names; of all kinds if none is given."""
+        columns = zip(self.effect.name, self.effect.kind, self.effect.named, strict=True)
+        return tuple(name for name, kind, named in columns if named and (not kinds or kind in kinds))
+
+    def _chosen(self, *, named: bool) -> tuple[NamedEffect, ...]:
+        pairs = zip(self.listed, self.effect.named, strict=True)
+        return tuple(effect for effect, flag in pairs if bool(flag) is named)
+
+    def _effect(self, index: int) -> NamedEffect:
+        from cpfls_cli.effects.registry import CATALOGUE
+        from cpfls_cli.gap.balance.weak_flight import Candidate
+        from cpfls_cli.gap.naming.results import NamedEffect
+
+        rows, name = self.effect, self.effect.name[index]
+        entry, shape = CATALOGUE.get(name), self.shape.of_effect(name)
+        known = entry is not None and entry.kind in _EVALUATED and len(shape) == len(entry.shapes)
+        return NamedEffect(
+            name,
+            Candidate(entry, shape) if entry and known else None,
+            self.linear.of_effect(name),
+            self.coefficient.of_effect(name),
+            float(rows.p_value[index]),
+            float(rows.share[index]),
+            float(rows.selection_frequency[index]),
+            rows.sentence[index],
+        )
+
+
+@record
+class GapChangeGroup:
+    """Gap of each channel on held-out flights, before and after."""
+
+    channel: tuple[str, ...] = dataset(
+        "channel",
+        "names of the channels: torque about (x y z, N m) and force along (x y z, N) the body axes",
+        "channel",
+    )
+    before: Array = dataset(
+        "before",
+        "root mean square on the held-out flights, model as given",
+        "channel",
+        units="SI",
+        frame=BODY,
+        gaps=True,
+    )
+    after: Array = dataset("after", "the same with the effects", "channel", units="SI", frame=BODY, gaps=True)
+    floor: Array = dataset("floor", "noise floor of the held-out flights", "channel", units="SI", frame=BODY, gaps=True)
+    before_floors: Array = dataset(
+        "before_floors", "gap of the model as given, in floors", "channel", frame=BODY, gaps=True
+    )
+    after_floors: Array = dataset("after_floors", "gap with the effects, in floors", "channel", frame=BODY, gaps=True)
+
+    @classmethod
+    def of(cls, before: GapSize, after: GapSize, floor: Array) -> Self:
+        """Arrange the gap before and after.
+
+        Parameters
+        ----------
+        floor : array, shape (6,), N m and N
+        """
+        from cpfls_cli.gap.balance.weak_flight import CHANNELS
+
+        return cls(
+            channel=CHANNELS,
+            before=before.value,
+            after=after.value,
+            floor=np.where(np.isfinite(before.value), floor, np.nan),
+            before_floors=before.floors,
+            after_floors=after.floors,
+        )
+
+    @property
+    def known(self) -> list[int]:
+        """Indices of the channels whose gap is known."""
+        return np.flatnonzero(np.isfinite(self.before_floors)).tolist()
+
+    @property
+    def has_force(self) -> bool:
+        """Whether the gap of any force is known."""
+        return any(self.channel[index].startswith("force") for index in self.known)
+
+    @property
+    def grown(self) -> BoolArray:
+        """Channels whose gap is above noise and larger with the effects than without, shape (channel,)."""
+        return above_noise(self.after_floors) & (self.after_floors > _GROWN * self.before_floors)
+
+    @property
+    def worse_axes(self) -> list[int]:
+        """Indices of the axes about which a clear gap clearly grows."""
+        from cpfls_cli.gap.extended import worse_axes
+
+        return worse_axes(self.before_floors, self.after_floors)
+
+    @property
+    def summary_before(self) -> dict[str, Any]:
+        """The gap of the model as given, for machines."""
+        return gap_summary(self.before, self.before_floors)
+
+    @property
+    def summary_after(self) -> dict[str, Any]:
+        """The gap with the effects, for machines."""
+        return gap_summary(self.after, self.after_floors)
+
+
+class ReplayErrors:
+    """Errors of replays by horizon, whichever models are replayed."""
+
+    horizon_s: Array
+    rate_held: Array
+
+    @property
+    def turns(self) -> bool:
+        """Whether the rates ever change; those of a log without rates do not."""
+        return bool(self.rate_held.any())
+
+    def errors(self, quantity: str) -> dict[str, Array]:
+        """Give the errors of ``rate`` or ``attitude`` by what is replayed, each of shape (horizon, 3)."""
+        names = [each.name for each in fields(self) if each.name.startswith(f"{quantity}_")]  # type: ignore[arg-type]  # a record
+        return {name.removeprefix(f"{quantity}_"): getattr(self, name) for name in names}
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The replays for machines."""
+        rates = {f"rate_{name}_rad_s": error.tolist() for name, error in self.errors("rate").items()}
+        attitudes = {f"attitude_{name}_rad": error.tolist() for name, error in self.errors("attitude").items()}
+        return {"horizon_s": self.horizon_s.tolist(), **rates, **attitudes}
+
+
+@record
+class ReplayChangeGroup(ReplayErrors):
+    """Errors of replays on held-out flights by horizon, before and after."""
+
+    horizon: IntArray = dataset("horizon", "samples over which measured rotor speeds are replayed", "horizon")
+    horizon_s: Array = dataset("horizon_s", "the same in seconds", "horizon", units="s", gaps=True)
+    rate_before: Array = dataset(
+        "rate_before",
+        "rms error of body rates, model as given",
+        "horizon",
+        "axis",
+        units="rad/s",
+        frame=BODY,
+        gaps=True,
+    )
+    rate_after: Array = dataset(
+        "rate_after", "the same with the effects", "horizon", "axis", units="rad/s", frame=BODY, gaps=True
+    )
+    rate_held: Array = dataset(
+        "rate_held", "the same where the rates are held", "horizon", "axis", units="rad/s", frame=BODY, gaps=True
+    )
+    attitude_before: Array = dataset(
+        "attitude_before",
+        "rms turn between simulated and measured",
+        "horizon",
+        "axis",
+        units="rad",
+        frame=BODY,
+        gaps=True,
+    )
+    attitude_after: Array = dataset(
+        "attitude_after", "the same with the effects", "horizon", "axis", units="rad", frame=BODY, gaps=True
+    )
+    attitude_held: Array = dataset(
+        "attitude_held", "the same where the rates are held", "horizon", "axis", units="rad", frame=BODY, gaps=True
+    )
+
+    @classmethod
+    def of(cls, before: Replayed, after: Replayed, held: Replayed) -> Self:
+        """Arrange replays by the model as given, with the effects, and by rates that stay what they are."""
+        return cls(
+            horizon=np.arange(1, len(held.horizon_s) + 1),
+            horizon_s=held.horizon_s,
+            rate_before=before.rate,
+            rate_after=after.rate,
+            rate_held=held.rate,
+            attitude_before=before.attitude,
+            attitude_after=after.attitude,
+            attitude_held=held.attitude,
+        )

@@ -1,0 +1,407 @@
+"""The page of a diagnosis: which effect a model misses, how sure that is, and what the gap becomes with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, PictureGroup, RunGroup
+from cpfls_cli.artifacts.gap_effects import CLEAR
+from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
+from cpfls_cli.gap.naming.results import GapVerdict
+from cpfls_cli.pages.disagreement import flight_warnings
+from cpfls_cli.pages.disagreement import verdict_box as disagreement_box
+from cpfls_cli.pages.effects import (
+    closest_sentence,
+    coefficients_table,
+    effect_sentence,
+    effect_title,
+    effects_table,
+    intervals_figure,
+    parameters_table,
+    share_words,
+    titles,
+)
+from cpfls_cli.pages.extended import verdict_box as extended_box
+from cpfls_cli.pages.gap import (
+    AXES,
+    BEFORE,
+    MEASURED,
+    channel_unit,
+    channel_words,
+    gap_sizes_figure,
+    gap_table,
+    keep_in_view,
+    marked,
+    replay_figure,
+    replay_text,
+)
+from cpfls_cli.pages.sensors import sensor_warnings, sensors_answer, unseen_answer
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.report.canvas import GREY, legend_over, plain_ticks, plot, stacked
+from cpfls_cli.report.content import Block, Box, Facts, Heading, Plot, Section, Text, Tone
+from cpfls_cli.report.numbers import joined, number, sentence
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cpfls_cli.gap.naming.results import Unexplained
+
+_TONES: dict[str, Tone] = {
+    GapVerdict.NAMED: "good",
+    GapVerdict.NO_GAP: "good",
+    GapVerdict.NOT_EXCITED: "note",
+    GapVerdict.AMBIGUOUS: "note",
+    GapVerdict.PARTIAL: "note",
+    GapVerdict.UNEXPLAINED: "warning",
+}
+_ENERGY = {
+    "feeds": "; it feeds energy into the motion",
+    "drains": "; it drains energy from the motion",
+}
+_BAND = 1.96
+
+
+def answer(diagnosis: Source[DiagnosisRecord]) -> Iterator[Block]:
+    """Say what a model misses, how sure that is, what the flights cannot show, and what to distrust."""
+    record = diagnosis.record
+    yield from _verdict(diagnosis, 1)
+    yield from _forces_decide(record)
+    yield from replay_text(record.replay)
+    yield from unseen_answer(record.not_excited)
+    yield from sensors_answer(record.audit)
+    yield from sensor_warnings(record.audit)
+
+
+def gap_blocks(sources: Sources) -> Iterator[Block]:
+    """Say what is missing, or where the gap is if nobody asked yet."""
+    several = len(sources.diagnoses) > 1
+    for index, diagnosis in enumerate(sources.diagnoses, start=1):
+        yield from [Heading(diagnosis.label)] if several else []
+        yield from _verdict(diagnosis, index)
+        yield from _as_sentences(sensor_warnings(diagnosis.record.audit))
+    for extended in sources.extensions:
+        if sources.by_hash(extended.made_from("diagnosis")) is None:
+            yield extended_box(extended)
+    answered = {diagnosis.made_from("disagreement") for diagnosis in sources.diagnoses}
+    for disagreement in sources.disagreements:
+        if disagreement.sha256 not in answered:
+            yield disagreement_box(disagreement)
+        yield from _as_sentences(flight_warnings(disagreement.record))
+
+
+def _as_sentences(warnings: Iterator[Text]) -> Iterator[Text]:
+    return (replace(warning, text=sentence(warning.text)) for warning in warnings)
+
+
+def _verdict(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator[Block]:
+    record = diagnosis.record
+    yield verdict_box(record)
+    yield from (Text(sentence(remark), "note") for remark in record.remarks)
+    caption = (
+        "The gap on flights held out from the fit, root mean square. A floor is what noise alone would leave; a gap of "
+        f"up to {CLEAR:g} floors is none."
+    )
+    yield gap_table(f"gap-{index}", record.gap, caption)
+    flights = ((word, record.flights.names(role)) for word, role in (("Fitted to", TRAINING), ("Held out", HELD_OUT)))
+    yield Facts([*((word, ", ".join(names)) for word, names in flights), ("Why", sentence(record.split))])
+
+
+def verdict_box(record: DiagnosisRecord) -> Box:
+    """Say what a diagnosis found."""
+    verdict = record.verdict
+    named = [effect_sentence(effect) for effect in record.effects.named]
+    named += [closest_sentence(effect) for effect in record.effects.closest]
+    rivals = list(_rivals(record))
+    # What hangs on another flight comes first.
+    effects = [*rivals, *named] if verdict == GapVerdict.AMBIGUOUS else [*named, *rivals]
+    left = [_left_sentence(each) for each in record.unexplained.unexplained()]
+    sentences = [*effects, *left, *_shrunk(record)]
+    return Box(verdict.replace("_", " "), _headline(record), sentences, _TONES.get(verdict, "note"))
+
+
+def _headline(record: DiagnosisRecord) -> str:
+    match record.verdict:
+        case GapVerdict.NO_GAP:
+            return "Nothing is missing that these flights can show."
+        case GapVerdict.NOT_EXCITED:
+            return "These flights move too little to show whether anything is missing."
+        case GapVerdict.UNEXPLAINED:
+            return "There is a gap that nothing in the catalogue explains."
+        case GapVerdict.AMBIGUOUS if record.alternative.name:
+            return _ambiguous(record)
+    named = " ".join(_blame(record)) or "There is a gap without a name."
+    return f"{named} That is the closest, not all of it." if record.verdict == GapVerdict.PARTIAL else named
+
+
+def _blame(record: DiagnosisRecord) -> Iterator[str]:
+    """Say who is at fault: the model, the sensors, or the numbers of the vehicle."""
+    if record.effects_of_motion:
+        yield f"What the model misses is {joined(titles(record.effects_of_motion))}."
+    sensors = record.effects.names("sensor")
+    if sensors:
+        yield f"The sensors are at fault: {joined(titles(sensors))}."
+    if record.effects.names("parameter"):
+        yield "A number of the vehicle is wrong: its inertia or its thrust."
+
+
+def _ambiguous(record: DiagnosisRecord) -> str:
+    rivals: dict[str, list[str]] = {}
+    for name, instead_of in zip(record.alternative.name, record.alternative.instead_of, strict=True):
+        rivals.setdefault(instead_of, []).append(effect_title(name))
+    parts = [f"{effect_title(named)} from {joined(others, 'or')}" for named, others in rivals.items()]
+    certain = [name for name in record.effects.names() if name not in rivals]
+    besides = f" Besides, the model misses {joined(titles(certain))}." if certain else ""
+    return f"These flights cannot tell {joined(parts)}.{besides}"
+
+
+def _rivals(record: DiagnosisRecord) -> Iterator[str]:
+    """Say which effects look alike and which flight would tell them apart."""
+    rivals = record.alternative
+    for name, instead_of, flight in zip(rivals.name, rivals.instead_of, rivals.separated_by, strict=True):
+        yield f"It could be {effect_title(name)} instead of {effect_title(instead_of)}. To tell: {flight}."
+
+
+def _left_sentence(left: Unexplained) -> str:
+    """Say on which axis something is left, and what it follows."""
+    follows = [f"it follows {left.signal} most"] if left.signal else []
+    rings = [f"it rings at {number(left.frequency_hz, 3)} Hz"] if left.frequency_hz is not None else []
+    cause = joined([*follows, *rings]) if follows or rings else "it follows no one signal"
+    share = f" ({share_words(left.share)} of it)" if follows or rings else ""
+    energy = _ENERGY.get(left.energy, "")
+    return f"Left unexplained: {channel_words(left.axis)}, {number(left.floors, 2)} floors; {cause}{share}{energy}."
+
+
+def _shrunk(record: DiagnosisRecord) -> Iterator[str]:
+    gap = record.gap
+    if not gap.known:
+        return
+    worst, left = int(np.nanargmax(gap.before_floors)), int(np.nanargmax(gap.after_floors))
+    before, after = number(float(gap.before_floors[worst]), 2), number(float(gap.after_floors[left]), 2)
+    names = [channel_words(channel) for channel in gap.channel]
+    if record.verdict in (GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED) or not record.effects.names():
+        still = f"; with the closest effects {after} are left" if record.effects.closest else ""
+        yield f"On flights held out, the largest gap is {before} noise floors, in the {names[worst]}{still}."
+        return
+    yield (
+        f"On flights held out from the fit, the largest gap shrinks from {before} noise floors, in the {names[worst]}, "
+        f"to {after}, in the {names[left]}. Of what stood above the noise, {share_words(record.share)} is gone."
+    )
+
+
+def _forces_decide(record: DiagnosisRecord) -> Iterator[Text]:
+    """Explain why torque alone, and torque and force together, name different effects."""
+    if record.forces_decide:
+        alone, share = record.torque_alone.name[0], share_words(float(record.torque_alone.share[0]))
+        yield Text(
+            f"From the torques alone it would be {effect_title(alone)}, which explains {share} of their gap: about the "
+            f"body axes the two look alike. What pulls at the hubs or the fuselage also pushes the vehicle, and with "
+            f"the forces the flights say {joined(titles(record.effects_of_motion))}. Without an accelerometer or a "
+            "velocity, only the first name could be given.",
+            "note",
+        )
+
+
+def diagnosis_section(sources: Sources) -> Section | None:
+    """Show the diagnoses; their verdicts stand in the summary.
+
+    Returns
+    -------
+    Section or None
+        None where no diagnosis was given.
+    """
+    return section_of_each("diagnosis", "Before and after", sources.diagnoses, _section)
+
+
+def _section(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator[Block]:
+    record = diagnosis.record
+    yield Heading(f"Measured and simulated, {diagnosis.label}")
+    yield from _pictures(record, index)
+    yield Heading("The gap on held-out flights")
+    yield from _sizes(record, index)
+    yield Heading("Effects and their numbers")
+    yield from _effects(record, index)
+
+
+def model_words(record: DiagnosisRecord) -> str:
+    """Say what the second model of a diagnosis is."""
+    if record.effects.names():
+        return f"with {joined(titles(record.effects.names()))}"
+    closest = [effect.name for effect in record.effects.closest]
+    if closest:
+        return f"with the closest effects, {joined(titles(closest))}, which are not the answer"
+    return "with nothing but the vehicle's own numbers refitted"
+
+
+def _pictures(record: DiagnosisRecord, index: int) -> Iterator[Block]:
+    after, run = model_words(record), record.run
+    if run is None:
+        yield Text("The held-out flights are too short to simulate a stretch of them.", "note")
+    elif not run.measured.any():
+        yield Text("The held-out flights have no body rates to simulate.", "note")
+    else:
+        yield free_runs_figure(f"free-runs-{index}", run, after, repaired=bool(record.audit.faults))
+    if record.picture is not None:
+        yield gap_picture_figure(f"gap-picture-{index}", record.picture, after)
+
+
+def _sizes(record: DiagnosisRecord, index: int) -> Iterator[Block]:
+    if record.gap.known:
+        yield gap_sizes_figure(f"gap-sizes-{index}", record.gap)
+    yield from replay_text(record.replay)
+    drawn = record.replay and replay_figure(f"prediction-error-{index}", record.replay, "on held-out flights")
+    yield from [drawn] if drawn else []
+    if record.whiteness is not None and len(record.whiteness.lag) > 1:
+        yield whiteness_figure(f"whiteness-{index}", record)
+
+
+def _effects(record: DiagnosisRecord, index: int) -> Iterator[Block]:
+    effects = record.effects
+    if effects.effect.name:
+        yield effects_table(f"effects-{index}", effects)
+    else:
+        yield Text("No effect of the catalogue is named.")
+    if effects.coefficient.name:
+        yield coefficients_table(f"coefficients-{index}", effects)
+        drawn = intervals_figure(f"intervals-{index}", effects)
+        yield from [drawn] if drawn else []
+    yield from _forces_decide(record)
+    if effects.parameter.name:
+        yield parameters_table(f"parameters-{index}", effects)
+
+
+def free_runs_figure(name: str, run: RunGroup, after: str, *, repaired: bool) -> Plot:
+    """Draw measured and simulated body rates over the stretch in which they disagreed most.
+
+    Parameters
+    ----------
+    after : str
+        What the second model is, for the caption.
+    repaired : bool
+        Whether faults of the sensors were taken out of the measured rates.
+    """
+    curves = {"measured": run.measured, "before": run.before, "after": run.after}
+    parts = np.split(np.arange(len(run.time)), np.searchsorted(run.time, run.restart[1:] - 1e-9))
+    astray: list[str] = []
+
+    def draw(figure: Figure) -> None:
+        panels = stacked(figure, len(AXES) + 1)
+        for axes, start in product(panels, run.restart):
+            axes.axvline(start, color=GREY, linewidth=1.2, linestyle=(0, (1, 1.5)), zorder=0.5)
+        for index, (axes, axis) in enumerate(zip(panels, AXES, strict=False)):
+            rates = {key: values[:, index] for key, values in curves.items()}
+            _draw_runs(axes, run.time, rates, parts, f"body rate about {axis}")
+            if keep_in_view(axes, (rates["measured"], rates["after"]), rates["before"]):
+                astray.append(axis)
+        errors = {key: curves[key][:, run.axis] - run.measured[:, run.axis] for key in ("before", "after")}
+        _draw_runs(panels[-1], run.time, errors, parts, f"simulated less measured about {AXES[run.axis]}")
+        panels[-1].axhline(0.0, color="black", linewidth=0.8)
+        legend_over(figure, panels[0])
+        panels[-1].set_xlabel("time, s")
+
+    drawn = plot(name, "", "Body rates about three axes, measured and simulated before and after, over time", 6.4, draw)
+    leaves = f" About {' and '.join(astray)} the model as given leaves the picture." if astray else ""
+    faults = " Measured are the rates without the faults of the sensors; before starts from the log as it is."
+    caption = (
+        f"{run.flight}, where the model as given went astray most (about {AXES[run.axis]}). At each dotted line the "
+        "simulation starts from the measured rates and then runs freely on the rotor speeds of the flight. Before: the "
+        f"model as given; after: {after}.{faults if repaired else ''}{leaves}"
+    )
+    return replace(drawn, caption=caption)
+
+
+def _draw_runs(axes: Axes, time: Array, curves: dict[str, Array], runs: Sequence[IntArray], title: str) -> None:
+    labels = {"measured": "measured", "before": "simulated before", "after": "simulated after"}
+    styles = {"measured": MEASURED, "before": BEFORE, "after": marked(len(time) // len(runs))}
+    for index, rows in enumerate(runs):
+        for key, values in curves.items():
+            axes.plot(time[rows], values[rows], label=labels[key] if index == 0 else None, **styles[key])
+    plain_ticks(axes.yaxis)
+    axes.set_title(title)
+    axes.set_ylabel("rad/s")
+
+
+def gap_picture_figure(name: str, picture: PictureGroup, after: str) -> Plot:
+    """Draw the channel with the largest gap over the stretch in which it is largest.
+
+    Parameters
+    ----------
+    after : str
+        What the second model is, for the caption.
+    """
+    channel = channel_words(picture.channel)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        axes.plot(picture.time, picture.measured, label="measured", **MEASURED)
+        axes.plot(picture.time, picture.before, label="simulated before", **BEFORE)
+        axes.plot(picture.time, picture.after, label="simulated after", **marked(len(picture.time)))
+        keep_in_view(axes, (picture.measured, picture.after), picture.before)
+        plain_ticks(axes.yaxis)
+        axes.set_ylabel(f"{channel}, {channel_unit(picture.channel)}")
+        axes.set_xlabel("time, s")
+        legend_over(figure, axes)
+
+    caption = (
+        f"The {channel} of {picture.flight} where its gap is largest, averaged over smooth windows. Measured: what the "
+        f"measured motion takes; before: what the model as given provides; after: {after}."
+    )
+    return plot(name, caption, f"{channel} over time, measured and simulated", 2.9, draw)
+
+
+def whiteness_figure(name: str, record: DiagnosisRecord) -> Plot:
+    """Draw the autocorrelation of the gap by channel, with the band of white noise.
+
+    Parameters
+    ----------
+    record : DiagnosisRecord
+        With whiteness.
+    """
+    white, gap = record.whiteness, record.gap
+    assert white is not None, "the record has whiteness"
+    band = _BAND / np.sqrt(max(_independent(record.residual.time, float(white.lag[0])), 1.0))
+    rows = -(-len(gap.known) // len(AXES))
+
+    def draw(figure: Figure) -> None:
+        panels = _by_channel(figure, [gap.channel[index] for index in gap.known])
+        for axes, index in zip(panels, gap.known, strict=True):
+            axes.axhspan(-band, band, color="#e6e6e6", label="white noise", zorder=0)
+            axes.axhline(0.0, color="#999999", linewidth=0.7)
+            axes.plot(white.lag, white.before[:, index], label="before", **BEFORE)
+            axes.plot(white.lag, white.after[:, index], label="after", **marked(len(white.lag)))
+            axes.set_ylim(-1.05, 1.05)
+        middle = min(len(AXES) * (rows - 1) + 1, len(panels) - 1)
+        panels[middle].set_xlabel("distance in time, s")
+        panels[0].set_ylabel("correlation")
+        legend_over(figure, panels[0])
+
+    caption = (
+        "Correlation of the gap with itself some time later, on held-out flights. Noise stays within the grey band; "
+        "a gap that keeps its sign for seconds has a cause."
+    )
+    return plot(name, caption, "Autocorrelation of the gap before and after, by channel", 0.9 + 1.6 * rows, draw)
+
+
+def _by_channel(figure: Figure, channels: Sequence[str]) -> list[Axes]:
+    """Make a small plot for each channel, torques above forces, named."""
+    rows = -(-len(channels) // len(AXES))
+    grid = figure.subplots(rows, len(AXES), sharex=True, sharey=True, squeeze=False)
+    for axes in grid.flat[len(channels) :]:
+        axes.set_axis_off()
+    for axes, channel in zip(grid.flat, channels, strict=False):
+        axes.set_title(channel)
+        plain_ticks(axes.yaxis)
+    return list(grid.flat[: len(channels)])
+
+
+def _independent(time: Array, lag: float) -> float:
+    """Count the windows that share no sample."""
+    steps = np.diff(time)
+    hop = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    return len(time) * hop / lag

@@ -1,0 +1,224 @@
+"""Effects on a page: what people call them, their sentences with all numbers, their tables, their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cpfls_cli.artifacts.gap_effects import NamedEffectsGroup
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.pages.gap import AFTER
+from cpfls_cli.report.canvas import plot
+from cpfls_cli.report.content import Plot, Table
+from cpfls_cli.report.numbers import UNKNOWN, number, printed, probability, whole_percent, with_interval
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cpfls_cli.arrays import Array
+    from cpfls_cli.gap.naming.results import Estimate, NamedEffect
+
+_NUMBERS = {
+    "inertia": "moment of inertia about",
+    "coupling": "coupling of rates about",
+    "reference": "offset of the point that the log follows along",
+}
+
+
+def effect_title(name: str) -> str:
+    """Say what people call an effect."""
+    return CATALOGUE[name].title if name in CATALOGUE else name.replace("_", " ")
+
+
+def titles(names: Iterable[str]) -> list[str]:
+    """Say what people call effects."""
+    return [effect_title(name) for name in names]
+
+
+def unit_words(unit: str) -> str:
+    """Write a unit as people do.
+
+    Parameters
+    ----------
+    unit : str
+        With powers such as ``^2``; ``1`` for none.
+    """
+    return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³")
+
+
+def share_words(share: float) -> str:
+    """Write a share in whole per cent; what rounding alone would make nothing or all of it is not called so."""
+    return whole_percent(share).replace("> ", "more than ").replace("< ", "less than ")
+
+
+def effect_sentence(effect: NamedEffect) -> str:
+    """Say what a named effect is, how large, and how sure."""
+    title = effect_title(effect.name)
+    return f"{title[0].upper()}{title[1:]} ({effect.name}): {effect.sentence} {_size(effect)}."
+
+
+def closest_sentence(effect: NamedEffect) -> str:
+    """Say which effect came closest to a gap that it does not explain."""
+    return f"The closest was {effect_title(effect.name)}, and that is not it: {effect.name}, {_size(effect)}."
+
+
+def _size(effect: NamedEffect) -> str:
+    chance = probability(effect.p_value)
+    p_value = f"p {chance}" if chance.startswith("<") else f"p = {chance}"
+    numbers = "; ".join(_coefficient(coefficient) for coefficient in effect.coefficients)
+    return f"{numbers} ({p_value}, {share_words(effect.share)} of the gap)".lstrip()
+
+
+def _coefficient(coefficient: Estimate) -> str:
+    unit = unit_words(coefficient.unit)
+    words = (printed(text) for text in with_interval(coefficient.value, coefficient.low, coefficient.high))
+    value, low, high = words
+    return f"{coefficient.name} = {value} [{low}, {high}]{' ' if unit else ''}{unit}"
+
+
+def effects_table(name: str, effects: NamedEffectsGroup) -> Table:
+    """Show how sure each effect is."""
+    rows = [
+        [
+            effect_title(effect.name) if named else f"{effect_title(effect.name)} (closest only)",
+            effect.name,
+            whole_percent(effect.share),
+            probability(effect.p_value),
+            whole_percent(effect.selection_frequency),
+            effect.sentence,
+        ]
+        for effect, named in zip(effects.listed, effects.effect.named, strict=True)
+    ]
+    caption = (
+        "Effects. Share: part of the gap above the floor that comes back without it. p: how often chance explains as "
+        "much with any effect of the catalogue. Chosen again: share of the stretches of flight without which it would "
+        "still be the first choice."
+    )
+    header = ("Effect", "Identifier", "Share", "p", "Chosen again", "What it is")
+    return Table(name, caption, header, rows, frozenset({0, 1, 5}), frozenset({0, 5}))
+
+
+def coefficients_table(name: str, effects: NamedEffectsGroup) -> Table:
+    """Show the coefficients of the effects with their intervals and ranges."""
+    numbers = effects.coefficient
+    low, high = numbers.plausible_low, numbers.plausible_high
+    rows = [
+        [
+            effect if effect not in numbers.effect[:index] else "",
+            _meaning(effect, numbers.name[index]),
+            *measured(*(float(values[index]) for values in (numbers.value, numbers.low, numbers.high))),
+            unit_words(numbers.unit[index]),
+            interval(float(low[index]), float(high[index]), 3),
+        ]
+        for index, effect in enumerate(numbers.effect)
+    ]
+    caption = "Coefficients with their 95 % intervals, and the range that is physically possible on this vehicle."
+    header = ("Effect", "Coefficient", "Value", "95 % interval", "Unit", "Possible")
+    return Table(name, caption, header, rows, frozenset({0, 1, 4}), frozenset({1}))
+
+
+def parameters_table(name: str, effects: NamedEffectsGroup) -> Table:
+    """Show the vehicle's own numbers, refitted with the effects."""
+    numbers = effects.parameter
+    columns = (numbers.value.tolist(), numbers.low.tolist(), numbers.high.tolist())
+    rows = [list(_parameter(*row)) for row in zip(numbers.name, numbers.unit, *columns, strict=True)]
+    caption = (
+        "The vehicle's own numbers, refitted with the effects; relative ones are changes against the vehicle file. "
+        "Only ratios to the torque of the rotors can be seen."
+    )
+    return Table(name, caption, ("Number", "Change", "95 % interval", "Unit"), rows, frozenset({0, 3}))
+
+
+def measured(value: float, low: float, high: float) -> list[str]:
+    """Write a value and its interval with the digits that the width of the interval leaves.
+
+    Returns
+    -------
+    list of str
+        Value, interval; the interval is ``—`` where it is not known.
+    """
+    first, *ends = (printed(text) for text in with_interval(value, low, high))
+    return [first, " … ".join(ends) if np.isfinite([low, high]).any() else UNKNOWN]
+
+
+def interval(low: float, high: float, digits: int = 4) -> str:
+    """Write an interval.
+
+    Returns
+    -------
+    str
+        ``—`` where it is not known.
+    """
+    return f"{number(low, digits)} … {number(high, digits)}" if np.isfinite([low, high]).any() else UNKNOWN
+
+
+def _meaning(effect: str, coefficient: str) -> str:
+    if effect not in CATALOGUE:
+        return coefficient
+    known = CATALOGUE[effect]
+    meanings = {entry.name: entry.meaning for entry in known.coefficients}
+    meaning = (meanings | {entry.name: entry.meaning for entry in known.shapes}).get(coefficient)
+    return f"{coefficient}: {meaning}" if meaning else coefficient
+
+
+def _parameter(name: str, unit: str, value: float, low: float, high: float) -> Iterator[str]:
+    kind, _, axis = name.rpartition("_")
+    yield f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else name.replace("_", " ")
+    scale = 100.0 if unit == "1" else 1.0
+    yield from measured(scale * value, scale * low, scale * high)
+    yield "%" if unit == "1" else unit_words(unit)
+
+
+def intervals_figure(name: str, effects: NamedEffectsGroup) -> Plot | None:
+    """Draw where each coefficient lies between the least and the largest possible value.
+
+    Returns
+    -------
+    Plot or None
+        None where no range is known.
+    """
+    coefficients = effects.coefficient
+    low, high = coefficients.plausible_low, coefficients.plausible_high
+    with np.errstate(divide="ignore", invalid="ignore"):
+        values = (coefficients.value, coefficients.low, coefficients.high)
+        placed = np.column_stack([(each - low) / (high - low) for each in values])
+    known = np.isfinite(placed[:, 0]) & np.isfinite(low) & np.isfinite(high)
+    # From below, as the axis counts.
+    shown = np.flatnonzero(known)[::-1]
+    if not len(shown):
+        return None
+    names = [f"{coefficients.effect[index]}  {coefficients.name[index]}" for index in shown]
+    ranges = [f"{interval(low[index], high[index], 3)} {unit_words(coefficients.unit[index])}" for index in shown]
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        for row, index in enumerate(shown):
+            _draw_row(axes, row, placed[index])
+        axes.set_yticks(range(len(shown)), names)
+        _right_labels(axes, ranges)
+        axes.set_xlim(-0.03, 1.03)
+        axes.set_xticks([0.0, 1.0], ["least possible", "largest possible"])
+        axes.grid(visible=False)
+
+    caption = "Value (dot) and 95 % interval (bar) of each coefficient within the range that is physically possible."
+    return plot(name, caption, "Coefficients within their possible ranges", 0.75 + 0.3 * len(shown), draw)
+
+
+def _draw_row(axes: Axes, row: int, placed: Array) -> None:
+    value, low, high = placed
+    axes.hlines(row, 0.0, 1.0, color="#cccccc", linewidth=5, zorder=0)
+    if np.isfinite(low) and np.isfinite(high):
+        axes.hlines(row, np.clip(low, 0, 1), np.clip(high, 0, 1), color="black", linewidth=2.4, zorder=1)
+    axes.plot([np.clip(value, 0.0, 1.0)], [row], "o", color=AFTER["color"], markersize=6, zorder=2)
+
+
+def _right_labels(axes: Axes, labels: list[str]) -> None:
+    right = axes.twinx()
+    axes.set_ylim(-0.6, len(labels) - 0.4)
+    right.set_ylim(axes.get_ylim())
+    right.set_yticks(range(len(labels)), labels)
+    right.tick_params(length=0)
+    right.grid(visible=False)

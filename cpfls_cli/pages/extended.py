@@ -1,0 +1,114 @@
+"""The page of an extended model: the effects in it, and what the gap becomes with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.pages.effects import coefficients_table, effect_sentence, intervals_figure, parameters_table, titles
+from cpfls_cli.pages.gap import gap_sizes_figure, gap_table, replay_figure, replay_text
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text
+from cpfls_cli.report.numbers import joined, number
+
+
+def answer(extended: Source[ExtendedRecord]) -> Iterator[Block]:
+    """Say what a model was extended by, what its gap becomes, and about which axes it gets worse."""
+    yield verdict_box(extended)
+    yield _gap_table(extended, 1)
+    yield from replay_text(extended.record.replay)
+    yield from (Text(warning, "warning") for warning in warnings(extended.record))
+
+
+def verdict_box(extended: Source[ExtendedRecord]) -> Box:
+    """Say what a model was extended by, and how its largest gap changes."""
+    record = extended.record
+    before, after = (float(np.nanmax(floors)) for floors in (record.gap.before_floors, record.gap.after_floors))
+    shrunk = f"On held-out flights its largest gap is {number(after, 2)} noise floors; it was {number(before, 2)}."
+    effects = [effect_sentence(effect) for effect in record.effects.named]
+    return Box("EXTENDED MODEL", model_with(extended.label, record), [*effects, shrunk])
+
+
+def model_with(label: str, record: ExtendedRecord) -> str:
+    """Say which effects the model of a file has in it."""
+    return f"{label}: the model with {_by(record)}."
+
+
+def warnings(record: ExtendedRecord) -> list[str]:
+    """Warn of axes that the extension serves ill, although it serves the whole well."""
+    gap = record.gap
+    return [
+        f"held out, {gap.channel[index]}: the gap grows, {gap.before_floors[index]:.3g} -> "
+        f"{gap.after_floors[index]:.3g} floors, although the sum over all channels shrinks"
+        for index in gap.worse_axes
+    ]
+
+
+def _by(record: ExtendedRecord) -> str:
+    return joined(titles(record.effects.names()) or ["nothing"])
+
+
+def extension_section(sources: Sources) -> Section | None:
+    """Show the extended models; what stands in their diagnosis is not shown again.
+
+    Returns
+    -------
+    Section or None
+        None where none was given.
+    """
+    return section_of_each(
+        "extension",
+        "The extended model",
+        sources.extensions,
+        lambda extended, index: _section(extended, index, sources.by_hash(extended.made_from("diagnosis")) is None),
+    )
+
+
+def _section(extended: Source[ExtendedRecord], index: int, alone: bool) -> Iterator[Block]:
+    record = extended.record
+    yield Heading(extended.label)
+    yield Facts(
+        [
+            ("Built on", "the rigid body of the vehicle" if record.base.is_vehicle else "an identified model"),
+            ("Extended by", _by(record)),
+            ("Thrust, relative to the vehicle", number(record.thrust_scale, 5)),
+        ]
+    )
+    yield _inertia_table(extended, index)
+    yield coefficients_table(f"extended-coefficients-{index}", record.effects)
+    yield _gap_table(extended, index)
+    yield from (Text(warning, "warning") for warning in warnings(record))
+    if alone:
+        yield from _figures(record, index)
+
+
+def _inertia_table(extended: Source[ExtendedRecord], index: int) -> Table:
+    record = extended.record
+    given = [*extended.vehicle.inertia_kg_m2, *[0.0] * 6][:6]
+    # Without a rigid body underneath, the six numbers are what the model gets on top of its own.
+    whole = record.base.is_vehicle
+    before = [number(value) if whole else "" for value in given]
+    rows = [list(row) for row in zip(INERTIA_PARAMETERS, before, map(number, record.inertia), strict=True)]
+    header = ("kg m²", "Vehicle", "Extended model" if whole else "Added")
+    return Table(f"extended-inertia-{index}", "Inertia, refitted with the effects.", header, rows)
+
+
+def _gap_table(extended: Source[ExtendedRecord], index: int) -> Table:
+    caption = f"Gap of {extended.label} on held-out flights, refitted together."
+    return gap_table(f"extended-gap-{index}", extended.record.gap, caption)
+
+
+def _figures(record: ExtendedRecord, index: int) -> Iterator[Block]:
+    if record.gap.known:
+        yield gap_sizes_figure(f"extended-gap-sizes-{index}", record.gap)
+    yield from replay_text(record.replay)
+    drawn = (
+        record.replay and replay_figure(f"extended-prediction-error-{index}", record.replay, "on held-out flights"),
+        intervals_figure(f"extended-intervals-{index}", record.effects),
+    )
+    yield from (plot for plot in drawn if plot)
+    if record.effects.parameter.name:
+        yield parameters_table(f"extended-parameters-{index}", record.effects)

@@ -1,0 +1,220 @@
+"""The gap on a page: channels in words, its size before and after, and how far simulations go astray."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.gap_effects import GapChangeGroup, ReplayChangeGroup, ReplayErrors
+from cpfls_cli.report.canvas import BASELINE, GREY, HELD, legend_over, plain_ticks, plot, style_of
+from cpfls_cli.report.content import Cell, Plot, Table, Text
+from cpfls_cli.report.numbers import number, plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+AXES = ("x (roll)", "y (pitch)", "z (yaw)")
+
+CHANNELS = {
+    "torque x": "torque about x (roll)",
+    "torque y": "torque about y (pitch)",
+    "torque z": "torque about z (yaw)",
+    "force x": "force along x (forward)",
+    "force y": "force along y (left)",
+    "force z": "force along z (up)",
+}
+
+MEASURED: dict[str, Any] = {"color": "black", "linestyle": "-", "linewidth": 2.6}
+"""Wide, so that a thin line on top of it leaves an edge."""
+
+BEFORE: dict[str, Any] = {**BASELINE, "linewidth": 1.4, "zorder": 3}
+AFTER: dict[str, Any] = {"color": style_of(1)["color"], "linestyle": "-", "linewidth": 1.2, "zorder": 2.5}
+
+_MARKS = 12
+_ROOM = 3.0
+_LEAST = 0.1
+_GIVEN: dict[str, Any] = {
+    "color": GREY,
+    "marker": "s",
+    "markerfacecolor": "white",
+    "markersize": 7,
+    "linestyle": "none",
+}
+_SHRUNK: dict[str, Any] = {"color": AFTER["color"], "marker": "o", "markersize": 7, "linestyle": "none"}
+_REPLAYS = {
+    "held": "rates stay as they are",
+    "before": "simulated before",
+    "model": "simulated",
+    "after": "simulated after",
+}
+_DEGREES = 180.0 / np.pi
+_ROWS = (("rate", "rate, rad/s", 1.0), ("attitude", "attitude, °", _DEGREES))
+
+
+def channel_words(channel: str) -> str:
+    """Say what a channel is."""
+    return CHANNELS.get(channel, channel)
+
+
+def channel_unit(channel: str) -> str:
+    """Give the unit of a channel."""
+    return "N\N{NO-BREAK SPACE}m" if channel.startswith("torque") else "N"
+
+
+def gap_table(name: str, gap: GapChangeGroup, caption: str) -> Table:
+    """Show the gap of each channel before and after, in its unit and in noise floors."""
+    rows: list[list[str | Cell]] = []
+    for index in gap.known:
+        channel = gap.channel[index]
+        sizes = [number(float(values[index]), 3) for values in (gap.before, gap.after, gap.floor)]
+        before, after = (number(float(values[index]), 2) for values in (gap.before_floors, gap.after_floors))
+        shrunk = Cell(after, "warning" if gap.grown[index] else "plain")
+        rows.append([channel_words(channel), channel_unit(channel), *sizes, before, shrunk])
+    header = ("Channel", "Unit", "Gap before", "Gap after", "Noise floor", "Before, in floors", "After, in floors")
+    return Table(name, caption, header, rows, frozenset({0, 1}))
+
+
+def marked(points: int) -> dict[str, Any]:
+    """Put circles on the curve after, so that it is told from the others without colour.
+
+    Parameters
+    ----------
+    points : int
+        Of the curve.
+    """
+    every = max(1, points // _MARKS)
+    return {**AFTER, "marker": "o", "markersize": 3.6, "markerfacecolor": "white", "markevery": every}
+
+
+def keep_in_view(axes: Axes, shown: Sequence[Array], astray: Array) -> bool:
+    """Stop a curve that runs away from flattening the others.
+
+    Parameters
+    ----------
+    shown : sequence of array
+        Curves that must be seen in full.
+    astray : array
+        The curve that may leave the picture.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
+    low, high = float(min(curve.min() for curve in shown)), float(max(curve.max() for curve in shown))
+    room = _ROOM * max(high - low, 1e-12)
+    leaves = bool(astray.min() < low - room or astray.max() > high + room)
+    if leaves:
+        axes.set_ylim(low - room, high + room)
+    return leaves
+
+
+def gap_sizes_figure(name: str, gap: GapChangeGroup) -> Plot:
+    """Draw the gap of each channel on a logarithmic scale, with the noise floor."""
+    channels = [channel_words(gap.channel[index]) for index in gap.known]
+    before, after = gap.before_floors[gap.known], gap.after_floors[gap.known]
+    hidden = bool((np.fmin(before, after) < _LEAST).any())
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        rows = np.arange(len(channels))[::-1]
+        start, end = (np.maximum(values, _LEAST) for values in (before, after))
+        axes.hlines(rows, np.fmin(start, end), np.fmax(start, end), color="#bbbbbb", linewidth=2, zorder=1)
+        axes.plot(start, rows, label="before", zorder=2, **_GIVEN)
+        axes.plot(end, rows, label="after", zorder=3, **_SHRUNK)
+        axes.axvline(1.0, color="black", linewidth=1.1, linestyle=(0, (4, 2)), label="noise floor", zorder=1)
+        axes.set_yticks(rows, channels)
+        _scale(axes, float(np.nanmax([*before, *after, 1.0])))
+        legend_over(figure, axes)
+
+    note = f" Marks at {plain(_LEAST)} stand for {plain(_LEAST)} or less." if hidden else ""
+    caption = (
+        f"Gap on held-out flights, in noise floors (logarithmic). A gap at the dashed line is as large as what noise "
+        f"alone leaves.{note}"
+    )
+    return plot(
+        name, caption, "Gap of each channel before and after, in noise floors", 1.0 + 0.34 * len(channels), draw
+    )
+
+
+def _scale(axes: Axes, largest: float) -> None:
+    axes.set_xscale("log")
+    axes.set_xlim(0.8 * _LEAST, 1.6 * max(largest, 3.0))
+    axes.set_ylim(-0.6, len(axes.get_yticks()) - 0.4)
+    ticks = [0.1, 1.0, *(10.0**power for power in range(1, 9) if 10.0**power < 1.6 * largest)]
+    axes.set_xticks(ticks, [plain(tick) for tick in ticks])
+    axes.set_xticks([], minor=True)
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel("gap, noise floors")
+
+
+def rates_off(error: Array) -> str:
+    """Write the error of the body rates at the longest horizon, rad/s about x, y and z.
+
+    Parameters
+    ----------
+    error : array, shape (horizon, 3), rad/s
+    """
+    return f"{', '.join(number(float(value), 2) for value in error[-1])} rad/s"
+
+
+def replay_text(replay: ReplayChangeGroup | None) -> Iterator[Text]:
+    """Say how far simulations of held-out flights are off at the longest horizon; nothing of flights without rates."""
+    if replay is not None and replay.turns:
+        before, after, held = (rates_off(each) for each in (replay.rate_before, replay.rate_after, replay.rate_held))
+        yield Text(
+            f"Simulated for {plain(float(replay.horizon_s[-1]))} s on the measured rotor speeds of held-out flights, "
+            f"the model as given is off by {before} (x, y, z), with the effects by {after}; rates that stay as they "
+            f"are would be off by {held}."
+        )
+
+
+def replay_figure(name: str, replay: ReplayErrors, where: str) -> Plot | None:
+    """Draw errors of body rates and attitude over the horizon, by axis.
+
+    Parameters
+    ----------
+    where : str
+        On which flights, for the caption.
+
+    Returns
+    -------
+    Plot or None
+        None where the rates never change, or for a single horizon.
+    """
+    horizon = replay.horizon_s
+    if len(horizon) < 2 or not replay.turns:
+        return None
+    styles = _replay_styles(len(horizon))
+    errors = {quantity: replay.errors(quantity) for quantity, _, _ in _ROWS}
+    rows = [row for row in _ROWS if np.isfinite(errors[row[0]]["held"]).any()]
+
+    def draw(figure: Figure) -> None:
+        grid = figure.subplots(len(rows), len(AXES), sharex=True, squeeze=False)
+        for panels, (quantity, label, scale) in zip(grid, rows, strict=True):
+            for key in (key for key in styles if key in errors[quantity]):
+                values = scale * errors[quantity][key]
+                for axes, column in zip(panels, values.T, strict=True):
+                    axes.plot(horizon, column, label=_REPLAYS[key], **styles[key])
+            for axes in panels:
+                axes.set_ylim(bottom=0.0)
+                plain_ticks(axes.yaxis)
+            panels[0].set_ylabel(label)
+        for axes, axis in zip(grid[0], AXES, strict=True):
+            axes.set_title(f"error about {axis}")
+        grid[-1][1].set_xlabel("horizon, s")
+        legend_over(figure, grid[0][0])
+
+    caption = (
+        f"Root mean square error after a simulation of so many seconds on the rotor speeds of the flight, from "
+        f"measured rates, {where}. A model that is worse than rates that stay as they are predicts nothing."
+    )
+    return plot(name, caption, "Error of simulated rates and attitude over the horizon", 1.0 + 1.7 * len(rows), draw)
+
+
+def _replay_styles(points: int) -> Mapping[str, dict[str, Any]]:
+    return {"held": HELD, "before": BEFORE, "model": {**BEFORE, "color": "black"}, "after": marked(points)}

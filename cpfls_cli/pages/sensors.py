@@ -1,0 +1,115 @@
+"""What the flights of a comparison can and cannot show: their sensors, and the effects that would stay unseen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cpfls_cli.artifacts.gap_flights import AuditGroup, NotExcitedGroup
+from cpfls_cli.pages.effects import effect_title, measured, titles, unit_words
+from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.report.content import Block, Box, Heading, Section, Table, Text
+from cpfls_cli.report.numbers import joined, probability, sentence
+
+_SENSORS, _UNSEEN = "Sensors", "What these flights cannot show"
+
+
+def sensors_answer(audit: AuditGroup) -> Iterator[Block]:
+    """Say under a heading what the sensors say about each other; broken channels are left to `sensor_warnings`."""
+    yield Heading(_SENSORS)
+    yield from _faults(audit)
+
+
+def _faults(audit: AuditGroup) -> Iterator[Block]:
+    for fault in audit.faults:
+        yield Box("SENSOR FAULT", f"{fault} The diagnosis repairs it before it looks at the model.", [], "warning")
+    if audit.finding and not audit.faults:
+        yield Text("The sensors agree with each other: no fault that matters.", "good")
+    for reason, names in audit.untested_by_reason.items():
+        yield Text(f"Not tested for {joined(titles(names))}: {reason.rstrip('.')}.")
+    yield from (Text(sentence(note)) for note in audit.note)
+
+
+def sensor_warnings(audit: AuditGroup) -> Iterator[Text]:
+    """Warn of channels that disagree or look broken."""
+    return (Text(warning, "warning") for warning in audit.warning)
+
+
+def sensors_section(sources: Sources) -> Section | None:
+    """Show the audit of the sensors, each once.
+
+    Returns
+    -------
+    Section or None
+        None where nothing of the gap workflow was given.
+    """
+    distinct = {_words(source.record.audit): source for source in reversed(sources.gap)}
+    blocks: list[Block] = []
+    for index, source in enumerate(reversed(distinct.values()), start=1):
+        audit = source.record.audit
+        blocks += [Heading(source.label)] if len(distinct) > 1 else []
+        blocks += [*_faults(audit), *sensor_warnings(audit)]
+        blocks += [_numbers(audit, f"sensor-numbers-{index}")] if audit.coefficient.name else []
+    return Section("sensors", _SENSORS, blocks) if blocks else None
+
+
+def _words(audit: AuditGroup) -> tuple[str, ...]:
+    return (*audit.sentence, *audit.untested, *audit.warning, *audit.note)
+
+
+def _numbers(audit: AuditGroup, name: str) -> Table:
+    rows = [
+        [
+            effect_title(finding.name),
+            number.name,
+            *measured(number.value, number.low, number.high),
+            unit_words(number.unit),
+            probability(finding.p_value),
+        ]
+        for finding in audit.findings
+        for number in finding.coefficients
+    ]
+    caption = "What was measured of each fault, whether it matters or not, with 95 % intervals."
+    header = ("Fault", "Number", "Value", "95 % interval", "Unit", "p")
+    return Table(name, caption, header, rows, frozenset({0, 1, 4}))
+
+
+def unseen_answer(unseen: NotExcitedGroup) -> Iterator[Block]:
+    """List the effects that could be there unseen, those of one reason together, and what would show them."""
+    if unseen.name:
+        yield Heading(_UNSEEN)
+        yield _unseen_table("unseen", unseen, "")
+
+
+def unseen_section(sources: Sources) -> Section | None:
+    """List the effects that could be there unseen, with the reason or the flight that would show them.
+
+    Returns
+    -------
+    Section or None
+        None where neither a disagreement nor a diagnosis was given.
+    """
+    given: list[Source] = [*sources.diagnoses, *sources.disagreements]
+    if not given:
+        return None
+    distinct = {_rows(source.record.not_excited): source for source in reversed(given)}
+    blocks = [_of_source(source, index) for index, source in enumerate(reversed(distinct.values()), start=1)]
+    return Section("unseen", _UNSEEN, blocks)
+
+
+def _of_source(source: Source, index: int) -> Block:
+    unseen: NotExcitedGroup = source.record.not_excited
+    if not unseen.name:
+        return Text(f"{source.label}: every effect of the catalogue would have shown.")
+    caption = f"Effects that could be there without {source.label} knowing, and why: what the logs lack, or how to fly."
+    return _unseen_table(f"unseen-{index}", unseen, caption)
+
+
+def _unseen_table(name: str, unseen: NotExcitedGroup, caption: str) -> Table:
+    header = ("Effects", "Identifiers", "Why, or what to fly")
+    return Table(name, caption, header, _rows(unseen), frozenset({0, 1, 2}), frozenset({0, 2}))
+
+
+def _rows(unseen: NotExcitedGroup) -> tuple[tuple[str, str, str], ...]:
+    return tuple(
+        (joined(titles(names)), ", ".join(names), sentence(reason)) for reason, names in unseen.by_reason.items()
+    )

@@ -1,0 +1,74 @@
+"""One record told in every form, as lines of plain text: terminal, and a report in HTML, Markdown and JSON."""
+
+import json
+import re
+import sys
+from contextlib import ExitStack
+from html import unescape
+from unittest.mock import patch
+
+from cpfls_cli.config.study import Study, resolved
+from cpfls_cli.pages.page import report_page
+from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.report.content import Plot
+from cpfls_cli.report.forms import Form
+from cpfls_cli.report.terminal import terminal_lines
+
+
+def source_of_record(record, label="record.h5"):
+    study = Study()
+    return Source.of(label, "f" * 64, record, resolved(study), study.vehicle, 0)
+
+
+def in_all_forms(record, blocks):
+    """Tell a record; give the text of each form, one line for each row of a table.
+
+    Parameters
+    ----------
+    blocks : iterable of Block
+        The answer of its command.
+    """
+    source = source_of_record(record)
+    sources = Sources([source], source.vehicle, Study().report)
+    with ExitStack() as drawing:
+        for module in [module for name, module in sys.modules.items() if name.startswith("cpfls_cli.pages.")]:
+            if hasattr(module, "plot"):
+                drawing.enter_context(patch.object(module, "plot", _undrawn))
+        pages = {form: report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
+    told = {
+        "terminal": "\n".join(terminal_lines(blocks)),
+        "html": _of_html(pages[Form.HTML]),
+        "markdown": _of_markdown(pages[Form.MARKDOWN]),
+        "json": "\n".join(_of_json(json.loads(pages[Form.JSON]))),
+    }
+    return {form: "\n".join(" ".join(line.split()) for line in text.splitlines()) for form, text in told.items()}
+
+
+def _undrawn(name, caption, description, _height, _draw):
+    """Stand for a figure whose curves are of no interest: drawing them takes longer than all the rest."""
+    return Plot(name, caption, "<svg></svg>", description)
+
+
+def _of_html(page):
+    body = re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", page, flags=re.DOTALL)
+    rows = re.sub(r"\s*\n\s*", " ", body)
+    return unescape(re.sub(r"<[^>]+>", " ", re.sub(r"</(tr|p|div|li|dd|h\d|caption|figcaption|thead)>", "\n", rows)))
+
+
+def _of_markdown(page):
+    plain = page.replace("**", "").replace("> ", "").replace(" | ", " ").replace("| ", "").replace(" |", "")
+    return unescape(re.sub(r"\\(.)", r"\1", plain))
+
+
+def _of_json(value):
+    """List all text, the cells of a row on one line."""
+    if isinstance(value, dict):
+        for item in value.values():
+            yield from _of_json(item)
+    elif isinstance(value, list) and value and all(isinstance(item, str) for item in value):
+        yield " ".join(value)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _of_json(item)
+    elif isinstance(value, str):
+        yield value

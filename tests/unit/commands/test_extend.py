@@ -1,0 +1,25 @@
+import numpy as np
+import pytest
+
+from cpfls_cli.commands.extend import require_named
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.gap.extended import worse_axes
+from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
+
+OFFSET = NamedEffect("com_offset", None, np.array([0.01]), (), 1e-9, 0.998, 1.0, "Off centre.")
+
+
+@pytest.mark.parametrize("verdict", [GapVerdict.UNEXPLAINED, GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED])
+def test_only_names_are_added(verdict):
+    with pytest.raises(ComputationError, match=f"the diagnosis is {verdict} and names no effect"):
+        require_named(verdict, [OFFSET])
+    with pytest.raises(ComputationError, match="names no effect"):
+        require_named(GapVerdict.NAMED, [])
+    for good in (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS):
+        require_named(good, [OFFSET])
+
+
+def test_axes_that_get_worse():
+    before = np.array([2.0, 1.4, 10.0, 3.0, np.nan, 1.0])
+    assert worse_axes(before, 1.3 * before) == [0, 2]
+    assert worse_axes(before, 1.1 * before) == []
