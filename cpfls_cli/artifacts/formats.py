@@ -34,8 +34,6 @@ RECORDS: tuple[type[Record], ...] = (
 FORMATS = tuple(record.spec() for record in RECORDS)
 """Their specifications."""
 
-TRAJECTORY, FLIGHT, SELECTION, MODEL, CHECKPOINT, SWEEP, PREDICTION, DISAGREEMENT, DIAGNOSIS, EXTENDED = FORMATS
-
 _HEAD = "| dataset | dimensions | units | frame | required | description |\n|---|---|---|---|---|---|"
 
 

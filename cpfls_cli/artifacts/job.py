@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import cpfls_cli
 from cpfls_cli.artifacts.output import check_output
-from cpfls_cli.artifacts.spec import ArtifactSpec, Header, InputFile, Record
-from cpfls_cli.artifacts.store import Artifact, file_sha256, format_name, write_artifact, write_record
+from cpfls_cli.artifacts.spec import Header, InputFile, Record
+from cpfls_cli.artifacts.store import file_sha256, format_name, write_record
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 
@@ -105,11 +105,6 @@ def finish(job: Job, record: R, inputs: Mapping[str, InputFile]) -> R:
     whole = record.with_header(header_of(job.study, inputs))
     write_record(job.output, whole)
     return whole
-
-
-def finish_data(job: Job, spec: ArtifactSpec, data: Mapping[str, Any], inputs: Mapping[str, InputFile]) -> None:
-    """Write the datasets of a job that are not a record yet."""
-    write_artifact(job.output, Artifact(spec, header_of(job.study, inputs), data))
 
 
 def header_of(study: Study, inputs: Mapping[str, InputFile]) -> Header:

@@ -64,7 +64,7 @@ def tell(outcome: Outcome, common: Common) -> None:
     elif not common.quiet:
         print("\n".join(_lines(outcome)), flush=True)
     if not common.quiet:
-        for warning in (*warnings_of(outcome.blocks), *outcome.warnings):
+        for warning in warnings_of(outcome.blocks):
             _complain(warning, "note")
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)

@@ -12,7 +12,7 @@ from scipy.ndimage import find_objects, label
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.formats import FLIGHT
+from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
@@ -20,7 +20,6 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
-from cpfls_cli.flights.sources import read_good
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.logs.formats import is_log
 
@@ -41,7 +40,7 @@ class _Source:
     """A flight as it was read; `units` are those of the import that made it."""
 
     name: str
-    data: Mapping[str, Array]
+    signals: Mapping[str, Array]
     units: Mapping[str, str]
     warnings: tuple[str, ...]
 
@@ -75,12 +74,11 @@ def _log(path: Path, study: Study) -> _Source:
 
 
 def _artifact(path: Path, study: Study) -> _Source:
-    flight = read_good(path, FLIGHT)
+    flight = read_record(path, FlightRecord)
     source = f"{path}: /config"
-    own = validate(parse_config(flight.header.config, source), source)
+    own = validate(parse_config(flight.origin.config, source), source)
     require_same_vehicle(path, own.vehicle, study.vehicle)
-    data = {name: flight.array(name) for name in flight.data if "/" not in name}
-    return _Source(path.name, data, _units(own) if "log" in flight.header.inputs else {}, ())
+    return _Source(path.name, flight.signals, _units(own) if flight.made_from("log") else {}, ())
 
 
 def _units(study: Study) -> dict[str, str]:
@@ -130,19 +128,19 @@ def _actuated(signals: Signals, source: _Source, data: Mapping[str, Array], stud
 
 def _known_part(source: _Source) -> tuple[dict[str, Array], tuple[str, ...]]:
     """Keep the longest stretch in which everything is known."""
-    count = len(source.data["time"])
+    count = len(source.signals["time"])
     known = np.ones(count, dtype=bool)
-    for values in source.data.values():
+    for values in source.signals.values():
         known &= np.isfinite(values.reshape(count, -1)).all(axis=1)
     if known.all() and count:
-        return dict(source.data), source.warnings
+        return dict(source.signals), source.warnings
     runs = [found[0] for found in find_objects(label(known)[0])]
     if not runs:
         raise InputError(f"{source.name}: no sample at which all of its signals are known")
     best = max(runs, key=lambda run: run.stop - run.start)
-    time = source.data["time"][best]
+    time = source.signals["time"][best]
     said = f"only {time[0]:.2f} s to {time[-1]:.2f} s are used, the longest stretch in which all signals are known"
-    return {name: values[best] for name, values in source.data.items()}, (*source.warnings, said)
+    return {name: values[best] for name, values in source.signals.items()}, (*source.warnings, said)
 
 
 def _with_voltage(

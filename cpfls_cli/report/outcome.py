@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from cpfls_cli.artifacts.job import Job
@@ -19,17 +19,14 @@ class Outcome:
     ----------
     summary : mapping
         For machines (``--json``).
-    blocks : tuple of Block or str
+    blocks : tuple of Block
         For people, on standard output; texts of tone ``warning`` go to standard error.
-    warnings : tuple of str
-        What to distrust, on standard error.
     exit_code : int
         Of the program; not 0 where the work was stopped.
     """
 
     summary: Mapping[str, Any]
-    blocks: tuple[Block | str, ...] = ()
-    warnings: tuple[str, ...] = field(default=())
+    blocks: tuple[Block, ...] = ()
     exit_code: int = 0
 
 

@@ -16,13 +16,11 @@ _STYLES: dict[Tone, str] = {"plain": "", "note": "", "good": "green", "warning":
 _UNLIMITED = 100_000
 
 
-def terminal_lines(blocks: Iterable[Block | str], width: int | None = None, *, colour: bool = False) -> Iterator[str]:
+def terminal_lines(blocks: Iterable[Block], width: int | None = None, *, colour: bool = False) -> Iterator[str]:
     """Write blocks as lines; texts that warn are left to `warnings_of`.
 
     Parameters
     ----------
-    blocks : iterable of Block or str
-        A string is a line of its own.
     width : int or None
         Columns of the terminal; None where there is none and lines are as long as they are.
     colour : bool
@@ -30,8 +28,6 @@ def terminal_lines(blocks: Iterable[Block | str], width: int | None = None, *, c
     """
     for block in blocks:
         match block:
-            case str():
-                yield block
             case Text() if block.tone == "warning":
                 pass
             case Text() | Heading():
@@ -49,7 +45,7 @@ def terminal_lines(blocks: Iterable[Block | str], width: int | None = None, *, c
                 pass
 
 
-def warnings_of(blocks: Iterable[Block | str]) -> tuple[str, ...]:
+def warnings_of(blocks: Iterable[Block]) -> tuple[str, ...]:
     """List the texts that warn."""
     return tuple(block.text for block in blocks if isinstance(block, Text) and block.tone == "warning")
 

@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from cpfls_cli.artifacts.formats import DIAGNOSIS, DISAGREEMENT, EXTENDED
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import Artifact
 
@@ -105,7 +107,7 @@ def disagreement(force=True, **changed):
         "base/kind": np.array("rigid-body"),
         **flights(roles=("given", "given")),
     }
-    return Artifact(DISAGREEMENT, Header("0", 1, "seed: 1\n"), data | changed)
+    return Artifact(DisagreementRecord.spec(), Header("0", 1, "seed: 1\n"), data | changed)
 
 
 def effects(*rows):
@@ -194,7 +196,7 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
         "base/kind": np.array("rigid-body"),
         **flights(),
     }  # fmt: skip
-    return Artifact(DIAGNOSIS, Header("0", 1, "seed: 1\n"), data | changed)
+    return Artifact(DiagnosisRecord.spec(), Header("0", 1, "seed: 1\n"), data | changed)
 
 
 def extended(diagnosis_sha256="", **changed):
@@ -208,7 +210,7 @@ def extended(diagnosis_sha256="", **changed):
         "base/kind": np.array("rigid-body"),
     }
     source = InputFile("diagnosis.h5", diagnosis_sha256 or "0" * 64, "cpfls/diagnosis")
-    return Artifact(EXTENDED, Header("0", 1, "seed: 1\n", {"diagnosis": source}), data | changed)
+    return Artifact(ExtendedRecord.spec(), Header("0", 1, "seed: 1\n", {"diagnosis": source}), data | changed)
 
 
 def without(artifact, *groups):

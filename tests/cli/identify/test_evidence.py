@@ -8,12 +8,12 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.formats import MODEL
+from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.report.numbers import sentence
 from cpfls_cli.validation import validate
 
 EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "period", "verdict")
-VALIDATION = [spec for spec in MODEL.datasets if spec.path.split("/")[0] in EVIDENCE]
+VALIDATION = [spec for spec in ModelRecord.spec().datasets if spec.path.split("/")[0] in EVIDENCE]
 WORDS = {
     "good-for-control": "Good for control",
     "good-inside-region": "Good inside the region that training visited, and only there",

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.formats import FLIGHT, MODEL
+from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import Artifact
+
+FLIGHT = FlightRecord.spec()
 
 
 def findings(spec=FLIGHT, **data):
@@ -52,7 +55,9 @@ def test_gaps_are_allowed_where_the_format_says_so():
 
 
 def test_lengths_in_digits_are_fixed():
-    assert findings(MODEL, model__rigid_body=np.zeros(5)) == ["model/rigid_body: 5 along '6', but 6 by the format"]
+    assert findings(ModelRecord.spec(), model__rigid_body=np.zeros(5)) == [
+        "model/rigid_body: 5 along '6', but 6 by the format"
+    ]
 
 
 def test_empty_datasets_are_not_an_error_of_the_rules():

@@ -6,10 +6,12 @@ import stat
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.formats import PREDICTION, SELECTION, TRAJECTORY
 from cpfls_cli.artifacts.output import write_text
+from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import Artifact, format_name, read_artifact, write_artifact
+from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.errors import InputError
 
 HEADER = Header("1.2.3", 4, "seed: 4\n", {"flight": InputFile("f.h5", "ab" * 32, "cpfls/flight")})
@@ -30,14 +32,14 @@ def selection(**changes):
         "stop_reason": np.array("size reached: 2 of 9, \u03bc"),
         "random/condition_number": np.array([5.0, np.nan]),
     }
-    return Artifact(SELECTION, HEADER, data | changes)
+    return Artifact(SelectionRecord.spec(), HEADER, data | changes)
 
 
 def test_reading_gives_what_was_written(tmp_path):
     path = tmp_path / "s.h5"
     write_artifact(path, selection())
-    artifact = read_artifact(path, SELECTION)
-    assert artifact.spec is SELECTION
+    artifact = read_artifact(path, SelectionRecord.spec())
+    assert artifact.spec is SelectionRecord.spec()
     assert artifact.header == HEADER
     assert artifact.text("stop_reason") == "size reached: 2 of 9, \u03bc"
     assert artifact.number("rank") == 2.0
@@ -94,7 +96,7 @@ def test_files_get_the_permissions_of_any_new_file(tmp_path):
 def test_wrong_format_names_both(tmp_path):
     write_artifact(tmp_path / "s.h5", selection())
     with pytest.raises(InputError, match=r"is a cpfls/selection; .* needs a cpfls/trajectory .* or cpfls/prediction"):
-        read_artifact(tmp_path / "s.h5", TRAJECTORY, PREDICTION)
+        read_artifact(tmp_path / "s.h5", TrajectoryRecord.spec(), PredictionRecord.spec())
 
 
 def test_pipe_is_not_waited_for(tmp_path):
