@@ -1,4 +1,4 @@
-"""Scores of torque predictions by axis, the baselines that a model must beat, and the spread over replicates."""
+"""Scores of torque predictions by axis, and the baselines that a model must beat."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from cpfls_cli.pages.claims import (
     ClaimVerdict,
     Measurement,
 )
+from cpfls_cli.pages.fuzzy_part import seesaw_figure
 from cpfls_cli.pages.printed import (
     PRINTED_BREAKPOINTS,
     PRINTED_RELATIVE_ERROR,
@@ -33,12 +34,8 @@ from cpfls_cli.pages.printed import (
 )
 from cpfls_cli.pages.search_claims import CLASSIC_CLAIM, REDUCED_CLAIMS, SMALLER_SEARCH_CLAIM
 from cpfls_cli.pages.source import Sources
-from cpfls_cli.report.canvas import line, plot, style_of
-from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text, Tone
+from cpfls_cli.report.content import Block, Cell, Folded, Section, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 CLAIMS: tuple[Claim, ...] = (
     RELATIVE_ERROR_CLAIM,
@@ -89,7 +86,7 @@ def reproduction_section(sources: Sources) -> Section | None:
         _claims(measured),
         _rules(),
         _figures(compared_figures(sources)),
-        _seesaw_figure("figure-1-seesaw"),
+        seesaw_figure("figure-1-seesaw"),
     ]
     return Section("reproduction", "Reproduction of the paper", blocks)
 
@@ -308,26 +305,3 @@ def _error_compared(sources: Sources) -> ComparedFigure:
     agrees = largest < PRINTED_RELATIVE_ERROR
     why = "Relative to the largest torque of each axis; the absolute errors belong to torques of other sizes."
     return ComparedFigure(title, printed, f"at most {percent(largest, 2)} ({axis})", _agreement(agrees), why)
-
-
-def _seesaw_figure(name: str) -> Plot:
-    """Draw the piecewise linear seesaw over two turns, with the values that the paper prints.
-
-    References
-    ----------
-    Figure 1 and equation (11) of the paper.
-    """
-    half_turns = np.linspace(-1.0, 3.0, 801)
-
-    def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        line(axes, half_turns, seesaw(np.pi * half_turns)[0], **style_of(0))
-        axes.plot(list(PRINTED_SEESAW), list(PRINTED_SEESAW.values()), "o", color=style_of(1)["color"])
-        axes.set_xlabel("angle, π rad")
-        axes.set_ylabel("seesaw")
-
-    caption = (
-        "Figure 1. The seesaw of equation (11) over two turns: equal where an angle and 2π meet. Dots: the values that "
-        "the equation prints at the quarters of a turn. It takes each value twice in a turn."
-    )
-    return plot(name, caption, "A triangle wave between -1 and 1 over two turns", 2.3, draw)

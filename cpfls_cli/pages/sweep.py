@@ -56,7 +56,7 @@ def _overview(sweep: Source[SweepRecord]) -> Table:
     ]
     sizes = ("Setting", "Samples", "Population", "Generations", "Runs")
     header = (*sizes, f"MSE, {SQUARED_TORQUE}", f"Largest error, {TORQUE}", "Condition number")
-    return Table("settings", "Mean ± standard deviation over the seeds.", header, rows)
+    return Table("settings", "", header, rows)
 
 
 def replicates_section(sources: Sources) -> Section | None:
