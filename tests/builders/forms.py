@@ -10,9 +10,12 @@ from unittest.mock import patch
 from cpfls_cli.config.study import Study, resolved
 from cpfls_cli.pages.page import report_page
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.report.content import Plot
+from cpfls_cli.report.content import Box, Document, Facts, Plot, Section, Table, Text
 from cpfls_cli.report.forms import Form
-from cpfls_cli.report.terminal import terminal_lines
+from cpfls_cli.report.html import html_page
+from cpfls_cli.report.json_page import json_page
+from cpfls_cli.report.markdown import markdown_page
+from cpfls_cli.report.terminal import terminal_lines, warnings_of
 
 
 def source_of_record(record, label="record.h5"):
@@ -20,28 +23,57 @@ def source_of_record(record, label="record.h5"):
     return Source.of(label, "f" * 64, record, resolved(study), study.vehicle, 0)
 
 
-def in_all_forms(record, blocks):
-    """Tell a record; give the text of each form, one line for each row of a table.
+def phrases(block):
+    """List what a block says: sentences, rows of tables, facts."""
+    match block:
+        case Box():
+            return [block.title, *block.sentences]
+        case Table():
+            return [" ".join(cell.text for cell in row) for row in block.cells]
+        case Facts():
+            return [value for _, value in block.rows]
+        case Text():
+            return [block.text]
+    return []
+
+
+def words(text):
+    """Let case, spaces and the end of a sentence be."""
+    return " ".join(text.split()).lower().rstrip(".")
+
+
+def in_all_forms(source, blocks):
+    """Tell a record on a page; give the text of each form, one line for each row of a table.
 
     Parameters
     ----------
     blocks : iterable of Block
         The answer of its command.
     """
-    source = source_of_record(record)
     sources = Sources([source], source.vehicle, Study().report)
     with ExitStack() as drawing:
         for module in [module for name, module in sys.modules.items() if name.startswith("cpfls_cli.pages.")]:
             if hasattr(module, "plot"):
                 drawing.enter_context(patch.object(module, "plot", _undrawn))
         pages = {form: report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
-    told = {
-        "terminal": "\n".join(terminal_lines(blocks)),
+    return _plain({"terminal": "\n".join(terminal_lines(blocks)), **pages})
+
+
+def blocks_in_all_forms(blocks):
+    """Write blocks alone in each form; give the text, one line for each row of a table."""
+    document = Document("Title", "0", [Section("answer", "Answer", blocks)], [])
+    pages = {Form.HTML: html_page(document), Form.MARKDOWN: markdown_page(document), Form.JSON: json_page(document)}
+    return _plain({"terminal": "\n".join([*terminal_lines(blocks), *warnings_of(blocks)]), **pages})
+
+
+def _plain(pages):
+    texts = {
+        "terminal": pages["terminal"],
         "html": _of_html(pages[Form.HTML]),
         "markdown": _of_markdown(pages[Form.MARKDOWN]),
         "json": "\n".join(_of_json(json.loads(pages[Form.JSON]))),
     }
-    return {form: "\n".join(" ".join(line.split()) for line in text.splitlines()) for form, text in told.items()}
+    return {form: "\n".join(" ".join(line.split()) for line in text.splitlines()) for form, text in texts.items()}
 
 
 def _undrawn(name, caption, description, _height, _draw):

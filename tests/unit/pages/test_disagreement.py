@@ -30,7 +30,8 @@ def disagreement(floors):
 def test_every_form_calls_the_same_channels_above_noise(floors, above):
     record = disagreement(floors)
     assert "".join("y" if record.gap.above_noise[index] else "n" for index in record.gap.known) == above
-    for form, text in in_all_forms(record, answer(source_of_record(record))).items():
+    source = source_of_record(record)
+    for form, text in in_all_forms(source, answer(source)).items():
         rows = [
             line.split() for line in text.splitlines() if line.startswith(("torque", "force")) and line.endswith("%")
         ]
@@ -41,7 +42,7 @@ def test_every_form_calls_the_same_channels_above_noise(floors, above):
 
 
 def test_no_signal_is_drawn_where_nothing_is_above_noise():
-    drawn = in_all_forms(disagreement(NOTHING_HIDDEN), [])["json"]
+    drawn = in_all_forms(source_of_record(disagreement(NOTHING_HIDDEN)), [])["json"]
     assert "dependence-1" not in drawn
     assert "No channel has a gap above noise, so there is nothing to follow." in drawn
 

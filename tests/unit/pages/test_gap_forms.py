@@ -7,34 +7,15 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.pages import diagnosis, disagreement, extended
-from cpfls_cli.report.content import Box, Facts, Table, Text
+from cpfls_cli.report.content import Text
 from tests.builders import gap_artifacts as made
-from tests.builders.forms import in_all_forms, source_of_record
+from tests.builders.forms import in_all_forms, phrases, source_of_record, words
 
 GREW = {"gap/after_floors": np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2])}
 FAULT = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
 RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust")]
 LEFT = [("torque z", 14.2, "yaw", 0.82, 3.21, "feeds"), ("force x", 2.0, "", 0.0, np.nan, "neither")]
 BROKEN = made.texts("rotor 2 looks saturated")
-
-
-def phrases(block):
-    """List what a block says: sentences, rows of tables, facts."""
-    match block:
-        case Box():
-            return [block.title, *block.sentences]
-        case Table():
-            return [" ".join(cell.text for cell in row) for row in block.cells]
-        case Facts():
-            return [value for _, value in block.rows]
-        case Text():
-            return [block.text]
-    return []
-
-
-def words(text):
-    """Let case, spaces and the end of a sentence be."""
-    return " ".join(text.split()).lower().rstrip(".")
 
 
 @pytest.mark.parametrize(
@@ -60,11 +41,12 @@ def words(text):
 )
 def test_every_form_says_what_the_command_says(kind, page, artifact):
     record = kind.of_data(artifact.header, artifact.data)
-    blocks = list(page.answer(source_of_record(record)))
+    source = source_of_record(record)
+    blocks = list(page.answer(source))
     said = [phrase for block in blocks for phrase in phrases(block)]
     assert len(said) > 6
     warned = [block.text for block in blocks if isinstance(block, Text) and block.tone == "warning"]
-    for form, text in in_all_forms(record, blocks).items():
+    for form, text in in_all_forms(source, blocks).items():
         told = words(text)
         for phrase in said:
             # Warnings of a command go to standard error.
