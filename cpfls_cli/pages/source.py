@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Generic, Self
 
 from typing_extensions import TypeVar
@@ -19,7 +18,6 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import Record
-from cpfls_cli.artifacts.store import Artifact
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import ReportSettings, resolved
@@ -59,16 +57,6 @@ class Source(Origin, Generic[R]):
     ) -> Self:
         """Name an artifact for a document."""
         return cls(label, sha256, record.FORMAT.name, record.origin, record, config, vehicle, parameters)
-
-    @cached_property
-    def artifact(self) -> Artifact:
-        """The artifact as datasets by path."""
-        return Artifact(self.record.spec(), self.header, self.record.data)
-
-    @property
-    def searched(self) -> bool:
-        """Whether a model has partitions to search for; without, one chromosome was evaluated."""
-        return bool(self.artifact.array("model/weights").size)
 
     def made_from(self, role: str) -> str | None:
         """Hash of an input by its role; None where it had none."""
