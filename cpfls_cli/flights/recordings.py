@@ -167,7 +167,7 @@ def _share(recording: Recording, full: float) -> Recording:
 
 
 @dataclass(frozen=True)
-class Split:
+class FlightSplit:
     """Flights to learn from, flights to judge on, and why."""
 
     training: tuple[Recording, ...]
@@ -175,7 +175,7 @@ class Split:
     sentence: str
 
 
-def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], settings: GapSettings) -> Split:
+def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], settings: GapSettings) -> FlightSplit:
     """Split flights for learning and judging.
 
     Parameters
@@ -190,12 +190,14 @@ def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], set
     """
     if held_out:
         common_windows([*given, *held_out], settings)
-        return Split(tuple(given), tuple(held_out), f"held out as asked: {_names(held_out)}")
+        return FlightSplit(tuple(given), tuple(held_out), f"held out as asked: {_names(held_out)}")
     if len(given) > 1:
         common_windows(given, settings)
         first = len(given) - max(1, len(given) // 3)
         training, last = tuple(given[:first]), tuple(given[first:])
-        return Split(training, last, f"no flight was held out by name, so the last third of them is: {_names(last)}")
+        return FlightSplit(
+            training, last, f"no flight was held out by name, so the last third of them is: {_names(last)}"
+        )
     return _thirds(given[0], settings)
 
 
@@ -215,7 +217,7 @@ def seen_twice(given: Iterable[InputFile], held_out: Iterable[InputFile]) -> tup
     return tuple(warnings)
 
 
-def _thirds(flight: Recording, settings: GapSettings) -> Split:
+def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
     # A flight whose windows are refused as a whole is refused for another reason than its length.
     common_windows([flight], settings)
     cut = 2 * len(flight.signals) // 3
@@ -228,12 +230,12 @@ def _thirds(flight: Recording, settings: GapSettings) -> Split:
             f"{flight.name}: one flight is too short to hold a third of it out; give more flights, or --held-out "
             f"FLIGHT: {error}"
         ) from None
-    return Split((training,), (last,), f"there is one flight only, so it was held out in time: {last.name}")
+    return FlightSplit((training,), (last,), f"there is one flight only, so it was held out in time: {last.name}")
 
 
 def _cut(signals: Signals, part: slice) -> Signals:
     values: dict[str, Any] = {field.name: getattr(signals, field.name) for field in fields(signals)}
-    cut = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
+    cut: dict[str, Any] = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
     return replace(signals, **cut)
 
 
