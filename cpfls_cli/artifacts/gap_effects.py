@@ -10,6 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, rows_of
+from cpfls_cli.gap.settings import CLEAR
 
 if TYPE_CHECKING:
     # What fits a gap loads its own numerics, which nobody waits for who only reads of one.
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
     from cpfls_cli.gap.extended import ExtendedModel
     from cpfls_cli.gap.naming.results import Estimate, GapSize, NamedEffect
     from cpfls_cli.gap.replay import Replayed
-
-CLEAR = 1.5
-"""Floors above which a gap is one: without a gap half of the channels exceed 1, by the scatter of noise and floor."""
 
 _GROWN = 1.05
 """Ratio of the gaps after and before from which on a channel is marked as worse."""

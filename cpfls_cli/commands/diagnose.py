@@ -15,9 +15,8 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.commands.compare import check_ignored, flight_roles, progress_of
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.recordings import read_flights
+from cpfls_cli.flights.recordings import FlightSplit, read_flights, seen_twice, split_flights
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
-from cpfls_cli.flights.split import Split, seen_twice, split_flights
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.naming.results import Diagnosis
@@ -59,7 +58,7 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
 
 
 def diagnosed(
-    study: Study, split: Split, base: BaseGroup, path: Path, progress: Callable[[float, str], None]
+    study: Study, split: FlightSplit, base: BaseGroup, path: Path, progress: Callable[[float, str], None]
 ) -> tuple[Diagnosis, DiagnosisRecord]:
     """Diagnose flights.
 

@@ -19,8 +19,7 @@ from cpfls_cli.commands.compare import base_of, check_ignored, compared, flight_
 from cpfls_cli.commands.diagnose import diagnosed, whole_answer, whole_summary
 from cpfls_cli.commands.extend import extended
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.recordings import Flights, read_flights
-from cpfls_cli.flights.split import Split, seen_twice, split_flights
+from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, seen_twice, split_flights
 from cpfls_cli.gap.extended import plain as without_effects
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where
@@ -38,7 +37,7 @@ class _Given:
     """What the workflow starts from."""
 
     flights: Flights
-    split: Split
+    split: FlightSplit
     base: BaseGroup
     path: Path
     inputs: Mapping[str, InputFile]

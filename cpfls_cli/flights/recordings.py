@@ -1,9 +1,9 @@
-"""Flights for the gap workflow: artifacts or logs, as signals on one clock each."""
+"""Flights of the gap workflow: artifacts or logs as signals on one clock each, and which of them are held out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from scipy.ndimage import find_objects, label
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
@@ -20,7 +21,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
-from cpfls_cli.gap.balance.windows import Recording
+from cpfls_cli.gap.balance.windows import Recording, common_windows
+from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import is_log
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
@@ -36,7 +38,7 @@ class Flights:
 
 
 @dataclass(frozen=True)
-class _Source:
+class _ReadFlight:
     """A flight as it was read; `units` are those of the import that made it."""
 
     name: str
@@ -58,104 +60,103 @@ def read_flights(paths: Sequence[Path], study: Study) -> Flights:
     InputError
         If a flight is of another vehicle, has no actuation, or is not uniform in time.
     """
-    sources = [_log(path, study) if is_log(path) else _artifact(path, study) for path in paths]
-    made = [_recording(source, study) for source in sources]
-    recordings, said = _with_voltage([recording for recording, _ in made], sources)
-    notes = [f"{source.name}: {w}" for source, (_, own) in zip(sources, made, strict=True) for w in own]
-    return Flights(tuple(recordings), (*notes, *said))
+    flights = [_log(path, study) if is_log(path) else _artifact(path, study) for path in paths]
+    made = [_recording(flight, study) for flight in flights]
+    recordings, notes = _with_voltage([recording for recording, _ in made], flights)
+    warnings = [f"{flight.name}: {w}" for flight, (_, own) in zip(flights, made, strict=True) for w in own]
+    return Flights(tuple(recordings), (*warnings, *notes))
 
 
-def _log(path: Path, study: Study) -> _Source:
+def _log(path: Path, study: Study) -> _ReadFlight:
     flight = imported(path, study)
     done = tuple(f"{what} ({count})" for what, count in log_findings(flight.report).items())
-    return _Source(
-        path.name, FlightRecord.of_import(flight, {}).signals, _units(study), (*done, *flight.report.warnings)
-    )
+    signals = FlightRecord.of_import(flight, {}).signals
+    return _ReadFlight(path.name, signals, _units(study), (*done, *flight.report.warnings))
 
 
-def _artifact(path: Path, study: Study) -> _Source:
-    flight = read_record(path, FlightRecord)
+def _artifact(path: Path, study: Study) -> _ReadFlight:
+    record = read_record(path, FlightRecord)
     source = f"{path}: /config"
-    own = validate(parse_config(flight.origin.config, source), source)
-    require_same_vehicle(path, own.vehicle, study.vehicle)
-    return _Source(path.name, flight.signals, _units(own) if flight.made_from("log") else {}, ())
+    made_by = validate(parse_config(record.origin.config, source), source)
+    require_same_vehicle(path, made_by.vehicle, study.vehicle)
+    return _ReadFlight(path.name, record.signals, _units(made_by) if record.made_from("log") else {}, ())
 
 
 def _units(study: Study) -> dict[str, str]:
     return {name: signal.unit for name, signal in study.import_.signals.items()}
 
 
-def _recording(source: _Source, study: Study) -> tuple[Recording, tuple[str, ...]]:
-    data, warnings = _known_part(source)
-    time = data["time"]
+def _recording(flight: _ReadFlight, study: Study) -> tuple[Recording, tuple[str, ...]]:
+    known, warnings = _known_part(flight)
+    time = known["time"]
     steps = np.diff(time)
     if len(time) < 2 or np.ptp(steps) > _UNIFORM * np.median(steps):
-        raise InputError(f"{source.name}: its samples are not evenly spaced in time; import it with import.rate_hz")
-    rate = body_rate_of(time, data.get("attitude"), data.get("body_rate"))
+        raise InputError(f"{flight.name}: its samples are not evenly spaced in time; import it with import.rate_hz")
+    rate = body_rate_of(time, known.get("attitude"), known.get("body_rate"))
     if rate is None:
         rate = np.zeros((len(time), 3))
         warnings += ("neither body rates nor attitude; taken as level and at rest, so only the balance is judged",)
-    optional: dict[str, Any] = {name: data.get(name) for name in _LOGGED}
+    optional: dict[str, Any] = {name: known.get(name) for name in _LOGGED}
     signals = Signals(
         time=time,
         body_rate=rate,
         vehicle=study.vehicle,
-        voltage=data.get("voltage"),
+        voltage=known.get("voltage"),
         ground_height_m=study.gap.ground_height_m,
         **optional,
     )
-    return Recording(source.name, _actuated(signals, source, data, study)), warnings
+    return Recording(flight.name, _actuated(signals, flight, known, study)), warnings
 
 
-def _actuated(signals: Signals, source: _Source, data: Mapping[str, Array], study: Study) -> Signals:
-    speed, commanded = data.get("rotor_speed"), False
+def _actuated(signals: Signals, flight: _ReadFlight, known: Mapping[str, Array], study: Study) -> Signals:
+    speed, commanded = known.get("rotor_speed"), False
     if speed is None:
-        unit = source.units.get("rotor_command", "rad/s")
-        speed = commanded_speed(data.get("rotor_command"), unit, study.vehicle.rotor_speed_max_rad_s)
+        unit = flight.units.get("rotor_command", "rad/s")
+        speed = commanded_speed(known.get("rotor_command"), unit, study.vehicle.rotor_speed_max_rad_s)
         commanded = True
     rotors = len(study.vehicle.rotors)
     if speed is not None and speed.shape[1] != rotors:
-        raise InputError(f"{source.name}: has {speed.shape[1]} rotors, vehicle.rotors of the config has {rotors}")
-    if speed is None and "body_torque" not in data:
+        raise InputError(f"{flight.name}: has {speed.shape[1]} rotors, vehicle.rotors of the config has {rotors}")
+    if speed is None and "body_torque" not in known:
         raise InputError(
-            f"{source.name}: has no rotor_speed, rotor_command or body_torque, so there is nothing to compare its "
+            f"{flight.name}: has no rotor_speed, rotor_command or body_torque, so there is nothing to compare its "
             "motion with; name their columns in import.signals"
         )
     if speed is not None:
         return replace(signals, rotor_speed=speed, commanded=commanded)
-    return replace(signals, stated_torque=data["body_torque"], stated_thrust=data.get("thrust"), commanded=True)
+    return replace(signals, stated_torque=known["body_torque"], stated_thrust=known.get("thrust"), commanded=True)
 
 
-def _known_part(source: _Source) -> tuple[dict[str, Array], tuple[str, ...]]:
+def _known_part(flight: _ReadFlight) -> tuple[dict[str, Array], tuple[str, ...]]:
     """Keep the longest stretch in which everything is known."""
-    count = len(source.signals["time"])
+    count = len(flight.signals["time"])
     known = np.ones(count, dtype=bool)
-    for values in source.signals.values():
+    for values in flight.signals.values():
         known &= np.isfinite(values.reshape(count, -1)).all(axis=1)
     if known.all() and count:
-        return dict(source.signals), source.warnings
-    runs = [found[0] for found in find_objects(label(known)[0])]
+        return dict(flight.signals), flight.warnings
+    runs = [parts[0] for parts in find_objects(label(known)[0])]
     if not runs:
-        raise InputError(f"{source.name}: no sample at which all of its signals are known")
+        raise InputError(f"{flight.name}: no sample at which all of its signals are known")
     best = max(runs, key=lambda run: run.stop - run.start)
-    time = source.signals["time"][best]
-    said = f"only {time[0]:.2f} s to {time[-1]:.2f} s are used, the longest stretch in which all signals are known"
-    return {name: values[best] for name, values in source.signals.items()}, (*source.warnings, said)
+    time = flight.signals["time"][best]
+    note = f"only {time[0]:.2f} s to {time[-1]:.2f} s are used, the longest stretch in which all signals are known"
+    return {name: values[best] for name, values in flight.signals.items()}, (*flight.warnings, note)
 
 
 def _with_voltage(
-    recordings: Sequence[Recording], sources: Sequence[_Source]
+    recordings: Sequence[Recording], flights: Sequence[_ReadFlight]
 ) -> tuple[list[Recording], tuple[str, ...]]:
     """Take a voltage in V as a share of the largest of all flights."""
-    full = [_largest_volts(r.signals, s) for r, s in zip(recordings, sources, strict=True)]
+    full = [_largest_volts(r.signals, s) for r, s in zip(recordings, flights, strict=True)]
     if not any(full):
         return list(recordings), ()
     scaled = [_share(r, max(full)) if volts else r for r, volts in zip(recordings, full, strict=True)]
     return scaled, (f"voltage: the largest of these flights, {max(full):.3g} V, is taken for that of a full battery",)
 
 
-def _largest_volts(signals: Signals, source: _Source) -> float:
-    in_volts = source.units.get("voltage", "1") != "1"
+def _largest_volts(signals: Signals, flight: _ReadFlight) -> float:
+    in_volts = flight.units.get("voltage", "1") != "1"
     return float(signals.voltage.max()) if in_volts and signals.voltage is not None else 0.0
 
 
@@ -163,3 +164,80 @@ def _share(recording: Recording, full: float) -> Recording:
     signals = recording.signals
     assert signals.voltage is not None, "its largest value was taken"
     return replace(recording, signals=replace(signals, voltage=signals.voltage / full))
+
+
+@dataclass(frozen=True)
+class FlightSplit:
+    """Flights to learn from, flights to judge on, and why."""
+
+    training: tuple[Recording, ...]
+    held_out: tuple[Recording, ...]
+    sentence: str
+
+
+def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], settings: GapSettings) -> FlightSplit:
+    """Split flights for learning and judging.
+
+    Parameters
+    ----------
+    held_out : sequence of Recording
+        Flights that are held out; if there are none, the last third of the flights is, or of one flight its last third.
+
+    Raises
+    ------
+    InputError
+        If a flight or a part is too short, or their rates differ.
+    """
+    if held_out:
+        common_windows([*given, *held_out], settings)
+        return FlightSplit(tuple(given), tuple(held_out), f"held out as asked: {_names(held_out)}")
+    if len(given) > 1:
+        common_windows(given, settings)
+        first = len(given) - max(1, len(given) // 3)
+        training, last = tuple(given[:first]), tuple(given[first:])
+        return FlightSplit(
+            training, last, f"no flight was held out by name, so the last third of them is: {_names(last)}"
+        )
+    return _thirds(given[0], settings)
+
+
+def seen_twice(given: Iterable[InputFile], held_out: Iterable[InputFile]) -> tuple[str, ...]:
+    """Warn of files that stand for two flights: what is learned and judged on one flight says nothing of another."""
+    learned: dict[str, str] = {}
+    warnings = []
+    for file in given:
+        if file.sha256 in learned:
+            warnings.append(f"{file.name}: is given twice, also as {learned[file.sha256]}")
+        learned[file.sha256] = file.name
+    warnings += [
+        f"{file.name}: is learned from and held out at once, so the gap after shows nothing of flights not seen"
+        for file in held_out
+        if file.sha256 in learned
+    ]
+    return tuple(warnings)
+
+
+def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
+    # A flight whose windows are refused as a whole is refused for another reason than its length.
+    common_windows([flight], settings)
+    cut = 2 * len(flight.signals) // 3
+    training = Recording(f"{flight.name} (first two thirds)", _cut(flight.signals, slice(0, cut)))
+    last = Recording(f"{flight.name} (last third)", _cut(flight.signals, slice(cut, None)))
+    try:
+        common_windows([training, last], settings)
+    except InputError as error:
+        raise InputError(
+            f"{flight.name}: one flight is too short to hold a third of it out; give more flights, or --held-out "
+            f"FLIGHT: {error}"
+        ) from None
+    return FlightSplit((training,), (last,), f"there is one flight only, so it was held out in time: {last.name}")
+
+
+def _cut(signals: Signals, part: slice) -> Signals:
+    values: dict[str, Any] = {field.name: getattr(signals, field.name) for field in fields(signals)}
+    cut: dict[str, Any] = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
+    return replace(signals, **cut)
+
+
+def _names(flights: Sequence[Recording]) -> str:
+    return ", ".join(flight.name for flight in flights)

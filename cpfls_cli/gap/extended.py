@@ -34,14 +34,11 @@ from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.naming.search import best_floor, block_index
 from cpfls_cli.gap.sensors.audit import Audit, Preparation
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.regressor.regressor import InertiaValues
 
 _TOUCHED = 0.2
 """Root mean square in floors by which effects and refit move a channel, from which on it has to get better."""
-
-_CLEAR = 1.5
-"""Root mean square in floors of a gap that is there."""
 
 _WORSE = 1.2
 """Ratio from which on a gap has grown."""
@@ -348,7 +345,7 @@ def worse_axes(before: Array, after: Array) -> list[int]:
     ----------
     before, after : array, shape (6,), floors
     """
-    return [int(c) for c in np.flatnonzero((before[:3] > _CLEAR) & (after[:3] > _WORSE * before[:3]))]
+    return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] > _WORSE * before[:3]))]
 
 
 def _renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Estimates) -> list[NamedEffect]:

@@ -11,6 +11,12 @@ from typing_extensions import Doc
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
 
+CLEAR = 1.5
+"""Root mean square in floors above which a gap is there.
+
+Without a gap half of the channels exceed 1 floor, and floors of coloured noise are off by a third.
+"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GapSettings(Settings):

@@ -11,9 +11,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, PictureGroup, RunGroup
-from cpfls_cli.artifacts.gap_effects import CLEAR
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.gap.naming.results import GapVerdict
+from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.disagreement import flight_warnings
 from cpfls_cli.pages.disagreement import verdict_box as disagreement_box
 from cpfls_cli.pages.effects import (

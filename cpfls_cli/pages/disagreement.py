@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord, HeatMapGroup, ReplayGroup
-from cpfls_cli.artifacts.gap_effects import CLEAR
+from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.gap import channel_unit, channel_words, rates_off, replay_figure
 from cpfls_cli.pages.sensors import sensors_answer, unseen_answer
 from cpfls_cli.pages.source import Source, Sources, section_of_each

@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gap_effects import GapChangeGroup, ReplayChangeGroup, ReplayErrors
+from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.report.canvas import BASELINE, GREY, HELD, legend_over, plain_ticks, plot, style_of
 from cpfls_cli.report.content import Cell, Plot, Table, Text
 from cpfls_cli.report.numbers import number, plain
@@ -126,6 +127,7 @@ def gap_sizes_figure(name: str, gap: GapChangeGroup) -> Plot:
         axes.hlines(rows, np.fmin(start, end), np.fmax(start, end), color="#bbbbbb", linewidth=2, zorder=1)
         axes.plot(start, rows, label="before", zorder=2, **_GIVEN)
         axes.plot(end, rows, label="after", zorder=3, **_SHRUNK)
+        axes.axvspan(0.8 * _LEAST, CLEAR, color="#eeeeee", label="within noise", zorder=0)
         axes.axvline(1.0, color="black", linewidth=1.1, linestyle=(0, (4, 2)), label="noise floor", zorder=1)
         axes.set_yticks(rows, channels)
         _scale(axes, float(np.nanmax([*before, *after, 1.0])))
@@ -134,7 +136,7 @@ def gap_sizes_figure(name: str, gap: GapChangeGroup) -> Plot:
     note = f" Marks at {plain(_LEAST)} stand for {plain(_LEAST)} or less." if hidden else ""
     caption = (
         f"Gap on held-out flights, in noise floors (logarithmic). A gap at the dashed line is as large as what noise "
-        f"alone leaves.{note}"
+        f"alone leaves; within the grey band, up to {CLEAR:g} floors, it is none.{note}"
     )
     return plot(
         name, caption, "Gap of each channel before and after, in noise floors", 1.0 + 0.34 * len(channels), draw

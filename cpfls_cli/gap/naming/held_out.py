@@ -15,15 +15,13 @@ from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.naming.results import GapSize
 from cpfls_cli.gap.sensors.audit import Preparation
+from cpfls_cli.gap.settings import CLEAR
 
 _MARGIN = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
 
 _COUNTS = 0.05
 """Share of the whole gap, in squared floors, from which on the lesser of torque and force is judged on its own."""
-
-_CLEAR = 1.5
-"""Root mean square in floors that one of its channels has to have: floors of coloured noise are off by a third."""
 
 _SEEN = 0.3
 """Root mean square in floors that wrong numbers of the vehicle have to explain of one channel."""
@@ -78,7 +76,7 @@ class HeldOut:
         clear = [
             share_removed(before[:, kind], after[:, kind], self.known[:, kind])
             for kind, size in zip(kinds, sizes, strict=True)
-            if size > _COUNTS * sum(sizes) and _largest(before[:, kind]) > _CLEAR
+            if size > _COUNTS * sum(sizes) and _largest(before[:, kind]) > CLEAR
         ]
         each = [share_removed(before[:, kind], after[:, kind], self.known[:, kind]) for kind in kinds]
         return min(clear) if clear else max(each)

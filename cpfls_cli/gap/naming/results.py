@@ -10,12 +10,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import CLEAR, GapSettings
 
 _SECOND_CAUSE = 0.03
 """Share of the gap, in squared floors, from which on what is left is a cause of its own."""
 
-_CLEAR = 1.5
 _PART = 0.05
 _STAYS = 0.7
 """Root mean square that is left of a clear gap about an axis, as a share, from which on nothing explained it."""
@@ -259,7 +258,7 @@ def gap_stays(before: Array, after: Array) -> bool:
 
 
 def _stays(before: Array, after: Array) -> bool:
-    clear = (before > _CLEAR) & (before**2 > _PART * np.nanmax(before, initial=0.0) ** 2)
+    clear = (before > CLEAR) & (before**2 > _PART * np.nanmax(before, initial=0.0) ** 2)
     large = (after > _LARGE) & (after > _REST * before)
     return bool((clear & ((after > _STAYS * before) | large)).any())
 
