@@ -100,6 +100,7 @@ def test_one_command_says_what_three_say(cpfls, gap_config, shifted, found, tmp_
         assert path.read_bytes() == (found.folder / path.name).read_bytes()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_held_out_by_name(cpfls, gap_config, shifted, tmp_path):
     words = ("gap", gap_config, *shifted[:1], "--held-out", shifted[1], "-o", tmp_path / "x", "--json")
     summary = json.loads(cpfls(*words).stdout)
@@ -108,6 +109,7 @@ def test_held_out_by_name(cpfls, gap_config, shifted, tmp_path):
     assert [effect["name"] for effect in summary["effects"]] == ["com_offset"]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_one_flight_is_split_in_time(cpfls, gap_config, shifted, tmp_path):
     summary = json.loads(cpfls("gap", gap_config, shifted[0], "-o", tmp_path / "x", "--json").stdout)
     assert summary["split"].endswith("flight_1.csv (last third)")
@@ -139,6 +141,7 @@ def test_extend_refuses_what_names_nothing(refuse, gap_config, none, tmp_path):
     assert message == "not extended: the diagnosis is NO_GAP and names no effect that could be added"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_later_run_leaves_no_file_of_an_earlier_one(cpfls, gap_config, found, exact, tmp_path):
     shutil.copytree(found.folder, tmp_path / "x")
     (tmp_path / "x" / "notes.txt").write_text("mine")
