@@ -2,29 +2,34 @@
 
 import shutil
 import subprocess
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
 STRICT = ["-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Wstrict-prototypes"]
 WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", *STRICT]
-MANY = 10_000
 CHECKS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
 MAIN = """
-#include "{stem}.h"
+{includes}
 #include <stdio.h>
+#include <stdlib.h>
 
-int main(void)
+int main(int count, char **words)
 {{
     double in[9];
+    int model = count > 1 ? atoi(words[1]) : 0;
     while (fread(in, sizeof in, 1, stdin) == 1) {{
         double D[3][3], C[3][3], torque[3], body[3], out[28];
         int i;
-        out[0] = {name}_inertia(in, D);
-        out[1] = {name}_coriolis(in, in + 3, C);
-        out[2] = {name}_torque(in, in + 3, in + 6, torque, body);
-        out[3] = {name}_inside(in);
+        switch (model) {{
+{models}
+        default:
+            return 2;
+        }}
         for (i = 0; i < 9; ++i) {{
             out[4 + i] = D[i / 3][i % 3];
             out[13 + i] = C[i / 3][i % 3];
@@ -39,17 +44,31 @@ int main(void)
     return 0;
 }}
 """
+MODEL = """\
+        case {number}:
+            out[0] = {name}_inertia(in, D);
+            out[1] = {name}_coriolis(in, in + 3, C);
+            out[2] = {name}_torque(in, in + 3, in + 6, torque, body);
+            out[3] = {name}_inside(in);
+            break;"""
 
 
-def require_gcc(folder):
-    """Skip where there is no gcc with its sanitisers."""
+@cache
+def why_not():
+    """Tell why nothing can be compiled here: no gcc, or none with its sanitisers."""
     if shutil.which("gcc") is None:
-        pytest.skip("no gcc on this machine")
-    probe = folder / "probe.c"
-    probe.write_text("int main(void) { return 0; }\n")
-    done = subprocess.run(["gcc", *CHECKS, probe, "-o", folder / "probe"], capture_output=True, check=False)
-    if done.returncode:
-        pytest.skip("gcc has no sanitisers on this machine")
+        return "no gcc on this machine"
+    with TemporaryDirectory() as folder:
+        probe = Path(folder) / "probe.c"
+        probe.write_text("int main(void) { return 0; }\n")
+        done = subprocess.run(["gcc", *CHECKS, probe, "-o", probe.with_name("probe")], capture_output=True, check=False)
+    return "gcc has no sanitisers on this machine" if done.returncode else None
+
+
+def require_gcc():
+    """Skip where there is no gcc with its sanitisers."""
+    if reason := why_not():
+        pytest.skip(reason)
 
 
 def build(folder, files, *flags, output="program"):
@@ -66,22 +85,23 @@ def written(folder, stem, source):
     (folder / f"{stem}.h").write_text(source.header)
 
 
-def evaluate(folder, stem, name, motion):
+def evaluate(folder, name, motion):
     """Compile exported C with all checks, and evaluate it along a motion."""
-    # Optimising takes longer than it saves on few states.
-    return drive(driver(folder, stem, name, "-O1" if len(motion) > MANY else "-O0"), motion)
+    return drive(driver(folder, [name]), motion)
 
 
-def driver(folder, stem, name, optimised="-O0"):
-    """Compile exported C with all checks into a program that takes states."""
-    (folder / "main.c").write_text(MAIN.format(stem=stem, name=name))
-    return build(folder, [f"{stem}.c", "main.c"], optimised, *CHECKS)
+def driver(folder, names, optimised="-O0"):
+    """Compile exported models with all checks into one program that takes states."""
+    includes = "\n".join(f'#include "{name}.h"' for name in names)
+    models = "\n".join(MODEL.format(number=number, name=name) for number, name in enumerate(names))
+    (folder / "main.c").write_text(MAIN.format(includes=includes, models=models))
+    return build(folder, ["main.c", *(f"{name}.c" for name in names)], optimised, *CHECKS)
 
 
-def drive(program, motion):
-    """Evaluate a compiled model along a motion."""
+def drive(program, motion, model=0):
+    """Evaluate one of the models of a program along a motion."""
     given = np.hstack([motion.attitude, motion.rate, motion.acceleration]).tobytes()
-    done = subprocess.run([program], input=given, capture_output=True, check=False)
+    done = subprocess.run([program, str(model)], input=given, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr.decode()
     out = np.frombuffer(done.stdout).reshape(len(motion), 28)
     return {

@@ -93,6 +93,12 @@ def configs():
 
 
 @pytest.fixture
+def undrawn(monkeypatch):
+    """Leave the pictures of a page away: four fifths of its time, nothing to a test of its words and numbers."""
+    monkeypatch.setattr("cpfls_cli.report.canvas._inline_svg", lambda *_: "<svg></svg>")
+
+
+@pytest.fixture
 def at_evaluation(monkeypatch):
     """Do something when so many chromosomes are evaluated, over all searches of a command."""
 

@@ -1,5 +1,8 @@
 """Flights made from the equations of motion alone: sums of sines for rates and thrust, rotor speeds that give them."""
 
+import json
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -91,6 +94,21 @@ def shifted(tmp_path_factory):
     """Three flights with the centre of mass off."""
     folder = tmp_path_factory.mktemp("shifted")
     return [save(folder / f"flight_{n}.csv", flight_table(n, OFFSET)) for n in (1, 2, 3)]
+
+
+@pytest.fixture(scope="session")
+def offset_answer(cpfls, gap_config, shifted, tmp_path_factory):
+    """The folder that `cpfls gap` fills from these flights, and its summary; nobody writes into it."""
+    folder = tmp_path_factory.mktemp("found") / "gap"
+    result = cpfls("gap", gap_config, *shifted, "-o", folder, "--json")
+    assert result.exit_code == 0, result.stderr
+    return SimpleNamespace(folder=folder, summary=json.loads(result.stdout))
+
+
+@pytest.fixture(scope="session")
+def extended(offset_answer):
+    """The vehicle with the centre of mass where it was found."""
+    return offset_answer.folder / "extended.h5"
 
 
 @pytest.fixture(scope="session")

@@ -11,13 +11,6 @@ CLOSED = ("--mode", "closed-loop")
 
 
 @pytest.fixture(scope="module")
-def extended(cpfls, gap_config, shifted, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("extended") / "gap"
-    assert cpfls("gap", gap_config, *shifted, "-o", folder, "-q").exit_code == 0
-    return folder / "extended.h5"
-
-
-@pytest.fixture(scope="module")
 def path(cpfls, gap_config, tmp_path_factory):
     target = tmp_path_factory.mktemp("path") / "trajectory.h5"
     result = cpfls("trajectory", gap_config, "--set", f"trajectory={json.dumps(PATH)}", "-o", target)

@@ -119,6 +119,7 @@ def test_commands_stand_in_where_speeds_are_missing(cpfls, gap_config, shifted, 
     assert "motor_lag" not in result.stdout
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_flight_that_is_learned_from_and_held_out(cpfls, gap_config, shifted, tmp_path):
     words = (gap_config, shifted[0], "--held-out", shifted[0], "-o", tmp_path / "x")
     result = cpfls("gap", *words)

@@ -8,13 +8,6 @@ COLUMNS = "t,wx,wy,wz,om1,om2,om3,om4,phi,theta,psi"
 
 
 @pytest.fixture(scope="module")
-def extended(cpfls, gap_config, shifted, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("extended") / "gap"
-    assert cpfls("gap", gap_config, *shifted, "-o", folder, "-q").exit_code == 0
-    return folder / "extended.h5"
-
-
-@pytest.fixture(scope="module")
 def flown(cpfls, gap_config, shifted, tmp_path_factory):
     """A flight that has an attitude too; level will do, for a prediction only turns torques by it."""
     folder = tmp_path_factory.mktemp("flown")

@@ -81,6 +81,7 @@ def test_a_model_without_evidence_names_the_command_that_adds_it(report, bare):
     assert "bare.h5: no verdict" in section(page, "summary")
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("label", "told", "tone"),
     [
@@ -100,6 +101,7 @@ def test_the_verdict_comes_first_and_with_its_reasons(report, model, label, told
         assert f"{sign}: {reason[0].upper()}{reason[1:]}." in evidence
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_incomplete_search_is_told_in_the_summary(report, model):
     stopped = {"search/complete": 0, "search/stop_reason": np.array("time-limit")}
     assert "The search is incomplete (time-limit)" in section(report(model(**stopped)), "summary")
@@ -124,6 +126,7 @@ def test_structures_are_compared_and_the_least_error_is_marked_in_words(page):
     assert "7 functions (this model)" in shown
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("error", "told"),
     [
@@ -143,12 +146,14 @@ def test_the_ridge_curve_says_whether_there_is_evidence_for_a_fuzzy_part(report,
     assert "ridge-curve-1" in page.figures
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_how_many_samples_of_how_many_were_examined(report, model):
     assert "the first 2500 of its 7300 samples" in section(report(model()), "residuals")
     whole = section(report(model(**{"residuals/available": 2500})), "residuals")
     assert "held-out rest, 2500 samples" in whole
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_model_of_before_the_mean_was_tested_is_shown(report, model):
     missing = dict.fromkeys(["residuals/available", "residuals/mean", "residuals/mean_p"])
     shown = section(report(model(**missing)), "residuals")
@@ -172,6 +177,7 @@ def test_residuals_that_are_rounding_are_not_drawn(report, model):
     assert not set(FIGURES[:3]) & set(page.figures)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipeline):
     artifact = read_artifact(pipeline.model)
     value = artifact.array("baselines/rigid_body")
@@ -185,6 +191,7 @@ def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipe
     assert last["Iyy"] == "◂"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_round_trip_is_told_with_its_share(page, report, model):
     assert "D22 96.0 %, D33 96.0 %, D11 96.0 %" in section(page, "uncertainty")
     without = report(model(**{"round_trip/inertia": None, "round_trip/inside": None}))
@@ -228,6 +235,7 @@ def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
     assert forms.count("band") == 4
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("condition", "told"), [(3.0, "one rule holds everywhere"), (1e4, "the model extrapolates")])
 def test_one_rule_that_training_determined_holds_everywhere(cpfls, report, pipeline, study, tmp_path, condition, told):
     single, known, prediction = (tmp_path / f"{name}.h5" for name in ("single", "known", "prediction"))

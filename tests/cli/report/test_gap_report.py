@@ -113,6 +113,7 @@ def test_a_disagreement_alone_says_where_and_how_to_go_on(tmp_path):
     assert "cpfls diagnose" in page.text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_disagreement_below_noise_has_nothing_to_follow(tmp_path):
     quiet = made.disagreement(**{"gap/floors": np.array([0.4, 0.5, 0.6, 0.7, 0.8, 0.9])})
     page = shown(tmp_path, quiet)
@@ -129,6 +130,7 @@ def test_an_extended_model_alone_brings_its_figures(tmp_path):
     assert "its largest gap is 1.2 noise floors; it was 70" in page.text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_fault_of_a_sensor_stands_under_sensors(tmp_path):
     finding = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
     page = shown(tmp_path, made.diagnosis(named=({"name": "gyro_bias", "kind": "sensor"},), **made.audit([finding])))

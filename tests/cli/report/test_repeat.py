@@ -8,6 +8,8 @@ import pytest
 
 from cpfls_cli.artifacts.store import file_sha256
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture
 def printed(cpfls, study, tmp_path):

@@ -11,6 +11,8 @@ import pytest
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.report.numbers import number
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CONFIG = """\
 seed: 4
 trajectory: {sample_time_s: 0.2}

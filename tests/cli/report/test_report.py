@@ -137,6 +137,7 @@ def test_no_id_stands_twice_and_every_element_is_closed(full):
     assert full.page.open == []
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_path):
     summary, html, _ = report(study, tmp_path, study.noisy)
     assert summary["sections"] == ["summary", "reproduction", "vehicle", "flights", "provenance"]
@@ -210,6 +211,7 @@ def test_the_paper_s_figures_go_when_they_are_not_asked_for(study, full, tmp_pat
     assert "Paper" not in Page(html).text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_rank_deficient_selection_is_called_so(study, tmp_path):
     selection = read_artifact(study.selection)
     rank = int(selection.number("rank_full")) - 2
@@ -222,6 +224,7 @@ def test_a_rank_deficient_selection_is_called_so(study, tmp_path):
     assert "better conditioned" not in text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_selections_from_one_flight_share_its_full_set(study, tmp_path):
     smaller = tmp_path / "smaller.h5"
     cpfls("reduce", study.config, study.flight, "-o", smaller, "--set", "reduction.size=40")
@@ -248,6 +251,7 @@ def test_the_provenance_names_hashes_and_no_folder(study, full):
     assert read_artifact(study.model).header.config in full.page.text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_file_given_twice_counts_once_and_equal_names_are_told_apart(study, tmp_path):
     (tmp_path / "other").mkdir()
     copy, other = tmp_path / "copy.h5", tmp_path / "other" / "flight.h5"
@@ -259,6 +263,7 @@ def test_a_file_given_twice_counts_once_and_equal_names_are_told_apart(study, tm
     assert len(set(re.findall(r"flight\.h5 \([0-9a-f]{12}\)", html))) == 2
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_another_vehicle_is_pointed_out(study, tmp_path):
     _, html, _ = report(study, tmp_path, study.flight, options=("--set", "vehicle.mass_kg=7.0"))
     assert "another vehicle than this one: flight.h5" in html
@@ -279,6 +284,7 @@ def test_an_existing_page_is_kept_and_a_dry_run_writes_nothing(study, full, tmp_
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_where_there_is_nothing_to_search_for_no_search_is_shown(study, tmp_path):
     model = tmp_path / "single.h5"
     single = ("--set", "identification.membership_functions=1", "--set", "identification.base=rigid-body")

@@ -9,6 +9,8 @@ from cpfls_cli.artifacts.store import read_artifact
 from cpfls_cli.report.content import Document, Listing, Section
 from cpfls_cli.report.markdown import markdown_page
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"
 
 

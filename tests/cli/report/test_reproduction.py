@@ -6,6 +6,8 @@ from html import unescape
 
 import pytest
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CONFIG = """\
 seed: 4
 trajectory: {sample_time_s: 0.2}

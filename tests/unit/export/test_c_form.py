@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.export import c_source, reference_points
 from cpfls_cli.regressor import Motion
-from tests.builders.compiled_c import CHECKS, build, drive, driver, evaluate, require_gcc, written
+from tests.builders.compiled_c import CHECKS, build, drive, driver, require_gcc, written
 from tests.builders.exported_models import CASES, Case, errors, model_of, sheet_of, states, wanted_of
 
 OUTSIDE, NOT_FINITE, VERTICAL = 1, 2, 4
@@ -17,41 +17,59 @@ QUICK = ("paper", "default", "rigid body, rules", "zero width, classic", "nothin
 ALLOWED = 1e-12
 
 
-@pytest.fixture(autouse=True)
-def compiler(tmp_path):
-    require_gcc(tmp_path)
+@pytest.fixture(autouse=True, scope="module")
+def compiler():
+    require_gcc()
 
 
-def exported(folder, model):
+def exported(folder, model, name="vehicle"):
     points = reference_points(model, np.random.default_rng(3))
-    source = c_source(sheet_of(model), points, "vehicle")
-    written(folder, "vehicle", source)
+    source = c_source(sheet_of(model, name=name), points, name)
+    written(folder, name, source)
     return source
 
 
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory):
+    """What the exported C of a case computes along a motion; all cases are compiled together, with all checks."""
+    programs = {}
+    # Optimising takes longer than it saves on few states.
+    for optimised, group in (("-O1", [*SAMPLES]), ("-O0", [name for name in CASES if name not in SAMPLES])):
+        folder = tmp_path_factory.mktemp("cases")
+        names = [f"case_{number}" for number in range(len(group))]
+        for name, case in zip(names, group, strict=True):
+            exported(folder, model_of(CASES[case]), name)
+        program = driver(folder, names, optimised)
+        programs |= {case: (program, number) for number, case in enumerate(group)}
+
+    def drive_case(case, motion):
+        program, number = programs[case]
+        return drive(program, motion, number)
+
+    return drive_case
+
+
 @pytest.mark.parametrize("name", CASES)
-def test_c_agrees_with_the_library(tmp_path, name):
+def test_c_agrees_with_the_library(computed, name):
     model = model_of(CASES[name])
-    exported(tmp_path, model)
     motion = states(model, SAMPLES.get(name, 2000))
-    found, wanted = evaluate(tmp_path, "vehicle", "vehicle", motion), wanted_of(model, motion)
+    found, wanted = computed(name, motion), wanted_of(model, motion)
     assert max(errors(found, wanted).values()) < ALLOWED, errors(found, wanted)
     assert np.array_equal(found["inside"], wanted.inside)
     flags = np.where(wanted.inside, 0, OUTSIDE) + np.where(vertical(motion.attitude), VERTICAL, 0)
     assert np.array_equal(found["status"], np.column_stack([flags] * 3))
 
 
-def test_the_comparison_would_notice_a_wrong_coefficient_and_a_wrong_side(tmp_path):
+def test_the_comparison_would_notice_a_wrong_coefficient_and_a_wrong_side(computed):
     model = model_of(CASES["paper"])
-    exported(tmp_path, model)
-    motion, program = states(model, 2000), driver(tmp_path, "vehicle", "vehicle")
-    found = drive(program, motion)
+    motion = states(model, 2000)
+    found = computed("paper", motion)
     model.coefficients[40] *= 1 + 1e-9
     assert max(errors(found, wanted_of(model, motion)).values()) > ALLOWED
     # At a fold of the seesaw the slope depends on the side alone.
     fold = Motion(np.full((1, 3), 0.5 * np.pi), np.ones((1, 3)), np.ones((1, 3)))
     beyond = Motion(fold.attitude + 4e-15, fold.rate, fold.acceleration)
-    here, there = (drive(program, m) for m in (fold, beyond))
+    here, there = (computed("paper", m) for m in (fold, beyond))
     assert np.max(np.abs(here["C"] - there["C"])) > 1e-3
     model = model_of(CASES["paper"])
     for found, motion in ((here, fold), (there, beyond)):
@@ -102,15 +120,13 @@ def test_self_test_fails_where_the_code_was_changed(tmp_path, before, after):
 
 
 @pytest.mark.parametrize("name", ["paper", "rigid body, rules"])
-def test_input_that_is_not_finite_is_flagged_and_gives_zeros(tmp_path, name):
-    model = model_of(CASES[name])
-    exported(tmp_path, model)
+def test_input_that_is_not_finite_is_flagged_and_gives_zeros(computed, name):
     rows = np.ones((30, 9))
     for row in range(27):
         rows[row, row // 3] = (np.nan, np.inf, -np.inf)[row % 3]
     rows[27, 3:6] = 1e200  # finite, but the torque is not
     rows[28, :3] = 1e300
-    found = evaluate(tmp_path, "vehicle", "vehicle", Motion(rows[:, :3], rows[:, 3:6], rows[:, 6:]))
+    found = computed(name, Motion(rows[:, :3], rows[:, 3:6], rows[:, 6:]))
     assert np.all(found["status"][:9] == NOT_FINITE)
     assert np.all(found["inside"][:9] == 0)
     assert np.all(found["status"][9:18, 0] & NOT_FINITE == 0)
@@ -126,12 +142,11 @@ def test_input_that_is_not_finite_is_flagged_and_gives_zeros(tmp_path, name):
     assert np.all(found["C"][:18] == 0)
 
 
-def test_the_torque_of_a_rigid_body_is_exact_with_the_nose_up(tmp_path):
+def test_the_torque_of_a_rigid_body_is_exact_with_the_nose_up(computed):
     model = model_of(CASES["rigid body alone"])
-    exported(tmp_path, model)
     attitude = np.array([[0.3, 0.5 * np.pi, 0.1], [0.3, -0.5 * np.pi, 0.1]])
     motion = Motion(attitude, np.ones((2, 3)), np.ones((2, 3)))
-    found = evaluate(tmp_path, "vehicle", "vehicle", motion)
+    found = computed("rigid body alone", motion)
     assert max(errors(found, wanted_of(model, motion)).values()) < 1e-15
     assert np.abs(found["body"]).max() < 10
 

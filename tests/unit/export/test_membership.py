@@ -91,10 +91,10 @@ def test_the_compiled_loops(case):
 
 
 def test_the_exported_c(case, tmp_path):
-    require_gcc(tmp_path)
+    require_gcc()
     points = reference_points(case.model, np.random.default_rng(3))
     written(tmp_path, "vehicle", c_source(sheet_of(case.model), points, "vehicle"))
-    assert_same(evaluate(tmp_path, "vehicle", "vehicle", case.motion)["torque"], case)
+    assert_same(evaluate(tmp_path, "vehicle", case.motion)["torque"], case)
 
 
 def test_the_exported_python(case):
