@@ -86,6 +86,7 @@ def steps():
         "steps/samples": np.arange(1, STEPS + 1),
         "steps/horizon": horizon,
         "steps/windows": 77,
+        "steps/lost": np.zeros((3, STEPS), dtype=int),
         "steps/attitude": 0.01 * growth,
         "steps/body_rate": rate,
     }
