@@ -45,4 +45,3 @@ def test_what_is_printed_loads_no_plotting(pipeline, study, tmp_path):
         ("effects",),
     )
     assert "matplotlib" not in packages
-    assert "jinja2" not in packages
