@@ -23,6 +23,7 @@ from cpfls_cli.flights.same_vehicle import other_vehicles, read_of_vehicle
 from cpfls_cli.identification.model import Model
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
+from cpfls_cli.pages.source import source_of
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -42,7 +43,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         if job.dry_run:
             return nothing_written(job)
         record = finish(job, prediction, inputs)
-        return Outcome(record.summary, tuple(answer(record, None)))
+        return Outcome(record.summary, tuple(answer(source_of(job, record))))
     identified = read_record(model, ModelRecord)
     rebuilt = identified.rebuilt(model)
     flown = read_record(flight, FlightRecord, "time", *MOTION)
@@ -50,8 +51,8 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         return nothing_written(job)
     prediction = PredictionRecord.of(rebuilt, flown.time, flown.motion, flown.torque, identified.draws())
     record = finish(job, prediction, inputs)
-    other = (Text(sentence, "warning") for sentence in other_vehicles([flight], job.study))
-    return Outcome(record.summary, (*trust_notes(identified, model), *other, *answer(record, identified)))
+    notes = (*trust_notes(identified, model), *(Text(n, "warning") for n in other_vehicles([flight], job.study)))
+    return Outcome(record.summary, (*notes, *answer(source_of(job, record), identified)))
 
 
 def _with_effects(path: Path, flight: Path, study: Study) -> PredictionRecord:

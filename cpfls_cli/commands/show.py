@@ -58,7 +58,7 @@ def _describe_dataset(artifact: Artifact, name: str) -> dict[str, Any]:
 def _dataset_row(name: str, entry: dict[str, Any]) -> list[str]:
     shape = "x".join(str(length) for length in entry["shape"]) or "scalar"
     value = entry.get("value", [])
-    shown = ", ".join(value) if isinstance(value, list) else str(value)
+    shown = ", ".join(filter(None, value)) if isinstance(value, list) else str(value)
     return [name, shape, entry["units"], f"{entry['description']}{': ' if shown else ''}{shown}"]
 
 

@@ -19,7 +19,14 @@ from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingE
 from cpfls_cli.excitation import Excitation, optimised_rotation
 from cpfls_cli.logs.csv_log import read_csv, row_lines
 from cpfls_cli.pages.source import source_of
-from cpfls_cli.pages.trajectory import absolute_jerk, answer, demand_sentences, figure_names, path_figures
+from cpfls_cli.pages.trajectory import (
+    absolute_jerk,
+    answer,
+    demand_sentences,
+    figure_names,
+    path_figures,
+    plan_blocks,
+)
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
@@ -81,9 +88,9 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
     source = source_of(job, finish(job, TrajectoryRecord.of(planned), inputs))
     for path, drawn in zip(figures, path_figures(source) if figures else (), strict=True):
         write_text(path, drawn.svg)
-    blocks = [*answer(source, planned, demand, excitation), *(Text(problem, "warning") for problem in problems)]
-    if figures:
-        blocks.append(Text(f"drawn: {', '.join(map(str, figures))}"))
+    blocks = [*plan_blocks(planned, demand, excitation), *answer(source)]
+    blocks += [Text(f"drawn: {', '.join(map(str, figures))}")] if figures else []
+    blocks += [Text(problem, "warning") for problem in problems]
     return Outcome(_summary(source.record, planned, demand, excitation, figures), tuple(blocks))
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _INERTIA_PANELS = (("D22", "D33"), ("D13", "D23"))
 
 
-def answer(prediction: PredictionRecord, model: Record | None) -> Iterator[Text]:
+def answer(prediction: Source[PredictionRecord], model: Record | None = None) -> Iterator[Text]:
     """Say how well a model explains a flight, and where it cannot be trusted.
 
     Parameters
@@ -33,18 +33,19 @@ def answer(prediction: PredictionRecord, model: Record | None) -> Iterator[Text]
     model : Record or None
         That predicted; None where it is not at hand.
     """
-    samples = len(prediction.time)
-    yield Text(f"{samples} samples, {prediction.outside_count} outside the region that the training data visited")
-    score = prediction.score
+    record = prediction.record
+    samples = len(record.time)
+    yield Text(f"{samples} samples, {record.outside_count} outside the region that the training data visited")
+    score = record.score
     if score is None:
         yield Text("the flight holds no torque, so there is no error to show")
     else:
         error = f"MSE {score.mse.mean():.4g} (N m)^2, relative error {score.worst_relative_error:.3%} (worst axis)"
         r2 = " ".join(f"{value:.4f}" for value in score.r2_body)
-        left_out = prediction.vertical_count
+        left_out = record.vertical_count
         without = f" (without {left_out} samples near a vertical pitch)" if left_out else ""
         yield from (Text(error), Text(f"R2 of body torque, roll pitch yaw: {r2}{without}"))
-    yield from trust_along(prediction.outside_count, prediction.not_positive_definite, samples, model)
+    yield from trust_along(record.outside_count, record.not_positive_definite, samples, model)
 
 
 def trust_along(outside: int, not_positive_definite: int, samples: int, model: Record | None) -> Iterator[Text]:
@@ -99,7 +100,7 @@ def _prediction(prediction: Source[PredictionRecord], index: int, sources: Sourc
     model = sources.by_hash(prediction.made_from("model"))
     yield Heading(prediction.label)
     yield Text(_seen(prediction, model))
-    yield from answer(prediction.record, None if model is None else model.record)
+    yield from answer(prediction, None if model is None else model.record)
     if prediction.record.error is not None:
         yield error_figure(f"figure-7-error-{index}", prediction)
     yield torques_figure(f"torques-{index}", prediction)

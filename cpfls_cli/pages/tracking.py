@@ -39,7 +39,7 @@ _WINDOW_S = 1.0
 _SHOWN = 1e-6
 
 
-def answer(flight: Source[FlightRecord], model: Record | None, index: int = 1) -> Iterator[Block]:
+def answer(flight: Source[FlightRecord], model: Record | None = None, index: int = 1) -> Iterator[Block]:
     """Say how closely each controller followed the plan, how the model does beside the others, and what to distrust.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,14 +32,32 @@ _TURN = 360.0
 
 
 def answer(
-    trajectory: Source[TrajectoryRecord], planned: PlannedRotation, demand: Flyability, excitation: Excitation | None
+    trajectory: Source[TrajectoryRecord], index: int = 1, printed: Mapping[str, float] | None = None
 ) -> Iterator[Block]:
-    """Say how long a path is and what it asks of the vehicle.
+    """Say what a path asks for: its peaks and its moves, or how a held vehicle turns.
 
     Parameters
     ----------
-    planned : PlannedRotation
-        The plan whose samples the artifact holds.
+    index : int
+        Number of the path on its page.
+    printed : mapping of str to float, optional
+        What the paper prints of the peaks, by name of the derivative.
+    """
+    record = trajectory.record
+    if record.held:
+        yield Text("the vehicle is held at its centre of mass and only turns")
+        yield _turns(f"turns-{index}", trajectory)
+        return
+    yield _peaks(f"peaks-{index}", trajectory, printed)
+    if record.leg is not None and any(record.leg.limited_by):
+        yield _moves(f"legs-{index}", trajectory.label, record.leg)
+
+
+def plan_blocks(planned: PlannedRotation, demand: Flyability, excitation: Excitation | None) -> Iterator[Block]:
+    """Say of a plan what its samples do not hold: how long it is, and what it asks of the vehicle between them.
+
+    Parameters
+    ----------
     demand : Flyability
         Of the plan on the vehicle.
     excitation : Excitation or None
@@ -47,13 +65,11 @@ def answer(
     """
     yield Text(f"{len(planned.time)} samples over {planned.duration:g} s")
     if isinstance(planned, Trajectory):
-        yield _peaks("peaks", "Largest value of each derivative in any move.", planned.maxima)
         tilt, thrust = np.degrees(demand.tilt.max()), demand.thrust.max()
         yield Text(f"largest tilt {tilt:.3g} deg, largest thrust {thrust:.4g} N")
         if any(leg.limited_by for leg in planned.legs):
-            yield _moves("moves", trajectory, [absolute_jerk(leg) for leg in planned.legs])
-    else:
-        yield from _turns("turns", trajectory)
+            jerk = ", ".join(f"{absolute_jerk(leg):.4g}" for leg in planned.legs[:_MOVES_SHOWN])
+            yield Text(f"integral of |jerk| by move, m/s^2: {jerk}")
     if excitation is not None:
         yield Text(
             f"condition number of the model's regressor {excitation.condition_number:.4g}, uniform partitions; of "
@@ -125,48 +141,40 @@ def path_section(sources: Sources) -> Section | None:
 
 
 def _path(trajectory: Source[TrajectoryRecord], index: int, printed: Mapping[str, float] | None) -> Iterator[Block]:
-    record = trajectory.record
+    record, label = trajectory.record, trajectory.label
+    yield from answer(trajectory, index, printed)
     if record.held:
-        yield from _turns(f"turns-{index}", trajectory)
-        yield rotation_figure(
-            f"figure-rotation-{index}", trajectory.label, record.time, record.attitude, record.attitude_rate
-        )
-        return
-    yield derivatives_figure(f"figure-2-derivatives-{index}", trajectory)
-    caption = f"Largest length of each derivative at the samples of {trajectory.label}, along the path."
-    if printed:
-        caption += " The paper prints its maxima for intervals of P = 1 s."
-    yield _peaks(f"peaks-{index}", caption, record.peaks(), printed)
-    if record.leg is not None and any(record.leg.limited_by):
-        yield _moves(f"legs-{index}", trajectory)
-    yield attitude_figure(f"figure-3-attitude-{index}", trajectory.label, record.time, record.attitude)
+        yield rotation_figure(f"figure-rotation-{index}", label, record.time, record.attitude, record.attitude_rate)
+    else:
+        yield derivatives_figure(f"figure-2-derivatives-{index}", trajectory)
+        yield attitude_figure(f"figure-3-attitude-{index}", label, record.time, record.attitude)
 
 
-def _peaks(name: str, caption: str, peaks: Mapping[str, float], printed: Mapping[str, float] | None = None) -> Table:
+def _peaks(name: str, trajectory: Source[TrajectoryRecord], printed: Mapping[str, float] | None) -> Table:
+    peaks = trajectory.record.peaks()
     rows = [
         [derivative, unit, _peak(derivative, peaks), *([number(printed[derivative])] if printed else [])]
         for derivative, unit in zip(DERIVATIVES, _UNITS, strict=True)
     ]
+    caption = f"Largest length of each derivative at the samples of {trajectory.label}, along the path."
+    if printed:
+        caption += " The paper prints its maxima for intervals of P = 1 s."
     header = ("Derivative", "Unit", "Largest", *(("Paper",) if printed else ()))
     return Table(name, caption, header, rows, frozenset({0, 1}))
 
 
 def _peak(name: str, peaks: Mapping[str, float]) -> str:
     """Write a peak; above a snap that jumps there is nothing at the samples, and no bound between them."""
-    jumps = name in ("crackle", "pop") and not peaks[name] and peaks["snap"]
-    return "no bound" if jumps or not np.isfinite(peaks[name]) else number(peaks[name])
+    return "no bound" if name in ("crackle", "pop") and not peaks[name] and peaks["snap"] else number(peaks[name])
 
 
-def _moves(name: str, trajectory: Source[TrajectoryRecord], jerk: Sequence[float] = ()) -> Table:
-    moves = trajectory.record.leg
-    assert moves is not None, "only a path in space has limits"
-    shown = range(min(len(moves.begin), _MOVES_SHOWN))
-    rows = [[*_move(moves, index), *([f"{jerk[index]:.4g}"] if jerk else [])] for index in shown]
+def _moves(name: str, label: str, moves: LegGroup) -> Table:
+    rows = [_move(moves, index) for index in range(min(len(moves.begin), _MOVES_SHOWN))]
     header = ("Move", "Begins, s", "Takes, s", "Length, m", "Limited by")
-    caption = f"Moves of {trajectory.label} under limits, and the derivatives that reach theirs."
+    caption = f"Moves of {label} under limits, and the derivatives that reach theirs."
     if len(moves.begin) > _MOVES_SHOWN:
         caption += f" The first {_MOVES_SHOWN} of {len(moves.begin)}."
-    return Table(name, caption, (*header, *(("Integral of |jerk|, m/s²",) if jerk else ())), rows, frozenset({0, 4}))
+    return Table(name, caption, header, rows, frozenset({0, 4}))
 
 
 def _move(moves: LegGroup, index: int) -> list[str]:
@@ -175,11 +183,10 @@ def _move(moves: LegGroup, index: int) -> list[str]:
     return [str(index + 1), *(plain(value) for value in numbers), moves.limited_by[index].replace(" ", ", ")]
 
 
-def _turns(name: str, trajectory: Source[TrajectoryRecord]) -> Iterator[Block]:
+def _turns(name: str, trajectory: Source[TrajectoryRecord]) -> Table:
     record = trajectory.record
-    yield Text("the vehicle is held at its centre of mass and only turns")
     rows = [
-        [quantity, unit, *(f"{value:.4g}" for value in np.abs(values).max(axis=0))]
+        [quantity, unit, *(number(value) for value in np.abs(values).max(axis=0))]
         for quantity, unit, values in (
             ("Euler rate", "rad/s", record.attitude_rate),
             ("body rate", "rad/s", record.body_rate),
@@ -187,7 +194,7 @@ def _turns(name: str, trajectory: Source[TrajectoryRecord]) -> Iterator[Block]:
         )
     ]
     caption = f"Largest rates and accelerations of {trajectory.label}; of body rates about x, y and z."
-    yield Table(name, caption, ("Quantity", "Unit", *AXES), rows, frozenset({0, 1}))
+    return Table(name, caption, ("Quantity", "Unit", *AXES), rows, frozenset({0, 1}))
 
 
 def path_figures(trajectory: Source[TrajectoryRecord]) -> tuple[Plot, ...]:

@@ -3,6 +3,9 @@
 import json
 import subprocess
 import sys
+from pkgutil import iter_modules
+
+from cpfls_cli import commands, pages
 
 HEAVY = {"h5py", "jinja2", "matplotlib", "numba", "numpy", "pydantic", "scipy", "yaml"}
 CODE = """
@@ -45,4 +48,10 @@ def test_what_is_printed_loads_no_plotting(pipeline, study, tmp_path):
         ("effects",),
     )
     assert "matplotlib" not in packages
-    assert "jinja2" not in packages
+
+
+def test_no_command_and_no_page_loads_plotting_before_it_draws():
+    names = [module.name for room in (commands, pages) for module in iter_modules(room.__path__, f"{room.__name__}.")]
+    assert len(names) > 20
+    code = f"import sys, {', '.join(names)}; print('matplotlib' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "False\n"

@@ -92,3 +92,11 @@ def test_time_left_of_a_resumed_search_is_that_of_its_own_pace(monkeypatch):
             clock[0] += 3.0
         (task,) = bars[0].tasks
         assert task.time_remaining == pytest.approx((26 - 9.5) * 6.0, abs=1.0)
+
+
+def test_an_encoding_without_the_signs_of_the_tables_ends_no_command(study, tmp_path):
+    command = [sys.executable, "-m", "cpfls_cli", "trajectory", study, "-o", tmp_path / "t.h5"]
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    result = subprocess.run([*map(str, command)], env=environment, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert re.search(r"^pop +m/s[?] +[0-9.]+$", result.stdout, re.MULTILINE)
