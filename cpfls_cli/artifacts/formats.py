@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from textwrap import fill
+
 from cpfls_cli.artifacts.checkpoint import CheckpointRecord
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
@@ -34,6 +36,8 @@ RECORDS: tuple[type[Record], ...] = (
 FORMATS = tuple(record.spec() for record in RECORDS)
 """Their specifications."""
 
+# Of a line of docs.
+_WIDTH = 120
 _HEAD = "| dataset | dimensions | units | frame | required | description |\n|---|---|---|---|---|---|"
 
 
@@ -56,7 +60,8 @@ def format_tables() -> str:
 def _section(spec: ArtifactSpec) -> str:
     inputs = ", ".join(f"`/inputs/{role}`" for role in spec.inputs) or "none"
     rows = "\n".join(_row(dataset) for dataset in spec.datasets)
-    return f"### `{spec.format}`\n\nMade by {spec.makers}: {spec.description}. Inputs: {inputs}.\n\n{_HEAD}\n{rows}\n"
+    words = fill(f"Made by {spec.makers}: {spec.description}. Inputs: {inputs}.", _WIDTH, break_on_hyphens=False)
+    return f"### `{spec.format}`\n\n{words}\n\n{_HEAD}\n{rows}\n"
 
 
 def _row(dataset: DatasetSpec) -> str:
