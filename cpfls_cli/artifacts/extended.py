@@ -52,7 +52,7 @@ class ExtendedRecord(Record):
             The identified model that is extended, or the vehicle.
         """
         model, unseen = refit.model, refit.unseen
-        assert model.audit is not None, "an refit repairs what the audit found"
+        assert model.audit is not None, "a refit repairs what the audit found"
         rigid_body = six_parameters(moments) if model.base is None else np.zeros(6)
         correction = np.array([*model.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])
         numbers = {number.name: number for number in refit.estimates.parameters}

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, r
 from cpfls_cli.gap.settings import CLEAR
 
 if TYPE_CHECKING:
-    # What fits a gap loads its own numerics, which nobody waits for who only reads of one.
+    # Reading a record does not need the numerics that fit a gap.
     from cpfls_cli.artifacts.gap_flights import AuditGroup
     from cpfls_cli.dynamics.equations_of_motion import InertiaModel
     from cpfls_cli.gap.extended import ExtendedModel
@@ -164,8 +164,8 @@ class LinearGroup:
 
     def of_effect(self, effect: str) -> Array:
         """Give those of one effect, shape (coefficient,)."""
-        own = np.array([name == effect for name in self.effect], dtype=bool)
-        return np.asarray(self.value[own])
+        chosen = np.array([name == effect for name in self.effect], dtype=bool)
+        return np.asarray(self.value[chosen])
 
 
 @record

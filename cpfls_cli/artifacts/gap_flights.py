@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.model import ModelRecord, rebuilt_model
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, columns_of, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
-    # What evaluates a model loads compiled kernels, which nobody waits for who only reads one.
+    # Reading a record does not need the compiled kernels that evaluate a model.
     from cpfls_cli.config.study import Study
     from cpfls_cli.effects.signals import Signals
     from cpfls_cli.gap.balance.windows import Recording
@@ -346,9 +346,9 @@ class SignalsGroup:
             field.name: values[samples] for field in fields(self) if (values := getattr(self, field.name)) is not None
         }
         # A flight that lacks a signal lacks all of it.
-        own = {name: values for name, values in known.items() if np.isfinite(values).all()}
+        whole = {name: values for name, values in known.items() if np.isfinite(values).all()}
         ground = study.gap.ground_height_m
-        return Signals(vehicle=study.vehicle, commanded=commanded, ground_height_m=ground, **own)
+        return Signals(vehicle=study.vehicle, commanded=commanded, ground_height_m=ground, **whole)
 
 
 def _joined(parts: Sequence[Array | None], lengths: Sequence[int]) -> Array | None:

@@ -10,13 +10,12 @@ from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish
-from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.recordings import Flights, read_flights
-from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.pages.disagreement import answer
@@ -51,22 +50,6 @@ def _model(path: Path | None, study: Study) -> tuple[ExtendedModel, BaseGroup]:
         return record.rebuilt(path), record.base
     base = base_of(path, study)
     return plain(base.rebuilt(path)), base
-
-
-def base_of(path: Path | None, study: Study) -> BaseGroup:
-    """Read the base of a comparison.
-
-    Parameters
-    ----------
-    path : Path or None
-        An identified model; None for the rigid body of the vehicle.
-
-    Raises
-    ------
-    InputError
-        If it was identified with another vehicle.
-    """
-    return BaseGroup.of(None if path is None else read_of_vehicle(path, ModelRecord, study))
 
 
 def compared(

@@ -10,10 +10,9 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_effects import ReplayChangeGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING, BaseGroup
 from cpfls_cli.artifacts.job import Job, begin, finish
-from cpfls_cli.commands.compare import base_of
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect

@@ -15,11 +15,12 @@ from cpfls_cli.artifacts.job import Job, finish, input_file, take_inputs
 from cpfls_cli.artifacts.output import check_folder, filled_folder, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands import report
-from cpfls_cli.commands.compare import base_of, check_ignored, compared, flight_roles, progress_of
+from cpfls_cli.commands.compare import check_ignored, compared, flight_roles, progress_of
 from cpfls_cli.commands.diagnose import diagnosed, whole_answer, whole_summary
 from cpfls_cli.commands.extend import extended
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, seen_twice, split_flights
+from cpfls_cli.flights.same_vehicle import base_of
 from cpfls_cli.gap.extended import plain as without_effects
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.disagreement import where

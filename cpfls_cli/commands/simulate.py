@@ -18,12 +18,11 @@ from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.commands import tracking
-from cpfls_cli.commands.compare import base_of
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError, SettingError
-from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle
 from cpfls_cli.pages.flight import answer, autopilot_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import violation_sentence

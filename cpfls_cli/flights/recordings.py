@@ -63,7 +63,7 @@ def read_flights(paths: Sequence[Path], study: Study) -> Flights:
     flights = [_log(path, study) if is_log(path) else _artifact(path, study) for path in paths]
     made = [_recording(flight, study) for flight in flights]
     recordings, notes = _with_voltage([recording for recording, _ in made], flights)
-    warnings = [f"{flight.name}: {w}" for flight, (_, own) in zip(flights, made, strict=True) for w in own]
+    warnings = [f"{flight.name}: {w}" for flight, (_, about) in zip(flights, made, strict=True) for w in about]
     return Flights(tuple(recordings), (*warnings, *notes))
 
 

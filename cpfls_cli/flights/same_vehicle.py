@@ -1,4 +1,4 @@
-"""Flights and models of one vehicle: list the keys that differ."""
+"""Flights and models of one vehicle: read those of it, and list the keys in which others differ."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TypeVar
 
+from cpfls_cli.artifacts.gap_flights import BaseGroup
+from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import read_header, read_record
 from cpfls_cli.config.load import parse_config, validate
@@ -17,12 +19,12 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 R = TypeVar("R", bound=Record)
 
 
-def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettings) -> None:
+def require_same_vehicle(path: Path, given: VehicleSettings, wanted: VehicleSettings) -> None:
     """Refuse a file that was made with another vehicle than that of the config.
 
     Parameters
     ----------
-    own : VehicleSettings
+    given : VehicleSettings
         Of the file.
     wanted : VehicleSettings
         Of the config.
@@ -32,7 +34,7 @@ def require_same_vehicle(path: Path, own: VehicleSettings, wanted: VehicleSettin
     InputError
         Naming the keys that differ.
     """
-    different = _different(own, wanted)
+    different = _different(given, wanted)
     if different:
         raise InputError(
             f"{path}: was made with another vehicle; not the same: {different}; use the config of that vehicle, or "
@@ -53,6 +55,22 @@ def read_of_vehicle(path: Path, wanted: type[R], study: Study) -> R:
     return record
 
 
+def base_of(path: Path | None, study: Study) -> BaseGroup:
+    """Read the base of a comparison.
+
+    Parameters
+    ----------
+    path : Path or None
+        An identified model; None for the rigid body of the vehicle.
+
+    Raises
+    ------
+    InputError
+        If it was identified with another vehicle.
+    """
+    return BaseGroup.of(None if path is None else read_of_vehicle(path, ModelRecord, study))
+
+
 def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
     """Name flights that were made with another vehicle than that of the config.
 
@@ -66,10 +84,10 @@ def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
     tuple of str
         A sentence for each.
     """
-    found = [(path, _difference_of(path, study)) for path in dict.fromkeys(paths)]
+    differences = [(path, _difference_of(path, study)) for path in dict.fromkeys(paths)]
     return tuple(
         f"{path}: was made with another vehicle; not the same: {different}; what it says of the model is of that one"
-        for path, different in found
+        for path, different in differences
         if different
     )
 
@@ -86,11 +104,11 @@ def _vehicle_of(path: Path, header: Header) -> VehicleSettings:
     return validate(parse_config(header.config, source), source).vehicle
 
 
-def _different(own: VehicleSettings, wanted: VehicleSettings) -> str:
+def _different(given: VehicleSettings, wanted: VehicleSettings) -> str:
     """Name the keys that differ, the first with its values; empty where none does."""
-    different = [f.name for f in fields(own) if getattr(own, f.name) != getattr(wanted, f.name)]
+    different = [f.name for f in fields(given) if getattr(given, f.name) != getattr(wanted, f.name)]
     if not different:
         return ""
     first = different[0]
-    values = "" if first == "rotors" else f" ({getattr(own, first)} there, {getattr(wanted, first)} in the config)"
+    values = "" if first == "rotors" else f" ({getattr(given, first)} there, {getattr(wanted, first)} in the config)"
     return ", ".join([f"vehicle.{first}{values}", *(f"vehicle.{name}" for name in different[1:])])

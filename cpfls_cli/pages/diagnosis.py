@@ -121,8 +121,8 @@ def verdict_box(record: DiagnosisRecord) -> Box:
     rivals = list(_rivals(record))
     # What hangs on another flight comes first.
     effects = [*rivals, *named] if verdict == GapVerdict.AMBIGUOUS else [*named, *rivals]
-    left = [_left_sentence(each) for each in record.unexplained.unexplained()]
-    sentences = [*effects, *left, *_shrunk(record)]
+    unexplained = [_unexplained_sentence(each) for each in record.unexplained.unexplained()]
+    sentences = [*effects, *unexplained, *_shrunk(record)]
     return Box(verdict.replace("_", " "), _headline(record), sentences, _TONES.get(verdict, "note"))
 
 
@@ -168,22 +168,24 @@ def _rivals(record: DiagnosisRecord) -> Iterator[str]:
         yield f"It could be {effect_title(name)} instead of {effect_title(instead_of)}. To tell: {flight}."
 
 
-def _left_sentence(left: Unexplained) -> str:
+def _unexplained_sentence(channel: Unexplained) -> str:
     """Say on which axis something is left, and what it follows."""
-    follows = [f"it follows {left.signal} most"] if left.signal else []
-    rings = [f"it rings at {number(left.frequency_hz, 3)} Hz"] if left.frequency_hz is not None else []
+    follows = [f"it follows {channel.signal} most"] if channel.signal else []
+    rings = [f"it rings at {number(channel.frequency_hz, 3)} Hz"] if channel.frequency_hz is not None else []
     cause = joined([*follows, *rings]) if follows or rings else "it follows no one signal"
-    share = f" ({share_words(left.share)} of it)" if follows or rings else ""
-    energy = _ENERGY.get(left.energy, "")
-    return f"Left unexplained: {channel_words(left.axis)}, {number(left.floors, 2)} floors; {cause}{share}{energy}."
+    share = f" ({share_words(channel.share)} of it)" if follows or rings else ""
+    energy = _ENERGY.get(channel.energy, "")
+    return (
+        f"Left unexplained: {channel_words(channel.axis)}, {number(channel.floors, 2)} floors; {cause}{share}{energy}."
+    )
 
 
 def _shrunk(record: DiagnosisRecord) -> Iterator[str]:
     gap = record.gap
     if not gap.known:
         return
-    worst, left = int(np.nanargmax(gap.before_floors)), int(np.nanargmax(gap.after_floors))
-    before, after = number(float(gap.before_floors[worst]), 2), number(float(gap.after_floors[left]), 2)
+    worst, largest = int(np.nanargmax(gap.before_floors)), int(np.nanargmax(gap.after_floors))
+    before, after = number(float(gap.before_floors[worst]), 2), number(float(gap.after_floors[largest]), 2)
     names = [channel_words(channel) for channel in gap.channel]
     if record.verdict in (GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED) or not record.effects.names():
         still = f"; with the closest effects {after} are left" if record.effects.closest else ""
@@ -191,7 +193,7 @@ def _shrunk(record: DiagnosisRecord) -> Iterator[str]:
         return
     yield (
         f"On flights held out from the fit, the largest gap shrinks from {before} noise floors, in the {names[worst]}, "
-        f"to {after}, in the {names[left]}. Of what stood above the noise, {share_words(record.share)} is gone."
+        f"to {after}, in the {names[largest]}. Of what stood above the noise, {share_words(record.share)} is gone."
     )
 
 

@@ -120,11 +120,11 @@ def _section(disagreement: Source[DisagreementRecord], index: int) -> Iterator[B
 def _axes_table(record: DisagreementRecord, index: int) -> Table:
     gap = record.gap
     rows: list[list[str | Cell]] = []
-    for place in gap.known:
-        channel = gap.channel[place]
-        sizes = [number(float(values[place]), 3) for values in (gap.rms, gap.floor, gap.floors)]
-        above = Cell("yes", "warning") if gap.above_noise[place] else Cell("no")
-        share = whole_percent(float(gap.share[place]))
+    for channel_index in gap.known:
+        channel = gap.channel[channel_index]
+        sizes = [number(float(values[channel_index]), 3) for values in (gap.rms, gap.floor, gap.floors)]
+        above = Cell("yes", "warning") if gap.above_noise[channel_index] else Cell("no")
+        share = whole_percent(float(gap.share[channel_index]))
         rows.append([channel_words(channel), channel_unit(channel), *sizes, above, share])
     caption = (
         "Gap between what the measured motion takes and what the model provides, root mean square over "
@@ -156,7 +156,7 @@ def _follows(record: DisagreementRecord) -> Iterator[Text]:
 
 def _followed_channels(record: DisagreementRecord) -> list[str]:
     """Channels above noise of which it is known what they follow: those below follow chance."""
-    above = [record.gap.channel[place] for place in np.flatnonzero(record.gap.above_noise)]
+    above = [record.gap.channel[index] for index in np.flatnonzero(record.gap.above_noise)]
     return [channel for channel in above if channel in record.dependence.channel]
 
 
