@@ -9,7 +9,7 @@ import yaml
 
 from benchmarks.blind.generator import DURATION, simulate_many, write, write_key
 
-_COLUMNS_OF = Path(__file__).parents[3] / "configs" / "gap" / "sixkg.yaml"
+_COLUMNS_OF = Path(__file__).parents[2] / "configs" / "gap" / "sixkg.yaml"
 
 
 def fly(group, folder, duration=DURATION):
