@@ -93,9 +93,9 @@ def configs():
 
 
 @pytest.fixture
-def undrawn(monkeypatch):
-    """Leave the pictures of a page away: four fifths of its time, nothing to a test of its words and numbers."""
-    monkeypatch.setattr("cpfls_cli.report.canvas._inline_svg", lambda *_: "<svg></svg>")
+def undrawn():
+    with command_line.undrawn():
+        yield
 
 
 @pytest.fixture
