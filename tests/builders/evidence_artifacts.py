@@ -89,7 +89,6 @@ def steps():
         "steps/lost": np.zeros((3, STEPS), dtype=int),
         "steps/attitude": 0.01 * growth,
         "steps/body_rate": rate,
-        "steps/lost": np.where(np.isnan(rate[:, :, 0]), 77, 0),
     }
 
 

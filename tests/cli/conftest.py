@@ -93,12 +93,6 @@ def configs():
 
 
 @pytest.fixture
-def undrawn():
-    with command_line.undrawn():
-        yield
-
-
-@pytest.fixture
 def at_evaluation(monkeypatch):
     """Do something when so many chromosomes are evaluated, over all searches of a command."""
 
