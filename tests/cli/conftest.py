@@ -27,6 +27,15 @@ identification:
 """
 
 
+LOG_STUDY = """\
+import:
+  time_column: t
+  signals:
+    attitude: {columns: [roll, pitch, yaw], unit: rad}
+    body_torque: {columns: [mx, my, mz], unit: N m}
+"""
+
+
 @pytest.fixture(scope="session")
 def cpfls():
     """Run a command; anything but an exit is a bug and is raised."""
@@ -82,6 +91,14 @@ def pipeline(cpfls, study):
     return SimpleNamespace(
         **paths, paths=paths, printed=printed, summaries={k: json.loads(v) for k, v in printed.items()}
     )
+
+
+@pytest.fixture
+def log_study(tmp_path):
+    """A study that imports logs of attitude and torque."""
+    path = tmp_path / "study.yaml"
+    path.write_text(LOG_STUDY)
+    return path
 
 
 @pytest.fixture(scope="session")
