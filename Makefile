@@ -218,7 +218,7 @@ docs/gap-example.svg: $(GAP_REPORT)
 	sed -n '/<figure id="gap-picture-1">/,/<\/svg>/{/<figure/d;s/.*<svg/<svg/;s/<\/svg>.*/<\/svg>/;p}' $< > $@
 
 test: $(INSTALLED_DEV)
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 lint: $(INSTALLED_DEV)
 	$(BIN)/ruff check .

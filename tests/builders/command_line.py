@@ -3,7 +3,9 @@
 import itertools
 import os
 import signal
+from contextlib import contextmanager
 
+import pytest
 from typer.testing import CliRunner
 
 from cpfls_cli.cli.app import app
@@ -18,6 +20,17 @@ def run(*words):
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result
+
+
+@contextmanager
+def undrawn():
+    """Leave the pictures of pages away: most of their time, and nothing to a test of their words and numbers.
+
+    The figures are made, and their series told; only what they look like is not worked out.
+    """
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr("cpfls_cli.report.canvas._inline_svg", lambda *_: "<svg></svg>")
+        yield
 
 
 def act_at_evaluation(monkeypatch, number, action):

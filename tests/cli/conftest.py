@@ -27,6 +27,15 @@ identification:
 """
 
 
+LOG_STUDY = """\
+import:
+  time_column: t
+  signals:
+    attitude: {columns: [roll, pitch, yaw], unit: rad}
+    body_torque: {columns: [mx, my, mz], unit: N m}
+"""
+
+
 @pytest.fixture(scope="session")
 def cpfls():
     """Run a command; anything but an exit is a bug and is raised."""
@@ -84,18 +93,20 @@ def pipeline(cpfls, study):
     )
 
 
+@pytest.fixture
+def log_study(tmp_path):
+    """A study that imports logs of attitude and torque."""
+    path = tmp_path / "study.yaml"
+    path.write_text(LOG_STUDY)
+    return path
+
+
 @pytest.fixture(scope="session")
 def configs():
     """The configs that are shipped."""
     found = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
     assert found
     return found
-
-
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Leave the pictures of a page away: four fifths of its time, nothing to a test of its words and numbers."""
-    monkeypatch.setattr("cpfls_cli.report.canvas._inline_svg", lambda *_: "<svg></svg>")
 
 
 @pytest.fixture

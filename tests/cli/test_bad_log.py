@@ -7,13 +7,6 @@ import h5py
 import numpy as np
 import pytest
 
-CONFIG = """\
-import:
-  time_column: t
-  signals:
-    attitude: {columns: [roll, pitch, yaw], unit: rad}
-    body_torque: {columns: [mx, my, mz], unit: N m}
-"""
 NAMES = ["t", "roll", "pitch", "yaw", "mx", "my", "mz"]
 
 
@@ -30,13 +23,6 @@ def table(delimiter=",", names=NAMES):
 
 
 @pytest.fixture
-def config(tmp_path):
-    path = tmp_path / "study.yaml"
-    path.write_text(CONFIG)
-    return path
-
-
-@pytest.fixture
 def write(tmp_path):
     def call(content, name="log.csv"):
         path = tmp_path / name
@@ -47,10 +33,10 @@ def write(tmp_path):
 
 
 @pytest.fixture
-def wrong(refuse, config, write, tmp_path):
+def wrong(refuse, log_study, write, tmp_path):
     def call(content, name="log.csv", *words):
         log = write(content, name)
-        lines = refuse("import", config, log, "-o", tmp_path / "flight.h5", *words)
+        lines = refuse("import", log_study, log, "-o", tmp_path / "flight.h5", *words)
         return [line.replace(str(log), "LOG") for line in lines]
 
     return call
@@ -68,9 +54,9 @@ def wrong(refuse, config, write, tmp_path):
     ],
     ids=["comma", "semicolon", "tab", "crlf", "bom", "gzip"],
 )
-def test_every_dialect_gives_the_same_flight(cpfls, config, write, tmp_path, content, name):
+def test_every_dialect_gives_the_same_flight(cpfls, log_study, write, tmp_path, content, name):
     flight = tmp_path / "flight.h5"
-    result = cpfls("import", config, write(content, name), "-o", flight, "--json")
+    result = cpfls("import", log_study, write(content, name), "-o", flight, "--json")
     assert result.exit_code == 0, result.stderr
     summary = json.loads(result.stdout)
     assert (summary["samples"], summary["dropped"]) == (200, {})
@@ -135,12 +121,12 @@ def test_config_without_signals(refuse, study, write, tmp_path):
     assert line.startswith(f"{log}: import.signals: no signal is mapped")
 
 
-def test_flight_without_torque_is_refused_by_identify(cpfls, refuse, config, write, tmp_path):
+def test_flight_without_torque_is_refused_by_identify(cpfls, refuse, log_study, write, tmp_path):
     flight = tmp_path / "flight.h5"
     without = "import:\n  signals:\n    attitude: {columns: [roll, pitch, yaw], unit: rad}\n  torque_source: null\n"
-    config.write_text(without)
-    assert cpfls("import", config, write(table()), "-o", flight).exit_code == 0
-    (line,) = refuse("identify", config, flight, "-o", tmp_path / "model.h5")
+    log_study.write_text(without)
+    assert cpfls("import", log_study, write(table()), "-o", flight).exit_code == 0
+    (line,) = refuse("identify", log_study, flight, "-o", tmp_path / "model.h5")
     assert line.startswith(f"{flight}: lacks torque; this stage needs time, attitude")
 
 

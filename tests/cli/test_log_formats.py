@@ -11,13 +11,6 @@ from cpfls_cli.config.load import load_study
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.logs import formats
 
-CONFIG = """\
-import:
-  time_column: t
-  signals:
-    attitude: {columns: [roll, pitch, yaw], unit: rad}
-    body_torque: {columns: [mx, my, mz], unit: N m}
-"""
 NAMES = ("t", "roll", "pitch", "yaw", "mx", "my", "mz")
 MAGIC = b"FAKE\x00"
 
@@ -37,13 +30,6 @@ def fake_format(monkeypatch):
     monkeypatch.setattr(formats, "LOG_FORMATS", (*formats.LOG_FORMATS, row))
 
 
-@pytest.fixture
-def config(tmp_path):
-    path = tmp_path / "study.yaml"
-    path.write_text(CONFIG)
-    return path
-
-
 def write(path):
     time = 0.02 * np.arange(200)
     signals = [0.2 * np.sin((2 + place) * time) for place in range(6)]
@@ -52,30 +38,30 @@ def write(path):
 
 
 @pytest.mark.usefixtures("fake_format")
-def test_import_takes_a_log_of_a_new_format(cpfls, config, tmp_path):
+def test_import_takes_a_log_of_a_new_format(cpfls, log_study, tmp_path):
     log = write(tmp_path / "log.FAKE")
-    result = cpfls("import", config, log, "-o", tmp_path / "flight.h5", "--json")
+    result = cpfls("import", log_study, log, "-o", tmp_path / "flight.h5", "--json")
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["samples"] == 200
     assert "cpfls: note: the logger was tired" in result.stderr.splitlines()
 
 
 @pytest.mark.usefixtures("fake_format")
-def test_the_gap_workflow_takes_it_as_well(config, tmp_path):
-    flights = read_flights([write(tmp_path / "log.fake")], load_study(config))
+def test_the_gap_workflow_takes_it_as_well(log_study, tmp_path):
+    flights = read_flights([write(tmp_path / "log.fake")], load_study(log_study))
     assert [recording.name for recording in flights.recordings] == ["log.fake"]
 
 
 @pytest.mark.usefixtures("fake_format")
-def test_messages_name_a_new_format(refuse, config, tmp_path):
+def test_messages_name_a_new_format(refuse, log_study, tmp_path):
     csv, other = write(tmp_path / "log.csv"), tmp_path / "log.txt"
     words = ("-o", tmp_path / "flight.h5")
-    assert refuse("import", config, csv, *words) == [
+    assert refuse("import", log_study, csv, *words) == [
         f"{csv}: seems to hold fakes, not what its name ends in; rename it to end in .fake"
     ]
-    assert refuse("import", config, other, *words) == [f"{other}: no such file"]
+    assert refuse("import", log_study, other, *words) == [f"{other}: no such file"]
     other.write_text("t\n")
-    assert refuse("import", config, other, *words) == [
+    assert refuse("import", log_study, other, *words) == [
         f"{other}: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg, .fake"
     ]
     assert formats.suffixes_in_words() == ".csv, .csv.gz, .parquet, .ulg or .fake"
@@ -83,11 +69,11 @@ def test_messages_name_a_new_format(refuse, config, tmp_path):
 
 
 @pytest.mark.usefixtures("fake_format")
-def test_a_package_of_a_new_format_that_is_missing_is_named(refuse, config, tmp_path, monkeypatch):
+def test_a_package_of_a_new_format_that_is_missing_is_named(refuse, log_study, tmp_path, monkeypatch):
     row = formats.LogFormat(
         suffix=".fake", name="Fake", content="fakes", reader="fake_reader", packages=("no_such.part",), extra="fake"
     )
     monkeypatch.setattr(formats, "LOG_FORMATS", (row,))
     log = write(tmp_path / "log.fake")
-    (line,) = refuse("import", config, log, "-o", tmp_path / "flight.h5")
+    (line,) = refuse("import", log_study, log, "-o", tmp_path / "flight.h5")
     assert line == f'{log}: reading .fake needs the package no_such; pip install "cpfls[fake]"'

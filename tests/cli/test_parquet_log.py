@@ -12,13 +12,6 @@ import pyarrow
 import pytest
 from pyarrow import parquet
 
-CONFIG = """\
-import:
-  time_column: t
-  signals:
-    attitude: {columns: [roll, pitch, yaw], unit: rad}
-    body_torque: {columns: [mx, my, mz], unit: N m}
-"""
 TIME = 0.02 * np.arange(200)
 COLUMNS = {
     name: 0.2 * np.sin((2 + place) * TIME) for place, name in enumerate(["roll", "pitch", "yaw", "mx", "my", "mz"])
@@ -36,13 +29,6 @@ def stamps(unit):
 
 
 @pytest.fixture
-def config(tmp_path):
-    path = tmp_path / "study.yaml"
-    path.write_text(CONFIG)
-    return path
-
-
-@pytest.fixture
 def write(tmp_path):
     def call(columns, name="log.parquet", **options):
         parquet.write_table(pyarrow.table(columns), tmp_path / name, **options)
@@ -52,10 +38,10 @@ def write(tmp_path):
 
 
 @pytest.fixture
-def flown(cpfls, config, write, tmp_path):
+def flown(cpfls, log_study, write, tmp_path):
     def call(columns, *words, **options):
         flight = tmp_path / "flight.h5"
-        result = cpfls("import", config, write(columns, **options), "-o", flight, "--json", *words)
+        result = cpfls("import", log_study, write(columns, **options), "-o", flight, "--json", *words)
         assert result.exit_code == 0, result.stderr
         with h5py.File(flight) as file:
             return json.loads(result.stdout), {name: file[name][()] for name in ("time", "attitude", "body_torque")}
@@ -64,9 +50,9 @@ def flown(cpfls, config, write, tmp_path):
 
 
 @pytest.fixture
-def wrong(refuse, config, tmp_path):
+def wrong(refuse, log_study, tmp_path):
     def call(log, *words):
-        lines = refuse("import", config, log, "-o", tmp_path / "flight.h5", *words)
+        lines = refuse("import", log_study, log, "-o", tmp_path / "flight.h5", *words)
         return [line.replace(str(log), "LOG") for line in lines]
 
     return call
@@ -116,10 +102,10 @@ def test_null_stamps_are_dropped(flown):
     assert summary["dropped"] == {"time_not_finite": 1}
 
 
-def test_a_dot_in_a_name_is_part_of_it(cpfls, config, write, tmp_path):
+def test_a_dot_in_a_name_is_part_of_it(cpfls, log_study, write, tmp_path):
     log = write({"t": TIME, "a.roll": COLUMNS["roll"], "a.other": COLUMNS["my"]} | COLUMNS)
-    config.write_text(CONFIG.replace("[roll,", "[a.roll,"))
-    result = cpfls("import", config, log, "-o", tmp_path / "flight.h5", "--json")
+    log_study.write_text(log_study.read_text().replace("[roll,", "[a.roll,"))
+    result = cpfls("import", log_study, log, "-o", tmp_path / "flight.h5", "--json")
     assert result.exit_code == 0, result.stderr
 
 

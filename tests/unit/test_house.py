@@ -3,6 +3,7 @@
 import ast
 import itertools
 import re
+from functools import cache
 from pathlib import Path
 from statistics import median
 
@@ -17,9 +18,13 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 60
 
 
+@cache
+def syntax(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def functions(path):
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return [node for node in ast.walk(syntax(path)) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
 
 
 def body_lines(function):
@@ -36,7 +41,7 @@ def test_functions_are_short():
 
 def documented(path):
     """Public functions, classes and methods at the top of a module, by name."""
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+    for node in syntax(path).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
             yield node.name, node
             for own in node.body if isinstance(node, ast.ClassDef) else ():
@@ -106,7 +111,7 @@ def test_docstrings_do_not_repeat_signatures():
 @pytest.mark.parametrize("path", [path for path in MODULES if path.name == "__init__.py"], ids=lambda p: p.parent.name)
 def test_package_files_only_re_export(path):
     allowed = (ast.Expr, ast.Import, ast.ImportFrom, ast.Assign)
-    assert all(isinstance(node, allowed) for node in ast.parse(path.read_text(encoding="utf-8")).body)
+    assert all(isinstance(node, allowed) for node in syntax(path).body)
 
 
 # Shows and checks artifacts of all formats alike, dataset by dataset.
@@ -140,14 +145,14 @@ def test_a_dataset_is_looked_up_by_its_path_in_artifacts_only():
     for path in MODULES:
         name = path.relative_to(PACKAGE).as_posix()
         if not name.startswith("artifacts/") and name not in OF_ALL_FORMATS:
-            nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            nodes = ast.walk(syntax(path))
             lookups[name] = [text for node in nodes if (text := looked_up(node)) is not None]
     assert {name: texts for name, texts in lookups.items() if texts} == {}
 
 
 def imported_tests(path):
     """Names below `tests` that a module imports, wherever in it the import stands."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(syntax(path)):
         if isinstance(node, ast.ImportFrom):
             yield from ["relative import"] * (node.level > 0)
             if node.module == "tests":

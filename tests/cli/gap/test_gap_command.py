@@ -9,6 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.builders.command_line import undrawn
+
 OFFSET = (0.008, -0.005)
 FILES = {"disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json"}
 
@@ -30,7 +32,8 @@ def again(cpfls, gap_config, shifted, tmp_path_factory):
 @pytest.fixture(scope="module")
 def none(cpfls, gap_config, exact, tmp_path_factory):
     folder = tmp_path_factory.mktemp("none") / "gap"
-    result = cpfls("gap", gap_config, *exact, "-o", folder, "--json")
+    with undrawn():
+        result = cpfls("gap", gap_config, *exact, "-o", folder, "--json")
     assert result.exit_code == 0, result.stderr
     return SimpleNamespace(folder=folder, summary=json.loads(result.stdout))
 

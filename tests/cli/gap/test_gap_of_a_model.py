@@ -5,11 +5,14 @@ import json
 import h5py
 import pytest
 
+from tests.builders.command_line import undrawn
+
 
 @pytest.fixture(scope="module")
 def answer(cpfls, gap_config, pipeline, with_attitude, tmp_path_factory):
     folder = tmp_path_factory.mktemp("model") / "gap"
-    result = cpfls("gap", gap_config, *with_attitude, "--model", pipeline.model, "-o", folder, "--json")
+    with undrawn():
+        result = cpfls("gap", gap_config, *with_attitude, "--model", pipeline.model, "-o", folder, "--json")
     assert result.exit_code == 0, result.stderr
     return folder, json.loads(result.stdout)
 

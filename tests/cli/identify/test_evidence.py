@@ -60,6 +60,7 @@ def test_the_verdict_is_printed_with_its_reasons(validated):
         assert f"\n  {SIGNS[reason['speaks']]}: {sentence(reason['text'])}\n" in text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls, study, tmp_path):
     model, text, _ = validated
     page = tmp_path / "report.json"

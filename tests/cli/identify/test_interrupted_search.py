@@ -148,8 +148,8 @@ def test_time_limit_in_several_units(cpfls, words, tmp_path, monkeypatch, text, 
             super().__init__(job, time_limit_s)
 
     monkeypatch.setattr("cpfls_cli.commands.identify.Watch", Seeing)
-    settings = ("--set", "identification.membership_functions=1", "--time-limit", text)
-    assert cpfls(*words, "-o", tmp_path / "model.h5", *settings).exit_code == 0
+    quick = ("--set", "identification.membership_functions=1", "--set", "identification.validation.enabled=false")
+    assert cpfls(*words, "-o", tmp_path / "model.h5", *quick, "--time-limit", text).exit_code == 0
     assert seen == [limit]
 
 

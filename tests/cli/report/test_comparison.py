@@ -11,6 +11,8 @@ from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.pages.comparison import differences
 from tests.builders.evidence_artifacts import curves, steps, verdict
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def bare(pipeline):
@@ -63,13 +65,11 @@ def named(blocks, name):
     return next(block for block in blocks if block.get("name") == name)
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_one_model_is_compared_with_nothing(compared, write):
     names, _ = compared(write("one.h5"))
     assert "comparison" not in names
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_two_models_stand_right_after_the_summary_and_the_best_of_each_column_is_marked(compared, write):
     names, blocks = compared(write("one.h5"), write("two.h5", (0.5, 2.0, 1.0)))
     assert names[:2] == ["summary", "comparison"]
@@ -88,7 +88,6 @@ def test_two_models_stand_right_after_the_summary_and_the_best_of_each_column_is
     }
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_among_models_the_smaller_error_is_marked(compared, write, bare):
     mse = bare.array("judged/mse").copy()
     mse[bare.texts("judged/models").index("rigid-body")] = 1.0
@@ -106,7 +105,6 @@ def test_among_models_the_smaller_error_is_marked(compared, write, bare):
     ]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_models_of_different_flights_are_not_ranked(compared, write):
     _, blocks = compared(write("one.h5"), write("two.h5", flight="f" * 64))
     texts = " ".join(block["text"] for block in blocks if block["kind"] == "text")
@@ -118,7 +116,6 @@ def test_models_of_different_flights_are_not_ranked(compared, write):
     assert not [block for block in blocks if block["kind"] == "figure"]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_flight_of_another_name_with_equal_content_is_the_same_flight(compared, write):
     path = write("two.h5")
     artifact = read_artifact(path)
@@ -129,7 +126,6 @@ def test_a_flight_of_another_name_with_equal_content_is_the_same_flight(compared
     assert len(named(blocks, "comparison-1")["rows"]) == 3
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_another_split_of_one_flight_is_other_data(compared, write):
     other = ("training_share: 1.0", "training_share: 0.9")
     _, blocks = compared(write("one.h5"), write("two.h5", config=other))
@@ -138,7 +134,6 @@ def test_another_split_of_one_flight_is_other_data(compared, write):
     assert keys["rows"] == [["identification.training_share", "1.0", "0.9"]]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_rigid_bodies_that_differ_are_told_apart_by_their_models(compared, write, bare):
     mse = bare.array("judged/mse").copy()
     mse[bare.texts("judged/models").index("rigid-body")] = 1.0
@@ -147,7 +142,6 @@ def test_rigid_bodies_that_differ_are_told_apart_by_their_models(compared, write
     assert [row[0] for row in named(blocks, "comparison-1")["rows"]] == names
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_what_only_rounding_tells_apart_is_marked_alike(compared, write):
     _, blocks = compared(write("one.h5", (1e-14, 1e-14, 1e-14)), write("two.h5", (3e-14, 3e-14, 3e-14)))
     assert all("◂" in cell for row in named(blocks, "comparison-axes-1")["rows"] for cell in row[1:])
@@ -166,7 +160,6 @@ def test_an_error_of_rounding_is_drawn_at_zero_and_leaves_the_others_their_scale
     assert rigid == [[0.0], [0.0]]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_each_model_is_summarised_after_the_comparison(compared, write):
     names, _ = compared(write("one.h5"), write("two.h5"))
     assert "models" not in names, "equal files count once"
@@ -174,7 +167,6 @@ def test_each_model_is_summarised_after_the_comparison(compared, write):
     assert names[:3] == ["summary", "comparison", "models"]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_file_given_twice_is_shown_once_and_said_so(cpfls, study, write, tmp_path):
     path = write("one.h5")
     result = cpfls("report", study, path, path, "-o", tmp_path / "twice.json")
@@ -182,7 +174,6 @@ def test_a_file_given_twice_is_shown_once_and_said_so(cpfls, study, write, tmp_p
     assert f"{path}: given 2 times; shown once" in result.stderr
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_equal_configs_are_called_equal(compared, write):
     _, blocks = compared(write("one.h5"), write("two.h5", (2.0, 1.0, 1.0)))
     assert any("Nothing: the same config" in block.get("text", "") for block in blocks)
@@ -215,7 +206,6 @@ def test_differences_are_found_at_every_depth_and_long_values_are_cut():
     assert found["new"] == ["not there", "2"]
 
 
-@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("above", "marks"), [(1.0 + 1e-9, [True, True, False]), (1.01, [True, False, False])])
 def test_predictors_that_are_equal_are_both_the_least(cpfls, study, write, tmp_path, above, marks):
     own = steps()

@@ -74,6 +74,7 @@ def test_all_evidence_is_shown(page):
     assert page.text.count('<details class="data">') == len(page.figures)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_model_without_evidence_names_the_command_that_adds_it(report, bare):
     page = report(bare)
     assert [name for name in page.sections if name in EVIDENCE] == ["validation"]
@@ -170,6 +171,7 @@ def test_residuals_are_called_white_where_they_are(page):
     assert "a|b <i>" in shown
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_residuals_that_are_rounding_are_not_drawn(report, model):
     exact = {"residuals/autocorrelation": np.full((40, 3), np.nan), "residuals/ljung_box": np.full(3, np.nan)}
     page = report(model(**exact))
@@ -204,6 +206,7 @@ def test_a_prediction_that_is_lost_is_a_dash_and_the_least_error_is_marked(page)
     assert re.search(r"0\.500 s 50 model \S+ ◂ \S+ ◂", shown)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_each_part_of_the_evidence_stands_alone(report, bare, tmp_path, model):
     whole, alone = read_artifact(model()), read_artifact(bare)
     groups = ("structures", "residuals", "uncertainty", "curves", "steps", "physics", "period", "verdict")
@@ -214,6 +217,7 @@ def test_each_part_of_the_evidence_stands_alone(report, bare, tmp_path, model):
         assert "holds its scores only" not in report(output).words
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_bands_of_a_prediction_are_drawn(report, pipeline, tmp_path):
     prediction, output = read_artifact(pipeline.prediction), tmp_path / "banded.h5"
     bands = {

@@ -39,9 +39,9 @@ def shown(folder, *artifacts, options=()):
 @pytest.fixture(scope="module")
 def full(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gap")
-    first = shown(folder, made.disagreement(), made.diagnosis(alone=[("torque_bias", 0.9)]))
-    return shown(folder, made.disagreement(), made.diagnosis(alone=[("torque_bias", 0.9)]),
-                 made.extended(file_sha256(first.paths[1])))  # fmt: skip
+    diagnosis = made.diagnosis(alone=[("torque_bias", 0.9)])
+    write_artifact(folder / "diagnosis.h5", diagnosis)
+    return shown(folder, made.disagreement(), diagnosis, made.extended(file_sha256(folder / "diagnosis.h5")))
 
 
 def test_the_answer_comes_first_and_every_figure_once(full):
@@ -95,6 +95,7 @@ def test_equal_artifacts_give_equal_pages(tmp_path):
     assert shown(tmp_path, given).html == shown(tmp_path, given).html
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_is_lacking_is_left_out_and_said(tmp_path):
     bare = made.without(made.diagnosis(force=False), "run", "picture", "whiteness", "replay")
     page = shown(tmp_path, bare)
@@ -105,6 +106,7 @@ def test_what_is_lacking_is_left_out_and_said(tmp_path):
     assert "force along" not in page.text[: page.text.index("Effects and their numbers")]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_disagreement_alone_says_where_and_how_to_go_on(tmp_path):
     page = shown(tmp_path, made.without(made.disagreement(force=False), "heat_map", "replay"))
     assert page.summary["figures"] == ["gap-over-time-1", "dependence-1"]
@@ -121,6 +123,7 @@ def test_a_disagreement_below_noise_has_nothing_to_follow(tmp_path):
     assert "dependence-1" not in page.summary["figures"]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_extended_model_alone_brings_its_figures(tmp_path):
     page = shown(tmp_path, made.extended())
     assert page.summary["figures"] == [

@@ -3,70 +3,28 @@
 import json
 import re
 from dataclasses import replace
-from html import unescape
 
 import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.report.numbers import number
+from tests.builders.pages import table_cells
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-CONFIG = """\
-seed: 4
-trajectory: {sample_time_s: 0.2}
-reduction: {size: 30, criterion: D}
-identification:
-  consequents: seesaw
-  products: additive
-  membership_functions: 3
-  base: none
-  population: 8
-  generations: 1
-  subpopulations: 2
-  training_share: 0.8
-  local_search: {enabled: false}
-sweep:
-  seeds: 3
-  settings: [{name: few}, {name: all of them, set: {reduction.size: null}}]
-"""
 
-
-@pytest.fixture(scope="module")
-def study(cpfls, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("replicates")
-    config = folder / "study.yaml"
-    config.write_text(CONFIG)
-    made = [
-        cpfls("trajectory", config, "-o", folder / "trajectory.h5"),
-        cpfls("simulate", config, folder / "trajectory.h5", "-o", folder / "flight.h5"),
-        cpfls("sweep", config, folder / "flight.h5", "-o", folder / "sweep.h5"),
-    ]
-    assert [result.exit_code for result in made] == [0, 0, 0]
-    return folder
-
-
-def page(cpfls, study, *options, sweep="sweep.h5"):
-    result = cpfls("report", study / "study.yaml", study / sweep, "-o", study / "r.html", "--force", "--json", *options)
+def page(cpfls, swept, *options, sweep="sweep.h5"):
+    result = cpfls("report", swept / "study.yaml", swept / sweep, "-o", swept / "r.html", "--force", "--json", *options)
     assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout), (study / "r.html").read_text(encoding="utf-8")
+    return json.loads(result.stdout), (swept / "r.html").read_text(encoding="utf-8")
 
 
-def table(html, name):
-    """Rows of a table as lists of text."""
-    found = re.search(rf'<table id="{name}".*?</table>', html, re.DOTALL)[0]
-    rows = re.findall(r"<tr>(.*?)</tr>", found, re.DOTALL)
-    return [
-        [unescape(re.sub("<.*?>", "", c)).strip() for c in re.findall(r"<t[hd].*?</t[hd]>", row, re.S)] for row in rows
-    ]
-
-
-def test_table_shows_means_and_deviations_of_the_runs(cpfls, study):
-    summary, html = page(cpfls, study)
+def test_table_shows_means_and_deviations_of_the_runs(cpfls, swept):
+    summary, html = page(cpfls, swept)
     assert "table-5-replicates-1" in summary["tables"]
-    rows = table(html, "table-5-replicates-1")
-    sweep = read_artifact(study / "sweep.h5")
+    rows = table_cells(html, "table-5-replicates-1")
+    sweep = read_artifact(swept / "sweep.h5")
     mse, setting = sweep.array("run/mse")[:, 0], sweep.array("run/setting")
     assert rows[0] == ["Quantity", "few", "all of them"]
     shown = {row[0].replace("\N{NO-BREAK SPACE}", " "): row[1:] for row in rows}
@@ -82,18 +40,18 @@ def test_table_shows_means_and_deviations_of_the_runs(cpfls, study):
     assert "the variance is the square of the standard deviation shown" in " ".join(html.split())
 
 
-def with_settings(study, name, **values):
+def with_settings(swept, name, **values):
     """Write a sweep that claims other settings."""
-    artifact = read_artifact(study / "sweep.h5")
+    artifact = read_artifact(swept / "sweep.h5")
     data = {path.replace("__", "/"): np.array(value) for path, value in values.items()}
-    write_artifact(study / name, replace(artifact, data={**artifact.data, **data}))
+    write_artifact(swept / name, replace(artifact, data={**artifact.data, **data}))
     return name
 
 
-def test_paper_stands_beside_settings_of_equal_structure_and_samples(cpfls, study):
-    claimed = with_settings(study, "paper.h5", setting__samples=[685, 5487], setting__structure=["cpfls", "fls"])
-    _, html = page(cpfls, study, "--set", "report.paper=true", sweep=claimed)
-    rows = table(html, "table-5-replicates-1")
+def test_paper_stands_beside_settings_of_equal_structure_and_samples(cpfls, swept):
+    claimed = with_settings(swept, "paper.h5", setting__samples=[685, 5487], setting__structure=["cpfls", "fls"])
+    _, html = page(cpfls, swept, "--set", "report.paper=true", sweep=claimed)
+    rows = table_cells(html, "table-5-replicates-1")
     places = {row[0].replace("\N{NO-BREAK SPACE}", " "): place for place, row in enumerate(rows)}
     assert rows[places["best run: MSE, (N m)²"] + 1] == ["· paper", "0.0008", "0.0007"]
     assert rows[places["best run: largest error, N m"] + 1] == ["· paper", "0.1952", "0.1531"]
@@ -103,28 +61,28 @@ def test_paper_stands_beside_settings_of_equal_structure_and_samples(cpfls, stud
     assert "standard deviation: a variance" in html
 
 
-def test_other_settings_stand_alone(cpfls, study):
-    _, html = page(cpfls, study, "--set", "report.paper=true")
-    assert "· paper" not in [row[0] for row in table(html, "table-5-replicates-1")]
+def test_other_settings_stand_alone(cpfls, swept):
+    _, html = page(cpfls, swept, "--set", "report.paper=true")
+    assert "· paper" not in [row[0] for row in table_cells(html, "table-5-replicates-1")]
     assert "Table 5. Results" not in html
 
 
-def test_held_out_part_has_its_table(cpfls, study):
-    _, html = page(cpfls, study)
-    rows = table(html, "held-out-1-1")
+def test_held_out_part_has_its_table(cpfls, swept):
+    _, html = page(cpfls, swept)
+    rows = table_cells(html, "held-out-1-1")
     assert [row[:2] for row in rows[1:]] == [["few", "3"], ["all of them", "3"]]
-    mse = read_artifact(study / "sweep.h5").array("run/mse")[:, 1]
+    mse = read_artifact(swept / "sweep.h5").array("run/mse")[:, 1]
     few = mse[::2]
     assert rows[1][2] == f"{number(float(np.mean(few)), 3)} ± {number(float(np.std(few, ddof=1)), 2)}"
 
 
-def test_unfinished_sweep_says_so(cpfls, study, monkeypatch):
+def test_unfinished_sweep_says_so(cpfls, swept, monkeypatch):
     from cpfls_cli.search.resumable import Watch
 
     stops = iter([None] * 9 + ["time-limit"] * 9)
     monkeypatch.setattr(Watch, "should_stop", lambda _: next(stops))
-    words = ("sweep", study / "study.yaml", study / "flight.h5", "-o", study / "unfinished.h5")
+    words = ("sweep", swept / "study.yaml", swept / "flight.h5", "-o", swept / "unfinished.h5")
     assert cpfls(*words).exit_code == 0
-    assert read_artifact(study / "unfinished.h5").number("complete") == 0
-    _, html = page(cpfls, study, sweep="unfinished.h5")
+    assert read_artifact(swept / "unfinished.h5").number("complete") == 0
+    _, html = page(cpfls, swept, sweep="unfinished.h5")
     assert re.search(r"Unfinished: \d of 6 runs of unfinished\.h5", html)

@@ -8,8 +8,7 @@ import pytest
 from cpfls_cli.artifacts.store import read_artifact
 from cpfls_cli.report.content import Document, Listing, Section
 from cpfls_cli.report.markdown import markdown_page
-
-pytestmark = pytest.mark.usefixtures("undrawn")
+from tests.builders.command_line import undrawn
 
 HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"
 
@@ -21,7 +20,8 @@ def report(cpfls, pipeline, study, tmp_path_factory):
     def write(name, *options, little=False):
         output = tmp_path_factory.mktemp("report") / name
         given = [pipeline.selection] if little else pipeline.paths.values()
-        result = cpfls("report", study, *given, "-o", output, "--json", *options)
+        with undrawn():
+            result = cpfls("report", study, *given, "-o", output, "--json", *options)
         assert result.exit_code == 0, result.stderr
         return output.read_text(encoding="utf-8"), json.loads(result.stdout)
 

@@ -12,6 +12,7 @@ from cpfls_cli.report.content import Cell, Plot, Table, Text
 from cpfls_cli.report.numbers import number
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+pytestmark = pytest.mark.usefixtures("undrawn")
 SETTINGS = {"plant": "vehicle", "natural_frequency_hz": [1.2, 1.2, 0.5], "damping": 1.0, "torque_max_n_m": None}
 NAMES = ("model", "rigid-body", "pd", "vehicle")
 

@@ -54,7 +54,7 @@ def test_without_effects_the_balance_closes_to_the_accuracy_of_the_integration(p
 
 
 def test_accuracy_is_of_second_order_in_the_step():
-    fine, coarse, reference = (flown(integration_rate_hz=rate).signals["position"] for rate in (400, 200, 1600))
+    fine, coarse, reference = (flown(1.0, integration_rate_hz=rate).signals["position"] for rate in (400, 200, 1600))
     ratio = rms(coarse - reference) / rms(fine - reference)
     assert (ratio > 3.0).all()
 
