@@ -27,3 +27,18 @@ def test_every_relative_link_leads_somewhere(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_nothing_is_left_to_be_filled_in(page):
     assert not re.findall(r"@@\w*|TODO|FIXME", page.read_text(encoding="utf-8"))
+
+
+def prose(page):
+    """Lines of a page outside code, tables, figures and headings, which Markdown cannot fold."""
+    fenced = False
+    for line in page.read_text(encoding="utf-8").splitlines():
+        fenced ^= line.lstrip().startswith("```")
+        if not fenced and not line.startswith(("|", "    ", "![", "#", "<")):
+            yield line
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_lines_of_prose_have_at_most_120_characters(page):
+    # A link in one piece may be longer.
+    assert [line for line in prose(page) if len(line) > 120 and " " in line.strip()] == []
