@@ -77,8 +77,8 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
     tracked = track(plan, controllers, loop, error, _planned_torque(plan, vehicle), job.progress)
     names = [controller.name for controller in controllers]
     exact = flown_signals(plan, tracked, names.index("model"), loop.plant)
-    found = scores(plan, tracked, loop.gains.settling_time)
-    comparison = TrackingGroup.of(plan, names, found, rebuilt, exact["attitude"])
+    tracking_scores = scores(plan, tracked, loop.gains.settling_time)
+    comparison = TrackingGroup.of(plan, names, tracking_scores, rebuilt, exact["attitude"])
     signals, noise = _logged(exact, job.study, rng)
     record = finish(job, FlightRecord.of_simulation(signals, noise, tracking=comparison), inputs)
     summary = {"samples": len(record.time), "noise": sorted(noise), **record.summary}
