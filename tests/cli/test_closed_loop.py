@@ -11,7 +11,12 @@ seed: 5
 trajectory: {legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, yaw_turn_rad: 0.3}
 simulation:
   noise: {body_rate: 0.002, rotor_speed: 0.5, rotor_command: 0.5}
-identification: {base: rigid-body, population: 10, generations: 1, local_search: {enabled: false}}
+identification:
+  base: rigid-body
+  population: 10
+  generations: 1
+  local_search: {enabled: false}
+  validation: {draws: 20, windows: 20}
 """
 
 

@@ -34,10 +34,11 @@ def test_the_version_and_the_help_load_nothing_heavy():
 
 
 def test_what_is_printed_loads_no_plotting(pipeline, study, tmp_path):
+    short = "trajectory={legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, yaw_turn_rad: 0.3}"
     packages = loaded(
-        ("trajectory", study, "-o", tmp_path / "trajectory.h5"),
+        ("trajectory", study, "--set", short, "-o", tmp_path / "trajectory.h5"),
         ("simulate", study, pipeline.trajectory, "-o", tmp_path / "flight.h5"),
-        ("simulate", study, pipeline.trajectory, "--mode", "closed-loop", "-o", tmp_path / "closed.h5"),
+        ("simulate", study, tmp_path / "trajectory.h5", "--mode", "closed-loop", "-o", tmp_path / "closed.h5"),
         ("reduce", study, pipeline.flight, "-o", tmp_path / "selection.h5"),
         ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", tmp_path / "model.h5"),
         ("predict", study, pipeline.model, pipeline.flight, "-o", tmp_path / "prediction.h5"),

@@ -15,7 +15,7 @@ identification:
   generations: 6
   subpopulations: 2
   local_search: {enabled: false}
-  validation: {draws: 20, windows: 20, horizon_samples: 20}
+  validation: {structures: false, draws: 20, windows: 20, horizon_samples: 20}
 """
 
 

@@ -67,7 +67,7 @@ def test_path_is_followed_and_no_rotor_is_clipped(plain):
 
 @pytest.mark.parametrize("name", SEEN_BY_BALANCE)
 def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
-    flight = flown(effects={name: typical(name)})
+    flight = flown(2.0, effects={name: typical(name)})
     (one,) = flight.effects.listed
     signals = signals_of(flight)
     weak, left = balance(signals)
