@@ -173,3 +173,53 @@ def test_tests_import_from_shared_builders_alone():
     ]
     assert wrong == []
     assert [path.name for path in TESTS.glob("builders/test_*.py")] == []
+
+
+# A module lives for two users or for more than about 80 lines of code. These are one thing of many of a kind, each
+# looked up by its place: a command, an effect, a reader of logs, a form of the report.
+ONE_OF_A_KIND = ("commands/", "effects/catalogue/", "logs/")
+SMALL_ALL_THE_SAME = {
+    "artifacts/formats.py": "the registry of formats, printed for docs/format.md",
+    "cli/main.py": "runs before anything heavy is loaded",
+    "control/controllers.py": "the laws, beside the loop that they close",
+    "excitation/optimise.py": "what the room is for",
+    "flightlog/topics.py": "topics of a log on one clock, which is no matter of its reader",
+    "identification/reference.py": "the slow, plain evaluation that tests hold the compiled one against",
+    "pages/page.py": "the list of sections",
+    "regressor/table.py": "loads without compiled loops",
+    "report/json_page.py": "a form",
+    "report/markdown.py": "a form",
+    "report/terminal.py": "a form",
+    "trajectory/attitude.py": "the attitude that flies a path",
+    "workers/compatibility.py": "loads without Dask",
+}
+FEW_LINES = 80
+
+
+def lines_of_code(path):
+    """Count lines without docstrings, comments, imports and blank lines."""
+    left_out = set()
+    for node in ast.walk(syntax(path)):
+        is_text = (
+            isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        )
+        if is_text or isinstance(node, ast.Import | ast.ImportFrom):
+            left_out |= set(range(node.lineno, node.end_lineno + 1))
+    lines = enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+    return sum(bool(line.strip()) and not line.strip().startswith("#") and n not in left_out for n, line in lines)
+
+
+def test_a_module_has_two_users_or_is_long_enough():
+    names = {".".join(("cpfls_cli", *path.relative_to(PACKAGE).with_suffix("").parts)): path for path in MODULES}
+    users = {name: set() for name in names}
+    for user, path in names.items():
+        for node in ast.walk(syntax(path)):
+            if isinstance(node, ast.ImportFrom) and node.module and path.name != "__init__.py":
+                for used in {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)} & names.keys():
+                    users[used].add(user)
+    small = {
+        path.relative_to(PACKAGE).as_posix()
+        for name, path in names.items()
+        if len(users[name]) < 2 and lines_of_code(path) < FEW_LINES and not path.name.startswith("__")
+    }
+    assert {name for name in small if not name.startswith(ONE_OF_A_KIND)} == set(SMALL_ALL_THE_SAME)
