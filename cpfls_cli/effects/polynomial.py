@@ -1,0 +1,148 @@
+"""Effects as polynomials of motion and rotor speeds, so that one compiled loop evaluates any of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations_with_replacement, product
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects import scales
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_AXES = "uvwpqr"
+_PAIRS = (*combinations_with_replacement(range(3), 2), *product(range(3), range(3, 6)))
+_PAIRS = (*_PAIRS, *((first + 3, second + 3) for first, second in combinations_with_replacement(range(3), 2)))
+FACTORS = np.array(_PAIRS)
+"""Indices of the two factors of each product among air velocity u v w and body rate p q r, shape (21, 2)."""
+
+STATE_TERMS = (
+    "1",
+    *_AXES,
+    *(_AXES[first] + _AXES[second] for first, second in _PAIRS),
+    *(f"|u| {axis}" for axis in "uvw"),
+    *(f"|{axis}| {axis}" for axis in "pqr"),
+)
+"""Terms of the motion: constant, linear, products, and speed times velocity, rate times rate with its sign."""
+
+_PROBES = 900
+_EXACT = 1e-9
+_NEGLIGIBLE = 1e-10
+
+
+def state_terms(velocity: Array, rate: Array) -> Array:
+    """Evaluate the terms of the motion.
+
+    Parameters
+    ----------
+    velocity : array, shape (time, 3), m/s, body frame
+        Through the air.
+    rate : array, shape (time, 3), rad/s, body frame
+
+    Returns
+    -------
+    array, shape (time, 34)
+        In the order of `STATE_TERMS`, SI.
+    """
+    motion = np.hstack([velocity, rate])
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    products = motion[:, FACTORS[:, 0]] * motion[:, FACTORS[:, 1]]
+    return np.hstack([np.ones((len(motion), 1)), motion, products, speed * velocity, np.abs(rate) * rate])
+
+
+def rotor_terms(speed: Array, acceleration: Array) -> Array:
+    """Evaluate the terms of the rotors: 1, then speeds, squared speeds and accelerations of all of them.
+
+    Parameters
+    ----------
+    speed : array, shape (time, rotor), rad/s
+    acceleration : array, shape (time, rotor), rad/s^2
+
+    Returns
+    -------
+    array, shape (time, 1 + 3 rotors)
+    """
+    return np.hstack([np.ones((len(speed), 1)), speed, speed**2, acceleration])
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Motions and rotor speeds at random, and their terms, for one vehicle."""
+
+    signals: Signals
+    rotor: Array
+    state: Array
+
+    @classmethod
+    def of(cls, vehicle: VehicleSettings) -> Probe:
+        """Draw motions of the size that the vehicle has.
+
+        Parameters
+        ----------
+        vehicle : VehicleSettings
+        """
+        rng = np.random.default_rng(0)
+        rotors = len(vehicle.rotors)
+        speed = scales.hover_speed(vehicle) * rng.uniform(0.5, 1.5, (_PROBES, rotors))
+        signals = Signals(
+            time=np.arange(_PROBES, dtype=float),
+            body_rate=rng.uniform(-2.0, 2.0, (_PROBES, 3)),
+            vehicle=vehicle,
+            attitude=rng.uniform(-1.0, 1.0, (_PROBES, 3)),
+            velocity=rng.uniform(-3.0, 3.0, (_PROBES, 3)),
+            position=rng.uniform(1.0, 2.0, (_PROBES, 3)),
+            rotor_speed=speed,
+        )
+        terms = rotor_terms(speed, np.zeros_like(speed))
+        return cls(signals, terms, state_terms(signals.air_velocity, signals.body_rate))
+
+
+def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array | None:
+    """Find the polynomial that an effect is, from its columns at random motions.
+
+    Parameters
+    ----------
+    known : Effect
+    probe : Probe
+    shape : mapping of str to float
+        Its nonlinear parameters.
+
+    Returns
+    -------
+    array, shape (coefficient, 6, state terms, rotor terms), or None
+        Torque and force for a unit of each coefficient, SI, body frame; None for an effect that is no such polynomial.
+    """
+    if known.columns is None or known.kind != "wrench" or known.missing(probe.signals):
+        return None
+    columns = known.columns(probe.signals, shape)
+    direct = _fitted(columns.direct, probe)
+    if direct is None or columns.momentum is None:
+        return direct
+    # A momentum of the rotors alone changes with their acceleration; one of the body is inertia, and no wrench.
+    momentum = _fitted(columns.momentum, probe)
+    rotors = len(probe.signals.vehicle.rotors)
+    if momentum is None or np.any(momentum[:, :, 1:]) or np.any(momentum[:, :, :, 1 + rotors :]):
+        return None
+    direct[..., 1 + 2 * rotors :] += momentum[..., 1 : 1 + rotors]
+    return direct
+
+
+def _fitted(columns: Array, probe: Probe) -> Array | None:
+    """Fit terms to columns, shape (time, 6, coefficient); None where they leave anything."""
+    used = [index for index in range(probe.rotor.shape[1]) if np.any(probe.rotor[:, index])]
+    joint = (probe.state[:, :, None] * probe.rotor[:, None, used]).reshape(len(columns), -1)
+    scale = np.sqrt(np.mean(joint**2, axis=0))
+    values = columns.reshape(len(columns), -1)
+    weights = np.linalg.lstsq(joint / scale, values, rcond=None)[0]
+    size = np.abs(weights).max(axis=0, initial=0.0)
+    left = np.abs(values - joint / scale @ weights).max(axis=0, initial=0.0)
+    if np.any(left > _EXACT * np.abs(values).max(axis=0, initial=0.0)):
+        return None
+    weights[np.abs(weights) < _NEGLIGIBLE * size] = 0.0
+    found = np.zeros((*columns.shape[1:], probe.state.shape[1], probe.rotor.shape[1]))
+    found[..., used] = (weights / scale[:, None]).T.reshape(*columns.shape[1:], probe.state.shape[1], len(used))
+    return np.moveaxis(found, 1, 0)

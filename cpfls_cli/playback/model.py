@@ -1,0 +1,264 @@
+"""The model of a whole vehicle: rotors, inertia, effects and a learned remainder, as one table of weights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.effects.polynomial import FACTORS, STATE_TERMS, Probe, polynomial, state_terms
+from cpfls_cli.effects.registry import effect
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.fuzzy.basis import Consequents
+from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
+from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.kernels import Airflow, Body, Terms, airflow_terms
+from cpfls_cli.playback.rotors import Hold, RotorResponse, rotor_terms_by_step
+from cpfls_cli.vehicle.rotors import allocation_matrix
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+class ModelEffect(NamedTuple):
+    """An effect of the catalogue in a model.
+
+    Attributes
+    ----------
+    name : str
+    shape : mapping of str to float
+    coefficients : array, shape (coefficient,)
+        Linear ones, SI.
+    """
+
+    name: str
+    shape: Mapping[str, float]
+    coefficients: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Remainder:
+    """What has no name: torque and force over the direction of the airflow, by a periodic fuzzy system.
+
+    Each column of the system enters with the speed in the rotor plane times the mean rotor speed, and with its square.
+
+    Attributes
+    ----------
+    breakpoints : array, shape (rules + 1,)
+        Peaks of the membership functions, share of a turn.
+    harmonic_order : int
+        Of the consequents; 0 for the seesaw.
+    rows : array of int, shape (row,)
+        Which of torque (0 to 2) and force (3 to 5) it adds to.
+    coefficients : array, shape (row, columns, 2)
+        For speed times mean rotor speed, and for squared speed.
+    """
+
+    breakpoints: Array
+    harmonic_order: int
+    rows: IntArray
+    coefficients: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleModel:
+    """A vehicle that gives torque, force and motion from its state and its rotor speeds.
+
+    Attributes
+    ----------
+    vehicle : VehicleSettings
+        Mass, inertia and rotors of the model, which need not be those of a config.
+    response : RotorResponse
+    thrust_linear : float
+        Law of the rotors: thrust and drag follow ``w^2 + thrust_linear w_h w``, with the speed w_h that hovers under
+        the square alone.
+    effects : tuple of ModelEffect
+        Polynomials of motion and rotor speeds.
+    remainder : Remainder or None
+    fuzzy : InertiaModel or None
+        Inertia that depends on the attitude; it then stands in the place of the vehicle's.
+    """
+
+    vehicle: VehicleSettings
+    response: RotorResponse = field(default_factory=RotorResponse)
+    thrust_linear: float = 0.0
+    effects: tuple[ModelEffect, ...] = ()
+    remainder: Remainder | None = None
+    fuzzy: InertiaModel | None = None
+
+    @property
+    def rotors(self) -> int:
+        """Number of rotors."""
+        return len(self.vehicle.rotors)
+
+    @cached_property
+    def weights(self) -> Array:
+        """Torque (3) and force (3) by term of the motion and term of the rotors, shape (6, terms, 1 + 4 rotors)."""
+        table = np.zeros((6, self.term_count, 1 + 4 * self.rotors))
+        table[:, 0] += rotor_weights(self.vehicle, self.thrust_linear, self.response)
+        probe = Probe.of(self.vehicle)
+        for known in self.effects:
+            weights = effect_weights(known.name, known.shape, probe)
+            table[:, : len(STATE_TERMS)] += np.tensordot(known.coefficients, weights, axes=1)
+        if self.remainder is not None:
+            table += remainder_weights(self.remainder, self.rotors)
+        return table
+
+    @property
+    def airflow(self) -> Airflow:
+        """Terms of the remainder."""
+        return airflow_of(self.remainder)
+
+    @property
+    def term_count(self) -> int:
+        """Number of terms of the motion."""
+        return len(STATE_TERMS) + airflow_terms(self.airflow)
+
+    @cached_property
+    def body(self) -> Body:
+        """What is moved, where its inertia is constant."""
+        return body_of(self.vehicle, symmetric(self.vehicle.inertia_kg_m2))
+
+    def rotor_terms(self, speed: Array, period: float, hold: Hold) -> Array:
+        """Evaluate the terms of the rotors over each step of a stretch.
+
+        Parameters
+        ----------
+        speed : array, shape (time, rotor), rad/s
+            Logged.
+        period : float, s
+        hold : {"linear", "previous"}
+            See `rotor_terms_by_step`.
+
+        Returns
+        -------
+        array, shape (time, 1 + 4 rotors)
+        """
+        response = self.response
+        terms = rotor_terms_by_step(speed, period, hold, response.delay_s, response.lag_s, response.slow_s)
+        return np.asarray(terms, dtype=float)
+
+    def step_weights(self, rotor: Array) -> tuple[Terms, Array]:
+        """Evaluate the weights of the terms of the motion over each step.
+
+        Parameters
+        ----------
+        rotor : array, shape (time, 1 + 4 rotors)
+            See `rotor_terms`.
+
+        Returns
+        -------
+        terms : Terms
+            Those in use.
+        weights : array, shape (time, 6, active)
+        """
+        used = used_terms(self.weights, self.airflow)
+        return used, weights_by_step(self.weights, used, rotor)
+
+    def wrench(self, velocity: Array, rate: Array, rotor: Array) -> Array:
+        """Compute torque and force on the body, without weight.
+
+        Parameters
+        ----------
+        velocity : array, shape (time, 3), m/s, body frame
+            Through the air.
+        rate : array, shape (time, 3), rad/s, body frame
+        rotor : array, shape (time, 1 + 4 rotors)
+            See `rotor_terms`.
+
+        Returns
+        -------
+        array, shape (time, 6), N m and N, body frame
+        """
+        terms = np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
+        flat = np.einsum("ta,kau,tu->tk", terms, self.weights, rotor, optimize=True)
+        return np.asarray(flat)
+
+
+def body_of(vehicle: VehicleSettings, inertia: Array) -> Body:
+    """Arrange mass and inertia for the compiled loops."""
+    return Body(vehicle.mass_kg, vehicle.gravity_m_s2, inertia, np.asarray(np.linalg.inv(inertia), dtype=float))
+
+
+def used_terms(table: Array, airflow: Airflow) -> Terms:
+    """List the terms of the motion that have weights."""
+    active = np.flatnonzero(np.any(table, axis=(0, 2))).astype(np.int64)
+    return Terms(FACTORS.astype(np.int64), airflow, active, table.shape[1])
+
+
+def weights_by_step(table: Array, used: Terms, rotor: Array) -> Array:
+    """Multiply a table with the terms of the rotors, shape (time, 6, active)."""
+    flat = table[:, used.active].reshape(-1, table.shape[2])
+    return np.ascontiguousarray((rotor @ flat.T).reshape(len(rotor), 6, -1))
+
+
+def airflow_of(remainder: Remainder | None) -> Airflow:
+    """Describe the terms of a remainder to the compiled loops."""
+    if remainder is None:
+        return Airflow(np.zeros(0), 0)
+    return Airflow(remainder.breakpoints, remainder.harmonic_order)
+
+
+def rotor_weights(vehicle: VehicleSettings, thrust_linear: float, response: RotorResponse) -> Array:
+    """Weigh the terms of the rotors alone, shape (6, 1 + 4 rotors)."""
+    rotors = len(vehicle.rotors)
+    thrust, *torque = allocation_matrix(vehicle)
+    wrench = np.vstack([torque, np.zeros((2, rotors)), thrust])
+    hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / thrust.sum())
+    table = np.zeros((6, 1 + 4 * rotors))
+    table[:, 1 : 1 + rotors] = thrust_linear * hover * wrench
+    table[:, 1 + rotors : 1 + 2 * rotors] = wrench
+    slow = response.slow_roll_pitch, response.slow_roll_pitch, response.slow_yaw
+    table[:3, 1 + 3 * rotors :] = np.array(slow)[:, None] * wrench[:3]
+    return table
+
+
+def effect_weights(name: str, shape: Mapping[str, float], probe: Probe) -> Array:
+    """Weigh the terms for a unit of each coefficient of an effect.
+
+    Returns
+    -------
+    array, shape (coefficient, 6, 34, 1 + 4 rotors)
+
+    Raises
+    ------
+    ComputationError
+        If the effect is no polynomial of motion and rotor speeds.
+    """
+    found = polynomial(effect(name), probe, shape)
+    if found is None:
+        raise ComputationError(f"the effect {name} is no polynomial of motion and rotor speeds")
+    slow = np.zeros((*found.shape[:3], len(probe.signals.vehicle.rotors)))
+    return np.concatenate([found, slow], axis=3)
+
+
+def remainder_weights(remainder: Remainder, rotors: int) -> Array:
+    """Weigh the terms of a remainder, shape (6, terms, 1 + 4 rotors)."""
+    terms = airflow_terms(airflow_of(remainder))
+    table = np.zeros((6, len(STATE_TERMS) + terms, 1 + 4 * rotors))
+    at = len(STATE_TERMS) + np.arange(0, terms, 2)
+    for row, by_column in zip(remainder.rows, remainder.coefficients, strict=True):
+        table[row, at, 1 : 1 + rotors] = by_column[:, :1] / rotors
+        table[row, at + 1, 0] = by_column[:, 1]
+    return table
+
+
+def remainder_terms(remainder: Remainder | None, velocity: Array) -> Array:
+    """Evaluate the terms of a remainder, shape (time, terms).
+
+    Parameters
+    ----------
+    remainder : Remainder or None
+    velocity : array, shape (time, 3), m/s, body frame
+    """
+    if remainder is None:
+        return np.zeros((len(velocity), 0))
+    order = remainder.harmonic_order
+    consequents: Consequents = "harmonic" if order else "seesaw"
+    structure = PeriodicStructure((remainder.breakpoints,), consequents, order, "additive")
+    columns = structure.columns(np.arctan2(velocity[:, 1], velocity[:, 0])[:, None])
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])[:, None]
+    return np.stack([columns * speed, columns * speed**2], axis=2).reshape(len(velocity), -1)

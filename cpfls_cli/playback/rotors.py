@@ -1,0 +1,94 @@
+"""From logged rotor speeds to those that act: delay, lag and slow actuation, and the terms of the rotors by step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from cpfls_cli.arrays import Array
+
+Hold = Literal["linear", "previous"]
+Numbers = NDArray[Any]
+"""Real, or complex for a derivative by a complex step."""
+
+_SHORTEST_S = 1e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotorResponse:
+    """How rotors follow their logged speed.
+
+    Attributes
+    ----------
+    delay_s : float
+        Pure delay.
+    lag_s : float
+        Time constant of the first-order lag; 0 for none.
+    slow_roll_pitch, slow_yaw : float
+        Slow actuation: share by which the torque of the rotors comes back (below 0: fades) after a change.
+    slow_s : float
+        Time constant with which it does.
+    """
+
+    delay_s: float = 0.0
+    lag_s: float = 0.0
+    slow_roll_pitch: float = 0.0
+    slow_yaw: float = 0.0
+    slow_s: float = 0.5
+
+
+def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, lag_s: Any, slow_s: Any) -> Numbers:
+    """Evaluate the terms of the rotors over each step: means of acting speeds, their squares, accelerations, slowness.
+
+    Parameters
+    ----------
+    speed : array, shape (time, rotor), rad/s
+        Of one stretch without pauses.
+    period : float, s
+    hold : {"linear", "previous"}
+        What a speed is between samples: a straight line, or what it was at the sample before.
+    delay_s, lag_s, slow_s : float or complex
+        As in `RotorResponse`; a complex one carries a derivative.
+
+    Returns
+    -------
+    array, shape (time, 1 + 4 rotors)
+        1, speeds, squared speeds, accelerations, and slow less present squared speeds.
+    """
+    mean, end, start = _lagged(_delayed(speed, delay_s / period), period, lag_s, hold)
+    squared = mean**2
+    slow, _, _ = _lagged(squared, period, slow_s, "previous")
+    one = np.ones((len(speed), 1), dtype=mean.dtype)
+    return np.hstack([one, mean, squared, (end - start) / period, slow - squared])
+
+
+def _delayed(values: Array, steps: Any) -> Numbers:
+    """Shift by a number of steps; before the first sample there is its value."""
+    whole = int(np.floor(np.real(steps)))
+    share = steps - whole
+    padded = np.concatenate([np.repeat(values[:1], whole + 1, axis=0), values])
+    late, later = padded[1 : 1 + len(values)], padded[: len(values)]
+    return np.asarray((1 - share) * late + share * later)
+
+
+def _lagged(values: Numbers, period: float, time_constant: Any, hold: Hold) -> tuple[Numbers, Numbers, Numbers]:
+    """Filter by a first-order lag: mean over each step, value at its end, value at its start."""
+    after = np.concatenate([values[1:], values[-1:]]) if hold == "linear" else values
+    if np.real(time_constant) < _SHORTEST_S and not np.imag(time_constant):
+        before = values if hold == "linear" else np.concatenate([values[:1], values[:-1]])
+        return 0.5 * (values + after), after, before
+    constant = time_constant if np.real(time_constant) > _SHORTEST_S else _SHORTEST_S + 1j * np.imag(time_constant)
+    ratio = constant / period
+    decay = np.exp(-1 / ratio)
+    spread = ratio * (1 - decay)
+    first, second = (spread - decay, 1 - spread) if hold == "linear" else (1 - decay, 0.0)
+    drive = first * values + second * after
+    end = lfilter([1.0], [1.0, -decay], drive, axis=0, zi=decay * values[:1])[0]
+    start = np.concatenate([values[:1], end[:-1]])
+    slope = (after - values) * ratio if hold == "linear" else 0.0
+    mean = values + 0.5 * (after - values) - slope + (start - values + slope) * spread
+    return mean, end, start
