@@ -16,6 +16,7 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.sweep import SweepRecord
@@ -112,6 +113,11 @@ class Sources:
     def predictions(self) -> list[Source[PredictionRecord]]:
         """Predictions of models along flights."""
         return self._of(PredictionRecord)
+
+    @property
+    def replays(self) -> list[Source[ReplayRecord]]:
+        """Models played back along flights."""
+        return self._of(ReplayRecord)
 
     @property
     def disagreements(self) -> list[Source[DisagreementRecord]]:
