@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 WORST = 5
 """Windows that are listed."""
 
+VEHICLE = "vehicle"
+"""In the place of a model: the vehicle of the config."""
+
 USUAL = "usual"
 """What is between samples where nobody says: measured speeds are straight lines, commands stay."""
 

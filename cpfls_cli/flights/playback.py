@@ -12,6 +12,7 @@ from scipy.ndimage import find_objects
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
@@ -25,9 +26,6 @@ from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, Player, player_of
 from cpfls_cli.playback.rotors import Hold
-
-VEHICLE = "vehicle"
-"""In the place of a model: the vehicle of the config."""
 
 _STATE = ("body_rate", "attitude", "velocity", "position")
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")

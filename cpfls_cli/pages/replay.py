@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.replay import ReplayRecord, RunsGroup, SignalErrorGroup
+from cpfls_cli.artifacts.replay import VEHICLE, ReplayRecord, RunsGroup, SignalErrorGroup
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import (
@@ -58,9 +58,12 @@ def answer(replay: Source[ReplayRecord], index: int = 1) -> Iterator[Block]:
     index : int
         Number of the replay on its page.
     """
-    record = replay.record
     yield verdict_box(replay)
-    yield _errors_table(replay, index)
+    yield from _grounds(replay.record, index)
+
+
+def _grounds(record: ReplayRecord, index: int) -> Iterator[Block]:
+    yield _errors_table(record, index)
     yield _worst_table(record, index)
     yield from (Text(words, "warning") for words in (*_diverged(record), *record.warning))
 
@@ -79,7 +82,7 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
 
 
 def _name(record: ReplayRecord) -> str:
-    return "the vehicle of the config" if record.played == "vehicle" else record.played
+    return "the vehicle of the config" if record.played == VEHICLE else record.played
 
 
 def _rivals(record: ReplayRecord) -> dict[str, tuple[SignalErrorGroup, int]]:
@@ -116,7 +119,7 @@ def _seconds(value: float) -> str:
 
 
 def _beside_stated(record: ReplayRecord) -> Iterator[str]:
-    if record.played != "vehicle":
+    if record.played != VEHICLE:
         total = record.body_rate.total
         share = whole_percent(float(total[_MODEL] / total[_STATED])) if total[_STATED] > 0 else "—"
         yield f"The errors of its body rates are {share} of those of the vehicle that the config states."
@@ -124,7 +127,7 @@ def _beside_stated(record: ReplayRecord) -> Iterator[str]:
 
 def _diverged(record: ReplayRecord) -> Iterator[str]:
     for index, count in enumerate(record.diverged.tolist()):
-        if count and not (index == _STATED and record.played == "vehicle"):
+        if count and not (index == _STATED and record.played == VEHICLE):
             who, where = (_name(record), f", first {_first_lost(record)}") if index == _MODEL else (_WORDS[index], "")
             yield (
                 f"{who}: runs away in {count} of {record.windows} windows{where}; a run is stopped there and counts as "
@@ -147,11 +150,11 @@ def _chosen_horizons(record: ReplayRecord) -> list[int]:
 
 def _shown(record: ReplayRecord) -> list[int]:
     """List the predictions that are shown: the stated vehicle once."""
-    return [_MODEL, _NOTHING, _RATE, *([] if record.played == "vehicle" else [_STATED])]
+    return [_MODEL, _NOTHING, _RATE, *([] if record.played == VEHICLE else [_STATED])]
 
 
-def _errors_table(replay: Source[ReplayRecord], index: int) -> Table:
-    record, chosen = replay.record, _chosen_horizons(replay.record)
+def _errors_table(record: ReplayRecord, index: int) -> Table:
+    chosen = _chosen_horizons(record)
     rows: list[list[str | Cell]] = []
     for name, (group, rival) in _rivals(record).items():
         words, unit, scale = _SIGNALS[name]
@@ -208,7 +211,7 @@ def _section(replay: Source[ReplayRecord], index: int) -> Iterator[Block]:
     record = replay.record
     yield Heading(replay.label)
     yield Facts(_facts(record))
-    yield from answer(replay, index)
+    yield from _grounds(record, index)
     if len(record.horizon_s) > 1:
         yield horizon_figure(f"replay-errors-{index}", record)
         yield worst_figure(f"replay-worst-windows-{index}", record)

@@ -141,8 +141,8 @@ class Sources:
 
     @property
     def only_gap(self) -> bool:
-        """Whether nothing else was given than what the gap workflow writes."""
-        return len(self.gap) == len(self.all)
+        """Whether nothing else was given than how models and flights disagree."""
+        return len(self.gap) + len(self.replays) == len(self.all)
 
     @property
     def title(self) -> str:

@@ -348,7 +348,7 @@ def _kept(good: BoolArray, new: Array, old: Array) -> Array:
 def _positive_definite(matrices: Array) -> BoolArray:
     """Flag positive definite matrices by their leading minors (Sylvester); what is not finite is none."""
     first, minor = matrices[:, 0, 0], matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] ** 2
-    finite = np.isfinite(matrices).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)), dtype=bool)
     whole = np.linalg.det(np.where(finite[:, None, None], matrices, 0.0))
     return np.asarray(finite & (first > 0) & (minor > 0) & (whole > 0))
 
