@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, dataset, group
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.flight import LoggedFlight
-    from cpfls_cli.playback.replay import Drawn, Played, Replay, ReplayOptions, SignalErrors, Windows
+    from cpfls_cli.playback.replay import Played, Replay, ReplayOptions, SignalErrors, Windows
 
 WORST = 5
 """Windows that are listed."""
@@ -120,48 +120,63 @@ class WindowGroup:
 
 
 @record
-class RunsGroup:
-    """Runs of the model beside the flight."""
+class WorstGroup:
+    """Runs of the model beside the flight in the windows in which it is farthest off."""
+
+    window: IntArray = dataset("window", "index of the window, the worst first", "worst")
+    measured: Array = dataset(
+        "measured", "body rate of the flight", "worst", "sample", "axis", units="rad/s", frame=BODY
+    )
+    model: Array = dataset("model", "body rate of the model", "worst", "sample", "axis", units="rad/s", frame=BODY)
+
+    @classmethod
+    def of(cls, windows: Windows, played: Sequence[Played], horizon: int) -> Self:
+        """Draw the worst windows.
+
+        Parameters
+        ----------
+        horizon : int
+            Samples.
+        """
+        from cpfls_cli.playback.replay import drawn_runs
+
+        chosen = windows.worst(horizon, WORST)
+        runs = [drawn_runs(played[windows.flight[index]], windows.start[[index]], horizon) for index in chosen]
+        return cls(
+            window=np.array(chosen, dtype=np.int64),
+            measured=np.concatenate([run.measured for run in runs]),
+            model=np.concatenate([run.model for run in runs]),
+        )
+
+
+@record
+class DrawnGroup:
+    """Runs of the model one after another beside a stretch of a flight."""
 
     window: IntArray = dataset("window", "index of the window", "run")
     measured: Array = dataset("measured", "body rate of the flight", "run", "sample", "axis", units="rad/s", frame=BODY)
     model: Array = dataset("model", "body rate of the model", "run", "sample", "axis", units="rad/s", frame=BODY)
     measured_position: Array | None = dataset(
-        "measured_position",
-        "position of the flight",
-        "run",
-        "sample",
-        "axis",
-        units="m",
-        frame=WORLD,
-        default=None,
+        "measured_position", "position of the flight", "run", "sample", "axis", units="m", frame=WORLD, default=None
     )
     model_position: Array | None = dataset(
         "model_position", "position of the model", "run", "sample", "axis", units="m", frame=WORLD, default=None
     )
 
     @classmethod
-    def of(cls, windows: Sequence[int], drawn: Sequence[Drawn]) -> Self:
-        """Arrange runs of windows.
+    def of(cls, windows: Windows, played: Sequence[Played], horizon: int) -> Self:
+        """Draw a stretch of which half are better and half are worse.
 
         Parameters
         ----------
-        windows : sequence of int
-            Indices, in the order of the runs.
-        drawn : sequence of Drawn
-            One after another.
+        horizon : int
+            Samples.
         """
-        positions = [(each.measured_position, each.model_position) for each in drawn]
-        measured = [first for first, _ in positions if first is not None]
-        model = [second for _, second in positions if second is not None]
-        known = len(measured) == len(drawn)
-        return cls(
-            window=np.array(windows, dtype=np.int64),
-            measured=np.concatenate([each.measured for each in drawn]),
-            model=np.concatenate([each.model for each in drawn]),
-            measured_position=np.concatenate(measured) if known else None,
-            model_position=np.concatenate(model) if known else None,
-        )
+        from cpfls_cli.playback.replay import drawn_runs
+
+        chosen = windows.typical(horizon, _DRAWN_RUNS)
+        runs = drawn_runs(played[windows.flight[chosen[0]]], windows.start[chosen], horizon)
+        return cls(window=np.array(chosen, dtype=np.int64), **vars(runs))
 
 
 @record
@@ -192,8 +207,8 @@ class ReplayRecord(Record):
     position: SignalErrorGroup | None = group("position", default=None)
     flight: PlayedFlightsGroup = group("flight")
     window: WindowGroup = group("window")
-    worst: RunsGroup = group("worst")
-    drawn: RunsGroup = group("drawn")
+    worst: WorstGroup = group("worst")
+    drawn: DrawnGroup = group("drawn")
     warning: tuple[str, ...] = dataset("warning", "what to know about flights and model", "warning")
 
     @classmethod
@@ -229,8 +244,8 @@ class ReplayRecord(Record):
             diverged=(windows.diverged >= 0).sum(axis=1),
             flight=PlayedFlightsGroup.of(flights, played, windows),
             window=WindowGroup.of(windows, [flight.time for flight in flights], period),
-            worst=_worst(windows, played, horizon),
-            drawn=_typical(windows, played, horizon),
+            worst=WorstGroup.of(windows, played, horizon),
+            drawn=DrawnGroup.of(windows, played, horizon),
             warning=tuple(warnings),
             **groups,  # type: ignore[arg-type]  # only the body rate is always known
         )
@@ -289,19 +304,3 @@ class ReplayRecord(Record):
     def _prediction(self, index: int) -> dict[str, Any]:
         signals = {name: None if found is None else found.summary(index) for name, found in self.errors.items()}
         return {**signals, "diverged": int(self.diverged[index])}
-
-
-def _worst(windows: Windows, played: Sequence[Played], horizon: int) -> RunsGroup:
-    from cpfls_cli.playback.replay import drawn_runs
-
-    chosen = windows.worst(horizon, WORST)
-    runs = [drawn_runs(played[windows.flight[index]], windows.start[[index]], horizon) for index in chosen]
-    return RunsGroup.of(chosen, runs)
-
-
-def _typical(windows: Windows, played: Sequence[Played], horizon: int) -> RunsGroup:
-    from cpfls_cli.playback.replay import drawn_runs
-
-    chosen = windows.typical(horizon, _DRAWN_RUNS)
-    runs = drawn_runs(played[windows.flight[chosen[0]]], windows.start[chosen], horizon)
-    return RunsGroup.of(chosen, [runs])

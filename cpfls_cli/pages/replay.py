@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.replay import VEHICLE, ReplayRecord, RunsGroup, SignalErrorGroup
+from cpfls_cli.artifacts.replay import VEHICLE, DrawnGroup, ReplayRecord, SignalErrorGroup
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import (
@@ -24,7 +24,7 @@ from cpfls_cli.report.canvas import (
     style_of,
 )
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import joined, number, whole_percent
+from cpfls_cli.report.numbers import joined, number, sentence, whole_percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,7 +78,7 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     horizon = _seconds(record.horizon_s[-1])
     whole = f"{_name(record)} {title} than what it has to beat, over {horizon}: {joined(signals)}."
     sentences = [_sentence(record, name, group, rival) for name, (group, rival) in rivals.items()]
-    return Box("REPLAY", whole[:1].upper() + whole[1:], [*sentences, *_beside_stated(record)], tone)  # type: ignore[arg-type]
+    return Box("REPLAY", sentence(whole), [*sentences, *_beside_stated(record)], tone)  # type: ignore[arg-type]
 
 
 def _name(record: ReplayRecord) -> str:
@@ -320,7 +320,7 @@ def drawn_figure(name: str, record: ReplayRecord) -> Plot:
     return plot(name, caption, "A flight beside its playback over time", 0.8 + 1.25 * len(panels_of), draw)
 
 
-def _rates(drawn: RunsGroup, axis: int) -> tuple[Array, Array]:
+def _rates(drawn: DrawnGroup, axis: int) -> tuple[Array, Array]:
     return drawn.measured[:, :, axis], drawn.model[:, :, axis]
 
 

@@ -127,7 +127,8 @@ def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> Playback
         _joined([_or_zero(part.velocity, part) for part in parts]),
         _joined([_level(part) if part.attitude is None else part.rotation for part in parts]),
         _joined([part.body_rate for part in parts]),
-        first.period,
+        # Clocks are rounded; what rounding leaves of a step would show in every horizon.
+        round(float(first.time[-1] - first.time[0]) / (len(first) - 1), 12),
     )
     ends = np.cumsum([0, *(len(part) for part in parts)]).tolist()
     return PlaybackFlight(
