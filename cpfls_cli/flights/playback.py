@@ -151,12 +151,15 @@ class ModelToPlay:
     made : callable
         From a flight to what is played back, faults of sensors taken out, and the model made ready for it.
     needs_attitude : bool
+    is_stated : bool
+        Whether it is the vehicle that the config states.
     repairs : tuple of str
         Faults of sensors that it takes out of a flight first.
     """
 
     made: Callable[[LoggedFlight], tuple[PlaybackFlight, Player]]
     needs_attitude: bool = False
+    is_stated: bool = False
     repairs: tuple[str, ...] = ()
 
     def played(self, flight: LoggedFlight) -> Played:
@@ -170,6 +173,8 @@ class ModelToPlay:
         if self.needs_attitude and flight.parts[0].attitude is None:
             raise InputError(f"{flight.name}: lacks the attitude, which the model needs: its inertia depends on it")
         along, player = self.made(flight)
+        if self.is_stated:
+            return Played(along, player, player)
         stated = player_of(VehicleModel(vehicle=flight.parts[0].vehicle), _with_speed_as_logged(along, flight))
         return Played(along, player, stated)
 
@@ -194,7 +199,7 @@ def model_to_play(path: Path, study: Study) -> ModelToPlay:
         If it is none, or of another vehicle than that of the config.
     """
     if is_vehicle(path):
-        return _whole(VehicleModel(vehicle=study.vehicle))
+        return _whole(VehicleModel(vehicle=study.vehicle), stated=True)
     if holds(path, ExtendedRecord):
         return _extended(read_of_vehicle(path, ExtendedRecord, study).rebuilt(path))
     # Further formats of models are added here.
@@ -207,12 +212,12 @@ def is_vehicle(path: Path) -> bool:
     return str(path) == VEHICLE
 
 
-def _whole(model: VehicleModel) -> ModelToPlay:
+def _whole(model: VehicleModel, *, stated: bool = False) -> ModelToPlay:
     def made(flight: LoggedFlight) -> tuple[PlaybackFlight, Player]:
         logged = flight.playback
         return logged, player_of(model, logged)
 
-    return ModelToPlay(made, needs_attitude=model.fuzzy is not None)
+    return ModelToPlay(made, needs_attitude=model.fuzzy is not None, is_stated=stated)
 
 
 def _extended(model: ExtendedModel) -> ModelToPlay:
@@ -220,4 +225,4 @@ def _extended(model: ExtendedModel) -> ModelToPlay:
         return extended_player(model, flight.name, [model.repaired(part) for part in flight.parts], flight.hold)
 
     repairs = () if model.audit is None else tuple(finding.sentence for finding in model.audit.named)
-    return ModelToPlay(made, model.base is not None, repairs)
+    return ModelToPlay(made, needs_attitude=model.base is not None, repairs=repairs)

@@ -562,8 +562,11 @@ def _added(sums: _Sums, played: Played, starts: IntArray, flight: int) -> tuple[
     size = np.empty((len(PREDICTIONS), len(starts)))
     diverged = np.empty(size.shape, dtype=np.int64)
     knows = played.knows
+    model: Runs | None = None
     for row, prediction in enumerate(PREDICTIONS):
-        runs = played.runs(prediction, starts, sums.horizon)
+        again = model if prediction == STATED and played.stated is played.model else None
+        runs = again or played.runs(prediction, starts, sums.horizon)
+        model = runs if prediction == MODEL else model
         sums.add(row, runs.errors, knows)
         size[row] = np.linalg.norm(runs.errors[:, :, SIGNALS.index("body_rate")], axis=2).mean(axis=1)
         diverged[row] = runs.diverged

@@ -139,7 +139,9 @@ def test_a_stated_torque_drives_a_flight_without_rotors(replayed, with_attitude,
 
 def test_a_simulated_flight_of_the_vehicle_itself_is_predicted(cpfls, replayed, tmp_path):
     config, path, flight = tmp_path / "study.yaml", tmp_path / "path.h5", tmp_path / "flight.h5"
-    config.write_text("seed: 1\ntrajectory: {legs: 1, displacement_m: 2.0, period_s: 0.4, sample_time_s: 0.01, yaw_turn_rad: 3.0}\n")
+    config.write_text(
+        "seed: 1\ntrajectory: {legs: 1, displacement_m: 2.0, period_s: 0.4, sample_time_s: 0.01, yaw_turn_rad: 3.0}\n"
+    )
     assert cpfls("trajectory", config, "-o", path).exit_code == 0
     result = cpfls("simulate", config, path, "--mode", "closed-loop", "-o", flight)
     assert result.exit_code == 0, result.stderr
