@@ -18,6 +18,7 @@ from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import ArtifactSpec, DatasetSpec, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 RECORDS: tuple[type[Record], ...] = (
     TrajectoryRecord,
@@ -30,6 +31,7 @@ RECORDS: tuple[type[Record], ...] = (
     DisagreementRecord,
     DiagnosisRecord,
     ExtendedRecord,
+    VehicleRecord,
 )
 """Every artifact format."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,8 +11,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.polynomial import FACTORS, STATE_TERMS, Probe, polynomial, state_terms
-from cpfls_cli.effects.registry import effect
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.fuzzy.basis import Consequents
 from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
@@ -228,11 +230,25 @@ def effect_weights(name: str, shape: Mapping[str, float], probe: Probe) -> Array
     ComputationError
         If the effect is no polynomial of motion and rotor speeds.
     """
-    found = polynomial(effect(name), probe, shape)
+    known = effect(name)
+    found = polynomial(_wrench_of_numbers() if known.kind == "parameter" else known, probe, shape)
     if found is None:
         raise ComputationError(f"the effect {name} is no polynomial of motion and rotor speeds")
     slow = np.zeros((*found.shape[:3], len(probe.signals.vehicle.rotors)))
     return np.concatenate([found, slow], axis=3)
+
+
+def _wrench_of_numbers() -> Effect:
+    """Make an effect of the numbers of the vehicle that are no inertia: scale of the thrust, coupling of the rates."""
+
+    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+        assert VEHICLE_NUMBERS.columns is not None
+        given = VEHICLE_NUMBERS.columns(signals, shape)
+        assert given.momentum is not None
+        # What has momentum is inertia, which stands in the vehicle, or the place of a sensor, which moves nothing.
+        return Columns(given.direct * ~np.any(given.momentum, axis=(0, 1)))
+
+    return replace(VEHICLE_NUMBERS, kind="wrench", columns=columns)
 
 
 def remainder_weights(remainder: Remainder, rotors: int) -> Array:
