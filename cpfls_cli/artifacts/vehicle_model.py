@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.spec import BODY, Format, Record, dataset, group, record
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled loops that play a vehicle back.
     from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
     from cpfls_cli.playback.rotors import RotorResponse
+    from cpfls_cli.playback.structure import Choice
+    from cpfls_cli.playback.vehicle import FoundVehicle
     from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 
@@ -279,14 +281,121 @@ class VehicleGroup:
 
 
 @record
+class FoundNumbersGroup:
+    """The numbers that were free, with 95 % intervals."""
+
+    name: tuple[str, ...] = dataset("name", "block and number", "found")
+    unit: tuple[str, ...] = dataset("unit", "empty for a ratio", "found")
+    value: Array = dataset("value", "estimate", "found", units="SI")
+    low: Array = dataset("low", "lower end of the 95 % interval", "found", units="SI")
+    high: Array = dataset("high", "upper end of the 95 % interval", "found", units="SI")
+    stated: Array = dataset("stated", "in /config; not finite where no config does", "found", units="SI", gaps=True)
+    determined: BoolArray = dataset("determined", "1 where the flights say more than what was believed before", "found")
+    at_bound: BoolArray = dataset("at_bound", "1 where it lies on a bound, so that the interval says little", "found")
+
+
+@record
+class TradesGroup:
+    """Pairs of numbers that the flights cannot tell apart."""
+
+    first: tuple[str, ...] = dataset("first", "one number", "trade")
+    second: tuple[str, ...] = dataset("second", "the other", "trade")
+    correlation: Array = dataset("correlation", "of the two estimates", "trade")
+
+
+@record
+class SharesGroup:
+    """How much each part of the model does along the training flights."""
+
+    name: tuple[str, ...] = dataset("name", "rotors, an effect, or remainder", "part")
+    torque: Array = dataset("torque", "root mean square", "part", "axis", units="N m", frame=BODY)
+    force: Array = dataset("force", "root mean square", "part", "axis", units="N", frame=BODY)
+
+
+@record
+class StructuresTriedGroup:
+    """Structures of the Pareto front and the baselines, each judged on the flights kept aside."""
+
+    name: tuple[str, ...] = dataset("name", "chosen, best, greedy, everything, nothing, or front", "structure")
+    blocks: tuple[str, ...] = dataset("blocks", "its blocks, one space between two", "structure")
+    error: Array = dataset("error", "mean error of the windows kept aside; about 1.1 for rates that stay", "structure")
+    worse: Array = dataset("worse", "error less that of the best", "structure")
+    uncertain: Array = dataset("uncertain", "standard error of that difference", "structure")
+    numbers: IntArray = dataset("numbers", "free numbers", "structure")
+    condition_number: Array = dataset("condition_number", "of the numbers in their natural sizes", "structure")
+
+    @classmethod
+    def of(cls, choice: Choice) -> Self:
+        """Arrange a choice."""
+        baselines = ("chosen", "best", "greedy", "everything", "nothing")
+        listed = [*((name, getattr(choice, name)) for name in baselines), *(("front", each) for each in choice.front)]
+        differences = [judged.worse_than(choice.best) for _, judged in listed]
+        return cls(
+            name=tuple(name for name, _ in listed),
+            blocks=tuple(" ".join(judged.structure.blocks) for _, judged in listed),
+            error=np.array([judged.error for _, judged in listed]),
+            worse=np.array([worse for worse, _ in differences]),
+            uncertain=np.array([uncertain for _, uncertain in differences]),
+            numbers=np.array([judged.numbers for _, judged in listed], dtype=np.int64),
+            condition_number=np.array([judged.condition_number for _, judged in listed]),
+        )
+
+
+@record
 class VehicleRecord(Record):
     """The artifact `cpfls/vehicle`."""
 
-    FORMAT: ClassVar = Format("cpfls/vehicle", "a vehicle found in flights", "vehicle", ("flight",))
+    FORMAT: ClassVar = Format("cpfls/vehicle", "a vehicle found in flights", "vehicle", ("flight", "held-out"))
 
     vehicle: VehicleGroup = group("vehicle")
+    found: FoundNumbersGroup = group("found")
+    trade: TradesGroup = group("trade")
+    structure: StructuresTriedGroup = group("structure")
+    share: SharesGroup = group("share")
+    airspeed: float = dataset(
+        "airspeed", "speed in the rotor plane that 95 % of the training samples stay below", units="m/s"
+    )
+    evaluated: int = dataset("evaluated", "structures that were judged")
+    complete: bool = dataset("complete", "1 where the search came to its end")
+    blocks: int = dataset("blocks", "blocks of windows that the intervals come from")
+    warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
+
+    @classmethod
+    def of(cls, found: FoundVehicle, warnings: Sequence[str]) -> Self:
+        """Arrange a vehicle that was found."""
+        return cls(
+            vehicle=VehicleGroup.of(found.model),
+            found=columns_of(
+                FoundNumbersGroup,
+                found.numbers,
+                determined=np.array([number.determined for number in found.numbers], dtype=bool),
+                at_bound=np.array([number.at_bound for number in found.numbers], dtype=bool),
+            ),
+            trade=columns_of(TradesGroup, found.trades),
+            structure=StructuresTriedGroup.of(found.choice),
+            share=SharesGroup(
+                name=tuple(share.name for share in found.shares),
+                torque=np.array([share.wrench[:3] for share in found.shares]),
+                force=np.array([share.wrench[3:] for share in found.shares]),
+            ),
+            airspeed=found.airspeed,
+            evaluated=found.choice.evaluated,
+            complete=found.choice.complete,
+            blocks=found.blocks,
+            warning=tuple(warnings),
+        )
 
     @property
     def summary(self) -> dict[str, Any]:
         """The vehicle for machines."""
-        return self.vehicle.summary
+        numbers = {row.pop("name"): row for row in rows_of(self.found)}
+        return {
+            **self.vehicle.summary,
+            "numbers": numbers,
+            "trades": [list(row.values()) for row in rows_of(self.trade)],
+            "structures": rows_of(self.structure),
+            "shares": {row.pop("name"): row for row in rows_of(self.share)},
+            "evaluated": self.evaluated,
+            "complete": self.complete,
+            "warnings": list(self.warning),
+        }

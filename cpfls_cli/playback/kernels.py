@@ -258,8 +258,9 @@ def _slopes(body: Body, weights: Array, value: Array, rotation: Array, rate: Arr
         for a in range(len(value)):
             total += weights[k, a] * value[a]
         out[k] = total
-    inertia, inverse = body.inertia, body.inverse
-    momentum = inertia @ rate
+    inertia, inverse, momentum = body.inertia, body.inverse, np.empty(3)
+    for i in range(3):
+        momentum[i] = inertia[i, 0] * rate[0] + inertia[i, 1] * rate[1] + inertia[i, 2] * rate[2]
     m0 = out[0] - (rate[1] * momentum[2] - rate[2] * momentum[1])
     m1 = out[1] - (rate[2] * momentum[0] - rate[0] * momentum[2])
     m2 = out[2] - (rate[0] * momentum[1] - rate[1] * momentum[0])
@@ -543,23 +544,58 @@ def _by_motion(used: Terms, weights: Array, slope: Array, out: Array) -> None:
 
 
 @_compiled
-def _wrench_change(
-    parameters: Parameters, c: int, sample: int, by_motion: Array, motion: Array, rate: Array, at: _Space, out: Array
-) -> None:
-    """Write the derivative of the wrench by a parameter, less that of ``I omega'`` by its inertia, shape (6,)."""
-    for k in range(6):
-        total = 0.0
-        for i in range(6):
-            total += by_motion[k, i] * motion[i]
-        out[k] = total
-    for e in range(parameters.first[c], parameters.first[c + 1]):
-        out[parameters.row[e]] += parameters.value[sample, e] * at.active[parameters.term[e]]
-    if parameters.moves[c]:
-        change = parameters.inertia[c]
-        turned, pushed = change @ rate, change @ at.out[3:6]
-        out[0] -= pushed[0] + rate[1] * turned[2] - rate[2] * turned[1]
-        out[1] -= pushed[1] + rate[2] * turned[0] - rate[0] * turned[2]
-        out[2] -= pushed[2] + rate[0] * turned[1] - rate[1] * turned[0]
+def _cross(first: Array, second: Array, out: Array) -> None:
+    """Write cross products of a vector with each column, or of each column of a matrix with a vector's."""
+    for c in range(out.shape[1]):
+        out[0, c] = first[1] * second[2, c] - first[2] * second[1, c]
+        out[1, c] = first[2] * second[0, c] - first[0] * second[2, c]
+        out[2, c] = first[0] * second[1, c] - first[1] * second[0, c]
+
+
+@_compiled
+def _times(matrix: Array, vectors: Array, out: Array) -> None:
+    """Multiply a small matrix with columns; the loop over columns is the inner one, so that it runs in registers."""
+    for i in range(matrix.shape[0]):
+        for c in range(vectors.shape[1]):
+            out[i, c] = matrix[i, 0] * vectors[0, c]
+        for k in range(1, matrix.shape[1]):
+            factor = matrix[i, k]
+            for c in range(vectors.shape[1]):
+                out[i, c] += factor * vectors[k, c]
+
+
+class _Columns(NamedTuple):
+    """Work space of a linearisation, a column for each parameter."""
+
+    motion: Array
+    wrench: Array
+    first: Array
+    second: Array
+    by_motion: Array
+
+
+@_compiled
+def _new_columns(count: int) -> _Columns:
+    return _Columns(
+        np.zeros((6, count)), np.zeros((6, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((6, 6))
+    )
+
+
+@_compiled
+def _own_change(parameters: Parameters, sample: int, rate: Array, at: _Space, wrench: Array) -> None:
+    """Add the derivatives of the wrench by the parameters, less those of ``I omega'`` by the inertia."""
+    turned, pushed = np.empty(3), np.empty(3)
+    for c in range(len(parameters.moves)):
+        for e in range(parameters.first[c], parameters.first[c + 1]):
+            wrench[parameters.row[e], c] += parameters.value[sample, e] * at.active[parameters.term[e]]
+        if parameters.moves[c]:
+            change = parameters.inertia[c]
+            for i in range(3):
+                turned[i] = change[i, 0] * rate[0] + change[i, 1] * rate[1] + change[i, 2] * rate[2]
+                pushed[i] = change[i, 0] * at.out[3] + change[i, 1] * at.out[4] + change[i, 2] * at.out[5]
+            wrench[0, c] -= pushed[0] + rate[1] * turned[2] - rate[2] * turned[1]
+            wrench[1, c] -= pushed[1] + rate[2] * turned[0] - rate[0] * turned[2]
+            wrench[2, c] -= pushed[2] + rate[0] * turned[1] - rate[1] * turned[0]
 
 
 @_compiled
@@ -572,39 +608,45 @@ def _linearise(
     state: _State,
     tangent: _Tangent,
     at: _Space,
+    work: _Columns,
     out: Array,
 ) -> None:
-    """Write derivatives of the accelerations (world, body frame) by each parameter, shape (6, parameter)."""
-    rotation, rate, force = state.rotation, state.rate, at.out[6:9]
-    by_motion, motion, change = np.empty((6, 6)), np.empty(6), np.empty(6)
-    _by_motion(used, weights, at.slope, by_motion)
-    inertia, inverse, momentum = body.inertia, body.inverse, body.inertia @ rate
-    air = np.empty(3)
+    """Write derivatives of the accelerations (world, body frame) by each parameter, shape (6, parameter).
+
+    ``R' dv + v_b x dphi`` and ``d omega`` move the wrench; then ``m dv' = R (dF - F x dphi)`` and
+    ``I d omega' = dM - d omega x I omega - omega x I d omega``.
+    """
+    rate, air = state.rate, at.value[1:4]
+    _by_motion(used, weights, at.slope, work.by_motion)
+    _times(state.rotation.T, tangent.velocity, work.motion[:3])
+    _cross(air, tangent.rotation, work.first)
     for i in range(3):
-        air[i] = at.value[1 + i]
-    for c in range(tangent.rate.shape[1]):
-        p0, p1, p2 = tangent.rotation[0, c], tangent.rotation[1, c], tangent.rotation[2, c]
-        r0, r1, r2 = tangent.rate[0, c], tangent.rate[1, c], tangent.rate[2, c]
-        v0, v1, v2 = tangent.velocity[0, c], tangent.velocity[1, c], tangent.velocity[2, c]
-        for i in range(3):
-            motion[i] = rotation[0, i] * v0 + rotation[1, i] * v1 + rotation[2, i] * v2
-        motion[0] += air[1] * p2 - air[2] * p1
-        motion[1] += air[2] * p0 - air[0] * p2
-        motion[2] += air[0] * p1 - air[1] * p0
-        motion[3], motion[4], motion[5] = r0, r1, r2
-        _wrench_change(parameters, c, sample, by_motion, motion, rate, at, change)
-        i0 = inertia[0, 0] * r0 + inertia[0, 1] * r1 + inertia[0, 2] * r2
-        i1 = inertia[1, 0] * r0 + inertia[1, 1] * r1 + inertia[1, 2] * r2
-        i2 = inertia[2, 0] * r0 + inertia[2, 1] * r1 + inertia[2, 2] * r2
-        m0 = change[0] - (r1 * momentum[2] - r2 * momentum[1]) - (rate[1] * i2 - rate[2] * i1)
-        m1 = change[1] - (r2 * momentum[0] - r0 * momentum[2]) - (rate[2] * i0 - rate[0] * i2)
-        m2 = change[2] - (r0 * momentum[1] - r1 * momentum[0]) - (rate[0] * i1 - rate[1] * i0)
-        f0 = change[3] - (force[1] * p2 - force[2] * p1)
-        f1 = change[4] - (force[2] * p0 - force[0] * p2)
-        f2 = change[5] - (force[0] * p1 - force[1] * p0)
-        for i in range(3):
-            out[i, c] = (rotation[i, 0] * f0 + rotation[i, 1] * f1 + rotation[i, 2] * f2) / body.mass
-            out[3 + i, c] = inverse[i, 0] * m0 + inverse[i, 1] * m1 + inverse[i, 2] * m2
+        for c in range(out.shape[1]):
+            work.motion[i, c] += work.first[i, c]
+            work.motion[3 + i, c] = tangent.rate[i, c]
+    _times(work.by_motion, work.motion, work.wrench)
+    _own_change(parameters, sample, rate, at, work.wrench)
+    _cross(at.out[6:9], tangent.rotation, work.first)
+    for i in range(3):
+        for c in range(out.shape[1]):
+            work.first[i, c] = (work.wrench[3 + i, c] - work.first[i, c]) / body.mass
+    _times(state.rotation, work.first, out[:3])
+    _turning_change(body, rate, tangent.rate, work)
+    _times(body.inverse, work.wrench[:3], out[3:])
+
+
+@_compiled
+def _turning_change(body: Body, rate: Array, change: Array, work: _Columns) -> None:
+    """Take the derivatives of ``omega x I omega`` off those of the torque."""
+    momentum = np.empty(3)
+    for i in range(3):
+        momentum[i] = body.inertia[i, 0] * rate[0] + body.inertia[i, 1] * rate[1] + body.inertia[i, 2] * rate[2]
+    _times(body.inertia, change, work.first)
+    _cross(rate, work.first, work.second)
+    _cross(momentum, change, work.first)
+    for i in range(3):
+        for c in range(change.shape[1]):
+            work.wrench[i, c] += work.first[i, c] - work.second[i, c]
 
 
 @_compiled
@@ -686,6 +728,7 @@ def sensitivities(
     state, middle, at = _new_state(), _new_state(), _new_space(used)
     count = len(parameters.inertia)
     tangent, half, change = _new_tangent(count), _new_tangent(count), np.empty((6, count))
+    work = _new_columns(count)
     error = np.empty((4, 3))
     total = 0.0
     for n in range(len(starts)):
@@ -695,11 +738,11 @@ def sensitivities(
         for step in range(len(loss.weight)):
             sample = starts[n] + step
             _evaluate(body, used, weights[sample], state, at)
-            _linearise(body, used, weights[sample], parameters, sample, state, tangent, at, change)
+            _linearise(body, used, weights[sample], parameters, sample, state, tangent, at, work, change)
             _to_middle(state, middle, h, translates, at)
             _tangent_to_middle(tangent, half, change, h, translates, at)
             _evaluate(body, used, weights[sample], middle, at)
-            _linearise(body, used, weights[sample], parameters, sample, middle, half, at, change)
+            _linearise(body, used, weights[sample], parameters, sample, middle, half, at, work, change)
             _to_end(state, middle, h, translates, at)
             _tangent_to_end(tangent, half, change, h, translates, at)
             if _lost(state):

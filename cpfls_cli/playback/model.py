@@ -99,15 +99,20 @@ class VehicleModel:
     @cached_property
     def weights(self) -> Array:
         """Torque (3) and force (3) by term of the motion and term of the rotors, shape (6, terms, 1 + 4 rotors)."""
-        table = np.zeros((6, self.term_count, 1 + 4 * self.rotors))
-        table[:, 0] += rotor_weights(self.vehicle, self.thrust_linear, self.response)
+        return np.asarray(sum(self.part_weights().values()))
+
+    def part_weights(self) -> dict[str, Array]:
+        """Give the weights of each part alone: rotors, effects by name, remainder; shapes as `weights`."""
+        parts = {"rotors": np.zeros((6, self.term_count, 1 + 4 * self.rotors))}
+        parts["rotors"][:, 0] = rotor_weights(self.vehicle, self.thrust_linear, self.response)
         probe = Probe.of(self.vehicle)
         for known in self.effects:
-            weights = effect_weights(known.name, known.shape, probe)
-            table[:, : len(STATE_TERMS)] += np.tensordot(known.coefficients, weights, axes=1)
+            weights = np.tensordot(known.coefficients, effect_weights(known.name, known.shape, probe), axes=1)
+            more = np.zeros((6, self.term_count - len(STATE_TERMS), weights.shape[2]))
+            parts[known.name] = np.concatenate([weights, more], axis=1)
         if self.remainder is not None:
-            table += remainder_weights(self.remainder, self.rotors)
-        return table
+            parts["remainder"] = remainder_weights(self.remainder, self.rotors)
+        return parts
 
     @property
     def airflow(self) -> Airflow:
@@ -175,9 +180,16 @@ class VehicleModel:
         -------
         array, shape (time, 6), N m and N, body frame
         """
-        terms = np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
-        flat = np.einsum("ta,kau,tu->tk", terms, self.weights, rotor, optimize=True)
-        return np.asarray(flat)
+        return wrench_of(self.weights, self.terms(velocity, rate), rotor)
+
+    def terms(self, velocity: Array, rate: Array) -> Array:
+        """Evaluate the terms of the motion, shape (time, terms)."""
+        return np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
+
+
+def wrench_of(weights: Array, terms: Array, rotor: Array) -> Array:
+    """Multiply weights with the terms of the motion and of the rotors, shape (time, 6)."""
+    return np.asarray(np.einsum("ta,kau,tu->tk", terms, weights, rotor, optimize=True))
 
 
 def body_of(vehicle: VehicleSettings, inertia: Array) -> Body:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
@@ -78,6 +79,30 @@ class Number:
     def block(self) -> str:
         """Block that it comes and goes with."""
         return self.name.split(".")[0]
+
+    @property
+    def absent(self) -> float:
+        """What it is in a model without its block."""
+        return 0.0 if self.block in ("motor_lag", "command_delay", "slow_actuation") else self.start
+
+
+class Physical(NamedTuple):
+    """A number as people know it.
+
+    Attributes
+    ----------
+    value : float
+    unit : str
+    positive : bool
+        Whether it cannot be below 0.
+    stated : bool
+        Whether a config states it.
+    """
+
+    value: float
+    unit: str
+    positive: bool = False
+    stated: bool = False
 
 
 _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
@@ -278,6 +303,29 @@ class Layout:
             for name, column in self._columns.items()
         }
 
+    def physical(self, values: Array) -> dict[str, Physical]:
+        """Give all numbers as people know them, in order: moments of inertia, factors of the first rotor, SI."""
+        inertia, coefficients = self.inertia(values), self.coefficients(values)
+        rotor, found = self.vehicle.rotors[0], {}
+        for number, value in zip(self.numbers, values.tolist(), strict=True):
+            name = number.name
+            if name in _INERTIA:
+                axis = _INERTIA.index(name)
+                known = Physical(float(inertia[axis, axis]), "kg m^2", positive=True, stated=True)
+                found[f"inertia.{INERTIA_PARAMETERS[axis]}"] = known
+            elif name in _PRODUCTS:
+                row, column = INERTIA_ENTRIES[3 + _PRODUCTS.index(name)]
+                found[name] = Physical(float(inertia[row, column]), "kg m^2", stated=True)
+            elif name == _THRUST:
+                found["thrust_factor"] = Physical(value * rotor.thrust_factor_n_s2, "N s^2", positive=True, stated=True)
+            elif name == _DRAG:
+                found["drag_factor"] = Physical(value * rotor.drag_factor_n_m_s2, "N m s^2", positive=True, stated=True)
+            elif name == _SLOW:
+                found["slow_actuation.slow_s"] = Physical(float(np.exp(value)), "s", positive=True)
+            else:
+                found[name] = Physical(coefficients.get(name, value), number.unit)
+        return found
+
     def table(self, values: Array) -> Array:
         """Build the weights, shape (6, terms, 1 + 4 rotors); see `VehicleModel.weights`."""
         rotors = len(self.vehicle.rotors)
@@ -435,17 +483,18 @@ class Evaluated:
             layout.inertia_derivatives(values),
         )
 
-    def weights(self, flight: PlaybackFlight) -> Array:
-        """Evaluate the weights over each step of a flight, shape (time, 6, active)."""
-        return weights_by_step(self.table, self.used, self.layout.rotor_terms(self.values, flight))
+    def weights(self, flight: PlaybackFlight, samples: IntArray) -> Array:
+        """Evaluate the weights over the steps that begin at samples of a flight, shape (samples, 6, active)."""
+        return weights_by_step(self.table, self.used, self.layout.rotor_terms(self.values, flight)[samples])
 
-    def parameters(self, flight: PlaybackFlight) -> Parameters:
-        """Differentiate the weights along a flight, and the inertia, by each number."""
-        terms = self.layout.rotor_terms(self.values, flight)
-        entries, values, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((len(flight), 0))], [0]
+    def parameters(self, flight: PlaybackFlight, samples: IntArray) -> Parameters:
+        """Differentiate the weights over these steps, and the inertia, by each number."""
+        terms = self.layout.rotor_terms(self.values, flight)[samples]
+        entries, values, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((len(samples), 0))], [0]
         for number, derivative in zip(self.layout.numbers, self.derivatives, strict=True):
             of_response = derivative is None
-            source = self.layout.rotor_terms(self.values, flight, number.name) if of_response else terms
+            moved = self.layout.rotor_terms(self.values, flight, number.name)[samples] if of_response else None
+            source = terms if moved is None else moved
             weights = (self.table if derivative is None else derivative)[:, self.used.active]
             # The first term of the rotors is constant, so the response in time leaves it.
             places = np.argwhere(np.any(weights[:, :, 1 if of_response else 0 :], axis=2))

@@ -24,5 +24,6 @@ class PlaybackSettings(Settings):
     population: Annotated[int, Ge(2), Doc("structures in the population of the search")] = 16
     generations: Annotated[int, Ge(0), Doc("generations bred; 0 takes the greedy choice and its neighbours alone")] = 8
     leave_out: Annotated[
-        tuple[str, ...], Doc("blocks that are not tried, such as remainder; `cpfls vehicle --blocks` lists all")
+        tuple[str, ...],
+        Doc("blocks that are not tried: effects, motor_lag, inertia, remainder (docs/playback.md)"),
     ] = ()
