@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import ArtifactSpec, DatasetSpec, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
@@ -28,6 +29,7 @@ RECORDS: tuple[type[Record], ...] = (
     CheckpointRecord,
     SweepRecord,
     PredictionRecord,
+    ReplayRecord,
     DisagreementRecord,
     DiagnosisRecord,
     ExtendedRecord,

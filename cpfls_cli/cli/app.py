@@ -100,6 +100,37 @@ SweepTimeLimitOption = Annotated[
 ]
 
 
+PlayedArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MODEL",
+        help="Made by `cpfls identify` or `cpfls extend`; or the word vehicle: that of the config.",
+    ),
+]
+HorizonOption = Annotated[
+    float | None,
+    typer.Option("--horizon", metavar="TIME", parser=seconds, help="Longest horizon (1, 1s); without, half a second."),
+]
+EveryOption = Annotated[int, typer.Option("--every", metavar="N", min=1, help="Begin at every N-th sample.")]
+
+
+class Between(StrEnum):
+    """What a rotor speed is between samples."""
+
+    LINEAR = "linear"
+    PREVIOUS = "previous"
+
+
+HoldOption = Annotated[
+    Between | None,
+    typer.Option(
+        "--hold",
+        help="Between samples a rotor speed is a straight line, or what it was; without, measured ones the first, "
+        "commands the second.",
+    ),
+]
+
+
 class ExportFormat(StrEnum):
     """What a model is exported as."""
 
@@ -335,6 +366,31 @@ def predict(
         return command.run(job, model, flight)
 
     _run("predict", config, output, common, call)
+
+
+@app.command()
+@with_common
+def replay(
+    config: ConfigArgument,
+    model: PlayedArgument,
+    flights: FlightsArgument,
+    output: OutputOption,
+    horizon: HorizonOption = None,
+    every: EveryOption = 1,
+    hold: HoldOption = None,
+    *,
+    common: Common,
+) -> None:
+    """Play a model back along flights: how far off its motion is by horizon, beside what it has to beat."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.commands import replay as command
+        from cpfls_cli.playback.replay import ReplayOptions
+
+        options = ReplayOptions(0.5 if horizon is None else horizon, every, None if hold is None else hold.value)
+        return command.run(job, model, flights, options)
+
+    _run("replay", config, output, common, call)
 
 
 @app.command()

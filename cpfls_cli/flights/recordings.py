@@ -38,8 +38,16 @@ class Flights:
 
 
 @dataclass(frozen=True)
-class _ReadFlight:
-    """A flight as it was read; `units` are those of the import that made it."""
+class ReadFlight:
+    """A flight as it was read.
+
+    Attributes
+    ----------
+    signals : mapping of str to array
+        By the names of a flight's datasets.
+    units : mapping of str to str
+        Of the import that made it.
+    """
 
     name: str
     signals: Mapping[str, Array]
@@ -60,42 +68,77 @@ def read_flights(paths: Sequence[Path], study: Study) -> Flights:
     InputError
         If a flight is of another vehicle, has no actuation, or is not uniform in time.
     """
-    flights = [_log(path, study) if is_log(path) else _artifact(path, study) for path in paths]
+    flights = [read_flight(path, study) for path in paths]
     made = [_recording(flight, study) for flight in flights]
-    recordings, notes = _with_voltage([recording for recording, _ in made], flights)
+    recordings, notes = with_voltage([recording for recording, _ in made], flights)
     warnings = [f"{flight.name}: {w}" for flight, (_, about) in zip(flights, made, strict=True) for w in about]
     return Flights(tuple(recordings), (*warnings, *notes))
 
 
-def _log(path: Path, study: Study) -> _ReadFlight:
+def read_flight(path: Path, study: Study) -> ReadFlight:
+    """Read a flight, or import it if it is a log.
+
+    Raises
+    ------
+    InputError
+        If it is of another vehicle.
+    """
+    return _log(path, study) if is_log(path) else _artifact(path, study)
+
+
+def _log(path: Path, study: Study) -> ReadFlight:
     flight = imported(path, study)
     done = tuple(f"{what} ({count})" for what, count in log_findings(flight.report).items())
     signals = FlightRecord.of_import(flight, {}).signals
-    return _ReadFlight(path.name, signals, _units(study), (*done, *flight.report.warnings))
+    return ReadFlight(path.name, signals, _units(study), (*done, *flight.report.warnings))
 
 
-def _artifact(path: Path, study: Study) -> _ReadFlight:
+def _artifact(path: Path, study: Study) -> ReadFlight:
     record = read_record(path, FlightRecord)
     source = f"{path}: /config"
     made_by = validate(parse_config(record.origin.config, source), source)
     require_same_vehicle(path, made_by.vehicle, study.vehicle)
-    return _ReadFlight(path.name, record.signals, _units(made_by) if record.made_from("log") else {}, ())
+    return ReadFlight(path.name, record.signals, _units(made_by) if record.made_from("log") else {}, ())
 
 
 def _units(study: Study) -> dict[str, str]:
     return {name: signal.unit for name, signal in study.import_.signals.items()}
 
 
-def _recording(flight: _ReadFlight, study: Study) -> tuple[Recording, tuple[str, ...]]:
+def _recording(flight: ReadFlight, study: Study) -> tuple[Recording, tuple[str, ...]]:
     known, warnings = _known_part(flight)
+    signals, notes = signals_of(flight, known, study)
+    return Recording(flight.name, signals), (*warnings, *notes)
+
+
+def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> tuple[Signals, tuple[str, ...]]:
+    """Arrange a stretch of a flight for the evaluation of effects.
+
+    Parameters
+    ----------
+    known : mapping of str to array
+        The stretch: time and signals, all known.
+
+    Returns
+    -------
+    signals : Signals
+    notes : tuple of str
+        What was taken for granted.
+
+    Raises
+    ------
+    InputError
+        If it is not uniform in time, or has no actuation.
+    """
     time = known["time"]
+    notes: tuple[str, ...] = ()
     steps = np.diff(time)
     if len(time) < 2 or np.ptp(steps) > _UNIFORM * np.median(steps):
         raise InputError(f"{flight.name}: its samples are not evenly spaced in time; import it with import.rate_hz")
     rate = body_rate_of(time, known.get("attitude"), known.get("body_rate"))
     if rate is None:
         rate = np.zeros((len(time), 3))
-        warnings += ("neither body rates nor attitude; taken as level and at rest, so only the balance is judged",)
+        notes = ("neither body rates nor attitude; taken as level and at rest, so only the balance is judged",)
     optional: dict[str, Any] = {name: known.get(name) for name in _LOGGED}
     signals = Signals(
         time=time,
@@ -105,10 +148,10 @@ def _recording(flight: _ReadFlight, study: Study) -> tuple[Recording, tuple[str,
         ground_height_m=study.gap.ground_height_m,
         **optional,
     )
-    return Recording(flight.name, _actuated(signals, flight, known, study)), warnings
+    return _actuated(signals, flight, known, study), notes
 
 
-def _actuated(signals: Signals, flight: _ReadFlight, known: Mapping[str, Array], study: Study) -> Signals:
+def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], study: Study) -> Signals:
     speed, commanded = known.get("rotor_speed"), False
     if speed is None:
         unit = flight.units.get("rotor_command", "rad/s")
@@ -127,7 +170,7 @@ def _actuated(signals: Signals, flight: _ReadFlight, known: Mapping[str, Array],
     return replace(signals, stated_torque=known["body_torque"], stated_thrust=known.get("thrust"), commanded=True)
 
 
-def _known_part(flight: _ReadFlight) -> tuple[dict[str, Array], tuple[str, ...]]:
+def _known_part(flight: ReadFlight) -> tuple[dict[str, Array], tuple[str, ...]]:
     """Keep the longest stretch in which everything is known."""
     count = len(flight.signals["time"])
     known = np.ones(count, dtype=bool)
@@ -144,10 +187,16 @@ def _known_part(flight: _ReadFlight) -> tuple[dict[str, Array], tuple[str, ...]]
     return {name: values[best] for name, values in flight.signals.items()}, (*flight.warnings, note)
 
 
-def _with_voltage(
-    recordings: Sequence[Recording], flights: Sequence[_ReadFlight]
+def with_voltage(
+    recordings: Sequence[Recording], flights: Sequence[ReadFlight]
 ) -> tuple[list[Recording], tuple[str, ...]]:
-    """Take a voltage in V as a share of the largest of all flights."""
+    """Take a voltage in V as a share of the largest of all flights.
+
+    Parameters
+    ----------
+    flights : sequence of ReadFlight
+        That the recordings are of, one for each.
+    """
     full = [_largest_volts(r.signals, s) for r, s in zip(recordings, flights, strict=True)]
     if not any(full):
         return list(recordings), ()
@@ -155,7 +204,7 @@ def _with_voltage(
     return scaled, (f"voltage: the largest of these flights, {max(full):.3g} V, is taken for that of a full battery",)
 
 
-def _largest_volts(signals: Signals, flight: _ReadFlight) -> float:
+def _largest_volts(signals: Signals, flight: ReadFlight) -> float:
     in_volts = flight.units.get("voltage", "1") != "1"
     return float(signals.voltage.max()) if in_volts and signals.voltage is not None else 0.0
 

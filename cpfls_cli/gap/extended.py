@@ -179,7 +179,7 @@ class ExtendedModel:
         correction = self.correction(signals)
         if self.base is None:
             return inertia_tensor(signals.vehicle) + correction
-        return _Corrected(self.base, correction)
+        return Corrected(self.base, correction)
 
     def replay_model(self, signals: Signals) -> ReplayModel:
         """Build the model of a replay: torque along the measured motion, and the refitted inertia.
@@ -285,13 +285,24 @@ def _numbers(parameters: Array, vehicle: VehicleSettings, corrected: Array) -> t
 
 
 @dataclass(frozen=True)
-class _Corrected:
-    """An inertia model plus a correction of its inertia tensor."""
+class Corrected:
+    """An inertia model plus a correction of its inertia tensor.
+
+    Attributes
+    ----------
+    correction : array, shape (3, 3), kg m^2
+    """
 
     base: InertiaModel
     correction: Array
 
     def inertia(self, attitude: Array) -> InertiaValues:
+        """Evaluate J(q) and its gradient.
+
+        Parameters
+        ----------
+        attitude : array, shape (samples, 3), rad
+        """
         values = self.base.inertia(attitude)
         return InertiaValues(
             values.value + inertia_matrix(attitude, self.correction),

@@ -14,6 +14,7 @@ from cpfls_cli.pages.fuzzy_part import partitions_section, rules_section
 from cpfls_cli.pages.identification import identification_section, search_section
 from cpfls_cli.pages.prediction import prediction_section
 from cpfls_cli.pages.provenance import missing, provenance_section
+from cpfls_cli.pages.replay import replay_section
 from cpfls_cli.pages.reproduction import reproduction_section
 from cpfls_cli.pages.residuals import residuals_section
 from cpfls_cli.pages.selection import reduction_section
@@ -55,6 +56,7 @@ _SECTIONS = (
     search_section,
     partitions_section,
     prediction_section,
+    replay_section,
     tracking_section,
     rules_section,
     provenance_section,

@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.replay import USUAL, VEHICLE, ReplayRecord
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
@@ -86,6 +87,7 @@ _COMMANDS: dict[type[Record], _Command] = {
     ModelRecord: _Command("identify", ("flight",), ("selection", "validate", "choose-on")),
     SweepRecord: _Command("sweep", ("flight",), ("validate", "choose-on")),
     PredictionRecord: _Command("predict", ("model", "flight")),
+    ReplayRecord: _Command("replay", ("model", "flight")),
     DisagreementRecord: _Command("compare", ("flight",), ("model",)),
     DiagnosisRecord: _Command("diagnose", ("disagreement",), ("held-out",)),
     ExtendedRecord: _Command("extend", ("diagnosis",), ("model",)),
@@ -146,11 +148,24 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
         yield f"# the search for {output} was stopped before its end; this one goes on to it"
     words = ["cpfls", command.name, _config_name(source)]
     for role in command.arguments:
-        words += _files(inputs, role, paths)
+        words += _files(inputs, role, paths) or _without_file(source.record, role)
     for role in command.options:
         for file in _files(inputs, role, paths):
             words += [f"--{role}", file]
-    yield " ".join([*words, "-o", output])
+    yield " ".join([*words, *_asked(source.record), "-o", output])
+
+
+def _without_file(record: Record, role: str) -> list[str]:
+    """Give the word that stands in the place of a file."""
+    return [VEHICLE] if isinstance(record, ReplayRecord) and role == "model" else []
+
+
+def _asked(record: Record) -> list[str]:
+    """Give the options that are no files."""
+    if not isinstance(record, ReplayRecord):
+        return []
+    hold = [] if record.hold == USUAL else ["--hold", record.hold]
+    return ["--horizon", repr(record.asked_s), "--every", str(record.every), *hold]
 
 
 def _files(inputs: Mapping[str, InputFile], role: str, paths: dict[str, str]) -> list[str]:

@@ -16,6 +16,7 @@ from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.sweep import SweepRecord
@@ -115,6 +116,11 @@ class Sources:
         return self._of(PredictionRecord)
 
     @property
+    def replays(self) -> list[Source[ReplayRecord]]:
+        """Models played back along flights."""
+        return self._of(ReplayRecord)
+
+    @property
     def disagreements(self) -> list[Source[DisagreementRecord]]:
         """Where models and flights disagree."""
         return self._of(DisagreementRecord)
@@ -141,8 +147,8 @@ class Sources:
 
     @property
     def only_gap(self) -> bool:
-        """Whether nothing else was given than what the gap workflow writes."""
-        return len(self.gap) == len(self.all)
+        """Whether nothing else was given than how models and flights disagree."""
+        return len(self.gap) + len(self.replays) == len(self.all)
 
     @property
     def title(self) -> str:

@@ -10,6 +10,7 @@ from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged
 from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.model import scores_table, solution, verdict_line
 from cpfls_cli.pages.provenance import missing
+from cpfls_cli.pages.replay import verdict_box
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
@@ -20,6 +21,7 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
+    blocks += [verdict_box(replay) for replay in sources.replays]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:

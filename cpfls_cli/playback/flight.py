@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.kernels import Motion
 from cpfls_cli.playback.rotors import Hold
@@ -28,6 +31,8 @@ class PlaybackFlight:
     stretches : tuple of slice
     has_attitude, has_velocity, has_position : bool
         Whether they were measured. Without attitude or velocity rotation alone is played back.
+    wrench : array, shape (time, 6), N m and N, body frame, or None
+        Stated torque and force of a flight without rotor speeds, which are then 0.
     """
 
     name: str
@@ -38,6 +43,7 @@ class PlaybackFlight:
     has_attitude: bool = True
     has_velocity: bool = True
     has_position: bool = True
+    wrench: Array | None = None
 
     def __len__(self) -> int:
         return len(self.speed)
@@ -63,9 +69,92 @@ class PlaybackFlight:
         found = [np.arange(part.start, part.stop - horizon, every) for part in self.stretches]
         starts = np.concatenate([np.zeros(0, dtype=np.int64), *found]).astype(np.int64)
         if not len(starts):
-            longest = max((part.stop - part.start for part in self.stretches), default=0)
+            longest = max((part.stop - part.start for part in self.stretches), default=1) - 1
+            period = self.motion.period
             raise InputError(
-                f"{self.name}: a horizon of {horizon} samples is longer than its longest stretch without a pause, "
-                f"{longest} samples; ask for a shorter one"
+                f"{self.name}: a horizon of {horizon * period:g} s is longer than its longest stretch without a pause, "
+                f"{longest * period:g} s; ask for a shorter one"
             )
         return starts
+
+
+@dataclass(frozen=True)
+class LoggedFlight:
+    """A flight to be played back, as it was logged.
+
+    Attributes
+    ----------
+    parts : tuple of Signals
+        Stretches without pauses, at least one.
+    hold : {"linear", "previous"}
+        What a speed is between samples.
+    actuation : str
+        What drives the playback, in words.
+    warnings : tuple of str
+    """
+
+    name: str
+    parts: tuple[Signals, ...]
+    hold: Hold
+    actuation: str
+    warnings: tuple[str, ...]
+
+    @property
+    def time(self) -> Array:
+        """Time of all samples, s."""
+        return np.concatenate([part.time for part in self.parts])
+
+    @property
+    def playback(self) -> PlaybackFlight:
+        """The flight as logged."""
+        return playback_flight(self.name, self.parts, self.hold)
+
+
+def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:
+    """Put the stretches of a flight one after another.
+
+    Parameters
+    ----------
+    parts : sequence of Signals
+        Of one sampling period and with the same signals, each with rotor speeds or a stated torque.
+    hold : {"linear", "previous"}
+        What a speed is between samples.
+    """
+    first = parts[0]
+    thrust_known = first.rotor_speed is not None or first.stated_thrust is not None
+    motion = Motion(
+        _joined([_or_zero(part.position, part) for part in parts]),
+        _joined([_or_zero(part.velocity, part) for part in parts]),
+        _joined([_level(part) if part.attitude is None else part.rotation for part in parts]),
+        _joined([part.body_rate for part in parts]),
+        # Clocks are rounded; what rounding leaves of a step would show in every horizon.
+        round(float(first.time[-1] - first.time[0]) / (len(first) - 1), 12),
+    )
+    ends = np.cumsum([0, *(len(part) for part in parts)]).tolist()
+    return PlaybackFlight(
+        name=name,
+        motion=motion,
+        speed=_joined([_rotor_speed(part) for part in parts]),
+        hold=hold,
+        stretches=tuple(slice(*pair) for pair in pairwise(ends)),
+        has_attitude=first.attitude is not None,
+        has_velocity=first.velocity is not None and thrust_known,
+        has_position=first.position is not None,
+        wrench=None if first.rotor_speed is not None else _joined([part.wrench for part in parts]),
+    )
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    return np.ascontiguousarray(np.concatenate(parts), dtype=float)
+
+
+def _or_zero(values: Array | None, part: Signals) -> Array:
+    return np.zeros((len(part), 3)) if values is None else values
+
+
+def _level(part: Signals) -> Array:
+    return np.tile(np.eye(3), (len(part), 1, 1))
+
+
+def _rotor_speed(part: Signals) -> Array:
+    return np.zeros((len(part), len(part.vehicle.rotors))) if part.rotor_speed is None else part.rotor_speed

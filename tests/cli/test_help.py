@@ -17,6 +17,7 @@ COMMANDS = (
     "identify",
     "sweep",
     "predict",
+    "replay",
     "export",
     "report",
     "compare",

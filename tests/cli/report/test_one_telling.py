@@ -18,7 +18,7 @@ from cpfls_cli.report.outcome import plain
 from tests.builders import gap_artifacts
 from tests.builders.forms import blocks_in_all_forms, in_all_forms, phrases, words
 
-FROM_COMMANDS = ("trajectory", "flight", "selection", "model", "prediction", "sweep")
+FROM_COMMANDS = ("trajectory", "flight", "selection", "model", "prediction", "replay", "sweep")
 FROM_NUMBERS = {"disagreement": disagreement, "diagnosis": diagnosis, "extended": extended}
 FORMATS = (*FROM_COMMANDS, *FROM_NUMBERS)
 # What a plan asks of the vehicle between its samples is not in its artifact.
@@ -37,6 +37,7 @@ def told(cpfls, study, tmp_path_factory):
         "selection": ("reduce", study, paths["flight"]),
         "model": ("identify", study, paths["flight"], "--selection", paths["selection"]),
         "prediction": ("predict", study, paths["model"], paths["flight"]),
+        "replay": ("replay", study, paths["model"], paths["flight"]),
         "sweep": ("sweep", study, paths["flight"], "--set", "sweep.seeds=2"),
     }
     artifacts = {}

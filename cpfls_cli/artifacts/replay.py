@@ -1,0 +1,306 @@
+"""The artifact of a replay: a model played back along flights, beside what it has to beat."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, dataset, group, record
+
+if TYPE_CHECKING:
+    from cpfls_cli.playback.flight import LoggedFlight
+    from cpfls_cli.playback.replay import Played, Replay, ReplayOptions, SignalErrors, Windows
+
+WORST = 5
+"""Windows that are listed."""
+
+VEHICLE = "vehicle"
+"""In the place of a model: the vehicle of the config."""
+
+USUAL = "usual"
+"""What is between samples where nobody says: measured speeds are straight lines, commands stay."""
+
+_DRAWN_RUNS = 12
+_MODEL = 0
+
+
+@record
+class SignalErrorGroup:
+    """Errors of one signal by prediction and horizon."""
+
+    mae: Array = dataset(
+        "mae", "mean norm of the error; of attitudes the geodesic distance", "prediction", "horizon", units="SI"
+    )
+    rms: Array = dataset("rms", "root mean square error by axis", "prediction", "horizon", "axis", units="SI")
+
+    @classmethod
+    def of(cls, errors: SignalErrors | None) -> Self | None:
+        """Arrange errors; None where no flight knows the signal."""
+        return None if errors is None else cls(mae=errors.mae, rms=errors.rms)
+
+    @property
+    def total(self) -> Array:
+        """Sum of the mean norms over the horizon, by prediction."""
+        return np.asarray(self.mae.sum(axis=1))
+
+    def summary(self, prediction: int) -> dict[str, Any]:
+        """One prediction for machines."""
+        by_axis = self.rms[prediction]
+        return {
+            "mae": self.mae[prediction].tolist(),
+            "rms": np.sqrt((by_axis**2).sum(axis=1)).tolist(),
+            "rms_by_axis": by_axis.tolist(),
+            "sum": float(self.total[prediction]),
+        }
+
+
+@record
+class PlayedFlightsGroup:
+    """Flights that a model was played back along."""
+
+    name: tuple[str, ...] = dataset("name", "file name", "flight")
+    windows: IntArray = dataset("windows", "samples from which it was played back", "flight")
+    actuation: tuple[str, ...] = dataset("actuation", "what drove the playback", "flight")
+    hold: tuple[str, ...] = dataset("hold", "what that is between samples: linear or previous", "flight")
+    rotation_alone: BoolArray = dataset("rotation_alone", "1 where velocity was not played back", "flight")
+
+    @classmethod
+    def of(cls, flights: Sequence[LoggedFlight], played: Sequence[Played], windows: Windows) -> Self:
+        """Arrange flights."""
+        return cls(
+            name=tuple(flight.name for flight in flights),
+            windows=np.bincount(windows.flight, minlength=len(flights)),
+            actuation=tuple(flight.actuation for flight in flights),
+            hold=tuple(flight.hold for flight in flights),
+            rotation_alone=np.array([not each.flight.translates for each in played]),
+        )
+
+
+@record
+class WindowGroup:
+    """Free runs, one for each sample from which the model was played back."""
+
+    flight: IntArray = dataset("flight", "index of the flight", "window")
+    start: Array = dataset("start", "begin, on the clock of the flight", "window", units="s")
+    error: Array = dataset(
+        "error",
+        "mean norm of the error of the body rate over the horizon",
+        "prediction",
+        "window",
+        units="rad/s",
+    )
+    diverged: Array = dataset(
+        "diverged", "when the model ran away, after the begin; not finite where not", "window", units="s", gaps=True
+    )
+
+    @classmethod
+    def of(cls, windows: Windows, times: Sequence[Array], period: float) -> Self:
+        """Arrange windows.
+
+        Parameters
+        ----------
+        times : sequence of array, s
+            Of the samples of each flight.
+        period : float, s
+        """
+        start = np.empty(len(windows.start))
+        for index, time in enumerate(times):
+            own = windows.flight == index
+            start[own] = time[windows.start[own]]
+        after = windows.diverged[_MODEL]
+        return cls(
+            flight=windows.flight,
+            start=start,
+            error=windows.size,
+            diverged=np.where(after < 0, np.nan, period * (after + 1)),
+        )
+
+
+@record
+class WorstGroup:
+    """Runs of the model beside the flight in the windows in which it is farthest off."""
+
+    window: IntArray = dataset("window", "index of the window, the worst first", "worst")
+    measured: Array = dataset(
+        "measured", "body rate of the flight", "worst", "sample", "axis", units="rad/s", frame=BODY
+    )
+    model: Array = dataset("model", "body rate of the model", "worst", "sample", "axis", units="rad/s", frame=BODY)
+
+    @classmethod
+    def of(cls, windows: Windows, played: Sequence[Played], horizon: int) -> Self:
+        """Draw the worst windows.
+
+        Parameters
+        ----------
+        horizon : int
+            Samples.
+        """
+        from cpfls_cli.playback.replay import drawn_runs
+
+        chosen = windows.worst(horizon, WORST)
+        runs = [drawn_runs(played[windows.flight[index]], windows.start[[index]], horizon) for index in chosen]
+        return cls(
+            window=np.array(chosen, dtype=np.int64),
+            measured=np.concatenate([run.measured for run in runs]),
+            model=np.concatenate([run.model for run in runs]),
+        )
+
+
+@record
+class DrawnGroup:
+    """Runs of the model one after another beside a stretch of a flight."""
+
+    window: IntArray = dataset("window", "index of the window", "run")
+    measured: Array = dataset("measured", "body rate of the flight", "run", "sample", "axis", units="rad/s", frame=BODY)
+    model: Array = dataset("model", "body rate of the model", "run", "sample", "axis", units="rad/s", frame=BODY)
+    measured_position: Array | None = dataset(
+        "measured_position", "position of the flight", "run", "sample", "axis", units="m", frame=WORLD, default=None
+    )
+    model_position: Array | None = dataset(
+        "model_position", "position of the model", "run", "sample", "axis", units="m", frame=WORLD, default=None
+    )
+
+    @classmethod
+    def of(cls, windows: Windows, played: Sequence[Played], horizon: int) -> Self:
+        """Draw a stretch of which half are better and half are worse.
+
+        Parameters
+        ----------
+        horizon : int
+            Samples.
+        """
+        from cpfls_cli.playback.replay import drawn_runs
+
+        chosen = windows.typical(horizon, _DRAWN_RUNS)
+        runs = drawn_runs(played[windows.flight[chosen[0]]], windows.start[chosen], horizon)
+        return cls(window=np.array(chosen, dtype=np.int64), **vars(runs))
+
+
+@record
+class ReplayRecord(Record):
+    """The artifact `cpfls/replay`."""
+
+    FORMAT: ClassVar = Format(
+        "cpfls/replay",
+        "a model played back along flights from many of their samples, beside what it has to beat",
+        "replay",
+        ("model", "flight"),
+    )
+
+    played: str = dataset("played", "what is played back: a file, or vehicle for that of /config")
+    prediction: tuple[str, ...] = dataset(
+        "prediction",
+        "the model; nothing moves: the whole state stays; rates and velocity stay; the vehicle that the config states",
+        "prediction",
+    )
+    asked_s: float = dataset("asked_s", "longest horizon, as asked for", units="s")
+    every: int = dataset("every", "samples from one begin to the next")
+    hold: str = dataset("hold", "what is between samples, as asked for: linear, previous; usual where nothing was")
+    horizon_s: Array = dataset("horizon_s", "horizons", "horizon", units="s")
+    diverged: IntArray = dataset("diverged", "windows in which a prediction ran away and was stopped", "prediction")
+    body_rate: SignalErrorGroup = group("body_rate")
+    attitude: SignalErrorGroup | None = group("attitude", default=None)
+    velocity: SignalErrorGroup | None = group("velocity", default=None)
+    position: SignalErrorGroup | None = group("position", default=None)
+    flight: PlayedFlightsGroup = group("flight")
+    window: WindowGroup = group("window")
+    worst: WorstGroup = group("worst")
+    drawn: DrawnGroup = group("drawn")
+    warning: tuple[str, ...] = dataset("warning", "what to know about flights and model", "warning")
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        asked: ReplayOptions,
+        flights: Sequence[LoggedFlight],
+        played: Sequence[Played],
+        replay: Replay,
+        warnings: Sequence[str],
+    ) -> Self:
+        """Arrange a replay.
+
+        Parameters
+        ----------
+        name : str
+            Of the model.
+        """
+        from cpfls_cli.playback.replay import PREDICTIONS
+
+        errors, windows, period = replay.errors, replay.windows, played[0].flight.motion.period
+        groups = {signal: SignalErrorGroup.of(found) for signal, found in errors.items()}
+        assert groups["body_rate"] is not None, "every flight has rates"
+        horizon = groups["body_rate"].mae.shape[1]
+        return cls(
+            played=name,
+            prediction=PREDICTIONS,
+            asked_s=asked.horizon_s,
+            every=asked.every,
+            hold=asked.hold or USUAL,
+            horizon_s=period * np.arange(1, horizon + 1),
+            diverged=(windows.diverged >= 0).sum(axis=1),
+            flight=PlayedFlightsGroup.of(flights, played, windows),
+            window=WindowGroup.of(windows, [flight.time for flight in flights], period),
+            worst=WorstGroup.of(windows, played, horizon),
+            drawn=DrawnGroup.of(windows, played, horizon),
+            warning=tuple(warnings),
+            **groups,  # type: ignore[arg-type]  # only the body rate is always known
+        )
+
+    @property
+    def errors(self) -> Mapping[str, SignalErrorGroup | None]:
+        """Errors by signal, what is asked of first first."""
+        return {
+            "body_rate": self.body_rate,
+            "attitude": self.attitude,
+            "velocity": self.velocity,
+            "position": self.position,
+        }
+
+    @property
+    def windows(self) -> int:
+        """Number of windows."""
+        return len(self.window.start)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The replay for machines."""
+        return {
+            "played": self.played,
+            "horizon_s": self.horizon_s.tolist(),
+            "windows": self.windows,
+            "models": {name: self._prediction(index) for index, name in enumerate(self.prediction)},
+            "flights": [
+                {
+                    "name": name,
+                    "windows": int(windows),
+                    "driven_by": actuation,
+                    "hold": hold,
+                    "rotation_alone": bool(alone),
+                }
+                for name, windows, actuation, hold, alone in zip(
+                    self.flight.name,
+                    self.flight.windows,
+                    self.flight.actuation,
+                    self.flight.hold,
+                    self.flight.rotation_alone,
+                    strict=True,
+                )
+            ],
+            "worst": [
+                {
+                    "flight": self.flight.name[self.window.flight[index]],
+                    "start_s": float(self.window.start[index]),
+                    "error_rad_s": float(self.window.error[_MODEL, index]),
+                }
+                for index in self.worst.window
+            ],
+            "warnings": list(self.warning),
+        }
+
+    def _prediction(self, index: int) -> dict[str, Any]:
+        signals = {name: None if found is None else found.summary(index) for name, found in self.errors.items()}
+        return {**signals, "diverged": int(self.diverged[index])}

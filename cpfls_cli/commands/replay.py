@@ -1,0 +1,51 @@
+"""Command `replay`: a model played back along flights, beside what it has to beat."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.replay import ReplayRecord
+from cpfls_cli.commands.compare import flight_roles
+from cpfls_cli.errors import InputError
+from cpfls_cli.flights.playback import flights_to_play, is_vehicle, model_to_play
+from cpfls_cli.pages.replay import answer
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.replay import ReplayOptions, replay
+from cpfls_cli.report.outcome import Outcome, nothing_written
+
+
+def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) -> Outcome:
+    """Play a model back along flights and write its errors by horizon.
+
+    Parameters
+    ----------
+    model : Path
+        Any model; the word ``vehicle`` for the vehicle of the config.
+    flights : sequence of Path
+        Artifacts, or logs that the config describes.
+    """
+    of_model = {} if is_vehicle(model) else {"model": model}
+    inputs = begin(job, of_model | flight_roles("flight", flights))
+    to_play = model_to_play(model, job.study)
+    given = flights_to_play(flights, job.study, options.hold)
+    played = [to_play.played(flight) for flight in given]
+    horizon = _samples(options.horizon_s, given[0])
+    for each in played:
+        each.flight.starts(horizon, options.every)
+    if job.dry_run:
+        return nothing_written(job)
+    errors = replay(played, horizon, options.every, lambda done: job.progress(done, 1))
+    repairs = [f"{model.name} takes a fault of the sensors out of the flights first: {r}" for r in to_play.repairs]
+    warnings = [*(warning for flight in given for warning in flight.warnings), *repairs]
+    record = finish(job, ReplayRecord.of(model.name, options, given, played, errors, warnings), inputs)
+    return Outcome(record.summary, tuple(answer(source_of(job, record))))
+
+
+def _samples(horizon_s: float, flight: LoggedFlight) -> int:
+    period = flight.parts[0].period
+    if horizon_s < 0.5 * period:
+        raise InputError(f"--horizon {horizon_s:g} s is shorter than a sample of {flight.name}, {period:.4g} s")
+    return round(horizon_s / period)

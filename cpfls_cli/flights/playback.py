@@ -1,0 +1,228 @@
+"""Flights to be played back, all their stretches, and any file of a model as what plays them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import find_objects
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.replay import VEHICLE
+from cpfls_cli.artifacts.store import holds
+from cpfls_cli.config.study import Study
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
+from cpfls_cli.flights.recordings import ReadFlight, read_flight, signals_of, with_voltage
+from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.gap.balance.windows import Recording
+from cpfls_cli.gap.extended import ExtendedModel
+from cpfls_cli.gap.playback import extended_player
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.replay import Played, Player, player_of
+from cpfls_cli.playback.rotors import Hold
+
+_STATE = ("body_rate", "attitude", "velocity", "position")
+_ACTUATION = ("rotor_speed", "rotor_command", "body_torque")
+_BESIDE = ("acceleration", "specific_force", "voltage", "thrust")
+_PAUSE = 1.5
+"""Steps of the clock from which on there is a pause."""
+
+_FEWEST = 8
+"""Samples of a stretch, which effects with derivatives need."""
+
+_SAME_PERIOD = 1e-3
+
+
+def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = None) -> tuple[LoggedFlight, ...]:
+    """Read flights, and import those that are logs.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Artifacts of the format ``cpfls/flight``, or logs that the section `import` describes.
+    hold : {"linear", "previous"} or None
+        What a speed is between samples; None: measured ones a straight line, commands what they were.
+
+    Raises
+    ------
+    InputError
+        If a flight is of another vehicle, has no actuation, is not uniform in time, or has another rate than the first.
+    """
+    read = [read_flight(path, study) for path in paths]
+    flights = _of_full_battery([_flight(flight, study, hold) for flight in read], read)
+    first = flights[0]
+    for flight in flights[1:]:
+        periods = [each.parts[0].period for each in (flight, first)]
+        if abs(periods[0] - periods[1]) > _SAME_PERIOD * periods[1]:
+            rates = [f"{1 / period:.4g} Hz" for period in periods]
+            raise InputError(
+                f"{flight.name}: sampled at {rates[0]}, {first.name} at {rates[1]}; play them back one by one, or "
+                "import them with import.rate_hz"
+            )
+    return tuple(flights)
+
+
+def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight:
+    actuation = next((name for name in _ACTUATION if name in flight.signals), None)
+    if actuation is None:
+        raise InputError(
+            f"{flight.name}: has no rotor_speed, rotor_command or body_torque, so nothing drives a playback; name "
+            "their columns in import.signals"
+        )
+    stretches = _stretches(flight, actuation)
+    made = [signals_of(flight, _known(flight, actuation, part), study) for part in stretches]
+    parts = tuple(signals for signals, _ in made)
+    warnings = [*flight.warnings, *made[0][1], *_warnings(flight, stretches, parts[0])]
+    usual: Hold = "linear" if actuation == "rotor_speed" else "previous"
+    words = {
+        "rotor_speed": "measured rotor speeds",
+        "rotor_command": "rotor commands",
+        "body_torque": "stated torque" if parts[0].stated_thrust is None else "stated torque and thrust",
+    }
+    named = tuple(f"{flight.name}: {warning}" for warning in warnings)
+    return LoggedFlight(flight.name, parts, hold or usual, words[actuation], named)
+
+
+def _stretches(flight: ReadFlight, actuation: str) -> list[slice]:
+    """Find the stretches without pauses in which all that is played back is known."""
+    time = flight.signals["time"]
+    known = np.ones(len(time), dtype=bool)
+    for name in (*_STATE, actuation):
+        if name in flight.signals:
+            known &= _finite(flight.signals[name])
+    steps = np.diff(time)
+    paused = steps > _PAUSE * np.median(steps) if len(steps) else np.zeros(0, dtype=bool)
+    number = np.concatenate([[1], 1 + np.cumsum(paused | (known[1:] != known[:-1]))])
+    found = [part for (part,) in find_objects(number) if known[part.start]]
+    long = [stretch for stretch in found if stretch.stop - stretch.start >= _FEWEST]
+    if not long:
+        raise InputError(f"{flight.name}: no {_FEWEST} samples one after another at which all of its signals are known")
+    return long
+
+
+def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:
+    """Cut out a stretch, with what is known in all of it."""
+    names = [name for name in ("time", *_STATE, actuation) if name in flight.signals]
+    beside = [name for name in _BESIDE if name in flight.signals and _finite(flight.signals[name][part]).all()]
+    return {name: flight.signals[name][part] for name in (*names, *beside)}
+
+
+def _finite(values: Array) -> BoolArray:
+    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+
+
+def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) -> list[str]:
+    warnings = []
+    used, samples = sum(part.stop - part.start for part in stretches), len(flight.signals["time"])
+    if len(stretches) > 1 or used < samples:
+        warnings.append(
+            f"{len(stretches)} stretches without a pause, {used} of {samples} samples; no window crosses from one to "
+            "the next"
+        )
+    lacks = [name for name in ("attitude", "velocity") if getattr(signals, name) is None]
+    if signals.rotor_speed is None and signals.stated_thrust is None:
+        lacks.append("thrust")
+    if lacks:
+        warnings.append(f"lacks {' and '.join(lacks)}, so rotation alone is played back")
+    return warnings
+
+
+def _of_full_battery(flights: Sequence[LoggedFlight], read: Sequence[ReadFlight]) -> list[LoggedFlight]:
+    """Take a voltage in V as a share of the largest of all flights."""
+    owners = [index for index, flight in enumerate(flights) for _ in flight.parts]
+    recordings = [Recording(flight.name, part) for flight in flights for part in flight.parts]
+    scaled, _ = with_voltage(recordings, [read[index] for index in owners])
+    parts = [[r.signals for r, owner in zip(scaled, owners, strict=True) if owner == i] for i in range(len(flights))]
+    return [replace(flight, parts=tuple(own)) for flight, own in zip(flights, parts, strict=True)]
+
+
+@dataclass(frozen=True)
+class ModelToPlay:
+    """A model that plays flights back.
+
+    Attributes
+    ----------
+    made : callable
+        From a flight to what is played back, faults of sensors taken out, and the model made ready for it.
+    needs_attitude : bool
+    is_stated : bool
+        Whether it is the vehicle that the config states.
+    repairs : tuple of str
+        Faults of sensors that it takes out of a flight first.
+    """
+
+    made: Callable[[LoggedFlight], tuple[PlaybackFlight, Player]]
+    needs_attitude: bool = False
+    is_stated: bool = False
+    repairs: tuple[str, ...] = ()
+
+    def played(self, flight: LoggedFlight) -> Played:
+        """Make a flight and the model ready for playback, beside the vehicle that the config states.
+
+        Raises
+        ------
+        InputError
+            If the flight lacks a signal that the model needs.
+        """
+        if self.needs_attitude and flight.parts[0].attitude is None:
+            raise InputError(f"{flight.name}: lacks the attitude, which the model needs: its inertia depends on it")
+        along, player = self.made(flight)
+        if self.is_stated:
+            return Played(along, player, player)
+        stated = player_of(VehicleModel(vehicle=flight.parts[0].vehicle), _with_speed_as_logged(along, flight))
+        return Played(along, player, stated)
+
+
+def _with_speed_as_logged(along: PlaybackFlight, flight: LoggedFlight) -> PlaybackFlight:
+    """Undo the lag of a model: the stated vehicle has none."""
+    logged = flight.playback
+    return replace(along, speed=logged.speed, wrench=logged.wrench, hold=logged.hold)
+
+
+def model_to_play(path: Path, study: Study) -> ModelToPlay:
+    """Read any model.
+
+    Parameters
+    ----------
+    path : Path
+        An artifact, or the word `VEHICLE`.
+
+    Raises
+    ------
+    InputError
+        If it is none, or of another vehicle than that of the config.
+    """
+    if is_vehicle(path):
+        return _whole(VehicleModel(vehicle=study.vehicle), stated=True)
+    if holds(path, ExtendedRecord):
+        return _extended(read_of_vehicle(path, ExtendedRecord, study).rebuilt(path))
+    # Further formats of models are added here.
+    identified = read_of_vehicle(path, ModelRecord, study).rebuilt(path)
+    return _whole(VehicleModel(vehicle=study.vehicle, fuzzy=identified))
+
+
+def is_vehicle(path: Path) -> bool:
+    """Tell whether the vehicle of the config is meant; a file of that name has to be given with its folder."""
+    return str(path) == VEHICLE
+
+
+def _whole(model: VehicleModel, *, stated: bool = False) -> ModelToPlay:
+    def made(flight: LoggedFlight) -> tuple[PlaybackFlight, Player]:
+        logged = flight.playback
+        return logged, player_of(model, logged)
+
+    return ModelToPlay(made, needs_attitude=model.fuzzy is not None, is_stated=stated)
+
+
+def _extended(model: ExtendedModel) -> ModelToPlay:
+    def made(flight: LoggedFlight) -> tuple[PlaybackFlight, Player]:
+        return extended_player(model, flight.name, [model.repaired(part) for part in flight.parts], flight.hold)
+
+    repairs = () if model.audit is None else tuple(finding.sentence for finding in model.audit.named)
+    return ModelToPlay(made, needs_attitude=model.base is not None, repairs=repairs)

@@ -1,0 +1,349 @@
+"""The page of a replay: to which horizon a model predicts motion better than nothing does, and where it is worst."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.replay import VEHICLE, DrawnGroup, ReplayRecord, SignalErrorGroup
+from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.report.canvas import (
+    BASELINE,
+    GREY,
+    HELD,
+    legend_over,
+    line,
+    plain_ticks,
+    plot,
+    runs,
+    stacked,
+    style_of,
+)
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.numbers import joined, number, sentence, whole_percent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MODEL, _NOTHING, _RATE, _STATED = range(4)
+_WORDS = ("the model", "nothing moves", "rate stays", "stated vehicle")
+_SIGNALS = {
+    "body_rate": ("body rate", "rad/s", 1.0),
+    "attitude": ("attitude", "°", 180.0 / np.pi),
+    "velocity": ("velocity", "m/s", 1.0),
+    "position": ("position", "m", 1.0),
+}
+_STYLES: tuple[dict[str, Any], ...] = (
+    {**style_of(0), "linewidth": 2.0, "zorder": 3},
+    HELD,
+    BASELINE,
+    {"color": GREY, "linestyle": "-", "linewidth": 0.9},
+)
+_PLAYED: dict[str, Any] = {**style_of(1), "linestyle": "-", "zorder": 3}
+_SHOWN_WORST = 3
+_ROUNDING = 1e-9
+_SAID = 2
+_POSITIONS = ("x", "y", "z")
+
+
+def answer(replay: Source[ReplayRecord], index: int = 1) -> Iterator[Block]:
+    """Say to which horizon a model is better than what it has to beat, by how much, and where it is worst.
+
+    Parameters
+    ----------
+    index : int
+        Number of the replay on its page.
+    """
+    yield verdict_box(replay)
+    yield from _grounds(replay.record, index)
+
+
+def _grounds(record: ReplayRecord, index: int) -> Iterator[Block]:
+    yield _errors_table(record, index)
+    yield _worst_table(record, index)
+    yield from (Text(words, "warning") for words in (*_diverged(record), *record.warning))
+
+
+def verdict_box(replay: Source[ReplayRecord]) -> Box:
+    """Say to which horizon a model is better than what it has to beat, and by how much."""
+    record = replay.record
+    rivals = _rivals(record)
+    beaten = [group.total[_MODEL] < group.total[rival] for group, rival in rivals.values()]
+    tone, title = ("good", "predicts better") if all(beaten) else ("warning", "predicts worse")
+    signals = [_SIGNALS[name][0] for (name, _), good in zip(rivals.items(), beaten, strict=True) if good == all(beaten)]
+    horizon = _seconds(record.horizon_s[-1])
+    whole = f"{_name(record)} {title} than what it has to beat, over {horizon}: {joined(signals)}."
+    sentences = [_sentence(record, name, group, rival) for name, (group, rival) in rivals.items()]
+    return Box("REPLAY", sentence(whole), [*sentences, *_beside_stated(record)], tone)  # type: ignore[arg-type]
+
+
+def _name(record: ReplayRecord) -> str:
+    return "the vehicle of the config" if record.played == VEHICLE else record.played
+
+
+def _rivals(record: ReplayRecord) -> dict[str, tuple[SignalErrorGroup, int]]:
+    """Pair each signal with what a model has to beat in it: the better of the two that know no model."""
+    known = {name: group for name, group in record.errors.items() if group is not None}
+    return {name: (g, _RATE if g.total[_RATE] < g.total[_NOTHING] else _NOTHING) for name, g in known.items()}
+
+
+def _sentence(record: ReplayRecord, name: str, group: SignalErrorGroup, rival: int) -> str:
+    words, (model, other) = _SIGNALS[name][0].capitalize(), group.total[[_MODEL, rival]]
+    if other == 0:
+        return f"{words}: “{_WORDS[rival]}” has no error, for the flight shows no motion."
+    if model < other:
+        much = f"over all horizons its errors are {whole_percent(float(1 - model / other))} smaller"
+    else:
+        much = f"over all horizons its errors are {number(float(model / other), 3)} times as large"
+    return f"{words}: {_where(record, group, rival)}; {much}."
+
+
+def _where(record: ReplayRecord, group: SignalErrorGroup, rival: int) -> str:
+    """Say at which horizons the model is better: at the longest stretches of them, where they are many."""
+    better = group.mae[_MODEL] < (1 - _ROUNDING) * group.mae[rival]
+    longest = sorted(sorted(runs(better), key=lambda run: run[0] - run[1])[:_SAID])
+    horizon = [_seconds(value) for value in record.horizon_s]
+    stretches = [f"{horizon[a]} to {horizon[b]}" if a < b else horizon[a] for a, b in longest]
+    other = f"“{_WORDS[rival]}”"
+    if better.all():
+        return f"better than {other} at every horizon to {horizon[-1]}"
+    return f"better than {other} at {joined(stretches)}" if stretches else f"better than {other} at no horizon"
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.3g} s"
+
+
+def _beside_stated(record: ReplayRecord) -> Iterator[str]:
+    if record.played != VEHICLE:
+        total = record.body_rate.total
+        share = whole_percent(float(total[_MODEL] / total[_STATED])) if total[_STATED] > 0 else "—"
+        yield f"The errors of its body rates are {share} of those of the vehicle that the config states."
+
+
+def _diverged(record: ReplayRecord) -> Iterator[str]:
+    for index, count in enumerate(record.diverged.tolist()):
+        if count and not (index == _STATED and record.played == VEHICLE):
+            who, where = (_name(record), f", first {_first_lost(record)}") if index == _MODEL else (_WORDS[index], "")
+            yield (
+                f"{who}: runs away in {count} of {record.windows} windows{where}; a run is stopped there and counts as "
+                "it stood"
+            )
+
+
+def _first_lost(record: ReplayRecord) -> str:
+    index = int(np.flatnonzero(np.isfinite(record.window.diverged))[0])
+    begin, after = record.window.start[index], record.window.diverged[index]
+    flight = record.flight.name[record.window.flight[index]]
+    return f"in {flight} from {begin:.2f} s after {after:.3g} s"
+
+
+def _chosen_horizons(record: ReplayRecord) -> list[int]:
+    """Choose the first horizon, a fifth of the longest, and the longest."""
+    last = len(record.horizon_s) - 1
+    return sorted({0, max((last + 1) // 5 - 1, 0), last})
+
+
+def _shown(record: ReplayRecord) -> list[int]:
+    """List the predictions that are shown: the stated vehicle once."""
+    return [_MODEL, _NOTHING, _RATE, *([] if record.played == VEHICLE else [_STATED])]
+
+
+def _errors_table(record: ReplayRecord, index: int) -> Table:
+    chosen = _chosen_horizons(record)
+    rows: list[list[str | Cell]] = []
+    for name, (group, rival) in _rivals(record).items():
+        words, unit, scale = _SIGNALS[name]
+        for row in _shown(record):
+            values = [*(scale * group.mae[row, chosen]), scale * group.total[row]]
+            worse = row == _MODEL and group.total[_MODEL] >= group.total[rival]
+            cells = [number(float(value), 3) for value in values]
+            rows.append(
+                [
+                    f"{words}, {unit}" if row == 0 else "",
+                    _WORDS[row],
+                    *cells[:-1],
+                    Cell(cells[-1], "warning" if worse else "plain"),
+                ]
+            )
+    header = ("Error of", "Prediction", *(f"After {_seconds(record.horizon_s[h])}" for h in chosen), "Sum")
+    caption = (
+        f"Mean error of {_name(record)} over {record.windows} windows of {joined(record.flight.name)}, played back "
+        "without correction; sum over all horizons."
+    )
+    return Table(f"replay-{index}", caption, header, rows, frozenset({0, 1}))
+
+
+def _worst_table(record: ReplayRecord, index: int) -> Table:
+    window = record.window
+    rows = [
+        [
+            str(rank),
+            record.flight.name[window.flight[at]],
+            f"{window.start[at]:.2f}",
+            *(number(float(window.error[row, at]), 3) for row in (_MODEL, _NOTHING)),
+        ]
+        for rank, at in enumerate(record.worst.window, start=1)
+    ]
+    caption = (
+        "The windows in which the body rate is farthest off, mean over the horizon in rad/s; none overlaps another."
+    )
+    header = ("Worst", "Flight", "From, s", "The model", "Nothing moves")
+    return Table(f"replay-worst-{index}", caption, header, rows, frozenset({0, 1}))
+
+
+def replay_section(sources: Sources) -> Section | None:
+    """Show how models predict the motion of flights.
+
+    Returns
+    -------
+    Section or None
+        None where no replay was given.
+    """
+    return section_of_each("replay", "Played back along flights", sources.replays, _section)
+
+
+def _section(replay: Source[ReplayRecord], index: int) -> Iterator[Block]:
+    record = replay.record
+    yield Heading(replay.label)
+    yield Facts(_facts(record))
+    yield from _grounds(record, index)
+    if len(record.horizon_s) > 1:
+        yield horizon_figure(f"replay-errors-{index}", record)
+        yield worst_figure(f"replay-worst-windows-{index}", record)
+        yield drawn_figure(f"replay-drawn-{index}", record)
+    yield where_figure(f"replay-where-{index}", record)
+
+
+def _facts(record: ReplayRecord) -> list[tuple[str, str]]:
+    flight = record.flight
+    words = {"linear": "a straight line between samples", "previous": "held between samples"}
+    driven = [
+        f"{name}: {count} windows, driven by {actuation}, {words[hold]}"
+        for name, count, actuation, hold in zip(flight.name, flight.windows, flight.actuation, flight.hold, strict=True)
+    ]
+    every = "every sample" if record.every == 1 else f"one in {record.every} samples"
+    return [
+        ("Played back", _name(record)),
+        ("Along", "; ".join(driven)),
+        ("From", f"{every}, for {_seconds(record.horizon_s[-1])}"),
+    ]
+
+
+def horizon_figure(name: str, record: ReplayRecord) -> Plot:
+    """Draw the mean error over the horizon, beside what a model has to beat."""
+    groups = _rivals(record)
+
+    def draw(figure: Figure) -> None:
+        panels = stacked(figure, len(groups))
+        for axes, (signal, (group, _)) in zip(panels, groups.items(), strict=True):
+            words, unit, scale = _SIGNALS[signal]
+            values = scale * group.mae
+            for row in reversed(_shown(record)):
+                line(axes, record.horizon_s, values[row], label=_WORDS[row], **_STYLES[row])
+            top = 1.6 * float(values[[_MODEL, _NOTHING, _RATE]].max())
+            axes.set_ylim(0.0, min(top, 1.06 * float(values.max())) or 1.0)
+            axes.set_title(f"{words}, {unit}")
+        panels[-1].set_xlabel("horizon, s")
+        legend_over(figure, panels[0])
+
+    caption = (
+        f"Mean error of {_name(record)} after so many seconds without correction. Grey: what it has to beat. A curve "
+        "that leaves the top of a panel is farther off than the panel is high."
+    )
+    return plot(
+        name, caption, "Mean error by horizon, of the model and of what it has to beat", 0.9 + 1.7 * len(groups), draw
+    )
+
+
+def worst_figure(name: str, record: ReplayRecord) -> Plot:
+    """Draw the body rates of flight and model in the windows in which the model is worst."""
+    worst, window = record.worst, record.window
+    shown = range(min(_SHOWN_WORST, len(worst.window)))
+    time = np.concatenate([[0.0], record.horizon_s])
+
+    def draw(figure: Figure) -> None:
+        grid = figure.subplots(len(AXES), len(shown), sharex=True, squeeze=False)
+        for column in shown:
+            at = worst.window[column]
+            flight = record.flight.name[window.flight[at]]
+            grid[0][column].set_title(f"{column + 1}: {flight}, {window.start[at]:.2f} s")
+            for row, axes in enumerate(grid[:, column]):
+                measured, model = worst.measured[column, :, row], worst.model[column, :, row]
+                line(axes, time, measured, label="flight", **MEASURED)
+                line(axes, time, model, label="playback", **_PLAYED)
+                keep_in_view(axes, [measured], model)
+                axes.set_ylabel(AXES[row] if column == 0 else "")
+        figure.supxlabel("time from the begin, s", fontsize=9.5)
+        figure.supylabel("body rate, rad/s", fontsize=9.5)
+        legend_over(figure, grid[0][0])
+
+    caption = "Body rates in the windows in which the model is farthest off: the flight, and its playback."
+    return plot(name, caption, "Body rates of flight and playback in the worst windows", 5.0, draw)
+
+
+def drawn_figure(name: str, record: ReplayRecord) -> Plot:
+    """Draw a stretch of a flight beside its playback, which begins anew after each horizon."""
+    drawn, window = record.drawn, record.window
+    flight = record.flight.name[window.flight[drawn.window[0]]]
+    times = window.start[drawn.window][:, None] + np.concatenate([[0.0], record.horizon_s])
+    panels_of: list[tuple[str, Array, Array]] = [
+        (f"rate about {axis}, rad/s", *_rates(drawn, index)) for index, axis in enumerate(AXES)
+    ]
+    if drawn.measured_position is not None and drawn.model_position is not None:
+        measured_position, model_position = drawn.measured_position, drawn.model_position
+        panels_of += [
+            (f"position {axis}, m", measured_position[:, :, index], model_position[:, :, index])
+            for index, axis in enumerate(_POSITIONS)
+        ]
+
+    def draw(figure: Figure) -> None:
+        panels = stacked(figure, len(panels_of))
+        for axes, (title, measured, model) in zip(panels, panels_of, strict=True):
+            for run, time in enumerate(times):
+                labels = ("flight", "playback") if run == 0 else (None, None)
+                line(axes, time, measured[run], label=labels[0], **MEASURED)
+                line(axes, time, model[run], label=labels[1], **_PLAYED)
+            keep_in_view(axes, [measured], model)
+            axes.set_title(title)
+        panels[-1].set_xlabel("time, s")
+        legend_over(figure, panels[0])
+
+    caption = (
+        f"A stretch of {flight} beside its playback, which begins anew from the flight after each horizon. Of all such "
+        "stretches half are better and half are worse."
+    )
+    return plot(name, caption, "A flight beside its playback over time", 0.8 + 1.25 * len(panels_of), draw)
+
+
+def _rates(drawn: DrawnGroup, axis: int) -> tuple[Array, Array]:
+    return drawn.measured[:, :, axis], drawn.model[:, :, axis]
+
+
+def where_figure(name: str, record: ReplayRecord) -> Plot:
+    """Draw how far off the model is over the time of each flight."""
+    window = record.window
+
+    def draw(figure: Figure) -> None:
+        panels = list(figure.subplots(len(record.flight.name), 1, squeeze=False)[:, 0])
+        for index, (axes, flight) in enumerate(zip(panels, record.flight.name, strict=True)):
+            own = window.flight == index
+            nothing, model = window.error[_NOTHING, own], window.error[_MODEL, own]
+            line(axes, window.start[own], nothing, label=_WORDS[_NOTHING], **HELD)
+            line(axes, window.start[own], model, label=_WORDS[_MODEL], **style_of(0))
+            keep_in_view(axes, [nothing], model)
+            axes.set_ylim(bottom=0.0)
+            plain_ticks(axes.yaxis)
+            axes.set_title(flight)
+        figure.supylabel("error of the body rate, rad/s", fontsize=9.5)
+        panels[-1].set_xlabel("begin of the window, s")
+        legend_over(figure, panels[0])
+
+    caption = "Where the model is good: mean error of the body rate over the horizon, by the begin of the window."
+    return plot(
+        name, caption, "Error of the body rate over the time of each flight", 0.9 + 1.3 * len(record.flight.name), draw
+    )

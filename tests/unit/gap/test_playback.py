@@ -1,0 +1,104 @@
+"""A model with effects played back along a flight that has them: true numbers predict it, whatever the effect."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
+from cpfls_cli.errors import InputError
+from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
+from cpfls_cli.gap.playback import extended_player
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.replay import Played, player_of, replay
+from cpfls_cli.simulation import simulated_effects
+from tests.builders.closed_loop_flights import VEHICLE, flown, signals_of
+
+PARAMETERS = [coefficient.name for coefficient in VEHICLE_NUMBERS.coefficients]
+# By how much the true model's rates are better than those of the stated vehicle. What comes late is known to a sample
+# of the log, and what is evaluated along the motion has no state of its own.
+EFFECTS = {
+    "linear_damping": ({"d_x": 0.3, "d_y": 0.3, "d_z": 0.2}, 0.02),
+    "rotor_drag": ([3e-4], 0.02),
+    "products_of_inertia": ({"Ixy": 0.08, "Ixz": -0.06}, 0.02),
+    "com_offset": ([0.01, -0.006], 0.02),
+    "rotor_mismatch": ([0.04, -0.03, 0.0, 0.0], 0.02),
+    "wind": ([4e-4, 3.0, -2.0], 0.02),
+    "motor_lag": ([0.05], 0.1),
+    "command_delay": ([0.04], 0.1),
+}
+
+
+def model_of(asked):
+    """The true model of a simulated flight."""
+    flying = simulated_effects(asked, VEHICLE).listed
+    fitted = [FittedEffect(Candidate(CATALOGUE[one.effect.name], one.shape), np.asarray(one.linear)) for one in flying]
+    return ExtendedModel(None, np.zeros(len(PARAMETERS)), tuple(fitted))
+
+
+def played_back(model, signals, horizon=30, hold="linear"):
+    flight, player = extended_player(model, "flight", [signals], hold)
+    found = replay([Played(flight, player, player_of(VehicleModel(vehicle=VEHICLE), flight))], horizon, 5)
+    return {name: errors.mae.sum(axis=1) for name, errors in found.errors.items()}, flight
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_the_true_effect_predicts_the_flight(name):
+    values, share = EFFECTS[name]
+    signals = signals_of(flown(effects={name: values}))
+    # The stated vehicle is played back along the speeds as logged.
+    stated, _ = played_back(model_of({}), signals)
+    errors, _ = played_back(model_of({name: values}), signals)
+    assert errors["body_rate"][0] < share * stated["body_rate"][0]
+    assert errors["attitude"][0] < share * stated["attitude"][0]
+
+
+def test_without_effects_it_is_the_vehicle_of_the_config():
+    errors, _ = played_back(model_of({}), signals_of(flown()))
+    for by_prediction in errors.values():
+        assert by_prediction[0] == pytest.approx(by_prediction[3])
+
+
+def test_wrong_numbers_of_the_vehicle_are_in_inertia_and_thrust():
+    signals = signals_of(flown())
+    model = model_of({})
+    model.parameters[[PARAMETERS.index(name) for name in ("inertia_x", "coupling_y", "thrust_scale")]] = 0.2, 0.3, 0.1
+    flight, player = extended_player(model, "flight", [signals], "linear")
+    np.testing.assert_allclose(player.body.inertia, np.diag([0.72, 0.6, 1.2]))
+    used, weights = player.step_weights(slice(0, 5))
+    plain, stated = player_of(VehicleModel(vehicle=VEHICLE), flight).step_weights(slice(0, 5))
+    assert plain.active.tolist() == [0]
+    np.testing.assert_allclose(weights[:, :3, 0], stated[:, :3, 0])
+    np.testing.assert_allclose(weights[:, 5, 0], 1.1 * stated[:, 5, 0])
+    # Of the catalogue: -g_y (I_x + I_z) / 2 times the other two rates.
+    (coupled,) = [index for index, term in enumerate(used.active) if term and weights[0, 1, index]]
+    assert weights[0, 1, coupled] == pytest.approx(-0.3 * 0.9)
+
+
+def test_a_lag_leaves_measured_speeds_as_they_are():
+    signals = signals_of(flown())
+    errors, flight = played_back(model_of({"motor_lag": [0.05]}), signals)
+    np.testing.assert_array_equal(flight.speed, signals.rotor_speed)
+    assert errors["body_rate"][0] < 0.01 * errors["body_rate"][2]
+
+
+def test_what_the_flight_lacks_is_named():
+    signals = signals_of(flown())
+    blind = type(signals)(time=signals.time, body_rate=signals.body_rate, vehicle=VEHICLE, rotor_speed=signals.speed)
+    with pytest.raises(InputError, match="flight: lacks velocity, which the model's effect rotor_drag needs"):
+        extended_player(model_of({"rotor_drag": [3e-4]}), "flight", [blind], "linear")
+
+
+def test_stretches_are_played_apart():
+    signals = signals_of(flown(effects={"wind": [4e-4, 3.0, -2.0]}))
+    model = model_of({"wind": [4e-4, 3.0, -2.0]})
+    names = ("time", "body_rate", "attitude", "velocity", "position", "acceleration", "rotor_speed")
+    parts = [
+        type(signals)(vehicle=VEHICLE, **{name: getattr(signals, name)[part] for name in names})
+        for part in (slice(0, 120), slice(150, 300))
+    ]
+    flight, player = extended_player(model, "flight", parts, "linear")
+    assert [part.stop - part.start for part in flight.stretches] == [120, 150]
+    found = replay([Played(flight, player, player)], 30, 5)
+    whole, _ = played_back(model, signals)
+    rates = found.errors["body_rate"].mae.sum(axis=1)
+    assert rates[0] < 2 * whole["body_rate"][0]

@@ -1,0 +1,306 @@
+"""Playback beside integration by another library, baselines beside their formulas, windows beside their stretches."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.dynamics.equations_of_motion import identified_turning
+from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
+from cpfls_cli.errors import InputError
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.replay import (
+    MODEL,
+    NOTHING_MOVES,
+    RATE_STAYS,
+    SIGNALS,
+    STATED,
+    Played,
+    free_runs,
+    player_of,
+    replay,
+    rotation_vectors,
+)
+from cpfls_cli.regressor.regressor import InertiaValues
+from cpfls_cli.rotations import euler_angles
+from cpfls_cli.vehicle.rotors import body_wrench
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+VEHICLE = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.02, -0.03, 0.01))
+INERTIA = np.array([[0.6, 0.02, -0.03], [0.02, 0.7, 0.01], [-0.03, 0.01, 1.2]])
+DAMPING, DRAG = np.array([0.3, 0.2, 0.1]), 2e-4
+EFFECTS = (ModelEffect("linear_damping", {}, DAMPING), ModelEffect("rotor_drag", {}, np.array([DRAG])))
+HUBS = np.array([rotor.position_m for rotor in VEHICLE.rotors])
+PLANE = np.array([1.0, 1.0, 0.0])
+
+
+def flight_of(samples=80, period=0.01, seed=0, **changes):
+    """A flight at random: a playback is held against another one, not against what any vehicle does."""
+    rng = np.random.default_rng(seed)
+    time = period * np.arange(samples)
+    turns = 0.4 * np.sin(np.outer(time, rng.uniform(1, 3, 3)) + rng.uniform(0, 6, 3))
+    motion = Motion(
+        position=rng.uniform(-1, 1, 3) + np.outer(time, rng.uniform(-1, 1, 3)),
+        velocity=np.cos(np.outer(time, rng.uniform(1, 3, 3)) + rng.uniform(0, 6, 3)),
+        rotation=Rotation.from_euler("ZYX", turns).as_matrix(),
+        rate=1.5 * np.sin(np.outer(time, rng.uniform(1, 3, 3)) + rng.uniform(0, 6, 3)),
+        period=period,
+    )
+    hover = np.sqrt(6 * 9.81 / 4 / VEHICLE.rotors[0].thrust_factor_n_s2)
+    speed = hover * (1 + 0.05 * np.sin(np.outer(time, rng.uniform(2, 6, 4)) + rng.uniform(0, 6, 4)))
+    given = {"name": "flight", "motion": motion, "speed": speed, "hold": "linear", "stretches": (slice(0, samples),)}
+    return PlaybackFlight(**{**given, **changes})
+
+
+def integrated(flight, start, horizon, acceleration):
+    """Integrate the state by scipy from a sample; `acceleration(rotation, air, rate, speed)` gives both derivatives."""
+    motion, period = flight.motion, flight.motion.period
+    time = period * np.arange(len(flight))
+
+    def slope(at, state):
+        speed = np.array([np.interp(at, time, rotor) for rotor in flight.speed.T])
+        rotation, velocity, rate = state[6:15].reshape(3, 3), state[3:6], state[15:]
+        linear, angular = acceleration(rotation, rotation.T @ velocity, rate, speed)
+        return np.concatenate([velocity, linear, np.cross(rotation, rate[None]).ravel(), angular])
+
+    first = [motion.position[start], motion.velocity[start], motion.rotation[start].ravel(), motion.rate[start]]
+    ends = time[start], time[start + horizon]
+    done = solve_ivp(slope, ends, np.concatenate(first), rtol=1e-10, atol=1e-12, max_step=period)
+    end = done.y[:, -1]
+    return end[:3], end[3:6], end[6:15].reshape(3, 3), end[15:]
+
+
+def wrench_with_effects(air, rate, speed):
+    """Rotors, damping, and drag of each rotor in its plane, written out."""
+    rotors = body_wrench(VEHICLE, speed[None])
+    pushes = -DRAG * speed[:, None] * (air + np.cross(rate, HUBS)) * PLANE
+    torque = rotors.body_torque[0] - DAMPING * rate + np.cross(HUBS, pushes).sum(axis=0)
+    return torque, np.array([0.0, 0.0, rotors.thrust[0]]) + pushes.sum(axis=0)
+
+
+def of_rigid_body(rotation, air, rate, speed):
+    torque, force = wrench_with_effects(air, rate, speed)
+    angular = np.linalg.solve(INERTIA, torque - np.cross(rate, INERTIA @ rate))
+    return rotation @ force / 6.0 - [0, 0, 9.81], angular
+
+
+def off(flight, start, horizon, model, acceleration):
+    """How far a playback is from the integration, for each part of the state."""
+    (errors,) = free_runs(player_of(model, flight), flight, np.array([start]), horizon).errors
+    at, motion = start + horizon, flight.motion
+    position, velocity, rotation, rate = integrated(flight, start, horizon, acceleration)
+    position_error, velocity_error, rotation_error, rate_error = errors[-1]
+    turned = motion.rotation[at] @ Rotation.from_rotvec(rotation_error).as_matrix()
+    return np.array(
+        [
+            np.linalg.norm(motion.position[at] + position_error - position),
+            np.linalg.norm(motion.velocity[at] + velocity_error - velocity),
+            np.linalg.norm(rotation_vectors(rotation, turned)),
+            np.linalg.norm(motion.rate[at] + rate_error - rate),
+        ]
+    )
+
+
+def finer(flight, factor):
+    """The same flight on a faster clock, its speeds straight lines as before; only its first sample counts."""
+    time, period = flight.motion.period * np.arange(len(flight)), flight.motion.period / factor
+    fine = period * np.arange((len(flight) - 1) * factor + 1)
+    speed = np.column_stack([np.interp(fine, time, rotor) for rotor in flight.speed.T])
+    index = np.minimum(np.arange(len(fine)) // factor, len(flight) - 1)
+    motion = Motion(*(values[index] for values in flight.motion[:4]), period)
+    return replace(flight, motion=motion, speed=speed, stretches=(slice(0, len(fine)),))
+
+
+def test_a_rigid_body_with_damping_and_rotor_drag_is_integrated_to_second_order():
+    flight, model = flight_of(), VehicleModel(vehicle=VEHICLE, effects=EFFECTS)
+    coarse = off(flight, 0, 50, model, of_rigid_body)
+    fine = off(finer(flight, 4), 0, 200, model, of_rigid_body)
+    assert coarse.max() < 2e-4
+    assert np.all(fine < coarse / 10)
+
+
+class Rigid:
+    """The tensor of a rigid body as a model in Euler coordinates."""
+
+    def inertia(self, attitude):
+        return InertiaValues(inertia_matrix(attitude, INERTIA), inertia_matrix_gradient(attitude, INERTIA))
+
+
+class Bent(Rigid):
+    """A rigid body with 0.1 cos(roll) on top of D22."""
+
+    def inertia(self, attitude):
+        rigid = super().inertia(attitude)
+        value, gradient = rigid.value.copy(), rigid.gradient.copy()
+        value[:, 1, 1] += 0.1 * np.cos(attitude[:, 0])
+        gradient[:, 0, 1, 1] -= 0.1 * np.sin(attitude[:, 0])
+        return InertiaValues(value, gradient)
+
+
+@pytest.mark.parametrize("known", [{}, {"has_velocity": False}], ids=["moving", "rotation alone"])
+def test_a_tensor_in_euler_coordinates_plays_like_the_rigid_body(known):
+    flight, starts = flight_of(**known), np.arange(0, 30, 7)
+    rigid = free_runs(player_of(VehicleModel(vehicle=VEHICLE, effects=EFFECTS), flight), flight, starts, 40)
+    fuzzy = free_runs(
+        player_of(VehicleModel(vehicle=VEHICLE, effects=EFFECTS, fuzzy=Rigid()), flight), flight, starts, 40
+    )
+    np.testing.assert_allclose(fuzzy.errors, rigid.errors, atol=1e-11)
+
+
+def test_an_inertia_that_depends_on_the_attitude_is_integrated_to_second_order():
+    turning = identified_turning(Bent())
+
+    def of_bent(rotation, air, rate, speed):
+        torque, force = wrench_with_effects(air, rate, speed)
+        law = turning(euler_angles(rotation[None])[0], rate)
+        return rotation @ force / 6.0 - [0, 0, 9.81], np.linalg.solve(law.inertia, torque - law.direct)
+
+    flight, model = flight_of(), VehicleModel(vehicle=VEHICLE, effects=EFFECTS, fuzzy=Bent())
+    coarse = off(flight, 0, 40, model, of_bent)
+    fine = off(finer(flight, 4), 0, 160, model, of_bent)
+    assert coarse.max() < 3e-4
+    assert np.all(fine < coarse / 10)
+
+
+def played(flight, model=None):
+    stated = VehicleModel(vehicle=VEHICLE)
+    return Played(flight, player_of(model or stated, flight), player_of(stated, flight))
+
+
+@pytest.mark.parametrize("prediction", [NOTHING_MOVES, RATE_STAYS])
+def test_baselines_are_their_formulas(prediction):
+    flight, horizon = flight_of(), 20
+    motion, goes_on = flight.motion, prediction == RATE_STAYS
+    runs = played(flight).runs(prediction, np.array([3, 11]), horizon)
+    assert np.all(runs.diverged == -1)
+    for run, start in enumerate((3, 11)):
+        for step in range(1, horizon + 1):
+            gone, at = goes_on * step * 0.01, start + step
+            turned = motion.rotation[start] @ Rotation.from_rotvec(gone * motion.rate[start]).as_matrix()
+            away = Rotation.from_matrix(motion.rotation[at].T @ turned).as_rotvec()
+            wanted = [
+                motion.position[start] + gone * motion.velocity[start] - motion.position[at],
+                motion.velocity[start] - motion.velocity[at],
+                away,
+                motion.rate[start] - motion.rate[at],
+            ]
+            np.testing.assert_allclose(runs.errors[run, step - 1], wanted, atol=1e-12)
+
+
+def test_errors_by_horizon_are_means_over_all_windows_of_all_flights():
+    flights = [flight_of(seed=seed, samples=samples) for seed, samples in ((1, 60), (2, 45))]
+    all_played = [played(flight, VehicleModel(vehicle=VEHICLE, effects=EFFECTS)) for flight in flights]
+    found = replay(all_played, 10, 3)
+    starts = [np.arange(0, samples - 10, 3) for samples in (60, 45)]
+    for row, prediction in enumerate((MODEL, NOTHING_MOVES, RATE_STAYS, STATED)):
+        pairs = zip(all_played, starts, strict=True)
+        errors = np.concatenate([each.runs(prediction, own, 10).errors for each, own in pairs])
+        for index, signal in enumerate(SIGNALS):
+            own = errors[:, :, index]
+            np.testing.assert_allclose(found.errors[signal].mae[row], np.linalg.norm(own, axis=2).mean(axis=0))
+            np.testing.assert_allclose(found.errors[signal].rms[row], np.sqrt((own**2).mean(axis=0)))
+        np.testing.assert_allclose(found.windows.size[row], np.linalg.norm(errors[:, :, 3], axis=2).mean(axis=1))
+    assert found.windows.flight.tolist() == [0] * 17 + [1] * 12
+
+
+def test_batches_do_not_show(monkeypatch):
+    flight = flight_of()
+    whole = replay([played(flight)], 20, 1)
+    monkeypatch.setattr("cpfls_cli.playback.replay._BATCH", 140)
+    parts = replay([played(flight)], 20, 1)
+    np.testing.assert_allclose(parts.errors["attitude"].mae, whole.errors["attitude"].mae, rtol=1e-12)
+    np.testing.assert_array_equal(parts.windows.start, whole.windows.start)
+
+
+def test_a_signal_that_no_flight_knows_has_no_errors():
+    found = replay([played(flight_of(has_velocity=False))], 10, 1)
+    assert {name: errors is None for name, errors in found.errors.items()} == {
+        "position": True,
+        "velocity": True,
+        "attitude": False,
+        "body_rate": False,
+    }
+
+
+def test_a_signal_is_averaged_over_the_flights_that_know_it():
+    known, alone = flight_of(seed=1), flight_of(seed=2, has_attitude=False)
+    both, one = replay([played(known), played(alone)], 10, 1), replay([played(known)], 10, 1)
+    np.testing.assert_allclose(both.errors["velocity"].mae, one.errors["velocity"].mae)
+    assert not np.allclose(both.errors["body_rate"].mae, one.errors["body_rate"].mae)
+
+
+@pytest.mark.parametrize("fuzzy", [None, Rigid()], ids=["rigid", "fuzzy"])
+def test_a_run_that_diverges_is_counted_and_bounded(fuzzy):
+    driven = (ModelEffect("linear_damping", {}, np.full(3, -90.0)),)
+    found = replay([played(flight_of(), VehicleModel(vehicle=VEHICLE, effects=driven, fuzzy=fuzzy))], 60, 5)
+    lost = (found.windows.diverged >= 0).sum(axis=1)
+    assert lost.tolist() == [4, 0, 0, 0]
+    assert all(np.isfinite(errors.mae).all() for errors in found.errors.values())
+    assert found.errors["body_rate"].mae.max() < 600
+
+
+class Hollow(Rigid):
+    """Has no inertia where the vehicle rolls far to the left."""
+
+    def inertia(self, attitude):
+        values = super().inertia(attitude)
+        sign = np.where(attitude[:, 0] < -0.2, -1.0, 1.0)
+        return InertiaValues(values.value * sign[:, None, None], values.gradient)
+
+
+def test_a_run_stops_where_no_body_has_the_inertia():
+    found = replay([played(flight_of(), VehicleModel(vehicle=VEHICLE, fuzzy=Hollow()))], 40, 1)
+    lost = found.windows.diverged[0]
+    assert 0 < (lost >= 0).sum() < len(lost)
+    assert np.isfinite(found.errors["attitude"].mae).all()
+
+
+def test_no_window_crosses_a_pause():
+    flight = flight_of(stretches=(slice(0, 30), slice(30, 80)))
+    found = replay([played(flight)], 20, 1)
+    assert found.windows.start.tolist() == [*range(10), *range(30, 60)]
+
+
+def test_a_horizon_beyond_the_longest_stretch_is_refused():
+    flight = flight_of(stretches=(slice(0, 30), slice(30, 80)))
+    with pytest.raises(InputError, match=r"flight: a horizon of 0.5 s is longer than .* without a pause, 0.49 s"):
+        flight.starts(50, 1)
+
+
+def test_the_worst_windows_do_not_overlap():
+    found = replay([played(flight_of(samples=200))], 20, 1).windows
+    worst = found.worst(20, 4)
+    starts = np.sort(found.start[worst])
+    assert np.diff(starts).min() > 20
+    assert worst[0] == found.size[0].argmax()
+    assert np.all(np.diff(found.size[0, worst]) <= 0)
+
+
+def test_a_typical_stretch_is_made_of_windows_one_after_another():
+    found = replay([played(flight_of(samples=400))], 20, 3).windows
+    typical = found.typical(20, 4)
+    assert len(typical) == 4
+    assert np.diff(found.start[typical]).tolist() == [21, 21, 21]
+
+
+def test_a_stated_wrench_drives_a_flight_without_speeds_late_by_the_response():
+    flight = flight_of()
+    rotors = body_wrench(VEHICLE, flight.speed)
+    wrench = np.column_stack([rotors.body_torque, np.zeros((80, 2)), rotors.thrust])
+    stated = replace(flight, speed=np.zeros_like(flight.speed), wrench=wrench, hold="previous")
+    held = replace(flight, hold="previous")
+    model, starts = VehicleModel(vehicle=VEHICLE), np.array([0, 9])
+    errors = [free_runs(player_of(model, each), each, starts, 30).errors for each in (stated, held)]
+    # A wrench held at once; a speed without lag is held too, but reaches it in the middle of the step.
+    late = replace(stated, hold="linear")
+    np.testing.assert_allclose(errors[0], free_runs(player_of(model, late), late, starts, 30).errors, atol=0.05)
+    assert np.abs(errors[0] - errors[1]).max() < 0.05
+
+
+def test_half_a_turn_is_pi():
+    half = Rotation.from_rotvec([0, np.pi, 0]).as_matrix()
+    assert np.linalg.norm(rotation_vectors(np.eye(3), half)) == pytest.approx(np.pi)
