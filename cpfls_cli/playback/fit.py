@@ -61,8 +61,8 @@ class Windows:
     def motion(self) -> Motion:
         """Motion at these samples."""
         whole = self.flight.motion
-        arrays = (np.ascontiguousarray(each[self.samples]) for each in whole[:4])
-        return Motion(*arrays, whole.period)
+        position, velocity, rotation, rate = (np.ascontiguousarray(each[self.samples]) for each in whole[:4])
+        return Motion(position, velocity, rotation, rate, whole.period)
 
     @cached_property
     def places(self) -> IntArray:
