@@ -55,9 +55,11 @@ class Runs(NamedTuple):
 
 
 def score(runs: Sequence[Runs]) -> Score:
-    """Take means over all runs of all flights, leaving out what is NaN."""
+    """Take means over all runs of all flights, leaving out what is NaN; NaN where nothing is known."""
     norms = np.concatenate([np.linalg.norm(run.errors, axis=3) for run in runs])
-    return Score(np.nanmean(norms, axis=0), len(norms), sum(run.diverged for run in runs))
+    known = np.isfinite(norms).sum(axis=0)
+    mae = np.where(known, np.nansum(norms, axis=0) / np.maximum(known, 1), np.nan)
+    return Score(mae, len(norms), sum(run.diverged for run in runs))
 
 
 def free_runs(model: VehicleModel, flight: PlaybackFlight, every: int = 1, horizon: int = HORIZON) -> Runs:
