@@ -24,7 +24,7 @@ STATED = VehicleSettings(
     inertia_kg_m2=(0.0040, 0.0044, 0.0075),
     rotor_speed_max_rad_s=1500.0,
     rotors=tuple(
-        RotorSettings(position_m=(x, y, 0.02), spin=spin, thrust_factor_n_s2=6e-6, drag_factor_n_m_s2=1e-7)
+        RotorSettings(position_m=(x, y, 0.02), spin=spin, thrust_factor_n_s2=6e-6, drag_factor_n_m_s2=1.4e-7)
         for x, y, spin in ((0.12, -0.11, 1), (-0.12, -0.11, -1), (-0.12, 0.11, 1), (0.12, 0.11, -1))
     ),
 )
@@ -70,7 +70,7 @@ def truth(vehicle=STATED):
         effects=(
             ModelEffect("linear_damping", {}, 2.0 * inertia),
             ModelEffect("rotor_drag", {}, np.array([1.2e-4])),
-            ModelEffect("flapping_moment", {}, np.array([1.5e-5])),
+            ModelEffect("flapping_moment", {}, np.array([7e-6])),
         ),
     )
 
@@ -110,18 +110,18 @@ def reference(kind, time, rng):
     if kind == "figure":
         pace = np.linspace(0.5, 1.4, len(time))
         phase = np.cumsum(pace) * (time[1] - time[0]) + rng.uniform(0, 2 * np.pi)
-        size = rng.uniform(1.8, 2.5, 3) * [1.0, 0.6, 0.2]
+        size = rng.uniform(2.0, 3.0, 3) * [1.0, 0.6, 0.25]
         position = size * np.stack([np.sin(phase), np.sin(2 * phase), np.cos(phase)], axis=1)
-        return position, np.gradient(position, time, axis=0), 0.8 * np.sin(0.5 * phase), ones, zero
+        return position, np.gradient(position, time, axis=0), 1.2 * np.sin(0.7 * phase), ones, zero
     if kind == "steps":
         part = (time / 1.1).astype(int)
-        velocity = rng.uniform(-1.0, 1.0, (part[-1] + 1, 3)) * [2.5, 2.5, 1.0]
-        return zero, velocity[part], rng.uniform(-0.6, 0.6, part[-1] + 1)[part], 0.0 * ones, zero
+        velocity = rng.uniform(-1.0, 1.0, (part[-1] + 1, 3)) * [3.8, 3.8, 1.5]
+        return zero, velocity[part], rng.uniform(-1.0, 1.0, part[-1] + 1)[part], 0.0 * ones, zero
     if kind != "multisine":
         raise ValueError(f"no kind of flight is called {kind}")
     frequency = np.geomspace(0.3, 5.0, 7)[:, None] * rng.uniform(0.85, 1.15, (7, 3))
     phase = rng.uniform(0, 2 * np.pi, (7, 3))
-    kick = np.sin(2 * np.pi * frequency * time[:, None, None] + phase).sum(axis=1) * [5.0, 5.0, 2.0]
+    kick = np.sin(2 * np.pi * frequency * time[:, None, None] + phase).sum(axis=1) * [5.0, 5.0, 4.0]
     return np.sin(0.7 * time)[:, None] * [0.6, 0.6, 0.8], zero, 0.0 * ones, ones, kick
 
 
@@ -218,11 +218,14 @@ class _Fleet:
         plan, stated = self.plan, self.stated
         pull = 2.5 * (plan.velocity[sample] - velocity) + [0.0, 0.0, stated.gravity_m_s2]
         pull += 1.8 * plan.held[sample][:, None] * (plan.position[sample] - position)
+        # Rotors have to be left for the torques: no steep tilts, no hard turns of the heading.
+        pull = np.clip(pull, [-7.0, -7.0, 6.0], [7.0, 7.0, 14.0])
         rotation = _rotation(quaternion)
         turned = np.swapaxes(_upright(pull, plan.heading[sample]), 1, 2) @ rotation
         skew = 0.5 * (turned - np.swapaxes(turned, 1, 2))
         error = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
-        wanted = 14.0 * (-5.0 * error * [1.0, 1.0, 0.5] - rate) * [1.0, 1.0, 0.4] + plan.kick[sample]
+        wanted = 14.0 * (-5.0 * error * [1.0, 1.0, 0.5] - rate) * [1.0, 1.0, 0.5] + plan.kick[sample]
+        wanted[:, 2] = np.clip(wanted[:, 2], -8.0, 8.0)
         thrust = stated.mass_kg * np.einsum("bi,bi->b", pull, rotation[:, :, 2])
         wrench = np.column_stack([thrust, wanted * np.array(stated.inertia_kg_m2[:3])])
         squared = wrench @ self.inverse.T
