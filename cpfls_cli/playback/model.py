@@ -175,9 +175,23 @@ class VehicleModel:
         -------
         array, shape (time, 6), N m and N, body frame
         """
+        return np.asarray(np.einsum("tku,tu->tk", self.weights_at(velocity, rate), rotor))
+
+    def weights_at(self, velocity: Array, rate: Array) -> Array:
+        """Compute what the terms of the rotors are multiplied with to give torque (3) and force (3).
+
+        Parameters
+        ----------
+        velocity : array, shape (time, 3), m/s, body frame
+            Through the air.
+        rate : array, shape (time, 3), rad/s, body frame
+
+        Returns
+        -------
+        array, shape (time, 6, 1 + 4 rotors)
+        """
         terms = np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
-        flat = np.einsum("ta,kau,tu->tk", terms, self.weights, rotor, optimize=True)
-        return np.asarray(flat)
+        return np.asarray(np.einsum("ta,kau->tku", terms, self.weights, optimize=True))
 
 
 def body_of(vehicle: VehicleSettings, inertia: Array) -> Body:
