@@ -186,6 +186,21 @@ class VehicleModel:
         """Evaluate the terms of the motion, shape (time, terms)."""
         return np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
 
+    def weights_at(self, velocity: Array, rate: Array) -> Array:
+        """Compute what the terms of the rotors are multiplied with to give torque (3) and force (3).
+
+        Parameters
+        ----------
+        velocity : array, shape (time, 3), m/s, body frame
+            Through the air.
+        rate : array, shape (time, 3), rad/s, body frame
+
+        Returns
+        -------
+        array, shape (time, 6, 1 + 4 rotors)
+        """
+        return np.asarray(np.einsum("ta,kau->tku", self.terms(velocity, rate), self.weights, optimize=True))
+
 
 def wrench_of(weights: Array, terms: Array, rotor: Array) -> Array:
     """Multiply weights with the terms of the motion and of the rotors, shape (time, 6)."""
