@@ -57,12 +57,12 @@ def pin_threads() -> None:
     use_one_thread()
 
 
-def table(name: str, columns: Sequence[str], rows: Sequence[Sequence[Any]], **more: Any) -> None:
+def table(name: str, columns: Sequence[str], rows: Sequence[Sequence[Any]], digits: int = 3, **more: Any) -> None:
     """Print a Markdown table and write it, with the machine in words, to ``benchmarks/results/NAME.json``."""
     print("| " + " | ".join(columns) + " |")
     print("|" + "---|" * len(columns))
     for row in rows:
-        print("| " + " | ".join(_text(value) for value in row) + " |", flush=True)
+        print("| " + " | ".join(_text(value, digits) for value in row) + " |", flush=True)
     RESULTS.mkdir(exist_ok=True)
     records = [dict(zip(columns, row, strict=True)) for row in rows]
     content: Mapping[str, Any] = {"machine": machine(), "rows": records, **more}
@@ -80,5 +80,5 @@ def machine() -> str:
     return f"{os.cpu_count()} cores ({get_host_cpu_name()}), {gigabytes:.0f} GiB, {versions}"
 
 
-def _text(value: Any) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+def _text(value: Any, digits: int) -> str:
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)

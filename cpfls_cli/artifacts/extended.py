@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -11,10 +10,15 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, ReplayChangeGroup, effect_summary
 from cpfls_cli.artifacts.gap_flights import AuditGroup, BaseGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, dataset, group, record
-from cpfls_cli.inertia import six_parameters
+from cpfls_cli.artifacts.vehicle_model import VehicleGroup
+from cpfls_cli.inertia import six_parameters, symmetric
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.extended import ExtendedModel, Refit
+    from cpfls_cli.vehicle.settings import VehicleSettings
+
+FUZZY_INERTIA = "inertia over attitude"
+"""Part of an extended model that no table of polynomials holds."""
 
 
 @record
@@ -37,21 +41,22 @@ class ExtendedRecord(Record):
     replay: ReplayChangeGroup | None = group("replay", default=None)
     audit: AuditGroup = group("")
     base: BaseGroup = group("base")
+    vehicle: VehicleGroup | None = group("vehicle", default=None)
 
     @classmethod
-    def of(cls, refit: Refit, moments: Sequence[float], replay: ReplayChangeGroup, base: BaseGroup) -> Self:
-        """Arrange an refit.
+    def of(cls, refit: Refit, vehicle: VehicleSettings, replay: ReplayChangeGroup, base: BaseGroup) -> Self:
+        """Arrange a refit.
 
         Parameters
         ----------
-        moments : sequence of float
-            Of the vehicle: three moments of inertia, or with the three products, kg m^2.
+        vehicle : VehicleSettings
+            As stated.
         replay : ReplayChangeGroup
             Of held-out flights.
         base : BaseGroup
             The identified model that is extended, or the vehicle.
         """
-        model, unseen = refit.model, refit.unseen
+        model, unseen, moments = refit.model, refit.unseen, vehicle.inertia_kg_m2
         assert model.audit is not None, "a refit repairs what the audit found"
         rigid_body = six_parameters(moments) if model.base is None else np.zeros(6)
         correction = np.array([*model.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])
@@ -64,6 +69,7 @@ class ExtendedRecord(Record):
             replay=replay,
             audit=AuditGroup.of(model.audit),
             base=base,
+            vehicle=_vehicle(model, vehicle, base),
         )
 
     def rebuilt(self, path: object) -> ExtendedModel:
@@ -84,3 +90,12 @@ class ExtendedRecord(Record):
             "gap_before": self.gap.summary_before,
             "gap_after": self.gap.summary_after,
         }
+
+
+def _vehicle(model: ExtendedModel, vehicle: VehicleSettings, base: BaseGroup) -> VehicleGroup:
+    """Arrange the whole vehicle, as far as it is a table of polynomials."""
+    from cpfls_cli.gap.extended import whole_vehicle
+
+    known = base.constant_inertia(vehicle)
+    whole = whole_vehicle(model, vehicle, symmetric(vehicle.inertia_kg_m2 if known is None else known))
+    return VehicleGroup.of(whole.model, (*whole.not_held, *([FUZZY_INERTIA] if known is None else [])))

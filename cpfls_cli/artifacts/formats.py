@@ -19,6 +19,7 @@ from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import ArtifactSpec, DatasetSpec, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 RECORDS: tuple[type[Record], ...] = (
     TrajectoryRecord,
@@ -32,6 +33,7 @@ RECORDS: tuple[type[Record], ...] = (
     DisagreementRecord,
     DiagnosisRecord,
     ExtendedRecord,
+    VehicleRecord,
 )
 """Every artifact format."""
 

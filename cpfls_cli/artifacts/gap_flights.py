@@ -11,6 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.model import ModelRecord, rebuilt_model
 from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, columns_of, dataset, group, record, rows_of
+from cpfls_cli.inertia import six_parameters
 
 if TYPE_CHECKING:
     # Reading a record does not need the compiled kernels that evaluate a model.
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from cpfls_cli.gap.sensors.audit import Audit
     from cpfls_cli.gap.sensors.findings import AuditFinding, FaultNumber
     from cpfls_cli.identification.model import Model
+    from cpfls_cli.vehicle.settings import VehicleSettings
 
 RIGID_BODY = "rigid-body"
 """Kind of a base that is the rigid body of the vehicle."""
@@ -225,6 +227,18 @@ class BaseGroup:
     def is_vehicle(self) -> bool:
         """Whether it is the rigid body of the vehicle of /config, and no identified model."""
         return self.kind == RIGID_BODY
+
+    def constant_inertia(self, vehicle: VehicleSettings) -> Array | None:
+        """Give its inertia, shape (6,), kg m^2; None where it depends on the attitude.
+
+        Parameters
+        ----------
+        vehicle : VehicleSettings
+            Of /config.
+        """
+        if self.is_vehicle:
+            return six_parameters(vehicle.inertia_kg_m2)
+        return None if np.any(self.coefficients) else self.rigid_body
 
     def rebuilt(self, path: object) -> Model | None:
         """Rebuild the identified model.

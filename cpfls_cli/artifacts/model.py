@@ -25,6 +25,7 @@ from cpfls_cli.artifacts.evidence import (
 )
 from cpfls_cli.artifacts.scores import MODEL, TRAINING, JudgedGroup
 from cpfls_cli.artifacts.spec import BODY, EULER, Format, Record, dataset, group, record
+from cpfls_cli.artifacts.vehicle_model import VehicleGroup
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from cpfls_cli.regressor.structure import ModelStructure
     from cpfls_cli.validation.bootstrap import Draws
     from cpfls_cli.validation.validate import Validation
+    from cpfls_cli.vehicle.settings import VehicleSettings
 
 WELL_CONDITIONED = 100.0
 """Largest condition number of a model whose coefficients are all known."""
@@ -170,9 +172,17 @@ class ModelRecord(Record):
     physics: PhysicsGroup | None = group("physics", default=None)
     period: PeriodGroup | None = group("period", default=None)
     verdict: VerdictGroup | None = group("verdict", default=None)
+    vehicle: VehicleGroup | None = group("vehicle", default=None)
 
     @classmethod
-    def of(cls, result: Identification, base: str, learned: IntArray, evidence: Validation | None) -> Self:
+    def of(
+        cls,
+        result: Identification,
+        base: str,
+        learned: IntArray,
+        evidence: Validation | None,
+        vehicle: VehicleSettings,
+    ) -> Self:
         """Arrange an identification and the evidence on it.
 
         Parameters
@@ -183,7 +193,11 @@ class ModelRecord(Record):
             Indices of the samples that trained.
         evidence : Validation or None
             None where it was not gathered.
+        vehicle : VehicleSettings
+            As stated: what was identified is its inertia.
         """
+        from cpfls_cli.playback.model import VehicleModel
+
         baselines = {baseline.name: baseline.parameters for baseline in result.baselines}
         return cls(
             model=_model(result, base),
@@ -205,6 +219,7 @@ class ModelRecord(Record):
             training_indices=learned,
             findings=tuple(result.findings),
             **({} if evidence is None else evidence_groups(evidence)),
+            vehicle=VehicleGroup.of(VehicleModel(vehicle=vehicle)),
         )
 
     @cached_property

@@ -335,6 +335,26 @@ def sweep(
 
 @app.command()
 @with_common
+def vehicle(
+    config: ConfigArgument,
+    flights: FlightsArgument,
+    output: OutputOption,
+    held_out: HeldOutOption = None,
+    *,
+    common: Common,
+) -> None:
+    """Find a whole vehicle in flights with rotor speeds: rotors, inertia and effects, fitted on what they predict."""
+
+    def call(job: Job) -> Outcome:
+        from cpfls_cli.commands import vehicle as command
+
+        return command.run(job, flights, held_out or [])
+
+    _run("vehicle", config, output, common, call)
+
+
+@app.command()
+@with_common
 def predict(
     config: ConfigArgument, model: ModelArgument, flight: FlightArgument, output: OutputOption, *, common: Common
 ) -> None:

@@ -110,4 +110,4 @@ def extended(
     extension = extend(training, held, named_effects(diagnosis), diagnosis.audit.audit(), study.gap, model)
     signals = [recording.signals for recording in held]
     runs = (replayed(signals, each, study.gap.horizon) for each in (plain(model), extension.model, None))
-    return ExtendedRecord.of(extension, study.vehicle.inertia_kg_m2, ReplayChangeGroup.of(*runs), base)
+    return ExtendedRecord.of(extension, study.vehicle, ReplayChangeGroup.of(*runs), base)

@@ -67,7 +67,8 @@ def run(
         raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
     with search.kept():
         evidence, interrupt = _evidence(job, result, data, held_out)
-        record = finish(job, ModelRecord.of(result, job.study.identification.base, data.indices, evidence), inputs)
+        base, vehicle = job.study.identification.base, job.study.vehicle
+        record = finish(job, ModelRecord.of(result, base, data.indices, evidence, vehicle), inputs)
     search.end(result.stop_reason)
     seconds = round(time.perf_counter() - clock, 3)
     summary = {**record.summary, "not_positive_definite": result.indefinite, "seconds": seconds}

@@ -19,13 +19,25 @@ from cpfls_cli.errors import ConfigError, SettingError
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.identification.settings import IdentificationSettings, SweepSettings
+from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.settings import Settings
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-SECTIONS = ("vehicle", "trajectory", "simulation", "import", "reduction", "identification", "sweep", "gap", "report")
+SECTIONS = (
+    "vehicle",
+    "trajectory",
+    "simulation",
+    "import",
+    "reduction",
+    "identification",
+    "sweep",
+    "gap",
+    "playback",
+    "report",
+)
 """The sections of a config, in the order of the pipeline."""
 
 
@@ -71,6 +83,9 @@ class Study(BaseModel):
     sweep: Annotated[SweepSettings, Doc("what `cpfls sweep` tries, and how often")] = SweepSettings()
     gap: Annotated[GapSettings, Doc("how `cpfls compare`, `diagnose`, `extend` and `gap` look for what is missing")] = (
         GapSettings()
+    )
+    playback: Annotated[PlaybackSettings, Doc("how `cpfls vehicle` fits a whole vehicle to what it predicts")] = (
+        PlaybackSettings()
     )
     report: Annotated[ReportSettings, Doc("what `cpfls report` shows")] = ReportSettings()
 

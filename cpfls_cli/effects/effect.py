@@ -171,6 +171,8 @@ class Effect:
         For effects on the log: how they are simulated.
     test : SensorTest or None
         For effects that the sensor audit finds.
+    inertia : callable or None
+        ``inertia(linear) -> array, shape (3, 3)``: for effects that are a change of the inertia tensor, in kg m^2.
     accounts : callable or None
         ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself leaves,
         so that the number is not called wrong.
@@ -202,6 +204,7 @@ class Effect:
     carried: Callable[[VehicleSettings, Mapping[str, float]], CarriedBody] | None = None
     log: SensorLog | None = None
     test: SensorTest | None = None
+    inertia: Callable[[Array], Array] | None = None
     accounts: Callable[[str, Mapping[str, float]], float] | None = None
 
     @property

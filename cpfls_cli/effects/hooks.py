@@ -39,12 +39,15 @@ class Actuation:
         ``lag(values) -> float``: time constant in s that replaces that of the rotors.
     link : callable or None
         ``link(values, step) -> Link`` after the lag, for steps of `step` seconds; made anew for each flight.
+    delay : callable or None
+        ``delay(values) -> float``: the same link as one number, where it is a pure delay in s.
     supply : callable or None
         ``supply(values, voltage) -> float``: factor on the rotor speed at a share of the full voltage, which is logged.
     """
 
     lag: Callable[[Mapping[str, float]], float] | None = None
     link: Callable[[Mapping[str, float], float], Link] | None = None
+    delay: Callable[[Mapping[str, float]], float] | None = None
     supply: Callable[[Mapping[str, float], float], float] | None = None
 
 

@@ -15,6 +15,7 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import holds
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, InputError
@@ -242,7 +243,8 @@ def model_to_play(path: Path, study: Study) -> ModelToPlay:
         return _whole(VehicleModel(vehicle=study.vehicle), stated=True)
     if holds(path, ExtendedRecord):
         return _extended(read_of_vehicle(path, ExtendedRecord, study).rebuilt(path))
-    # Further formats of models are added here.
+    if holds(path, VehicleRecord):
+        return _whole(read_of_vehicle(path, VehicleRecord, study).vehicle.vehicle_model())
     identified = read_of_vehicle(path, ModelRecord, study).rebuilt(path)
     return _whole(VehicleModel(vehicle=study.vehicle, fuzzy=identified))
 

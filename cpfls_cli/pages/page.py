@@ -25,6 +25,7 @@ from cpfls_cli.pages.sweep import replicates_section
 from cpfls_cli.pages.tracking import tracking_section
 from cpfls_cli.pages.trajectory import path_section
 from cpfls_cli.pages.uncertainty import uncertainty_section
+from cpfls_cli.pages.vehicle_model import found_vehicle_section
 from cpfls_cli.report.content import Document
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
@@ -38,6 +39,7 @@ _SECTIONS = (
     reproduction_section,
     diagnosis_section,
     extension_section,
+    found_vehicle_section,
     disagreement_section,
     sensors_section,
     unseen_section,

@@ -21,6 +21,7 @@ from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import ReportSettings, resolved
 from cpfls_cli.report.content import HASH_SHOWN, Block, Origin, Section
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -128,6 +129,11 @@ class Sources:
     def diagnoses(self) -> list[Source[DiagnosisRecord]]:
         """What models miss."""
         return self._of(DiagnosisRecord)
+
+    @property
+    def vehicles(self) -> list[Source[VehicleRecord]]:
+        """Vehicles found in flights."""
+        return self._of(VehicleRecord)
 
     @property
     def extensions(self) -> list[Source[ExtendedRecord]]:

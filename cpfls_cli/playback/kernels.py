@@ -76,7 +76,6 @@ class Airflow(NamedTuple):
     order: int
 
 
-POLYNOMIAL_TERMS = 34
 _POWERS = 2
 
 
@@ -97,47 +96,63 @@ def _falling(u: float) -> tuple[float, float]:
 
 
 @_compiled
-def _columns(airflow: Airflow, angle: float, value: Array, slope: Array) -> int:
-    """Evaluate the columns of a periodic system of one angle and their slopes; see `cpfls_cli.fuzzy.basis.basis`."""
-    rules = max(len(airflow.breakpoints) - 1, 1)
-    features = 1 + (2 * airflow.order if airflow.order else 1)
-    value[: rules * features] = 0.0
-    slope[: rules * features] = 0.0
+def _degrees(airflow: Airflow, angle: float, rule: IntArray, degree: Array, slope: Array) -> int:
+    """Fire the rules of a periodic partition; one rule alone always fires."""
+    rules = len(airflow.breakpoints) - 1
+    rule[0], degree[0], slope[0] = 0, 1.0, 0.0
+    if rules < 2:
+        return 1
     turn = angle / (2.0 * np.pi)
     turn -= np.floor(turn)
     interval = 0
     for k in range(1, rules):
         interval += 1 if turn >= airflow.breakpoints[k] else 0
-    degrees, degree_slopes, fires = np.ones(2), np.zeros(2), np.zeros(2, np.int64)
-    count = 1
-    if rules > 1:
-        start, end = airflow.breakpoints[interval], airflow.breakpoints[interval + 1]
-        width = end - start
-        u = min((turn - start) / width, 1.0) if width > 0.0 else 1.0
-        falling, by_u = _falling(u)
-        by_angle = by_u / width / (2.0 * np.pi) if width > 0.0 else 0.0
-        degrees[0], degrees[1], degree_slopes[0], degree_slopes[1] = falling, 1.0 - falling, by_angle, -by_angle
-        fires[0], fires[1] = interval, (interval + 1) % rules
-        count = 2
-    for i in range(count):
-        base = fires[i] * features
-        value[base] += degrees[i]
-        slope[base] += degree_slopes[i]
-        if airflow.order == 0:
-            wrapped = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
-            if abs(wrapped) > 0.5 * np.pi:
-                saw, saw_slope = (np.copysign(np.pi, wrapped) - wrapped) * (2.0 / np.pi), -2.0 / np.pi
-            else:
-                saw, saw_slope = wrapped * (2.0 / np.pi), 2.0 / np.pi
-            value[base + 1] += degrees[i] * saw
-            slope[base + 1] += degree_slopes[i] * saw + degrees[i] * saw_slope
-        for k in range(1, airflow.order + 1):
-            sine, cosine = np.sin(k * angle), np.cos(k * angle)
-            value[base + k] += degrees[i] * sine
-            slope[base + k] += degree_slopes[i] * sine + degrees[i] * k * cosine
-            value[base + airflow.order + k] += degrees[i] * cosine
-            slope[base + airflow.order + k] += degree_slopes[i] * cosine - degrees[i] * k * sine
-    return rules * features
+    start, end = airflow.breakpoints[interval], airflow.breakpoints[interval + 1]
+    width = end - start if end > start else 1.0
+    falling, by_position = _falling(min((turn - start) / width, 1.0) if end > start else 1.0)
+    by_angle = by_position / (width * 2.0 * np.pi)
+    rule[0], degree[0], slope[0] = interval, falling, by_angle
+    rule[1], degree[1], slope[1] = (interval + 1) % rules, 1.0 - falling, -by_angle
+    return 2
+
+
+@_compiled
+def _consequents(airflow: Airflow, angle: float, value: Array, slope: Array) -> int:
+    """Evaluate the consequent features: 1, and a seesaw or harmonics of the angle."""
+    value[0], slope[0] = 1.0, 0.0
+    if airflow.order == 0:
+        wrapped = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+        outer = abs(wrapped) > 0.5 * np.pi
+        value[1] = (np.copysign(np.pi, wrapped) - wrapped if outer else wrapped) * (2.0 / np.pi)
+        slope[1] = -2.0 / np.pi if outer else 2.0 / np.pi
+        return 2
+    for k in range(1, airflow.order + 1):
+        sine, cosine = np.sin(k * angle), np.cos(k * angle)
+        value[k], slope[k] = sine, k * cosine
+        value[airflow.order + k], slope[airflow.order + k] = cosine, -k * sine
+    return 1 + 2 * airflow.order
+
+
+MOST_COLUMNS = 64
+"""Columns of a remainder at most: rules times features of a rule."""
+
+
+@_compiled
+def _columns(airflow: Airflow, angle: float, value: Array, slope: Array) -> int:
+    """Evaluate the columns of a periodic system of one angle and their slopes; see `cpfls_cli.fuzzy.basis.basis`."""
+    rule, degree, degree_slope = np.zeros(2, np.int64), np.zeros(2), np.zeros(2)
+    feature, feature_slope = np.zeros(MOST_COLUMNS), np.zeros(MOST_COLUMNS)
+    firing = _degrees(airflow, angle, rule, degree, degree_slope)
+    features = _consequents(airflow, angle, feature, feature_slope)
+    count = max(len(airflow.breakpoints) - 1, 1) * features
+    value[:count] = 0.0
+    slope[:count] = 0.0
+    for i in range(firing):
+        for f in range(features):
+            at = rule[i] * features + f
+            value[at] += degree[i] * feature[f]
+            slope[at] += degree_slope[i] * feature[f] + degree[i] * feature_slope[f]
+    return count
 
 
 @_compiled
@@ -169,6 +184,14 @@ def terms(motion: Array, factors: IntArray, airflow: Airflow, value: Array, slop
         if i == j:
             slope[at, i] = 2.0 * motion[i]
         at += 1
+    at = _signed_squares(motion, at, value, slope)
+    if len(airflow.breakpoints):
+        _airflow(motion, airflow, at, value, slope)
+
+
+@_compiled
+def _signed_squares(motion: Array, at: int, value: Array, slope: Array) -> int:
+    """Evaluate speed times velocity, and rates times their size; give the next index."""
     speed = np.sqrt(motion[0] ** 2 + motion[1] ** 2 + motion[2] ** 2)
     inverse = 1.0 / speed if speed > 0.0 else 0.0
     for i in range(3):
@@ -181,8 +204,7 @@ def terms(motion: Array, factors: IntArray, airflow: Airflow, value: Array, slop
         value[at] = abs(motion[i]) * motion[i]
         slope[at, i] = 2.0 * abs(motion[i])
         at += 1
-    if len(airflow.breakpoints):
-        _airflow(motion, airflow, at, value, slope)
+    return at
 
 
 @_compiled
@@ -191,7 +213,7 @@ def _airflow(motion: Array, airflow: Airflow, at: int, value: Array, slope: Arra
     speed = np.sqrt(forward * forward + left * left)
     angle = np.arctan2(left, forward)
     inverse = 1.0 / speed if speed > 0.0 else 0.0
-    column, by_angle = np.zeros(64), np.zeros(64)
+    column, by_angle = np.zeros(MOST_COLUMNS), np.zeros(MOST_COLUMNS)
     count = _columns(airflow, angle, column, by_angle)
     for c in range(count):
         value[at] = column[c] * speed
@@ -236,8 +258,9 @@ def _slopes(body: Body, weights: Array, value: Array, rotation: Array, rate: Arr
         for a in range(len(value)):
             total += weights[k, a] * value[a]
         out[k] = total
-    inertia, inverse = body.inertia, body.inverse
-    momentum = inertia @ rate
+    inertia, inverse, momentum = body.inertia, body.inverse, np.empty(3)
+    for i in range(3):
+        momentum[i] = inertia[i, 0] * rate[0] + inertia[i, 1] * rate[1] + inertia[i, 2] * rate[2]
     m0 = out[0] - (rate[1] * momentum[2] - rate[2] * momentum[1])
     m1 = out[1] - (rate[2] * momentum[0] - rate[0] * momentum[2])
     m2 = out[2] - (rate[0] * momentum[1] - rate[1] * momentum[0])
@@ -251,35 +274,6 @@ def _slopes(body: Body, weights: Array, value: Array, rotation: Array, rate: Arr
 
 _FASTEST = 300.0
 """Body rate in rad/s, and speed in m/s, at which a run is called diverged and stands still."""
-
-
-class Workspace(NamedTuple):
-    """Arrays of one run; `value` and `slope` of all terms, `active` ones of both."""
-
-    value: Array
-    slope: Array
-    active_value: Array
-    active_slope: Array
-    out: Array
-    turn: Array
-    right: Array
-    half: Array
-    half_right: Array
-
-
-@_compiled
-def _workspace(terms_count: int, active: int) -> Workspace:
-    return Workspace(
-        np.zeros(terms_count),
-        np.zeros((terms_count, 6)),
-        np.zeros(active),
-        np.zeros((active, 6)),
-        np.zeros(9),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-    )
 
 
 class Terms(NamedTuple):
@@ -302,50 +296,134 @@ class Terms(NamedTuple):
     total: int
 
 
+class _State(NamedTuple):
+    """A state, in arrays that a run writes over."""
+
+    position: Array
+    velocity: Array
+    rotation: Array
+    rate: Array
+
+
+class _Space(NamedTuple):
+    """What one evaluation leaves: terms with slopes, accelerations and force, turns with their right Jacobians."""
+
+    value: Array
+    slope: Array
+    active: Array
+    out: Array
+    turn: Array
+    right: Array
+    half: Array
+    half_right: Array
+    moved: Array
+
+
 @_compiled
-def _evaluate(
-    body: Body, used: Terms, weights: Array, velocity: Array, rotation: Array, rate: Array, w: Workspace
-) -> None:
+def _new_state() -> _State:
+    return _State(np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3))
+
+
+@_compiled
+def _new_space(used: Terms) -> _Space:
+    return _Space(
+        np.zeros(used.total),
+        np.zeros((used.total, 6)),
+        np.zeros(len(used.active)),
+        np.zeros(9),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+    )
+
+
+@_compiled
+def _start(motion: Motion, sample: int, state: _State) -> None:
+    state.position[:] = motion.position[sample]
+    state.velocity[:] = motion.velocity[sample]
+    state.rotation[:] = motion.rotation[sample]
+    state.rate[:] = motion.rate[sample]
+
+
+@_compiled
+def _evaluate(body: Body, used: Terms, weights: Array, state: _State, at: _Space) -> None:
+    rotation, velocity = state.rotation, state.velocity
     motion = np.empty(6)
     for i in range(3):
         motion[i] = rotation[0, i] * velocity[0] + rotation[1, i] * velocity[1] + rotation[2, i] * velocity[2]
-        motion[3 + i] = rate[i]
-    terms(motion, used.factors, used.airflow, w.value, w.slope)
+        motion[3 + i] = state.rate[i]
+    terms(motion, used.factors, used.airflow, at.value, at.slope)
     for a in range(len(used.active)):
-        w.active_value[a] = w.value[used.active[a]]
-    _slopes(body, weights, w.active_value, rotation, rate, w.out)
+        at.active[a] = at.value[used.active[a]]
+    _slopes(body, weights, at.active, rotation, state.rate, at.out)
 
 
 @_compiled
-def _rotated(first: Array, second: Array, out: Array) -> None:
+def _product(first: Array, second: Array, out: Array) -> None:
     for i in range(3):
         for j in range(3):
             out[i, j] = first[i, 0] * second[0, j] + first[i, 1] * second[1, j] + first[i, 2] * second[2, j]
 
 
 @_compiled
+def _to_middle(state: _State, middle: _State, h: float, translates: bool, at: _Space) -> None:
+    """Go half a step along the slopes at its begin."""
+    _turn(0.5 * h * state.rate, at.half, at.half_right)
+    for i in range(3):
+        middle.velocity[i] = state.velocity[i] + (0.5 * h * at.out[i] if translates else 0.0)
+        middle.rate[i] = state.rate[i] + 0.5 * h * at.out[3 + i]
+    _product(state.rotation, at.half, middle.rotation)
+
+
+@_compiled
+def _to_end(state: _State, middle: _State, h: float, translates: bool, at: _Space) -> None:
+    """Go the whole step along the slopes in its middle."""
+    _turn(h * middle.rate, at.turn, at.right)
+    _product(state.rotation, at.turn, at.moved)
+    state.rotation[:] = at.moved
+    for i in range(3):
+        state.rate[i] += h * at.out[3 + i]
+        if translates:
+            state.position[i] += h * middle.velocity[i]
+            state.velocity[i] += h * at.out[i]
+
+
+@_compiled
+def _lost(state: _State) -> bool:
+    """Tell whether a state is beyond what any vehicle flies; what is no number is."""
+    fastest = 0.0
+    for i in range(3):
+        for value in (state.rate[i], state.velocity[i]):
+            fastest = max(fastest, abs(value)) if value == value else np.inf
+    return not fastest < _FASTEST
+
+
+@_compiled
 def rotation_error(measured: Array, predicted: Array, out: Array) -> None:
     """Write the rotation vector from a measured to a predicted rotation, body frame of the measured one."""
     relative = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            relative[i, j] = (
-                measured[0, i] * predicted[0, j] + measured[1, i] * predicted[1, j] + measured[2, i] * predicted[2, j]
-            )
+    _product(measured.T, predicted, relative)
     x = 0.5 * (relative[2, 1] - relative[1, 2])
     y = 0.5 * (relative[0, 2] - relative[2, 0])
     z = 0.5 * (relative[1, 0] - relative[0, 1])
     sine = np.sqrt(x * x + y * y + z * z)
     cosine = 0.5 * (relative[0, 0] + relative[1, 1] + relative[2, 2] - 1.0)
-    angle = np.arctan2(sine, cosine)
-    if sine > 1e-12:
-        scale = angle / sine
-    elif cosine > 0.0:
-        scale = 1.0
-    else:
+    scale = np.arctan2(sine, cosine) / sine if sine > 1e-12 else 1.0
+    if sine <= 1e-12 and cosine < 0.0:
         # Half a turn: the axis does not show in the skew part, its length is all that is used.
         x, y, z, scale = np.pi, 0.0, 0.0, 1.0
     out[0], out[1], out[2] = scale * x, scale * y, scale * z
+
+
+@_compiled
+def _write_errors(motion: Motion, sample: int, state: _State, out: Array) -> None:
+    for i in range(3):
+        out[0, i] = state.position[i] - motion.position[sample, i]
+        out[1, i] = state.velocity[i] - motion.velocity[sample, i]
+        out[3, i] = state.rate[i] - motion.rate[sample, i]
+    rotation_error(motion.rotation[sample], state.rotation, out[2])
 
 
 @_compiled
@@ -365,58 +443,40 @@ def errors_of_runs(
     translates : bool
         Whether velocity and position are simulated; otherwise they stay.
     out : array, shape (run, horizon, 4, 3)
-        Written to: predicted less measured position, velocity, rotation vector, rate.
+        Written to: predicted less measured position, velocity, rotation vector, rate. A run that diverges stays as it
+        was before the step in which it did.
 
     Returns
     -------
     array of int, shape (run,)
-        Step at which a run diverged and was stopped; -1 for those that did not.
+        Step at which a run diverged; -1 for those that did not.
     """
-    horizon, h = out.shape[1], motion.period
+    h = motion.period
     diverged = np.full(len(starts), -1)
-    w = _workspace(used.total, len(used.active))
-    rotation, middle, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    rate_m, velocity_m = np.empty(3), np.empty(3)
+    state, middle, before, at = _new_state(), _new_state(), _new_state(), _new_space(used)
     for n in range(len(starts)):
-        s = starts[n]
-        position, velocity, rate = motion.position[s].copy(), motion.velocity[s].copy(), motion.rate[s].copy()
-        rotation[:] = motion.rotation[s]
-        for step in range(horizon):
+        _start(motion, starts[n], state)
+        for step in range(out.shape[1]):
+            sample = starts[n] + step
             if diverged[n] < 0:
-                G = weights[s + step]
-                _evaluate(body, used, G, velocity, rotation, rate, w)
-                _turn(0.5 * h * rate, w.half, w.half_right)
-                for i in range(3):
-                    velocity_m[i] = velocity[i] + (0.5 * h * w.out[i] if translates else 0.0)
-                    rate_m[i] = rate[i] + 0.5 * h * w.out[3 + i]
-                _rotated(rotation, w.half, middle)
-                _evaluate(body, used, G, velocity_m, middle, rate_m, w)
-                _turn(h * rate_m, w.turn, w.right)
-                _rotated(rotation, w.turn, moved)
-                rotation[:] = moved
-                fastest = 0.0
-                for i in range(3):
-                    rate[i] += h * w.out[3 + i]
-                    if translates:
-                        position[i] += h * velocity_m[i]
-                        velocity[i] += h * w.out[i]
-                    fastest = max(fastest, abs(rate[i]), abs(velocity[i]))
-                if not fastest < _FASTEST:
+                _copy(state, before)
+                _evaluate(body, used, weights[sample], state, at)
+                _to_middle(state, middle, h, translates, at)
+                _evaluate(body, used, weights[sample], middle, at)
+                _to_end(state, middle, h, translates, at)
+                if _lost(state):
                     diverged[n] = step
-                    for i in range(3):
-                        rate[i] = min(max(rate[i], -_FASTEST), _FASTEST) if rate[i] == rate[i] else _FASTEST
-                        velocity[i] = min(max(velocity[i], -_FASTEST), _FASTEST) if velocity[i] == velocity[i] else 0.0
-                        if not abs(position[i]) < 1e6:
-                            position[i] = motion.position[s, i]
-                    if not np.abs(rotation).max() < 2.0:
-                        rotation[:] = np.eye(3)
-            at = s + step + 1
-            for i in range(3):
-                out[n, step, 0, i] = position[i] - motion.position[at, i]
-                out[n, step, 1, i] = velocity[i] - motion.velocity[at, i]
-                out[n, step, 3, i] = rate[i] - motion.rate[at, i]
-            rotation_error(motion.rotation[at], rotation, out[n, step, 2])
+                    _copy(before, state)
+            _write_errors(motion, sample + 1, state, out[n, step])
     return diverged
+
+
+@_compiled
+def _copy(source: _State, target: _State) -> None:
+    target.position[:] = source.position
+    target.velocity[:] = source.velocity
+    target.rotation[:] = source.rotation
+    target.rate[:] = source.rate
 
 
 class Parameters(NamedTuple):
@@ -424,7 +484,7 @@ class Parameters(NamedTuple):
 
     Attributes
     ----------
-    parameter, row, term : array of int, shape (entry,)
+    row, term : array of int, shape (entry,)
         Weight ``(row, term)`` of all samples changes with a parameter; entries of a parameter stand together.
     first : array of int, shape (parameter + 1,)
         First entry of each parameter.
@@ -445,7 +505,7 @@ class Parameters(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """How errors are weighed: ``sum over signals of weight * delta^2 (sqrt(1 + |e|^2 / delta^2) - 1)``.
+    """How errors are weighed: ``sum over signals of weight delta^2 (sqrt(1 + |e|^2 / delta^2) - 1)``.
 
     Attributes
     ----------
@@ -457,6 +517,87 @@ class Loss(NamedTuple):
     delta: Array
 
 
+class _Tangent(NamedTuple):
+    """Derivatives of a state by each parameter, shape (3, parameter); the rotation's as a vector in the body frame."""
+
+    position: Array
+    velocity: Array
+    rotation: Array
+    rate: Array
+
+
+@_compiled
+def _new_tangent(count: int) -> _Tangent:
+    return _Tangent(np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)))
+
+
+@_compiled
+def _by_motion(used: Terms, weights: Array, slope: Array, out: Array) -> None:
+    """Write derivatives of the wrench by air velocity and rate, shape (6, 6)."""
+    out[:] = 0.0
+    for k in range(6):
+        for a in range(len(used.active)):
+            weight = weights[k, a]
+            if weight != 0.0:
+                for i in range(6):
+                    out[k, i] += weight * slope[used.active[a], i]
+
+
+@_compiled
+def _cross(first: Array, second: Array, out: Array) -> None:
+    """Write cross products of a vector with each column, or of each column of a matrix with a vector's."""
+    for c in range(out.shape[1]):
+        out[0, c] = first[1] * second[2, c] - first[2] * second[1, c]
+        out[1, c] = first[2] * second[0, c] - first[0] * second[2, c]
+        out[2, c] = first[0] * second[1, c] - first[1] * second[0, c]
+
+
+@_compiled
+def _times(matrix: Array, vectors: Array, out: Array) -> None:
+    """Multiply a small matrix with columns; the loop over columns is the inner one, so that it runs in registers."""
+    for i in range(matrix.shape[0]):
+        for c in range(vectors.shape[1]):
+            out[i, c] = matrix[i, 0] * vectors[0, c]
+        for k in range(1, matrix.shape[1]):
+            factor = matrix[i, k]
+            for c in range(vectors.shape[1]):
+                out[i, c] += factor * vectors[k, c]
+
+
+class _Columns(NamedTuple):
+    """Work space of a linearisation, a column for each parameter."""
+
+    motion: Array
+    wrench: Array
+    first: Array
+    second: Array
+    by_motion: Array
+
+
+@_compiled
+def _new_columns(count: int) -> _Columns:
+    return _Columns(
+        np.zeros((6, count)), np.zeros((6, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((6, 6))
+    )
+
+
+@_compiled
+def _own_change(parameters: Parameters, sample: int, rate: Array, at: _Space, wrench: Array) -> None:
+    """Add the derivatives of the wrench by the parameters, less those of ``I omega'`` by the inertia."""
+    turned, pushed = np.empty(3), np.empty(3)
+    for c in range(len(parameters.moves)):
+        for e in range(parameters.first[c], parameters.first[c + 1]):
+            wrench[parameters.row[e], c] += parameters.value[sample, e] * at.active[parameters.term[e]]
+        if parameters.moves[c]:
+            change = parameters.inertia[c]
+            for i in range(3):
+                turned[i] = change[i, 0] * rate[0] + change[i, 1] * rate[1] + change[i, 2] * rate[2]
+                pushed[i] = change[i, 0] * at.out[3] + change[i, 1] * at.out[4] + change[i, 2] * at.out[5]
+            wrench[0, c] -= pushed[0] + rate[1] * turned[2] - rate[2] * turned[1]
+            wrench[1, c] -= pushed[1] + rate[2] * turned[0] - rate[0] * turned[2]
+            wrench[2, c] -= pushed[2] + rate[0] * turned[1] - rate[1] * turned[0]
+
+
 @_compiled
 def _linearise(
     body: Body,
@@ -464,77 +605,91 @@ def _linearise(
     weights: Array,
     parameters: Parameters,
     sample: int,
-    rotation: Array,
-    velocity: Array,
-    rate: Array,
-    state: Array,
-    w: Workspace,
+    state: _State,
+    tangent: _Tangent,
+    at: _Space,
+    work: _Columns,
     out: Array,
 ) -> None:
-    """Write derivatives of the accelerations by each parameter, shape (6, parameter), given those of the state.
+    """Write derivatives of the accelerations (world, body frame) by each parameter, shape (6, parameter).
 
-    `state` has the rows velocity, rotation vector (body frame), rate: shape (9, parameter).
+    ``R' dv + v_b x dphi`` and ``d omega`` move the wrench; then ``m dv' = R (dF - F x dphi)`` and
+    ``I d omega' = dM - d omega x I omega - omega x I d omega``.
     """
-    active = len(used.active)
-    by_motion = np.zeros((6, 6))
-    for k in range(6):
-        for a in range(active):
-            weight = weights[k, a]
-            if weight != 0.0:
-                for i in range(6):
-                    by_motion[k, i] += weight * w.slope[used.active[a], i]
-    count = state.shape[1]
-    air = np.empty(3)
+    rate, air = state.rate, at.value[1:4]
+    _by_motion(used, weights, at.slope, work.by_motion)
+    _times(state.rotation.T, tangent.velocity, work.motion[:3])
+    _cross(air, tangent.rotation, work.first)
     for i in range(3):
-        air[i] = rotation[0, i] * velocity[0] + rotation[1, i] * velocity[1] + rotation[2, i] * velocity[2]
-    force = w.out[6:9]
-    momentum = body.inertia @ rate
-    inertia, inverse = body.inertia, body.inverse
-    d = np.empty(6)
-    W = np.empty(6)
-    for c in range(count):
-        p0, p1, p2 = state[3, c], state[4, c], state[5, c]
-        for i in range(3):
-            d[i] = rotation[0, i] * state[0, c] + rotation[1, i] * state[1, c] + rotation[2, i] * state[2, c]
-            d[3 + i] = state[6 + i, c]
-        d[0] += air[1] * p2 - air[2] * p1
-        d[1] += air[2] * p0 - air[0] * p2
-        d[2] += air[0] * p1 - air[1] * p0
-        for k in range(6):
-            total = 0.0
-            for i in range(6):
-                total += by_motion[k, i] * d[i]
-            W[k] = total
-        for e in range(parameters.first[c], parameters.first[c + 1]):
-            W[parameters.row[e]] += parameters.value[sample, e] * w.active_value[parameters.term[e]]
-        if parameters.moves[c]:
-            change = parameters.inertia[c]
-            turned, pushed = change @ rate, change @ w.out[3:6]
-            W[0] -= pushed[0] + rate[1] * turned[2] - rate[2] * turned[1]
-            W[1] -= pushed[1] + rate[2] * turned[0] - rate[0] * turned[2]
-            W[2] -= pushed[2] + rate[0] * turned[1] - rate[1] * turned[0]
-        r0, r1, r2 = d[3], d[4], d[5]
-        i0 = inertia[0, 0] * r0 + inertia[0, 1] * r1 + inertia[0, 2] * r2
-        i1 = inertia[1, 0] * r0 + inertia[1, 1] * r1 + inertia[1, 2] * r2
-        i2 = inertia[2, 0] * r0 + inertia[2, 1] * r1 + inertia[2, 2] * r2
-        m0 = W[0] - (r1 * momentum[2] - r2 * momentum[1]) - (rate[1] * i2 - rate[2] * i1)
-        m1 = W[1] - (r2 * momentum[0] - r0 * momentum[2]) - (rate[2] * i0 - rate[0] * i2)
-        m2 = W[2] - (r0 * momentum[1] - r1 * momentum[0]) - (rate[0] * i1 - rate[1] * i0)
-        f0 = W[3] - (force[1] * p2 - force[2] * p1)
-        f1 = W[4] - (force[2] * p0 - force[0] * p2)
-        f2 = W[5] - (force[0] * p1 - force[1] * p0)
-        for i in range(3):
-            out[i, c] = (rotation[i, 0] * f0 + rotation[i, 1] * f1 + rotation[i, 2] * f2) / body.mass
-            out[3 + i, c] = inverse[i, 0] * m0 + inverse[i, 1] * m1 + inverse[i, 2] * m2
+        for c in range(out.shape[1]):
+            work.motion[i, c] += work.first[i, c]
+            work.motion[3 + i, c] = tangent.rate[i, c]
+    _times(work.by_motion, work.motion, work.wrench)
+    _own_change(parameters, sample, rate, at, work.wrench)
+    _cross(at.out[6:9], tangent.rotation, work.first)
+    for i in range(3):
+        for c in range(out.shape[1]):
+            work.first[i, c] = (work.wrench[3 + i, c] - work.first[i, c]) / body.mass
+    _times(state.rotation, work.first, out[:3])
+    _turning_change(body, rate, tangent.rate, work)
+    _times(body.inverse, work.wrench[:3], out[3:])
 
 
 @_compiled
-def _turned_state(turn: Array, right: Array, interval: float, phi: Array, rate: Array, out: Array) -> None:
-    """Write derivatives of a rotation after a turn: ``turn' phi + right * interval * rate``."""
-    for c in range(phi.shape[1]):
+def _turning_change(body: Body, rate: Array, change: Array, work: _Columns) -> None:
+    """Take the derivatives of ``omega x I omega`` off those of the torque."""
+    momentum = np.empty(3)
+    for i in range(3):
+        momentum[i] = body.inertia[i, 0] * rate[0] + body.inertia[i, 1] * rate[1] + body.inertia[i, 2] * rate[2]
+    _times(body.inertia, change, work.first)
+    _cross(rate, work.first, work.second)
+    _cross(momentum, change, work.first)
+    for i in range(3):
+        for c in range(change.shape[1]):
+            work.wrench[i, c] += work.first[i, c] - work.second[i, c]
+
+
+@_compiled
+def _move_rotation(turn: Array, right: Array, h: float, rotation: Array, rate: Array, out: Array) -> None:
+    """Write derivatives of a rotation after a turn: ``turn' rotation + h right rate``; `out` may be `rotation`."""
+    for c in range(rotation.shape[1]):
+        p0, p1, p2 = rotation[0, c], rotation[1, c], rotation[2, c]
         for i in range(3):
-            out[i, c] = turn[0, i] * phi[0, c] + turn[1, i] * phi[1, c] + turn[2, i] * phi[2, c]
-            out[i, c] += interval * (right[i, 0] * rate[0, c] + right[i, 1] * rate[1, c] + right[i, 2] * rate[2, c])
+            moved = turn[0, i] * p0 + turn[1, i] * p1 + turn[2, i] * p2
+            out[i, c] = moved + h * (right[i, 0] * rate[0, c] + right[i, 1] * rate[1, c] + right[i, 2] * rate[2, c])
+
+
+@_compiled
+def _tangent_to_middle(tangent: _Tangent, middle: _Tangent, change: Array, h: float, moves: bool, at: _Space) -> None:
+    for i in range(3):
+        for c in range(change.shape[1]):
+            middle.velocity[i, c] = tangent.velocity[i, c] + (0.5 * h * change[i, c] if moves else 0.0)
+            middle.rate[i, c] = tangent.rate[i, c] + 0.5 * h * change[3 + i, c]
+    _move_rotation(at.half, at.half_right, 0.5 * h, tangent.rotation, tangent.rate, middle.rotation)
+
+
+@_compiled
+def _tangent_to_end(tangent: _Tangent, middle: _Tangent, change: Array, h: float, moves: bool, at: _Space) -> None:
+    _move_rotation(at.turn, at.right, h, tangent.rotation, middle.rate, tangent.rotation)
+    for i in range(3):
+        for c in range(change.shape[1]):
+            tangent.rate[i, c] += h * change[3 + i, c]
+            if moves:
+                tangent.position[i, c] += h * middle.velocity[i, c]
+                tangent.velocity[i, c] += h * change[i, c]
+
+
+@_compiled
+def _add(error: Array, rows: Array, weight: float, delta: float, gradient: Array, hessian: Array) -> float:
+    """Add one error to gradient and Hessian; give its loss."""
+    root = np.sqrt(1.0 + (error[0] ** 2 + error[1] ** 2 + error[2] ** 2) / (delta * delta))
+    share = weight / root
+    for c in range(len(gradient)):
+        r0, r1, r2 = share * rows[0, c], share * rows[1, c], share * rows[2, c]
+        gradient[c] += r0 * error[0] + r1 * error[1] + r2 * error[2]
+        for k in range(c + 1):
+            hessian[c, k] += r0 * rows[0, k] + r1 * rows[1, k] + r2 * rows[2, k]
+    return float(weight * delta * delta * (root - 1.0))
 
 
 @_compiled
@@ -547,11 +702,14 @@ def sensitivities(
     loss: Loss,
     starts: IntArray,
     translates: bool,
+    group: IntArray,
     gradient: Array,
     hessian: Array,
-    group: IntArray,
 ) -> float:
     """Sum the loss of free runs, its gradient and its Gauss-Newton Hessian by the parameters.
+
+    The gradient is exact: the derivative of a rotation's error vector differs from that of the rotation only across
+    the vector, and the loss depends on its length alone.
 
     Parameters
     ----------
@@ -559,84 +717,47 @@ def sensitivities(
         See `errors_of_runs`.
     parameters : Parameters
     loss : Loss
+    group : array of int, shape (run,)
+        Which sum a run is added to.
     gradient : array, shape (group, parameter)
         Added to.
     hessian : array, shape (group, parameter, parameter)
-        Added to.
-    group : array of int, shape (run,)
-        Which sum a run is added to.
+        Added to, the lower triangle.
     """
-    h, horizon = motion.period, len(loss.weight)
+    h = motion.period
+    state, middle, at = _new_state(), _new_state(), _new_space(used)
     count = len(parameters.inertia)
-    w = _workspace(used.total, len(used.active))
-    rotation, middle, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    rate_m, velocity_m, error = np.empty(3), np.empty(3), np.empty(3)
-    state, middle_state, place = np.empty((9, count)), np.empty((9, count)), np.empty((3, count))
-    change = np.empty((6, count))
+    tangent, half, change = _new_tangent(count), _new_tangent(count), np.empty((6, count))
+    work = _new_columns(count)
+    error = np.empty((4, 3))
     total = 0.0
     for n in range(len(starts)):
-        s, g = starts[n], group[n]
-        position, velocity, rate = motion.position[s].copy(), motion.velocity[s].copy(), motion.rate[s].copy()
-        rotation[:] = motion.rotation[s]
-        state[:] = 0.0
-        place[:] = 0.0
-        for step in range(horizon):
-            G, sample = weights[s + step], s + step
-            _evaluate(body, used, G, velocity, rotation, rate, w)
-            _linearise(body, used, G, parameters, sample, rotation, velocity, rate, state, w, change)
-            _turn(0.5 * h * rate, w.half, w.half_right)
-            for i in range(3):
-                velocity_m[i] = velocity[i] + (0.5 * h * w.out[i] if translates else 0.0)
-                rate_m[i] = rate[i] + 0.5 * h * w.out[3 + i]
-                for c in range(count):
-                    middle_state[i, c] = state[i, c] + (0.5 * h * change[i, c] if translates else 0.0)
-                    middle_state[6 + i, c] = state[6 + i, c] + 0.5 * h * change[3 + i, c]
-            _turned_state(w.half, w.half_right, 0.5 * h, state[3:6], state[6:9], middle_state[3:6])
-            _rotated(rotation, w.half, middle)
-            _evaluate(body, used, G, velocity_m, middle, rate_m, w)
-            _linearise(body, used, G, parameters, sample, middle, velocity_m, rate_m, middle_state, w, change)
-            _turn(h * rate_m, w.turn, w.right)
-            _rotated(rotation, w.turn, moved)
-            rotation[:] = moved
-            _turned_state(w.turn, w.right, h, state[3:6].copy(), middle_state[6:9], state[3:6])
-            for i in range(3):
-                rate[i] += h * w.out[3 + i]
-                for c in range(count):
-                    state[6 + i, c] += h * change[3 + i, c]
-                if translates:
-                    position[i] += h * velocity_m[i]
-                    velocity[i] += h * w.out[i]
-                    for c in range(count):
-                        place[i, c] += h * middle_state[i, c]
-                        state[i, c] += h * change[i, c]
-            fastest = max(np.abs(rate).max(), np.abs(velocity).max())
-            if not fastest < _FASTEST:
+        _start(motion, starts[n], state)
+        for part in tangent:
+            part[:] = 0.0
+        for step in range(len(loss.weight)):
+            sample = starts[n] + step
+            _evaluate(body, used, weights[sample], state, at)
+            _linearise(body, used, weights[sample], parameters, sample, state, tangent, at, work, change)
+            _to_middle(state, middle, h, translates, at)
+            _tangent_to_middle(tangent, half, change, h, translates, at)
+            _evaluate(body, used, weights[sample], middle, at)
+            _linearise(body, used, weights[sample], parameters, sample, middle, half, at, work, change)
+            _to_end(state, middle, h, translates, at)
+            _tangent_to_end(tangent, half, change, h, translates, at)
+            if _lost(state):
                 # A run that leaves every flight behind: as bad as the largest error, and of no direction.
-                total += np.sum(loss.weight[step:]) * _FASTEST
+                total += np.sum(loss.weight[step:] * loss.delta[step:]) * _FASTEST
                 break
-            at = s + step + 1
+            _write_errors(motion, sample + 1, state, error)
             for signal in range(4):
-                if loss.weight[step, signal] == 0.0:
-                    continue
-                if signal == 2:
-                    rotation_error(motion.rotation[at], rotation, error)
-                    rows = state[3:6]
-                elif signal == 0:
-                    error[:] = position - motion.position[at]
-                    rows = place
-                elif signal == 1:
-                    error[:] = velocity - motion.velocity[at]
-                    rows = state[0:3]
-                else:
-                    error[:] = rate - motion.rate[at]
-                    rows = state[6:9]
-                delta = loss.delta[step, signal]
-                root = np.sqrt(1.0 + (error[0] ** 2 + error[1] ** 2 + error[2] ** 2) / (delta * delta))
-                total += loss.weight[step, signal] * delta * delta * (root - 1.0)
-                weight = loss.weight[step, signal] / root
-                for c in range(count):
-                    r0, r1, r2 = weight * rows[0, c], weight * rows[1, c], weight * rows[2, c]
-                    gradient[g, c] += r0 * error[0] + r1 * error[1] + r2 * error[2]
-                    for k in range(c + 1):
-                        hessian[g, c, k] += r0 * rows[0, k] + r1 * rows[1, k] + r2 * rows[2, k]
+                if loss.weight[step, signal] > 0.0:
+                    total += _add(
+                        error[signal],
+                        tangent[signal],
+                        loss.weight[step, signal],
+                        loss.delta[step, signal],
+                        gradient[group[n]],
+                        hessian[group[n]],
+                    )
     return total

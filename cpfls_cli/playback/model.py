@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,8 +11,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.polynomial import FACTORS, STATE_TERMS, Probe, polynomial, state_terms
-from cpfls_cli.effects.registry import effect
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.fuzzy.basis import Consequents
 from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
@@ -97,15 +99,20 @@ class VehicleModel:
     @cached_property
     def weights(self) -> Array:
         """Torque (3) and force (3) by term of the motion and term of the rotors, shape (6, terms, 1 + 4 rotors)."""
-        table = np.zeros((6, self.term_count, 1 + 4 * self.rotors))
-        table[:, 0] += rotor_weights(self.vehicle, self.thrust_linear, self.response)
+        return np.asarray(sum(self.part_weights().values()))
+
+    def part_weights(self) -> dict[str, Array]:
+        """Give the weights of each part alone: rotors, effects by name, remainder; shapes as `weights`."""
+        parts = {"rotors": np.zeros((6, self.term_count, 1 + 4 * self.rotors))}
+        parts["rotors"][:, 0] = rotor_weights(self.vehicle, self.thrust_linear, self.response)
         probe = Probe.of(self.vehicle)
         for known in self.effects:
-            weights = effect_weights(known.name, known.shape, probe)
-            table[:, : len(STATE_TERMS)] += np.tensordot(known.coefficients, weights, axes=1)
+            weights = np.tensordot(known.coefficients, effect_weights(known.name, known.shape, probe), axes=1)
+            more = np.zeros((6, self.term_count - len(STATE_TERMS), weights.shape[2]))
+            parts[known.name] = np.concatenate([weights, more], axis=1)
         if self.remainder is not None:
-            table += remainder_weights(self.remainder, self.rotors)
-        return table
+            parts["remainder"] = remainder_weights(self.remainder, self.rotors)
+        return parts
 
     @property
     def airflow(self) -> Airflow:
@@ -173,9 +180,31 @@ class VehicleModel:
         -------
         array, shape (time, 6), N m and N, body frame
         """
-        terms = np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
-        flat = np.einsum("ta,kau,tu->tk", terms, self.weights, rotor, optimize=True)
-        return np.asarray(flat)
+        return wrench_of(self.weights, self.terms(velocity, rate), rotor)
+
+    def terms(self, velocity: Array, rate: Array) -> Array:
+        """Evaluate the terms of the motion, shape (time, terms)."""
+        return np.hstack([state_terms(velocity, rate), remainder_terms(self.remainder, velocity)])
+
+    def weights_at(self, velocity: Array, rate: Array) -> Array:
+        """Compute what the terms of the rotors are multiplied with to give torque (3) and force (3).
+
+        Parameters
+        ----------
+        velocity : array, shape (time, 3), m/s, body frame
+            Through the air.
+        rate : array, shape (time, 3), rad/s, body frame
+
+        Returns
+        -------
+        array, shape (time, 6, 1 + 4 rotors)
+        """
+        return np.asarray(np.einsum("ta,kau->tku", self.terms(velocity, rate), self.weights, optimize=True))
+
+
+def wrench_of(weights: Array, terms: Array, rotor: Array) -> Array:
+    """Multiply weights with the terms of the motion and of the rotors, shape (time, 6)."""
+    return np.asarray(np.einsum("ta,kau,tu->tk", terms, weights, rotor, optimize=True))
 
 
 def body_of(vehicle: VehicleSettings, inertia: Array) -> Body:
@@ -228,11 +257,25 @@ def effect_weights(name: str, shape: Mapping[str, float], probe: Probe) -> Array
     ComputationError
         If the effect is no polynomial of motion and rotor speeds.
     """
-    found = polynomial(effect(name), probe, shape)
+    known = effect(name)
+    found = polynomial(_wrench_of_numbers() if known.kind == "parameter" else known, probe, shape)
     if found is None:
         raise ComputationError(f"the effect {name} is no polynomial of motion and rotor speeds")
     slow = np.zeros((*found.shape[:3], len(probe.signals.vehicle.rotors)))
     return np.concatenate([found, slow], axis=3)
+
+
+def _wrench_of_numbers() -> Effect:
+    """Make an effect of the numbers of the vehicle that are no inertia: scale of the thrust, coupling of the rates."""
+
+    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+        assert VEHICLE_NUMBERS.columns is not None
+        given = VEHICLE_NUMBERS.columns(signals, shape)
+        assert given.momentum is not None
+        # What has momentum is inertia, which stands in the vehicle, or the place of a sensor, which moves nothing.
+        return Columns(given.direct * ~np.any(given.momentum, axis=(0, 1)))
+
+    return replace(VEHICLE_NUMBERS, kind="wrench", columns=columns)
 
 
 def remainder_weights(remainder: Remainder, rotors: int) -> Array:

@@ -58,5 +58,5 @@ EFFECT = Effect(
     shapes=(Shape("delay_s", "s", (0.004, 0.008, 0.012, 0.02, 0.03, 0.04, 0.055, 0.07, 0.09, 0.12), "time of travel"),),
     unit_coefficient=True,
     apply=_apply,
-    actuation=Actuation(link=_link),
+    actuation=Actuation(link=_link, delay=lambda values: values["delay_s"]),
 )

@@ -9,7 +9,7 @@ import numpy as np
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric_columns
+from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric, symmetric_columns
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
@@ -40,4 +40,5 @@ EFFECT = Effect(
     source="Newton-Euler equations; RotorPy and PX4 sih.cpp (Ixy, Ixz, Iyz)",
     columns=_columns,
     rate_derivative=True,
+    inertia=lambda linear: symmetric([0.0, 0.0, 0.0, *linear]),
 )

@@ -1,0 +1,141 @@
+"""Print what models predict of the nano-drone benchmark's test flights, beside the models that are published.
+
+    python benchmarks/nanodrone.py DATA
+
+DATA is a clone of idsia-robotics/nanodrone-sysid-benchmark, branch model_export (commit ac439db), which has the raw
+flights; a folder that holds the files of `data/real/raw/parquets`, `data/real/processed/train`, `data/sim` and
+`data/sim/old` side by side does as well. The flights are prepared by the steps of the benchmark's notebook. Needs
+pyarrow (extra `parquet`). The inertia is the benchmark's but for Izz, where its 3.2347e-6 kg m^2 contradicts the flat
+body: 3.2347e-5.
+
+From every sample of the flights melon 1, 4 and 5, models are played back over 50 steps of 10 ms by the measured rotor
+speeds of the sample before each step. Learned is on the flights square, multisine (which the benchmark calls chirp) and
+random alone.
+
+"nothing moves" has to give 0.0796, 0.3588 and 0.8777 rad/s at h = 1, 10 and 50. The benchmark says 0.3596 and 0.8837,
+since its script lays the flights end to end and holds the last windows of a flight against the beginning of the next.
+Rows "their way" are counted like that, and are what the published rows are to be set beside.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import numpy as np
+
+from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
+from benchmarks.shared.playback_scores import (
+    SHOWN,
+    SIGNALS,
+    SYMBOLS,
+    Runs,
+    as_published,
+    free_runs,
+    nothing_moves,
+    rate_stays,
+    score,
+)
+from cpfls_cli.errors import InputError
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.model import VehicleModel
+
+# Of position, velocity, attitude, body rate: h = 1, 10, 50, and the sum over h = 1 to 50. Printed by the notebook
+# results/model_comparison.ipynb of the benchmark's branch main (commit 2d921b5) and in arXiv 2512.14450.
+PUBLISHED = {
+    "published: nothing moves": (
+        (0.0143, 0.1430, 0.6797, 17.7878),
+        (0.0329, 0.3182, 1.4749, 38.9241),
+        (0.0071, 0.0692, 0.3041, 8.2138),
+        (0.0796, 0.3596, 0.8837, 29.0866),
+    ),
+    "published: physics": (
+        (0.0013, 0.0126, 0.1269, 2.3223),
+        (0.0080, 0.0570, 0.5781, 10.6232),
+        (0.0011, 0.0205, 0.2544, 5.1013),
+        (0.0796, 0.3596, 0.8837, 29.0866),
+    ),
+    "published: MLP": (
+        (0.0032, 0.0305, 0.1712, 4.0519),
+        (0.0116, 0.0890, 0.5720, 12.5809),
+        (0.0022, 0.0331, 0.2268, 6.0591),
+        (0.1138, 0.5949, 0.9005, 35.5735),
+    ),
+    "published: hybrid": (
+        (0.0016, 0.0166, 0.1119, 2.3625),
+        (0.0092, 0.0613, 0.5556, 10.4033),
+        (0.0027, 0.0376, 0.2306, 6.1534),
+        (0.0912, 0.4880, 0.5979, 28.9873),
+    ),
+    "published: LSTM": (
+        (0.0079, 0.0390, 0.2572, 5.9711),
+        (0.0247, 0.1175, 0.7407, 16.7207),
+        (0.0066, 0.0372, 0.2325, 5.6525),
+        (0.1021, 0.4292, 1.2407, 35.8353),
+    ),
+}
+COLUMNS = (
+    "model",
+    *(f"{SYMBOLS[signal]} {column}" for signal in SIGNALS for column in (*(f"h={h}" for h in SHOWN), "sum")),
+    "windows",
+    "diverged",
+)
+
+
+def models(_training: Sequence[PlaybackFlight]) -> Mapping[str, VehicleModel]:
+    """Give the models that are played back, by name; those that learn see the training flights alone."""
+    return {"stated rigid body": VehicleModel(vehicle=VEHICLE)}
+
+
+def our_rows(training: Sequence[PlaybackFlight], test: Sequence[PlaybackFlight]) -> list[list[object]]:
+    """Play the baselines and the models back on the test flights, counted within flights and as published."""
+    rows = [
+        *rows_of("nothing moves", test, [nothing_moves(flight) for flight in test]),
+        *rows_of("rate stays", test, [rate_stays(flight) for flight in test]),
+    ]
+    for name, model in models(training).items():
+        rows += rows_of(name, test, [free_runs(model, flight) for flight in test])
+    return rows
+
+
+def rows_of(name: str, test: Sequence[PlaybackFlight], runs: Sequence[Runs]) -> list[list[object]]:
+    """Count runs within flights, and as the published script does."""
+    rows: list[list[object]] = []
+    for title, counted in ((name, runs), (f"{name}, their way", as_published(test, runs))):
+        found = score(counted)
+        rows.append([title, *by_signal(found.mae).ravel(), found.windows, found.diverged])
+    return rows
+
+
+def by_signal(mae: np.ndarray) -> np.ndarray:
+    """Pick the published horizons and the sum, shape (signal, 4)."""
+    return np.column_stack([mae[np.array(SHOWN) - 1].T, mae.sum(axis=0)])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", type=Path, metavar="DATA", help="folder of the benchmark's files")
+    folder = parser.parse_args().data
+    start = perf_counter()
+    try:
+        training, test = flights(folder, TRAINING), flights(folder, TEST)
+    except InputError as error:
+        sys.exit(
+            f"{error}\nget it: git clone -b model_export https://github.com/idsia-robotics/nanodrone-sysid-benchmark"
+        )
+    print(f"{len(training)} training flights, {len(test)} test flights read in {perf_counter() - start:.1f} s\n")
+    published = [[name, *np.ravel(values), 19347, ""] for name, values in PUBLISHED.items()]
+    table("nanodrone", COLUMNS, [*published, *our_rows(training, test)], digits=4)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,141 @@
+"""Free runs of models along flights, held against what was measured, with the metric of the nano-drone benchmark."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import errors_of_runs
+from cpfls_cli.playback.model import VehicleModel
+
+HORIZON = 50
+SHOWN = (1, 10, 50)
+SIGNALS = ("position", "velocity", "attitude", "body_rate")
+SYMBOLS = dict(zip(SIGNALS, ("p", "v", "R", "ω"), strict=True))
+
+
+class Score(NamedTuple):
+    """What free runs miss.
+
+    Attributes
+    ----------
+    mae : array, shape (horizon, 4), m, m/s, rad, rad/s
+        Means of the norms of the errors; of position, velocity, attitude (geodesic), body rate.
+    windows, diverged : int
+        Runs, and those that were stopped because they left every flight behind.
+    """
+
+    mae: Array
+    windows: int
+    diverged: int = 0
+
+    @property
+    def sums(self) -> Array:
+        """Sums over the horizons, shape (4,)."""
+        return np.asarray(self.mae.sum(axis=0))
+
+
+class Runs(NamedTuple):
+    """Free runs along one flight.
+
+    Attributes
+    ----------
+    errors : array, shape (run, horizon, 4, 3)
+        Predicted less measured position, velocity, rotation vector (body frame of the measured attitude), rate.
+    diverged : int
+    """
+
+    errors: Array
+    diverged: int = 0
+
+
+def score(runs: Sequence[Runs]) -> Score:
+    """Take means over all runs of all flights, leaving out what is NaN; NaN where nothing is known."""
+    norms = np.concatenate([np.linalg.norm(run.errors, axis=3) for run in runs])
+    known = np.isfinite(norms).sum(axis=0)
+    mae = np.where(known, np.nansum(norms, axis=0) / np.maximum(known, 1), np.nan)
+    return Score(mae, len(norms), sum(run.diverged for run in runs))
+
+
+def free_runs(model: VehicleModel, flight: PlaybackFlight, every: int = 1, horizon: int = HORIZON) -> Runs:
+    """Play a model back, without correction, from every n-th sample of a flight from which the horizon fits."""
+    starts = flight.starts(horizon, every)
+    rotor = np.zeros((len(flight), 1 + 4 * model.rotors))
+    for part in flight.stretches:
+        rotor[part] = model.rotor_terms(flight.speed[part], flight.motion.period, flight.hold)
+    terms, weights = model.step_weights(rotor)
+    errors = np.empty((len(starts), horizon, 4, 3))
+    diverged = errors_of_runs(flight.motion, model.body, terms, weights, starts, flight.translates, errors)
+    return Runs(errors, int(np.sum(diverged >= 0)))
+
+
+def nothing_moves(flight: PlaybackFlight, every: int = 1, horizon: int = HORIZON) -> Runs:
+    """Let all stay as it is at the start: position, velocity, attitude, rate."""
+    starts = flight.starts(horizon, every)
+    return Runs(_less_measured(flight, starts, horizon, np.zeros(3), np.zeros(3)))
+
+
+def rate_stays(flight: PlaybackFlight, every: int = 1, horizon: int = HORIZON) -> Runs:
+    """Let rate and velocity stay, so that the body goes on turning and moving."""
+    starts = flight.starts(horizon, every)
+    motion = flight.motion
+    return Runs(_less_measured(flight, starts, horizon, motion.velocity[starts], motion.rate[starts]))
+
+
+def _less_measured(flight: PlaybackFlight, starts: IntArray, horizon: int, velocity: Array, rate: Array) -> Array:
+    """Move on at a constant velocity and turn at a constant rate; velocity and rate themselves stay."""
+    motion, errors = flight.motion, np.empty((len(starts), horizon, 4, 3))
+    rotation, zero = Rotation.from_matrix(motion.rotation), np.zeros((len(starts), 3))
+    for step in range(horizon):
+        at, later = starts + step + 1, (step + 1) * motion.period
+        turned = rotation[starts] * Rotation.from_rotvec(zero + later * rate)
+        errors[:, step, 0] = motion.position[starts] + later * velocity - motion.position[at]
+        errors[:, step, 1] = motion.velocity[starts] - motion.velocity[at]
+        errors[:, step, 2] = (rotation[at].inv() * turned).as_rotvec()
+        errors[:, step, 3] = motion.rate[starts] - motion.rate[at]
+    return errors
+
+
+def as_published(flights: Sequence[PlaybackFlight], runs: Sequence[Runs]) -> list[Runs]:
+    """Hold runs against what the published script of the nano-drone benchmark holds them against.
+
+    It lays the windows of all flights end to end before it looks for the sample h steps later, so that the last windows
+    of a flight meet the beginning of the next; of the last flight they meet nothing and are left out (NaN).
+
+    Parameters
+    ----------
+    flights : sequence of PlaybackFlight
+    runs : sequence of Runs
+        From every sample of each flight.
+    """
+    held = [Runs(run.errors.copy(), run.diverged) for run in runs]
+    for index, run in enumerate(held):
+        windows, horizon = run.errors.shape[:2]
+        window, step = np.nonzero(np.arange(windows)[:, None] + np.arange(horizon) >= windows)
+        if index + 1 == len(flights):
+            run.errors[window, step] = np.nan
+            continue
+        at, beyond = window + step + 1, window + step - windows + 1
+        run.errors[window, step] = _moved(run.errors[window, step], flights[index], at, flights[index + 1], beyond)
+    return held
+
+
+def _moved(errors: Array, flight: PlaybackFlight, at: Array, other: PlaybackFlight, there: Array) -> Array:
+    """Turn errors against samples of a flight into errors against samples of another."""
+    here, next_ = flight.motion, other.motion
+    predicted = Rotation.from_matrix(here.rotation[at]) * Rotation.from_rotvec(errors[:, 2])
+    turn = Rotation.from_matrix(next_.rotation[there]).inv() * predicted
+    return np.stack(
+        [
+            errors[:, 0] + here.position[at] - next_.position[there],
+            errors[:, 1] + here.velocity[at] - next_.velocity[there],
+            turn.as_rotvec(),
+            errors[:, 3] + here.rate[at] - next_.rate[there],
+        ],
+        axis=1,
+    )

@@ -1,0 +1,78 @@
+"""Command `vehicle`: a whole vehicle found in flights, fitted on what it predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from pathlib import Path
+
+from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.commands.compare import flight_roles
+from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.errors import ConfigError, InputError
+from cpfls_cli.flights.playback import flights_to_play
+from cpfls_cli.pages.source import source_of
+from cpfls_cli.pages.vehicle_model import answer
+from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.playback.structure import SearchStoppedError
+from cpfls_cli.playback.vehicle import find_vehicle
+from cpfls_cli.report.outcome import Outcome, nothing_written
+
+
+def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path]) -> Outcome:
+    """Find a vehicle and write it.
+
+    Parameters
+    ----------
+    flights : sequence of Path
+        Artifacts, or logs that the config describes; the vehicle is found in them.
+    held_out : sequence of Path
+        Others to judge it on, once.
+
+    Raises
+    ------
+    InputError
+        If a flight has no rotor speeds or commands, or is shorter than the horizon.
+    """
+    study = job.study
+    inputs = begin(job, flight_roles("flight", flights) | flight_roles("held-out", held_out))
+    _check_left_out(study)
+    read = flights_to_play([*flights, *held_out], study)
+    for flight in read:
+        if flight.playback.wrench is not None:
+            raise InputError(
+                f"{flight.name}: states torque and thrust instead of rotor speeds; a vehicle is found from rotor_speed "
+                "or rotor_command, name their columns in import.signals"
+            )
+    training, rest = read[: len(flights)], read[len(flights) :]
+    if job.dry_run:
+        return nothing_written(job)
+    job.progress(0.0, 1, "loads compiled loops; at the first use on a machine compiles them")
+    with settings_of("playback", study), job.deferred_interrupts() as interrupted:
+
+        def progress(done: int, total: int, best: float) -> None:
+            job.progress(done, total, f"structure {done}, smallest error {best:.3g}")
+            if interrupted() is not None:
+                raise SearchStoppedError
+
+        found = find_vehicle(
+            study.vehicle,
+            [flight.playback for flight in training],
+            study.playback,
+            generator(study, "vehicle"),
+            progress,
+        )
+    warnings = [warning for flight in read for warning in flight.warnings]
+    record = finish(job, VehicleRecord.of(found, warnings), inputs)
+    return Outcome(record.summary, tuple(answer(source_of(job, record))))
+
+
+def _check_left_out(study: Study) -> None:
+    """Refuse names in `playback.leave_out` that no block has."""
+    known = blocks_of(study.vehicle)
+    for name in study.playback.leave_out:
+        if name not in known:
+            near = get_close_matches(name, known, n=1, cutoff=0.4)
+            hint = f"did you mean {near[0]}?" if near else f"the blocks are {', '.join(known)}"
+            raise ConfigError(f"playback.leave_out = {name}: no such block ({hint})")

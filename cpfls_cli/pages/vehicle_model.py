@@ -1,0 +1,230 @@
+"""The page of a vehicle found in flights: its numbers, what was tried, and what has no name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.spec import rows_of
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.pages.source import Source, Sources, section_of_each
+from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, stacked, style_of
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.numbers import joined, number, percent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_NAMES = {
+    "chosen": "chosen: fewest numbers within one standard error of the best",
+    "best": "smallest error",
+    "greedy": "blocks added one by one",
+    "everything": "all blocks",
+    "nothing": "the stated vehicle",
+}
+_REMAINDER, _ROTORS = "remainder", "rotors"
+_AXES = ("x", "y", "z")
+_FAR = 3.0
+"""Factor from the stated number from which on a found one is called effective, and no property of a part."""
+
+
+def answer(found: Source[VehicleRecord]) -> Iterator[Block]:
+    """Say what was found, how well it predicts what it was not fitted to, and what to be careful with."""
+    yield _box(found)
+    yield _numbers_table(found, 1)
+    yield from (Text(warning, "warning") for warning in warnings(found.record))
+
+
+def _box(found: Source[VehicleRecord]) -> Box:
+    record = found.record
+    errors = dict(zip(record.structure.name, record.structure.error, strict=True))
+    free = len(record.found.name)
+    title = f"{found.label}: a vehicle with {free} numbers found in its flights."
+    judged = (
+        f"On parts of the flights kept aside in turn its error is {number(errors['chosen'], 3)}; with all blocks "
+        f"{number(errors['everything'], 3)}, with blocks added one by one {number(errors['greedy'], 3)}, with the "
+        f"stated vehicle {number(errors['nothing'], 3)}; rates that stay have about 1.1."
+    )
+    blocks = _chosen_blocks(record)
+    holds = f"It holds {joined(blocks)}." if blocks else "It holds nothing but the stated vehicle."
+    return Box("VEHICLE", title, [judged, holds], "good" if errors["chosen"] < errors["nothing"] else "warning")
+
+
+def _chosen_blocks(record: VehicleRecord) -> list[str]:
+    chosen = record.structure.blocks[record.structure.name.index("chosen")]
+    return [block.replace("_", " ") for block in chosen.split()]
+
+
+def warnings(record: VehicleRecord) -> list[str]:
+    """Warn of numbers that the flights do not tell, and of what is known about the flights."""
+    found = record.found
+    said = list(record.warning)
+    bound = [name for name, at in zip(found.name, found.at_bound, strict=True) if at]
+    open_ = [name for name, known in zip(found.name, found.determined, strict=True) if not known]
+    if bound:
+        said.append(f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; not a physical number")
+    if open_:
+        said.append(f"{joined(open_)}: the flights say no more of it than what was believed before")
+    said.extend(
+        f"{row['first']} and {row['second']} trade against each other (correlation {row['correlation']:.3f}): only "
+        "together do they mean anything"
+        for row in rows_of(record.trade)
+    )
+    far = [row["name"] for row in rows_of(found) if _far(row["value"], row["stated"])]
+    if far:
+        said.append(
+            f"{joined(far)}: more than {_FAR:g} times off what is stated; an effective number that predicts, not a "
+            "property of the part that it is named after"
+        )
+    if not record.complete:
+        said.append("the search was stopped before its end; other structures may be better")
+    return said
+
+
+def _far(value: float, stated: float) -> bool:
+    return bool(np.isfinite(stated) and stated > 0 and not 1 / _FAR < value / stated < _FAR)
+
+
+def _numbers_table(found: Source[VehicleRecord], index: int) -> Table:
+    rows: list[list[str | Cell]] = []
+    for row in rows_of(found.record.found):
+        weak = row["at_bound"] or not row["determined"]
+        value = Cell(number(row["value"]), "warning" if weak else "plain")
+        rows.append(
+            [row["name"], row["unit"], value, number(row["low"], 3), number(row["high"], 3), number(row["stated"], 3)]
+        )
+    caption = "Numbers of the vehicle with 95 % intervals from blocks of the flights; stated: in the config."
+    header = ("Number", "Unit", "Value", "From", "To", "Stated")
+    return Table(f"vehicle-numbers-{index}", caption, header, rows, frozenset({0, 1}))
+
+
+def found_vehicle_section(sources: Sources) -> Section | None:
+    """Show the vehicles found in flights; None where none was given."""
+    return section_of_each("found-vehicle", "The vehicle found in flights", sources.vehicles, _section)
+
+
+def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
+    record = found.record
+    yield Heading(found.label)
+    yield _box(found)
+    yield Facts(
+        [
+            ("Structures judged", str(record.evaluated)),
+            ("Blocks of windows behind the intervals", str(record.blocks)),
+            ("Named and learned shares of the torque", _share_in_words(record)),
+        ]
+    )
+    yield _numbers_table(found, index)
+    yield from (Text(warning, "warning") for warning in warnings(record))
+    yield _structures_table(record, index)
+    yield _structures_figure(record, index)
+    yield _shares_table(record, index)
+    if record.vehicle.remainder is not None:
+        yield _remainder_figure(record, index)
+
+
+def _share_in_words(record: VehicleRecord) -> str:
+    """Compare what has a name with what is learned, beside the rotors."""
+    torque = dict(zip(record.share.name, np.linalg.norm(record.share.torque, axis=1).tolist(), strict=True))
+    learned = torque.pop(_REMAINDER, 0.0)
+    torque.pop(_ROTORS)
+    named = float(np.sqrt(sum(value**2 for value in torque.values())))
+    if named + learned == 0:
+        return "the rotors alone"
+    share = learned**2 / (named**2 + learned**2)
+    return f"named {percent(1 - share)}, learned {percent(share)} (squares, beside the rotors)"
+
+
+def _structures_table(record: VehicleRecord, index: int) -> Table:
+    rows = [
+        [
+            _NAMES[row["name"]],
+            number(row["error"], 4),
+            f"{number(row['worse'], 2)} ± {number(row['uncertain'], 2)}",
+            str(row["numbers"]),
+            number(row["condition_number"], 2),
+            row["blocks"].replace(" ", ", "),
+        ]
+        for row in rows_of(record.structure)
+        if row["name"] in _NAMES
+    ]
+    caption = "Structures, judged on parts of the flights kept aside in turn."
+    header = ("Structure", "Error", "Worse than the best", "Numbers", "Condition", "Blocks")
+    return Table(f"vehicle-structures-{index}", caption, header, rows, frozenset({0, 5}), frozenset({0, 5}))
+
+
+def _structures_figure(record: VehicleRecord, index: int) -> Plot:
+    rows = rows_of(record.structure)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        front = sorted((row["numbers"], row["error"]) for row in rows if row["name"] == "front")
+        count, error = (np.array(values, dtype=float) for values in zip(*front, strict=True))
+        axes.plot(count, error, "o", label="Pareto front", color=GREY, markersize=4)
+        markers = {"chosen": "s", "best": "^", "greedy": "v", "everything": "D", "nothing": "x"}
+        for place, (name, marker) in enumerate(markers.items()):
+            row = next(each for each in rows if each["name"] == name)
+            color = style_of(place)["color"]
+            axes.plot([row["numbers"]], [row["error"]], marker, label=name, color=color, markersize=7, linestyle="none")
+        axes.axhline(1.1, label="rates stay", **BASELINE)
+        axes.set_xlabel("free numbers")
+        axes.set_ylabel("error on flights kept aside")
+        axes.set_yscale("log")
+        legend_over(figure, axes)
+
+    caption = "Playback error by the number of free numbers; the chosen structure is the simplest that is as good."
+    return plot(f"vehicle-structures-figure-{index}", caption, caption, 3.4, draw)
+
+
+def _shares_table(record: VehicleRecord, index: int) -> Table:
+    rows = [
+        [name.replace("_", " "), *(number(float(value), 3) for value in (*torque, *force))]
+        for name, torque, force in zip(record.share.name, record.share.torque, record.share.force, strict=True)
+    ]
+    header = ("Part", *(f"torque {a}, N m" for a in _AXES), *(f"force {a}, N" for a in _AXES))
+    caption = "What each part of the model does along the training flights, root mean square."
+    return Table(f"vehicle-shares-{index}", caption, header, rows)
+
+
+def _remainder_figure(record: VehicleRecord, index: int) -> Plot:
+    direction, wrench = remainder_curves(record)
+
+    def draw(figure: Figure) -> None:
+        torques, forces = stacked(figure, 2)
+        for axis, name in enumerate(_AXES):
+            line(torques, direction, wrench[:, axis], label=f"about or along {name}", **style_of(axis))
+            line(forces, direction, wrench[:, 3 + axis], **style_of(axis))
+        torques.set_ylabel("torque, N m")
+        forces.set_ylabel("force, N")
+        forces.set_xlabel("direction of flight in the rotor plane, ° (0 forward, 90 left)")
+        forces.set_xticks(np.arange(-180, 181, 45))
+        legend_over(figure, torques)
+
+    speed = number(record.airspeed, 2)
+    caption = f"What has no name, over the direction of flight at {speed} m/s and the rotor speed of hover."
+    return plot(f"vehicle-remainder-{index}", caption, caption, 4.2, draw)
+
+
+def remainder_curves(record: VehicleRecord) -> tuple[Array, Array]:
+    """Evaluate the remainder over the direction of flight.
+
+    Returns
+    -------
+    direction : array, shape (73,), degrees
+    wrench : array, shape (73, 6), N m and N
+    """
+    from cpfls_cli.effects.scales import hover_speed
+    from cpfls_cli.playback.model import wrench_of
+
+    model = record.vehicle.vehicle_model()
+    direction = np.linspace(-180.0, 180.0, 73)
+    angle = np.radians(direction)
+    velocity = record.airspeed * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    rotor = np.zeros((len(angle), 1 + 4 * model.rotors))
+    rotor[:, 0] = 1.0
+    rotor[:, 1 : 1 + model.rotors] = hover_speed(model.vehicle)
+    weights = model.part_weights()[_REMAINDER]
+    return direction, wrench_of(weights, model.terms(velocity, np.zeros_like(velocity)), rotor)

@@ -1,0 +1,366 @@
+"""Prediction-error fit: the numbers with which free runs along flights come out closest to what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+from scipy.stats import t as student
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Loss, Motion, errors_of_runs, sensitivities
+from cpfls_cli.playback.parameters import Evaluated, Layout
+
+POSITION, VELOCITY, ATTITUDE, RATE = range(4)
+_SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
+"""Position follows from velocity, and half of the attitude's error from the rate's: each says less that is new."""
+
+_ROBUST = 0.5
+_LEAST = 0.1
+"""Error at which the loss turns from square to absolute, in those of "rate stays"; at least a share of their mean."""
+
+_PRIOR = 1e-3
+"""Weight of what is believed before the flights: as one window of a thousand."""
+
+_FIRST_DAMPING, _DAMPING_UP, _DAMPING_DOWN, _LEAST_DAMPING = 1e-3, 6.0, 5.0, 1e-9
+_TRIES = 8
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows of a flight that runs are compared in.
+
+    Attributes
+    ----------
+    flight : PlaybackFlight
+    starts : array of int, shape (window,)
+    loss : Loss
+        In errors of "rate stays" on windows of the flight, so that each flight counts alike.
+    """
+
+    flight: PlaybackFlight
+    starts: IntArray
+    loss: Loss
+
+    @property
+    def horizon(self) -> int:
+        """Steps of each window."""
+        return len(self.loss.weight)
+
+    @cached_property
+    def samples(self) -> IntArray:
+        """Samples of the flight in the windows, window by window: only there the weights are needed."""
+        return np.asarray((self.starts[:, None] + np.arange(self.horizon + 1)).ravel())
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Motion at these samples."""
+        whole = self.flight.motion
+        position, velocity, rotation, rate = (np.ascontiguousarray(each[self.samples]) for each in whole[:4])
+        return Motion(position, velocity, rotation, rate, whole.period)
+
+    @cached_property
+    def places(self) -> IntArray:
+        """Where the windows start in `samples`."""
+        return np.arange(len(self.starts), dtype=np.int64) * (self.horizon + 1)
+
+    @classmethod
+    def of(cls, flight: PlaybackFlight, horizon: int, every: int) -> Windows:
+        """Take every n-th window of a flight.
+
+        Parameters
+        ----------
+        flight : PlaybackFlight
+        horizon, every : int
+            Samples.
+        """
+        starts = flight.starts(horizon, every)
+        return cls(flight, starts, loss_of(flight, starts, horizon))
+
+
+def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Array:
+    """Compute mean errors of "rate stays": the attitude turns with it, and velocity stays.
+
+    Returns
+    -------
+    array, shape (horizon, 4), m, m/s, rad, rad/s
+    """
+    motion, errors = flight.motion, np.zeros((horizon, 4))
+    turned = Rotation.from_matrix(motion.rotation[starts])
+    for step in range(1, horizon + 1):
+        at, elapsed = starts + step, step * motion.period
+        moved = motion.position[starts] + elapsed * motion.velocity[starts] - motion.position[at]
+        turn = (turned * Rotation.from_rotvec(elapsed * motion.rate[starts])).inv()
+        away = (turn * Rotation.from_matrix(motion.rotation[at])).magnitude()
+        faster = motion.velocity[starts] - motion.velocity[at]
+        spun = motion.rate[starts] - motion.rate[at]
+        sizes = (np.linalg.norm(each, axis=1) for each in (moved, faster, spun))
+        position, velocity, rate = (float(size.mean()) for size in sizes)
+        errors[step - 1] = position, velocity, float(away.mean()), rate
+    return errors
+
+
+def loss_of(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Loss:
+    """Weigh errors by those of "rate stays" on the same windows: 1 is as good as nothing known.
+
+    Parameters
+    ----------
+    flight : PlaybackFlight
+    starts : array of int, shape (window,)
+    horizon : int
+        Samples.
+    """
+    scale = rate_stays(flight, starts, horizon)
+    known = np.array([flight.translates, flight.translates, flight.has_attitude, True])
+    total = np.where(known & (scale.sum(axis=0) > 0), scale.sum(axis=0), np.inf)
+    delta = np.maximum(_ROBUST * np.maximum(scale, _LEAST * scale.mean(axis=0)), 1e-12)
+    return Loss(np.array(_SIGNAL_WEIGHTS) / total / delta, delta)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A layout fitted to windows.
+
+    Attributes
+    ----------
+    layout : Layout
+    values : array, shape (number,)
+    loss : float
+        Mean over windows, without the prior; about 1.1 for rates that stay.
+    hessian : array, shape (number, number)
+        Gauss-Newton, of the mean loss with the prior, in scales of the numbers.
+    """
+
+    layout: Layout
+    values: Array
+    loss: float
+    hessian: Array
+
+    @property
+    def condition_number(self) -> float:
+        """Of the numbers in their scales, prior included."""
+        eigenvalues = np.linalg.eigvalsh(self.hessian) if len(self.hessian) else np.ones(1)
+        return float(eigenvalues[-1] / max(eigenvalues[0], np.finfo(float).tiny))
+
+
+@dataclass(frozen=True)
+class _Point:
+    values: Array
+    loss: float
+    objective: float
+    gradient: Array
+    hessian: Array
+
+
+def fit(layout: Layout, windows: Sequence[Windows], known: Mapping[str, float], steps: int, tolerance: float) -> Fitted:
+    """Minimise the robust prediction error over windows by a damped Gauss-Newton method within bounds.
+
+    Parameters
+    ----------
+    layout : Layout
+    windows : sequence of Windows
+    known : mapping of str to float
+        Values to start from, by name.
+    steps : int
+        At most.
+    tolerance : float
+        Relative decrease of the loss below which the fit has come to its end.
+
+    Raises
+    ------
+    ComputationError
+        If the starting values lead nowhere: the loss is not finite.
+
+    References
+    ----------
+    Ljung, System Identification, section 10.2; Jategaonkar, Flight Vehicle System Identification, chapter 4 (output
+    error); Bock 1983 (multiple shooting: each window starts from what was measured).
+    """
+    low, high = layout.array("low"), layout.array("high")
+    point = _evaluated(layout, windows, np.clip(layout.values(known), low, high))
+    if not np.isfinite(point.objective):
+        raise ComputationError("the prediction error is not finite at the stated numbers; look at the units of the log")
+    damping = _FIRST_DAMPING
+    for _ in range(steps):
+        following, damping = _better(layout, windows, point, damping, (low, high))
+        if following is None:
+            break
+        decrease, point = point.objective - following.objective, following
+        if decrease < tolerance * point.objective:
+            break
+    return Fitted(layout, point.values, point.loss, point.hessian)
+
+
+def _evaluated(layout: Layout, windows: Sequence[Windows], values: Array) -> _Point:
+    evaluated = Evaluated.of(layout, values)
+    total, gradient, hessian = 0.0, np.zeros(len(values)), np.zeros((len(values), len(values)))
+    for window in windows:
+        loss, by_group, curvature = window_sums(evaluated, window, np.zeros(len(window.starts), dtype=np.int64))
+        total, gradient, hessian = total + loss, gradient + by_group[0], hessian + curvature[0]
+    count = sum(len(window.starts) for window in windows)
+    scale, spread = layout.array("scale"), layout.array("spread")
+    away = (values - layout.array("start")) / scale
+    belief = _PRIOR / spread**2
+    return _Point(
+        values,
+        total / count,
+        total / count + 0.5 * float(belief @ away**2),
+        gradient / count * scale + belief * away,
+        hessian / count * scale[:, None] * scale + np.diag(belief),
+    )
+
+
+def window_sums(evaluated: Evaluated, window: Windows, group: IntArray) -> tuple[float, Array, Array]:
+    """Sum loss, gradient and Hessian over the windows of a flight.
+
+    Parameters
+    ----------
+    evaluated : Evaluated
+    window : Windows
+    group : array of int, shape (window,)
+        Which sum each window is added to.
+
+    Returns
+    -------
+    loss : float
+    gradient : array, shape (group, number)
+    hessian : array, shape (group, number, number)
+    """
+    flight, count, groups = window.flight, len(evaluated.values), int(group.max(initial=0)) + 1
+    gradient, hessian = np.zeros((groups, count)), np.zeros((groups, count, count))
+    loss = sensitivities(
+        window.motion,
+        evaluated.body,
+        evaluated.used,
+        evaluated.weights(flight, window.samples),
+        evaluated.parameters(flight, window.samples),
+        window.loss,
+        window.places,
+        flight.translates,
+        group,
+        gradient,
+        hessian,
+    )
+    return float(loss), gradient, np.tril(hessian) + np.tril(hessian, -1).swapaxes(1, 2)
+
+
+def _better(
+    layout: Layout, windows: Sequence[Windows], point: _Point, damping: float, bounds: tuple[Array, Array]
+) -> tuple[_Point | None, float]:
+    """Find a point with a smaller objective, with more damping where a step fails; None where none is found."""
+    for _ in range(_TRIES):
+        step = _step(point, damping, bounds, layout.array("scale"))
+        following = _evaluated(layout, windows, np.clip(point.values + step, *bounds))
+        if following.objective < point.objective:
+            return following, max(damping / _DAMPING_DOWN, _LEAST_DAMPING)
+        damping *= _DAMPING_UP
+    return None, damping
+
+
+def _step(point: _Point, damping: float, bounds: tuple[Array, Array], scale: Array) -> Array:
+    """Solve for a step; numbers that it would push through a bound on which they lie stay."""
+    low, high = bounds
+    damped = point.hessian + damping * np.diag(np.diag(point.hessian))
+    free = np.ones(len(point.values), dtype=bool)
+    step = np.zeros(len(free))
+    while free.any():
+        step = np.zeros(len(free))
+        step[free] = -scale[free] * np.linalg.solve(damped[np.ix_(free, free)], point.gradient[free])
+        through = (step < 0) & (point.values <= low) | (step > 0) & (point.values >= high)
+        if not (through & free).any():
+            break
+        free &= ~through
+    return step
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Intervals of the numbers of a fit, from the scatter of blocks of windows.
+
+    Attributes
+    ----------
+    covariance : array, shape (number, number)
+    low, high : array, shape (number,)
+        95 % intervals.
+    blocks : int
+    determined : array of bool, shape (number,)
+        Whether the flights say more of a number than what was believed before.
+    """
+
+    covariance: Array
+    low: Array
+    high: Array
+    blocks: int
+    determined: BoolArray
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation of the estimates, shape (number, number)."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        return np.asarray(self.covariance / np.maximum(np.outer(deviation, deviation), np.finfo(float).tiny))
+
+
+_BLOCKS = 30
+_INFORMED = 10.0
+"""Curvature by the flights over that by the prior from which on a number counts as determined."""
+
+
+def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
+    """Estimate how far the numbers scatter, from blocks of neighbouring windows.
+
+    The covariance is ``H^-1 (sum_b g_b g_b') H^-1`` with the gradients of the blocks, which are alike only within one.
+
+    Parameters
+    ----------
+    fitted : Fitted
+    windows : sequence of Windows
+        Of the flights that it was fitted to.
+
+    References
+    ----------
+    White 1982 (sandwich); Ljung, section 9.4.
+    """
+    layout = fitted.layout
+    evaluated, scale = Evaluated.of(layout, fitted.values), layout.array("scale")
+    count = sum(len(window.starts) for window in windows)
+    gradients = []
+    for window in windows:
+        blocks = max(2, round(_BLOCKS * len(window.starts) / count))
+        group = np.arange(len(window.starts), dtype=np.int64) * blocks // len(window.starts)
+        gradients.append(window_sums(evaluated, window, group)[1] * scale)
+    joined = np.concatenate(gradients)
+    number = len(joined)
+    centred = joined - joined.mean(axis=0)
+    inverse = np.linalg.inv(fitted.hessian * count)
+    spread = inverse @ (centred.T @ centred * number / max(number - 1, 1)) @ inverse
+    covariance = spread * scale[:, None] * scale
+    half = student.ppf(0.975, number - 1) * np.sqrt(np.diag(covariance))
+    belief = _PRIOR / layout.array("spread") ** 2
+    conditional = np.diag(fitted.hessian) - belief
+    return Uncertainty(
+        covariance, fitted.values - half, fitted.values + half, number, np.asarray(conditional > _INFORMED * belief)
+    )
+
+
+def window_errors(fitted: Fitted, window: Windows) -> Array:
+    """Weigh the errors of each window as the fit does, shape (window,): about 1.1 for rates that stay."""
+    flight = window.flight
+    evaluated = Evaluated.of(fitted.layout, fitted.values)
+    errors = np.empty((len(window.starts), window.horizon, 4, 3))
+    errors_of_runs(
+        window.motion,
+        evaluated.body,
+        evaluated.used,
+        evaluated.weights(flight, window.samples),
+        window.places,
+        flight.translates,
+        errors,
+    )
+    weight, delta = window.loss.weight, window.loss.delta
+    root = np.sqrt(1.0 + (errors**2).sum(axis=3) / delta**2)
+    return np.asarray((weight * delta**2 * (root - 1.0)).sum(axis=(1, 2)))

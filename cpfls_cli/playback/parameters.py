@@ -1,0 +1,512 @@
+"""Numbers of a vehicle that a fit may change: blocks of them, the model they make, and its derivatives by them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects import scales
+from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Airflow, Body, Parameters, Terms, airflow_terms
+from cpfls_cli.playback.model import (
+    ModelEffect,
+    Remainder,
+    VehicleModel,
+    body_of,
+    effect_weights,
+    remainder_weights,
+    rotor_weights,
+    used_terms,
+    weights_by_step,
+)
+from cpfls_cli.playback.rotors import Numbers, RotorResponse, rotor_terms_by_step
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+REMAINDER = "remainder"
+_INERTIA = tuple(f"inertia.log_{name}" for name in INERTIA_PARAMETERS[:3])
+_PRODUCTS = tuple(f"products_of_inertia.{name}" for name in INERTIA_PARAMETERS[3:])
+_DELAY, _LAG, _SLOW = "command_delay.delay_s", "motor_lag.lag_s", "slow_actuation.log_slow_s"
+_SLOW_SHARES = ("slow_actuation.roll_pitch", "slow_actuation.yaw")
+_THRUST, _DRAG, _LAW = "thrust_factor.scale", "drag_factor.scale", "thrust_law.linear"
+
+_ROOM = 10.0
+"""Bounds of a coefficient here, in multiples of those of the catalogue: an effective number may lie beyond them."""
+
+_STEP = 1e-30
+"""Imaginary step of a derivative: so small that no digit is lost."""
+
+_TURNED, _PUSHED = 2.0, 0.5
+"""Natural size of a remainder: angular acceleration in rad/s^2 per m/s, acceleration in m/s^2 per m/s."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of a vehicle.
+
+    Attributes
+    ----------
+    name : str
+        Block and number, such as ``linear_damping.d_x``.
+    unit : str
+        Empty for a ratio, or the logarithm of one.
+    start : float
+        What is stated, or a small value where nothing is.
+    scale : float
+        Natural size of a change.
+    low, high : float
+        Physical bounds.
+    spread : float
+        Standard deviation of what is believed before the flights, in scales.
+    """
+
+    name: str
+    unit: str
+    start: float
+    scale: float
+    low: float
+    high: float
+    spread: float
+
+    @property
+    def block(self) -> str:
+        """Block that it comes and goes with."""
+        return self.name.split(".")[0]
+
+    @property
+    def absent(self) -> float:
+        """What it is in a model without its block."""
+        return 0.0 if self.block in ("motor_lag", "command_delay", "slow_actuation") else self.start
+
+
+class Physical(NamedTuple):
+    """A number as people know it.
+
+    Attributes
+    ----------
+    value : float
+    unit : str
+    positive : bool
+        Whether it cannot be below 0.
+    stated : bool
+        Whether a config states it.
+    """
+
+    value: float
+    unit: str
+    positive: bool = False
+    stated: bool = False
+
+
+_OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
+    "inertia": tuple(Number(name, "", 0.0, 0.5, -4.0, 4.0, 3.0) for name in _INERTIA),
+    "thrust_factor": (Number(_THRUST, "", 1.0, 0.2, 0.1, 10.0, 2.0),),
+    "drag_factor": (Number(_DRAG, "", 1.0, 0.5, 0.01, 30.0, 4.0),),
+    "thrust_law": (Number(_LAW, "", 0.0, 0.5, -0.9, 5.0, 2.0),),
+    "motor_lag": (Number(_LAG, "s", 0.01, 0.02, 0.001, 0.3, 5.0),),
+    "command_delay": (Number(_DELAY, "s", 0.002, 0.01, 0.0, 0.1, 5.0),),
+    "slow_actuation": (
+        *(Number(name, "", -0.05, 0.3, -1.5, 3.0, 3.0) for name in _SLOW_SHARES),
+        Number(_SLOW, "", float(np.log(0.3)), 0.7, float(np.log(0.03)), float(np.log(5.0)), 2.0),
+    ),
+}
+"""Blocks that are the same for all vehicles."""
+
+
+def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
+    """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder."""
+    probe = Probe.of(vehicle)
+    effects = (
+        name for name, known in CATALOGUE.items() if not known.shapes and polynomial(known, probe, {}) is not None
+    )
+    return (*_OF_ROTORS, "products_of_inertia", *effects, REMAINDER)
+
+
+def needs_velocity(block: str) -> bool:
+    """Tell whether a block can only be found where the velocity was measured."""
+    return block in (REMAINDER, "thrust_factor", "thrust_law") or (
+        block in CATALOGUE and bool(CATALOGUE[block].needs & {"velocity", "force"})
+    )
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a coefficient adds to the weights.
+
+    Attributes
+    ----------
+    weights : array, shape (6, terms, 1 + 4 rotors)
+        For a unit.
+    share : array, shape (3,)
+        A coefficient of torque is counted in units of the inertia about the axes on which it acts, so that a fit can
+        change the inertia alone; 0 for one that has a force, which knows no inertia.
+    """
+
+    weights: Array
+    share: Array
+
+    @classmethod
+    def of(cls, weights: Array) -> Column:
+        """Find the axes on which a coefficient acts."""
+        acts = np.any(weights[:3], axis=(1, 2))
+        free = not np.any(weights[3:])
+        return cls(weights, acts / max(acts.sum(), 1) * float(free))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The numbers that are free, and how they make a model of the vehicle.
+
+    Attributes
+    ----------
+    vehicle : VehicleSettings
+        As stated.
+    blocks : tuple of str
+    airflow : Airflow
+        Rules of the remainder, where it is among the blocks.
+    rows : tuple of int
+        Rows of the wrench that the remainder adds to.
+    """
+
+    vehicle: VehicleSettings
+    blocks: tuple[str, ...]
+    airflow: Airflow
+    rows: tuple[int, ...] = (0, 1, 2)
+
+    @cached_property
+    def numbers(self) -> tuple[Number, ...]:
+        """All numbers, block by block."""
+        return tuple(number for block in self.blocks for number in self._numbers(block))
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Place of each number by name."""
+        return {number.name: place for place, number in enumerate(self.numbers)}
+
+    def array(self, attribute: str) -> Array:
+        """List an attribute of all numbers: start, scale, low, high or spread."""
+        return np.array([getattr(number, attribute) for number in self.numbers], dtype=float)
+
+    def values(self, known: Mapping[str, float]) -> Array:
+        """Start from known values, and from the stated ones where none is known."""
+        return np.array([known.get(number.name, number.start) for number in self.numbers], dtype=float)
+
+    def named(self, values: Array) -> dict[str, float]:
+        """Name values."""
+        return dict(zip(self.index, values.tolist(), strict=True))
+
+    @property
+    def used_airflow(self) -> Airflow:
+        """Rules of the remainder; none where it is no block."""
+        return self.airflow if REMAINDER in self.blocks else Airflow(np.zeros(0), 0)
+
+    def _numbers(self, block: str) -> tuple[Number, ...]:
+        if block in _OF_ROTORS:
+            return _OF_ROTORS[block]
+        if block == "products_of_inertia":
+            size = scales.smallest_inertia(self.vehicle)
+            return tuple(Number(name, "kg m^2", 0.0, 0.1 * size, -0.5 * size, 0.5 * size, 1.0) for name in _PRODUCTS)
+        if block == REMAINDER:
+            return self._remainder_numbers()
+        return tuple(self._coefficient(block, place) for place in range(len(CATALOGUE[block].coefficients)))
+
+    def _coefficient(self, block: str, place: int) -> Number:
+        coefficient = CATALOGUE[block].coefficients[place]
+        scale = 1.0 if coefficient.scale is None else coefficient.scale(self.vehicle)
+        low, high = coefficient.bounds(self.vehicle)
+        name = f"{block}.{coefficient.name}"
+        return Number(name, coefficient.unit, 0.0, scale, _ROOM * low, _ROOM * high, 1.0)
+
+    def _remainder_numbers(self) -> tuple[Number, ...]:
+        vehicle, hover = self.vehicle, scales.hover_speed(self.vehicle)
+        sizes = [*(_TURNED * moment for moment in vehicle.inertia_kg_m2[:3]), *[_PUSHED * vehicle.mass_kg] * 3]
+        return tuple(
+            Number(f"{REMAINDER}.{row}_{column}_{power}", "SI", 0.0, sizes[row] / rotor, -np.inf, np.inf, 1.0)
+            for row in self.rows
+            for column in range(airflow_terms(self.airflow) // 2)
+            for power, rotor in ((0, hover), (1, 1.0))
+        )
+
+    @cached_property
+    def _columns(self) -> dict[str, Column]:
+        """What the coefficients of effects and remainder add to the weights."""
+        columns: dict[str, Column] = {}
+        probe = Probe.of(self.vehicle)
+        terms = len(STATE_TERMS) + airflow_terms(self.used_airflow)
+        rotors = len(self.vehicle.rotors)
+        for block in self.blocks:
+            if block == REMAINDER:
+                units = np.eye(len(self._numbers(block)))
+                weights = np.array([remainder_weights(self._remainder(unit), rotors) for unit in units])
+            elif not _is_effect(block):
+                continue
+            else:
+                weights = effect_weights(block, {}, probe)
+                more = np.zeros((*weights.shape[:2], terms - weights.shape[2], weights.shape[3]))
+                weights = np.concatenate([weights, more], axis=2)
+            named = zip(self._numbers(block), weights, strict=True)
+            columns |= {number.name: Column.of(column) for number, column in named}
+        return columns
+
+    def _remainder(self, coefficients: Array) -> Remainder:
+        rows = np.array(self.rows, dtype=np.int64)
+        shaped = coefficients.reshape(len(rows), -1, 2)
+        return Remainder(
+            breakpoints=self.airflow.breakpoints,
+            harmonic_order=self.airflow.order,
+            rows=rows,
+            coefficients=shaped,
+        )
+
+    def _get(self, values: Array, name: str, otherwise: float) -> float:
+        return float(values[self.index[name]]) if name in self.index else otherwise
+
+    def _log_inertia(self, values: Array) -> Array:
+        return np.array([self._get(values, name, 0.0) for name in _INERTIA])
+
+    def inertia(self, values: Array) -> Array:
+        """Build the inertia tensor, shape (3, 3), kg m^2."""
+        root = np.exp(0.5 * self._log_inertia(values))
+        tensor = symmetric(self.vehicle.inertia_kg_m2) + symmetric(
+            [0.0, 0.0, 0.0, *(self._get(values, name, 0.0) for name in _PRODUCTS)]
+        )
+        return np.asarray(root[:, None] * tensor * root)
+
+    def response(self, values: Array) -> RotorResponse:
+        """Build the response of the rotors."""
+        stated = RotorResponse()
+        return RotorResponse(
+            delay_s=self._get(values, _DELAY, 0.0),
+            lag_s=self._get(values, _LAG, 0.0),
+            slow_roll_pitch=self._get(values, _SLOW_SHARES[0], 0.0),
+            slow_yaw=self._get(values, _SLOW_SHARES[1], 0.0),
+            slow_s=float(np.exp(self._get(values, _SLOW, float(np.log(stated.slow_s))))),
+        )
+
+    def _rotor_table(self, values: Array) -> Array:
+        weights = rotor_weights(self.vehicle, self._get(values, _LAW, 0.0), self.response(values))
+        thrust, drag = self._get(values, _THRUST, 1.0), self._get(values, _DRAG, 1.0)
+        return np.array([thrust, thrust, drag, thrust, thrust, thrust])[:, None] * weights
+
+    def coefficients(self, values: Array) -> dict[str, float]:
+        """Give the coefficients of effects and remainder in SI, by name."""
+        log_inertia = self._log_inertia(values)
+        return {
+            name: float(values[self.index[name]] * np.exp(column.share @ log_inertia))
+            for name, column in self._columns.items()
+        }
+
+    def physical(self, values: Array) -> dict[str, Physical]:
+        """Give all numbers as people know them, in order: moments of inertia, factors of the first rotor, SI."""
+        inertia, coefficients = self.inertia(values), self.coefficients(values)
+        rotor, found = self.vehicle.rotors[0], {}
+        for number, value in zip(self.numbers, values.tolist(), strict=True):
+            name = number.name
+            if name in _INERTIA:
+                axis = _INERTIA.index(name)
+                known = Physical(float(inertia[axis, axis]), "kg m^2", positive=True, stated=True)
+                found[f"inertia.{INERTIA_PARAMETERS[axis]}"] = known
+            elif name in _PRODUCTS:
+                row, column = INERTIA_ENTRIES[3 + _PRODUCTS.index(name)]
+                found[name] = Physical(float(inertia[row, column]), "kg m^2", stated=True)
+            elif name == _THRUST:
+                found["thrust_factor"] = Physical(value * rotor.thrust_factor_n_s2, "N s^2", positive=True, stated=True)
+            elif name == _DRAG:
+                found["drag_factor"] = Physical(value * rotor.drag_factor_n_m_s2, "N m s^2", positive=True, stated=True)
+            elif name == _SLOW:
+                found["slow_actuation.slow_s"] = Physical(float(np.exp(value)), "s", positive=True)
+            else:
+                found[name] = Physical(coefficients.get(name, value), number.unit)
+        return found
+
+    def table(self, values: Array) -> Array:
+        """Build the weights, shape (6, terms, 1 + 4 rotors); see `VehicleModel.weights`."""
+        rotors = len(self.vehicle.rotors)
+        table = np.zeros((6, len(STATE_TERMS) + airflow_terms(self.used_airflow), 1 + 4 * rotors))
+        table[:, 0] += self._rotor_table(values)
+        for name, coefficient in self.coefficients(values).items():
+            if coefficient:
+                table += coefficient * self._columns[name].weights
+        return table
+
+    def table_derivatives(self, values: Array) -> list[Array | None]:
+        """Differentiate the weights by each number; None by those of the rotors' response in time."""
+        coefficients, log_inertia = self.coefficients(values), self._log_inertia(values)
+        return [self._derivative(number.name, values, coefficients, log_inertia) for number in self.numbers]
+
+    def _derivative(
+        self, name: str, values: Array, coefficients: Mapping[str, float], log_inertia: Array
+    ) -> Array | None:
+        if name in (_DELAY, _LAG, _SLOW):
+            return None
+        if name in self._columns:
+            column = self._columns[name]
+            return np.asarray(np.exp(column.share @ log_inertia) * column.weights)
+        derivative = np.zeros_like(self._template)
+        if name in _INERTIA:
+            axis = _INERTIA.index(name)
+            for each, column in self._columns.items():
+                derivative += coefficients[each] * column.share[axis] * column.weights
+        elif name not in _PRODUCTS:
+            # The weights of the rotors are linear in each of their numbers.
+            moved = values.copy()
+            moved[self.index[name]] += 1.0
+            derivative[:, 0] = self._rotor_table(moved) - self._rotor_table(values)
+        return derivative
+
+    @cached_property
+    def _template(self) -> Array:
+        return self.table(self.array("start"))
+
+    def inertia_derivatives(self, values: Array) -> Array:
+        """Differentiate the inertia tensor by each number, shape (number, 3, 3)."""
+        inertia, root = self.inertia(values), np.exp(0.5 * self._log_inertia(values))
+        derivatives = np.zeros((len(self.numbers), 3, 3))
+        for axis, name in enumerate(_INERTIA):
+            if name in self.index:
+                derivatives[self.index[name], axis] += 0.5 * inertia[axis]
+                derivatives[self.index[name], :, axis] += 0.5 * inertia[:, axis]
+        for name, (row, column) in zip(_PRODUCTS, INERTIA_ENTRIES[3:], strict=True):
+            if name in self.index:
+                entry = root[row] * root[column]
+                derivatives[self.index[name], row, column] = derivatives[self.index[name], column, row] = entry
+        return derivatives
+
+    def rotor_terms(self, values: Array, flight: PlaybackFlight, by: str | None = None) -> Array:
+        """Evaluate the terms of the rotors over each step, or their derivative by a number of the response.
+
+        Parameters
+        ----------
+        values : array, shape (number,)
+        flight : PlaybackFlight
+        by : str or None
+            Name of the number.
+
+        Returns
+        -------
+        array, shape (time, 1 + 4 rotors)
+        """
+        response = self.response(values)
+        delay: complex = response.delay_s + (1j * _STEP if by == _DELAY else 0.0)
+        lag: complex = response.lag_s + (1j * _STEP if by == _LAG else 0.0)
+        slow: complex = response.slow_s * (1 + 1j * _STEP if by == _SLOW else 1.0)
+        given = (delay, lag, slow) if by else (response.delay_s, response.lag_s, response.slow_s)
+        parts: list[Numbers] = [
+            rotor_terms_by_step(flight.speed[part], flight.motion.period, flight.hold, *given)
+            for part in flight.stretches
+        ]
+        terms = np.zeros((len(flight), parts[0].shape[1]))
+        for part, found in zip(flight.stretches, parts, strict=True):
+            terms[part] = found.imag / _STEP if by else found.real
+        return terms
+
+    def model(self, values: Array) -> VehicleModel:
+        """Build the model, with what was found as numbers of the vehicle."""
+        thrust, drag = self._get(values, _THRUST, 1.0), self._get(values, _DRAG, 1.0)
+        rotors = tuple(
+            replace(
+                rotor,
+                thrust_factor_n_s2=rotor.thrust_factor_n_s2 * thrust,
+                drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * drag,
+            )
+            for rotor in self.vehicle.rotors
+        )
+        xx, yy, zz, xy, xz, yz = (float(self.inertia(values)[entry]) for entry in INERTIA_ENTRIES)
+        vehicle = replace(self.vehicle, rotors=rotors, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
+        coefficients = self.coefficients(values)
+        effects = tuple(self._effect(name, coefficients, vehicle) for name in self.blocks if _is_effect(name))
+        learned = np.array([value for name, value in coefficients.items() if name.startswith(f"{REMAINDER}.")])
+        return VehicleModel(
+            vehicle=vehicle,
+            response=self.response(values),
+            # The speed that hovers goes with the root of the thrust factor.
+            thrust_linear=self._get(values, _LAW, 0.0) * float(np.sqrt(thrust)),
+            effects=effects,
+            remainder=self._remainder(learned) if len(learned) else None,
+        )
+
+    def _effect(self, name: str, coefficients: Mapping[str, float], vehicle: VehicleSettings) -> ModelEffect:
+        """Count the coefficients of an effect on the vehicle that was found, not on the stated one."""
+        found = effect_weights(name, {}, Probe.of(vehicle))
+        scaled = [
+            coefficients[number.name] * _ratio(self._columns[number.name].weights[:, : len(STATE_TERMS)], weights)
+            for number, weights in zip(self._numbers(name), found, strict=True)
+        ]
+        return ModelEffect(name, {}, np.array(scaled))
+
+
+def _is_effect(block: str) -> bool:
+    """Tell whether a block is an effect of the catalogue that adds a wrench."""
+    return block in CATALOGUE and block not in _OF_ROTORS and block != "products_of_inertia"
+
+
+def _ratio(stated: Array, found: Array) -> float:
+    return float(np.sum(stated * found) / np.sum(found**2))
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """A layout at values: what is moved, and the weights of its terms."""
+
+    layout: Layout
+    values: Array
+    body: Body
+    used: Terms
+    table: Array
+    derivatives: list[Array | None]
+    inertia: Array
+
+    @classmethod
+    def of(cls, layout: Layout, values: Array) -> Evaluated:
+        """Evaluate a layout.
+
+        Parameters
+        ----------
+        values : array, shape (number,)
+        """
+        table, derivatives = layout.table(values), layout.table_derivatives(values)
+        touched = np.abs(table) + sum(np.abs(each) for each in derivatives if each is not None)
+        return cls(
+            layout,
+            values,
+            body_of(layout.vehicle, layout.inertia(values)),
+            used_terms(touched, layout.used_airflow),
+            table,
+            derivatives,
+            layout.inertia_derivatives(values),
+        )
+
+    def weights(self, flight: PlaybackFlight, samples: IntArray) -> Array:
+        """Evaluate the weights over the steps that begin at samples of a flight, shape (samples, 6, active)."""
+        return weights_by_step(self.table, self.used, self.layout.rotor_terms(self.values, flight)[samples])
+
+    def parameters(self, flight: PlaybackFlight, samples: IntArray) -> Parameters:
+        """Differentiate the weights over these steps, and the inertia, by each number."""
+        terms = self.layout.rotor_terms(self.values, flight)[samples]
+        entries, values, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((len(samples), 0))], [0]
+        for number, derivative in zip(self.layout.numbers, self.derivatives, strict=True):
+            of_response = derivative is None
+            moved = self.layout.rotor_terms(self.values, flight, number.name)[samples] if of_response else None
+            source = terms if moved is None else moved
+            weights = (self.table if derivative is None else derivative)[:, self.used.active]
+            # The first term of the rotors is constant, so the response in time leaves it.
+            places = np.argwhere(np.any(weights[:, :, 1 if of_response else 0 :], axis=2))
+            entries.append(places)
+            values.append(source @ weights[places[:, 0], places[:, 1]].T)
+            first.append(first[-1] + len(places))
+        joined = np.concatenate(entries)
+        return Parameters(
+            np.ascontiguousarray(joined[:, 0]),
+            np.ascontiguousarray(joined[:, 1]),
+            np.array(first, dtype=np.int64),
+            np.ascontiguousarray(np.hstack(values)),
+            self.inertia,
+            np.asarray(np.any(self.inertia, axis=(1, 2))),
+        )

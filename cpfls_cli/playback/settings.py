@@ -1,0 +1,29 @@
+"""Settings of the fit of a whole vehicle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Ge, Gt
+from typing_extensions import Doc
+
+from cpfls_cli.settings import Settings
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlaybackSettings(Settings):
+    """Configure playback, the fit of a vehicle to it, and the choice of what the vehicle's model holds."""
+
+    horizon_s: Annotated[float, Gt(0), Doc("how far free runs go, s")] = 0.5
+    window_interval_s: Annotated[float, Gt(0), Doc("time between the starts of the windows that are fitted, s")] = 0.6
+    search_interval_s: Annotated[
+        float, Gt(0), Doc("time between the starts of the windows while the structure is searched for, s")
+    ] = 1.2
+    folds: Annotated[int, Ge(2), Doc("parts of the flights, each of which is kept aside once in the search")] = 3
+    population: Annotated[int, Ge(2), Doc("structures in the population of the search")] = 16
+    generations: Annotated[int, Ge(0), Doc("generations bred; 0 takes the greedy choice and its neighbours alone")] = 8
+    leave_out: Annotated[
+        tuple[str, ...],
+        Doc("blocks that are not tried: effects, motor_lag, inertia, remainder (docs/playback.md)"),
+    ] = ()

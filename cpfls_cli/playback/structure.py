@@ -1,0 +1,399 @@
+"""Which blocks a model of a vehicle holds: those that lower the playback error on flights kept aside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
+from cpfls_cli.playback.fit import Fitted, Windows, fit, window_errors
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Airflow
+from cpfls_cli.playback.parameters import REMAINDER, Layout, blocks_of, needs_velocity
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
+_STEPS, _TOLERANCE = 60, 3e-5
+_JUDGED_BLOCKS = 30
+_HALF = 2**15
+
+
+class Rules(NamedTuple):
+    """Partition and consequents of a remainder: rules over the circle, order of the harmonics (0: seesaw)."""
+
+    number: int
+    order: int
+
+    @property
+    def airflow(self) -> Airflow:
+        """Equidistant rules."""
+        return Airflow(np.linspace(0.0, 1.0, self.number + 1), self.order)
+
+
+REMAINDERS = (Rules(1, 1), Rules(1, 2), Rules(1, 3), Rules(3, 1), Rules(4, 0))
+"""Partitions of the remainder that are tried."""
+
+
+class Structure(NamedTuple):
+    """Blocks of a model, and the rules of its remainder, if that is one of them."""
+
+    blocks: tuple[str, ...]
+    rules: Rules = REMAINDERS[0]
+
+    def layout(self, vehicle: VehicleSettings) -> Layout:
+        """Lay out its numbers."""
+        return Layout(vehicle, self.blocks, self.rules.airflow)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A structure, fitted without each part of the flights and judged on it.
+
+    Attributes
+    ----------
+    structure : Structure
+    error : float
+        Mean over windows of all parts; see `window_errors`.
+    by_block : array, shape (block,)
+        The same by blocks of neighbouring windows, equal for all structures.
+    numbers : int
+    condition_number : float
+        The largest of its fits.
+    fits : tuple of Fitted
+        One a part that was kept aside.
+    """
+
+    structure: Structure
+    error: float
+    by_block: Array
+    numbers: int
+    condition_number: float
+    fits: tuple[Fitted, ...]
+
+    def worse_than(self, other: Judged) -> tuple[float, float]:
+        """Compare on the same blocks: mean difference, and its standard error."""
+        difference = self.by_block - other.by_block
+        return float(difference.mean()), float(difference.std(ddof=1) / np.sqrt(len(difference)))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a search for the structure came to.
+
+    Attributes
+    ----------
+    chosen : Judged
+        The one with the fewest numbers within one standard error of the best.
+    best : Judged
+    greedy, everything, nothing : Judged
+        Baselines: blocks added one by one, all blocks, and the stated vehicle.
+    front : tuple of Judged
+        Not dominated in error, numbers and condition number, by number.
+    evaluated : int
+        Structures that were judged.
+    complete : bool
+        Whether the search came to its end.
+    """
+
+    chosen: Judged
+    best: Judged
+    greedy: Judged
+    everything: Judged
+    nothing: Judged
+    front: tuple[Judged, ...]
+    evaluated: int
+    complete: bool
+
+
+Progress = Callable[[int, int, float], None]
+"""Told the structures judged, about how many there will be, and the smallest error so far; may raise the next."""
+
+
+class SearchStoppedError(Exception):
+    """Somebody asks the search to stop; what it has found so far is taken."""
+
+
+@dataclass
+class _Bench:
+    """Judges structures; remembers all, and starts each fit from the nearest that is known."""
+
+    vehicle: VehicleSettings
+    parts: Sequence[Sequence[Windows]]
+    progress: Progress
+    expected: int
+    known: dict[Structure, Judged] = field(default_factory=dict)
+
+    def judge(self, structure: Structure) -> Judged:
+        if structure not in self.known:
+            near = self._nearest(structure)
+            with ThreadPoolExecutor(2) as threads:
+                fits = list(threads.map(lambda part: self._fit(structure, part, near), range(len(self.parts))))
+            self.known[structure] = self._judged(structure, tuple(fits))
+            best = min(judged.error for judged in self.known.values())
+            self.progress(len(self.known), max(self.expected, len(self.known)), best)
+        return self.known[structure]
+
+    def _nearest(self, structure: Structure) -> Judged | None:
+        """Find the known structure that differs in the fewest blocks; the better one of two."""
+        asked = set(structure.blocks)
+
+        def away(judged: Judged) -> tuple[int, float]:
+            other = judged.structure
+            rules = REMAINDER in asked and REMAINDER in other.blocks and structure.rules != other.rules
+            return len(asked ^ set(other.blocks)) + 2 * int(rules), judged.error
+
+        return min(self.known.values(), key=away, default=None)
+
+    def _fit(self, structure: Structure, part: int, near: Judged | None) -> Fitted:
+        training = [windows for other, kept in enumerate(self.parts) if other != part for windows in kept]
+        known = {}
+        if near is not None:
+            known = near.fits[part].layout.named(near.fits[part].values)
+            if near.structure.rules != structure.rules:
+                known = {name: value for name, value in known.items() if not name.startswith(f"{REMAINDER}.")}
+        return fit(structure.layout(self.vehicle), training, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
+
+    def _judged(self, structure: Structure, fits: tuple[Fitted, ...]) -> Judged:
+        errors = [
+            window_errors(fitted, windows) for fitted, kept in zip(fits, self.parts, strict=True) for windows in kept
+        ]
+        joined = np.concatenate(errors)
+        blocks = max(2, min(_JUDGED_BLOCKS, len(joined) // 2))
+        by_block = np.array([part.mean() for part in np.array_split(joined, blocks)])
+        condition = max(fitted.condition_number for fitted in fits)
+        return Judged(structure, float(joined.mean()), by_block, len(fits[0].values), condition, fits)
+
+
+def tried_blocks(
+    vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], settings: PlaybackSettings
+) -> tuple[str, ...]:
+    """List the blocks that the flights can say anything of.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+    flights : sequence of PlaybackFlight
+    settings : PlaybackSettings
+    """
+    moves = all(flight.translates for flight in flights)
+    found = (block for block in blocks_of(vehicle) if block not in settings.leave_out)
+    return tuple(block for block in found if moves or not needs_velocity(block))
+
+
+def choose(
+    vehicle: VehicleSettings,
+    flights: Sequence[PlaybackFlight],
+    settings: PlaybackSettings,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> Choice:
+    """Search for the structure: all blocks, fewer and fewer of them, greedy addition, then the genetic algorithm.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        As stated.
+    flights : sequence of PlaybackFlight
+        Training flights alone.
+    settings : PlaybackSettings
+    rng : numpy.random.Generator
+    progress : callable
+
+    Raises
+    ------
+    SearchStoppedError
+        If it is stopped before all blocks were judged.
+    """
+    blocks = tried_blocks(vehicle, flights, settings)
+    parts = parts_of(flights, settings)
+    bench = _Bench(vehicle, parts, progress, 3 * len(blocks) + settings.population * (1 + settings.generations) // 2)
+    nothing, everything = bench.judge(Structure(())), bench.judge(Structure(blocks))
+    path, complete = [nothing], True
+    try:
+        shrunk = [bench.judge(structure) for structure in _shrinking(everything)]
+        path.extend(_greedy(bench, blocks, nothing))
+        first = min(bench.known.values(), key=lambda each: each.error)
+        _evolve(bench, blocks, [*path, *shrunk, *_neighbours(bench, first)], settings, rng)
+    except SearchStoppedError:
+        complete = False
+    judged = sorted(bench.known.values(), key=lambda each: (each.numbers, each.error))
+    best = min(judged, key=lambda each: each.error)
+    chosen = _simplest(judged, best)
+    return Choice(chosen, best, path[-1], everything, nothing, _front(judged), len(judged), complete)
+
+
+def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> list[list[Windows]]:
+    """Split flights into parts that are kept aside in turn: whole flights, or thirds of a single one.
+
+    Parameters
+    ----------
+    flights : sequence of PlaybackFlight
+    settings : PlaybackSettings
+    """
+    windows = [_windows(flight, settings, settings.search_interval_s) for flight in flights]
+    if len(windows) > 1:
+        count = min(settings.folds, len(windows))
+        return [windows[part::count] for part in range(count)]
+    only, horizon = windows[0], windows[0].horizon
+    pieces = np.array_split(only.starts, settings.folds)
+    # Windows that reach into the next piece are left out, so that no sample is in two pieces.
+    ends = [*(piece[0] for piece in pieces[1:]), np.inf]
+    kept = [piece[piece + horizon < end] for piece, end in zip(pieces, ends, strict=True)]
+    return [[Windows(only.flight, piece, only.loss)] for piece in kept if len(piece)]
+
+
+def _windows(flight: PlaybackFlight, settings: PlaybackSettings, interval_s: float) -> Windows:
+    period = flight.motion.period
+    return Windows.of(flight, max(1, round(settings.horizon_s / period)), max(1, round(interval_s / period)))
+
+
+def _greedy(bench: _Bench, blocks: tuple[str, ...], start: Judged) -> Iterator[Judged]:
+    """Add the block that lowers the error most, until none lowers it by more than its standard error.
+
+    What a block gained before bounds what it may gain now, near enough, so that few are tried again.
+    """
+    present, promise = start, dict.fromkeys(blocks, np.inf)
+    yield present
+    while promise:
+        best: Judged | None = None
+        for block in sorted(promise, key=lambda name: -promise[name]):
+            if best is not None and promise[block] < present.error - best.error:
+                break
+            tried = bench.judge(_with(present.structure, block, blocks))
+            promise[block] = present.error - tried.error
+            if best is None or tried.error < best.error:
+                best = tried
+        if best is None:
+            return
+        better, uncertain = present.worse_than(best)
+        if better <= uncertain:
+            return
+        for block in set(best.structure.blocks) & promise.keys():
+            del promise[block]
+        present = best
+        yield present
+
+
+def _shrinking(everything: Judged) -> Iterator[Structure]:
+    """Take out the block that the loss near the fit of all blocks misses least, one after another.
+
+    Without the numbers b the loss rises by ``1/2 b' ((H^-1)_bb)^-1 b``, the other numbers fitted again; H is the mean
+    of all parts.
+    """
+    structure, fits = everything.structure, everything.fits
+    layout, hessian = fits[0].layout, np.mean([fitted.hessian for fitted in fits], axis=0)
+    scale, absent = layout.array("scale"), np.array([number.absent for number in layout.numbers])
+    away = np.mean([(fitted.values - absent) / scale for fitted in fits], axis=0)
+    inverse = np.linalg.inv(hessian)
+    place = {block: [i for i, n in enumerate(layout.numbers) if n.block == block] for block in structure.blocks}
+
+    def missed(blocks: Sequence[str]) -> float:
+        at = [index for block in blocks for index in place[block]]
+        return float(away[at] @ np.linalg.solve(inverse[np.ix_(at, at)], away[at]))
+
+    gone: list[str] = []
+    while len(gone) + 1 < len(structure.blocks):
+        kept = [block for block in structure.blocks if block not in gone]
+        gone.append(min(kept, key=lambda block: missed([*gone, block])))
+        yield Structure(tuple(block for block in structure.blocks if block not in gone), structure.rules)
+
+
+def _with(structure: Structure, block: str, order: Sequence[str]) -> Structure:
+    """Add a block, or take it out where it is in."""
+    kept = set(structure.blocks) ^ {block}
+    return Structure(tuple(name for name in order if name in kept), structure.rules)
+
+
+def _neighbours(bench: _Bench, judged: Judged) -> list[Judged]:
+    """Judge the structures with one block less, or with other rules of the remainder."""
+    structure = judged.structure
+    fewer = [_with(structure, block, structure.blocks) for block in structure.blocks]
+    other = [structure._replace(rules=rules) for rules in REMAINDERS] if REMAINDER in structure.blocks else []
+    return [bench.judge(each) for each in (*fewer, *other)]
+
+
+def _evolve(
+    bench: _Bench,
+    blocks: tuple[str, ...],
+    first: Sequence[Judged],
+    settings: PlaybackSettings,
+    rng: np.random.Generator,
+) -> None:
+    """Breed structures: a gene for each block, in its upper half for one that is in, and one for the remainder."""
+    evolution = EvolutionSettings(
+        population=settings.population,
+        generations=settings.generations,
+        recombination="single-point",
+        mutated_bits=0.02,
+    )
+
+    def evaluate(genes: IntArray) -> Evaluation:
+        judged = [bench.judge(_decoded(chromosome, blocks)) for chromosome in genes]
+        return Evaluation(genes, np.array([_objectives(each) for each in judged]))
+
+    ranked = sorted({each.structure: each for each in first}.values(), key=lambda each: each.error)
+    initial = np.array([_encoded(each.structure, blocks) for each in ranked[: settings.population]], dtype=np.int64)
+    for _ in evolve(evaluate, len(blocks) + 1, evolution, rng, initial):
+        pass
+
+
+def _objectives(judged: Judged) -> tuple[float, float, float]:
+    return judged.error, float(judged.numbers), float(np.log10(judged.condition_number))
+
+
+def _decoded(genes: IntArray, blocks: tuple[str, ...]) -> Structure:
+    chosen = tuple(block for block, gene in zip(blocks, genes, strict=False) if gene >= _HALF)
+    rules = REMAINDERS[int(genes[-1]) * len(REMAINDERS) // (2 * _HALF)] if REMAINDER in chosen else REMAINDERS[0]
+    return Structure(chosen, rules)
+
+
+def _encoded(structure: Structure, blocks: tuple[str, ...]) -> list[int]:
+    middle = [_HALF + _HALF // 2 if block in structure.blocks else _HALF // 2 for block in blocks]
+    place = REMAINDERS.index(structure.rules)
+    return [*middle, (2 * place + 1) * _HALF // len(REMAINDERS)]
+
+
+def _simplest(judged: Sequence[Judged], best: Judged) -> Judged:
+    """Choose the fewest numbers within one standard error of the best."""
+    for each in judged:
+        worse, uncertain = each.worse_than(best)
+        if worse <= uncertain:
+            return each
+    return best
+
+
+def _front(judged: Sequence[Judged]) -> tuple[Judged, ...]:
+    """Keep what nothing else beats in error, numbers and condition number."""
+    values = np.array([_objectives(each) for each in judged])
+    beaten = [np.any(np.all(values <= row, axis=1) & np.any(values < row, axis=1)) for row in values]
+    return tuple(each for each, lost in zip(judged, beaten, strict=True) if not lost)
+
+
+def fitted_to_all(
+    structure: Structure,
+    vehicle: VehicleSettings,
+    flights: Sequence[PlaybackFlight],
+    settings: PlaybackSettings,
+    start: Fitted,
+) -> tuple[Fitted, list[Windows]]:
+    """Fit a structure to all training flights, with windows close together.
+
+    Parameters
+    ----------
+    structure : Structure
+    vehicle : VehicleSettings
+        As stated.
+    flights : sequence of PlaybackFlight
+    settings : PlaybackSettings
+    start : Fitted
+        The same structure on some of them.
+    """
+    windows = [_windows(flight, settings, settings.window_interval_s) for flight in flights]
+    known = start.layout.named(start.values)
+    return fit(structure.layout(vehicle), windows, known, _STEPS, _TOLERANCE), windows

@@ -1,0 +1,190 @@
+"""A whole vehicle found in flights: structure, numbers with intervals, and what the flights cannot tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.playback.fit import Fitted, Uncertainty, uncertainty
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.model import VehicleModel, wrench_of
+from cpfls_cli.playback.parameters import Layout
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.structure import Choice, Progress, choose, fitted_to_all
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_TRADED = 0.95
+"""Size of a correlation from which on two numbers trade against each other."""
+
+_AT_BOUND = 1e-6
+_STEP = 1e-5
+
+
+class FoundNumber(NamedTuple):
+    """A number of a vehicle, in SI.
+
+    Attributes
+    ----------
+    name : str
+        Block and number.
+    unit : str
+    value, low, high : float
+        With a 95 % interval.
+    stated : float
+        In the config; NaN for what no config states.
+    determined : bool
+        Whether the flights say more of it than what was believed before.
+    at_bound : bool
+        Whether it lies on a bound, so that the interval says little.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    stated: float
+    determined: bool
+    at_bound: bool
+
+
+class Trade(NamedTuple):
+    """Two numbers that the flights cannot tell apart."""
+
+    first: str
+    second: str
+    correlation: float
+
+
+class Share(NamedTuple):
+    """How much a part of the model does along the training flights.
+
+    Attributes
+    ----------
+    name : str
+        ``rotors``, an effect, or ``remainder``.
+    wrench : array, shape (6,), N m and N, body frame
+        Root mean square.
+    """
+
+    name: str
+    wrench: Array
+
+
+@dataclass(frozen=True)
+class FoundVehicle:
+    """What was found.
+
+    Attributes
+    ----------
+    model : VehicleModel
+    numbers : tuple of FoundNumber
+    shares : tuple of Share
+        Of rotors, named effects and learned remainder.
+    airspeed : float, m/s
+        In the rotor plane; 95 % of the samples are slower.
+    trades : tuple of Trade
+    choice : Choice
+    condition_number : float
+        Of the last fit.
+    blocks : int
+        Blocks of windows that the intervals come from.
+    """
+
+    model: VehicleModel
+    numbers: tuple[FoundNumber, ...]
+    shares: tuple[Share, ...]
+    airspeed: float
+    trades: tuple[Trade, ...]
+    choice: Choice
+    condition_number: float
+    blocks: int
+
+
+def find_vehicle(
+    vehicle: VehicleSettings,
+    flights: Sequence[PlaybackFlight],
+    settings: PlaybackSettings,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> FoundVehicle:
+    """Find structure and numbers of a vehicle in training flights.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        As stated.
+    flights : sequence of PlaybackFlight
+    settings : PlaybackSettings
+    rng : numpy.random.Generator
+    progress : callable
+    """
+    choice = choose(vehicle, flights, settings, rng, progress)
+    chosen = choice.chosen
+    fitted, windows = fitted_to_all(chosen.structure, vehicle, flights, settings, chosen.fits[0])
+    spread = uncertainty(fitted, windows)
+    model = fitted.layout.model(fitted.values)
+    return FoundVehicle(
+        model,
+        tuple(_numbers(fitted, spread)),
+        *_shares(model, flights),
+        tuple(_trades(fitted.layout, spread)),
+        choice,
+        fitted.condition_number,
+        spread.blocks,
+    )
+
+
+def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
+    """Evaluate the parts of a model along the measured motion, and the speed in the rotor plane."""
+    parts = model.part_weights()
+    squares, speeds, samples = {name: np.zeros(6) for name in parts}, [], 0
+    for flight in flights:
+        velocity = np.einsum("tji,tj->ti", flight.motion.rotation, flight.motion.velocity)
+        terms = model.terms(velocity, flight.motion.rate)
+        speeds.append(np.hypot(velocity[:, 0], velocity[:, 1]))
+        for stretch in flight.stretches:
+            rotor = model.rotor_terms(flight.speed[stretch], flight.motion.period, flight.hold)
+            samples += len(rotor)
+            for name, weights in parts.items():
+                squares[name] += (wrench_of(weights, terms[stretch], rotor) ** 2).sum(axis=0)
+    shares = tuple(Share(name, np.sqrt(square / samples)) for name, square in squares.items())
+    return shares, float(np.quantile(np.concatenate(speeds), 0.95))
+
+
+def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
+    """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that."""
+    layout, values = fitted.layout, fitted.values
+    physical, scale = layout.physical(values), layout.array("scale")
+    stated = layout.physical(layout.array("start"))
+    slopes = np.empty((len(values), len(values)))
+    for place, step in enumerate(_STEP * scale * np.eye(len(values))):
+        ahead, behind = layout.physical(values + step), layout.physical(values - step)
+        slopes[:, place] = [(ahead[name].value - behind[name].value) / (2 * step[place]) for name in physical]
+    deviation = np.sqrt(np.diag(slopes @ spread.covariance @ slopes.T))
+    half = student.ppf(0.975, spread.blocks - 1) * deviation
+    for place, (number, (name, found)) in enumerate(zip(layout.numbers, physical.items(), strict=True)):
+        span = _AT_BOUND * number.scale
+        bound = min(values[place] - number.low, number.high - values[place]) <= span
+        low, high = _interval(found.value, float(half[place]), positive=found.positive)
+        known = stated[name].value if found.stated else np.nan
+        yield FoundNumber(name, found.unit, found.value, low, high, known, bool(spread.determined[place]), bool(bound))
+
+
+def _interval(value: float, half: float, *, positive: bool) -> tuple[float, float]:
+    """Give the ends of an interval; by a factor for what cannot be below 0."""
+    if not positive:
+        return value - half, value + half
+    factor = float(np.exp(half / value))
+    return value / factor, value * factor
+
+
+def _trades(layout: Layout, spread: Uncertainty) -> Iterator[Trade]:
+    names, correlation = list(layout.physical(layout.array("start"))), spread.correlation
+    for first, second in np.argwhere(np.triu(np.abs(correlation) > _TRADED, 1)).tolist():
+        yield Trade(names[first], names[second], float(correlation[first, second]))

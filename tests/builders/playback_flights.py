@@ -1,0 +1,332 @@
+"""Flights with a known truth for playback: a vehicle flown in closed loop and logged with noise, and RotorPy's."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.effects.polynomial import state_terms
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.model import ModelEffect, VehicleModel, remainder_terms
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.rotations import rotation_matrix
+from cpfls_cli.vehicle import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.rotors import allocation_matrix
+from tests.builders.recorded_flights import columns_of_log
+
+KINDS = ("multisine", "steps", "figure")
+STATED = VehicleSettings(
+    mass_kg=0.8,
+    inertia_kg_m2=(0.0040, 0.0044, 0.0075),
+    rotor_speed_max_rad_s=1500.0,
+    rotors=tuple(
+        RotorSettings(position_m=(x, y, 0.02), spin=spin, thrust_factor_n_s2=6e-6, drag_factor_n_m_s2=1.4e-7)
+        for x, y, spin in ((0.12, -0.11, 1), (-0.12, -0.11, -1), (-0.12, 0.11, 1), (0.12, 0.11, -1))
+    ),
+)
+FINE_STEP_S = 0.005
+MOTOR_S = 0.03
+"""Time in which rotors of a flight with measured speeds follow their commands, before the model's own lag."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Standard deviations of the noise of a log, SI, and its time constant where it is coloured."""
+
+    rate: float = 0.0
+    attitude: float = 0.0
+    velocity: float = 0.0
+    position: float = 0.0
+    speed: float = 0.0
+    time_constant_s: float = 0.0
+
+    def drawn(self, size, values, period, rng):
+        """Draw noise of the shape of some values, with the same deviation whatever its colour."""
+        keep = np.exp(-period / self.time_constant_s) if self.time_constant_s else 0.0
+        settle = int(20 * self.time_constant_s / period)
+        white = rng.standard_normal((settle + len(values), *values.shape[1:]))
+        return size * lfilter([np.sqrt(1 - keep**2)], [1.0, -keep], white, axis=0)[settle:]
+
+
+MIDDLING = Noise(rate=0.02, attitude=0.003, velocity=0.02, position=0.003, speed=2.0)
+
+
+def truth(vehicle=STATED):
+    """Put lag, damping, drag, flapping and wrong constants into a stated vehicle, all at once."""
+    inertia = np.array(vehicle.inertia_kg_m2) * [1.2, 0.85, 1.1]
+    rotors = tuple(
+        replace(
+            rotor, thrust_factor_n_s2=0.92 * rotor.thrust_factor_n_s2, drag_factor_n_m_s2=1.2 * rotor.drag_factor_n_m_s2
+        )
+        for rotor in vehicle.rotors
+    )
+    return VehicleModel(
+        vehicle=replace(vehicle, inertia_kg_m2=tuple(inertia.tolist()), rotors=rotors),
+        response=RotorResponse(lag_s=0.035),
+        effects=(
+            ModelEffect("linear_damping", {}, 2.0 * inertia),
+            ModelEffect("rotor_drag", {}, np.array([1.2e-4])),
+            ModelEffect("flapping_moment", {}, np.array([7e-6])),
+        ),
+    )
+
+
+def flown(model, kinds=KINDS, *, stated=STATED, duration_s=20.0, rate_hz=100.0, hold="previous", noise=None, seed=0):
+    """Fly a model once for each kind of excitation, by an autopilot that knows the stated vehicle alone.
+
+    Between samples the rotor speeds of the log are what `hold` says, so that the model's own response is all there is
+    between them and the torque. The motion is integrated by Runge-Kutta of fourth order in steps of 5 ms or less.
+    """
+    rng = np.random.default_rng(seed)
+    period = 1 / rate_hz
+    time = period * np.arange(round(duration_s * rate_hz))
+    plans = [reference(kind, time, rng) for kind in kinds]
+    plan = Plan(*(np.stack(part, axis=1) for part in zip(*plans, strict=True)))
+    states, speeds = _Fleet(model, stated, plan, period, hold).flown(len(time))
+    return [
+        _logged(f"{kind}-{seed}-{number}", states[:, number], speeds[:, number], period, hold, noise or Noise(), rng)
+        for number, kind in enumerate(kinds)
+    ]
+
+
+class Plan(NamedTuple):
+    """What an autopilot is told: shape (time, flight, 3), or (time, flight) for heading and share of position held."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    heading: np.ndarray
+    held: np.ndarray
+    kick: np.ndarray
+    """Angular acceleration that is added, rad/s^2."""
+
+
+def reference(kind, time, rng):
+    """Plan one flight; its details are drawn."""
+    zero, ones = np.zeros((len(time), 3)), np.ones(len(time))
+    if kind == "figure":
+        pace = np.linspace(0.5, 1.4, len(time))
+        phase = np.cumsum(pace) * (time[1] - time[0]) + rng.uniform(0, 2 * np.pi)
+        size = rng.uniform(2.0, 3.0, 3) * [1.0, 0.6, 0.25]
+        position = size * np.stack([np.sin(phase), np.sin(2 * phase), np.cos(phase)], axis=1)
+        return position, np.gradient(position, time, axis=0), 1.2 * np.sin(0.7 * phase), ones, zero
+    if kind == "steps":
+        part = (time / 1.1).astype(int)
+        velocity = rng.uniform(-1.0, 1.0, (part[-1] + 1, 3)) * [3.8, 3.8, 1.5]
+        return zero, velocity[part], rng.uniform(-1.0, 1.0, part[-1] + 1)[part], 0.0 * ones, zero
+    if kind != "multisine":
+        raise ValueError(f"no kind of flight is called {kind}")
+    frequency = np.geomspace(0.3, 5.0, 7)[:, None] * rng.uniform(0.85, 1.15, (7, 3))
+    phase = rng.uniform(0, 2 * np.pi, (7, 3))
+    kick = np.sin(2 * np.pi * frequency * time[:, None, None] + phase).sum(axis=1) * [5.0, 5.0, 4.0]
+    return np.sin(0.7 * time)[:, None] * [0.6, 0.6, 0.8], zero, 0.0 * ones, ones, kick
+
+
+class _Fleet:
+    """Several flights of one model at a time, each with its own plan."""
+
+    def __init__(self, model, stated, plan, period, hold):
+        self.model, self.stated, self.plan, self.period, self.hold = model, stated, plan, period, hold
+        self.rotors, self.flights = model.rotors, plan.held.shape[1]
+        # Delayed speeds jump within a sample: a step ends there.
+        even = np.linspace(0.0, 1.0, int(np.ceil(period / FINE_STEP_S - 1e-9)) + 1)
+        self.marks = np.unique(np.append(even, np.round(model.response.delay_s / period % 1.0, 9)))
+        self.ends = np.cumsum([3, 3, 4, 3, self.rotors])
+        self.inverse = np.linalg.pinv(allocation_matrix(stated))
+        self.weight = np.array([0.0, 0.0, model.vehicle.gravity_m_s2])
+        self.used = np.flatnonzero(np.any(model.weights, axis=(0, 2)))
+        self.weights = model.weights[:, self.used].reshape(-1, model.weights.shape[2]).T
+        self.hover = np.sqrt(stated.mass_kg * stated.gravity_m_s2 / allocation_matrix(stated)[0].sum())
+
+    def flown(self, samples):
+        """Give states and logged rotor speeds at all samples, time first."""
+        state = np.zeros((self.flights, self.ends[-1] + self.rotors))
+        state[:, 9] = 1.0
+        state[:, :3], state[:, 3:6] = self.plan.position[0], self.plan.velocity[0]
+        # A model knows nothing of what was before a log, and takes the rotors to have settled at its first speeds.
+        first = self.command(0, state) if self.hold == "previous" else self.hover
+        state[:, self.ends[3] : self.ends[4]], state[:, self.ends[4] :] = first, first**2
+        states, self.log = (
+            np.empty((samples, *state.shape)),
+            np.full((samples + 2, self.flights, self.rotors), self.hover),
+        )
+        for sample in range(samples):
+            command = self.command(sample, state)
+            if self.hold == "previous":
+                self.log[sample] = command
+            else:
+                now = self.log[sample]
+                self.log[sample + 1] = now + (command - now) * (1 - np.exp(-self.period / MOTOR_S))
+            states[sample] = state
+            for begin, end in pairwise(self.marks):
+                state = self.advanced(state, sample + begin, end - begin)
+        return states, self.log[:samples]
+
+    def advanced(self, state, at, share):
+        """Take one step of Runge-Kutta; `at` and `share` count samples."""
+        h, early = self.period * share, 1e-6 * share
+        # A step that begins or ends where speeds jump has those between.
+        first = self.slopes(state, at + early)
+        second = self.slopes(state + 0.5 * h * first, at + 0.5 * share)
+        third = self.slopes(state + 0.5 * h * second, at + 0.5 * share)
+        fourth = self.slopes(state + h * third, at + share - early)
+        state = state + h / 6 * (first + 2 * second + 2 * third + fourth)
+        state[:, 6:10] /= np.linalg.norm(state[:, 6:10], axis=1, keepdims=True)
+        return state
+
+    def driven(self, at):
+        """Give the logged speed that is under way to the rotors, and its change in time."""
+        at = max(at - self.model.response.delay_s / self.period, 0.0)
+        before = int(at)
+        value = self.log[before]
+        if self.hold == "previous":
+            return value, np.zeros_like(value)
+        change = self.log[before + 1] - value
+        return value + (at - before) * change, change / self.period
+
+    def slopes(self, state, at):
+        """Give the derivatives of position, velocity, attitude, rate, acting speed and slow squared speed."""
+        _, velocity, quaternion, rate, acting, slow = np.split(state, self.ends, axis=1)
+        response, body = self.model.response, self.model.body
+        driven, change = self.driven(at)
+        if response.lag_s:
+            change = (driven - acting) / response.lag_s
+        else:
+            acting = driven
+        squared = acting**2
+        rotor = np.hstack([np.ones((self.flights, 1)), acting, squared, change, slow - squared])
+        rotation = _rotation(quaternion)
+        air = np.einsum("bij,bi->bj", rotation, velocity)
+        terms = state_terms(air, rate)
+        if self.model.remainder is not None:
+            terms = np.hstack([terms, remainder_terms(self.model.remainder, air)])
+        by_rotor = (rotor @ self.weights).reshape(self.flights, 6, -1)
+        wrench = np.einsum("bka,ba->bk", by_rotor, terms[:, self.used])
+        torque, force = wrench[:, :3], wrench[:, 3:]
+        angular = (torque - _cross(rate, rate @ body.inertia)) @ body.inverse
+        acceleration = np.einsum("bij,bj->bi", rotation, force) / body.mass - self.weight
+        return np.hstack(
+            [velocity, acceleration, _turning(quaternion, rate), angular, change, (squared - slow) / response.slow_s]
+        )
+
+    def command(self, sample, state):
+        """Ask for rotor speeds as a cascade of velocity, attitude and rate does."""
+        position, velocity, quaternion, rate = np.split(state, self.ends, axis=1)[:4]
+        plan, stated = self.plan, self.stated
+        pull = 2.5 * (plan.velocity[sample] - velocity) + [0.0, 0.0, stated.gravity_m_s2]
+        pull += 1.8 * plan.held[sample][:, None] * (plan.position[sample] - position)
+        # Rotors have to be left for the torques: no steep tilts, no hard turns of the heading.
+        pull = np.clip(pull, [-7.0, -7.0, 6.0], [7.0, 7.0, 14.0])
+        rotation = _rotation(quaternion)
+        turned = np.swapaxes(_upright(pull, plan.heading[sample]), 1, 2) @ rotation
+        skew = 0.5 * (turned - np.swapaxes(turned, 1, 2))
+        error = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
+        wanted = 14.0 * (-5.0 * error * [1.0, 1.0, 0.5] - rate) * [1.0, 1.0, 0.5] + plan.kick[sample]
+        wanted[:, 2] = np.clip(wanted[:, 2], -8.0, 8.0)
+        thrust = stated.mass_kg * np.einsum("bi,bi->b", pull, rotation[:, :, 2])
+        wrench = np.column_stack([thrust, wanted * np.array(stated.inertia_kg_m2[:3])])
+        squared = wrench @ self.inverse.T
+        return np.sqrt(np.clip(squared, (0.3 * self.hover) ** 2, (1.7 * self.hover) ** 2))
+
+
+def _turning(quaternion, rate):
+    """Differentiate quaternions x, y, z, w of bodies that turn."""
+    vector, scalar = quaternion[:, :3], quaternion[:, 3:]
+    along = scalar * rate + _cross(vector, rate)
+    return 0.5 * np.hstack([along, -np.sum(vector * rate, axis=1, keepdims=True)])
+
+
+def _rotation(quaternion):
+    """Give the matrices of unit quaternions x, y, z, w."""
+    x, y, z, w = quaternion.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _cross(first, second):
+    """Multiply vectors, much faster than `numpy.cross` for a few of them."""
+    return first[:, [1, 2, 0]] * second[:, [2, 0, 1]] - first[:, [2, 0, 1]] * second[:, [1, 2, 0]]
+
+
+def _upright(pull, heading):
+    """Orient bodies whose z axes point along a pull."""
+    up = pull / np.linalg.norm(pull, axis=1, keepdims=True)
+    forward = np.cross(np.stack([-np.sin(heading), np.cos(heading), 0 * heading], axis=1), up)
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    return np.stack([forward, np.cross(up, forward), up], axis=2)
+
+
+def _logged(name, states, speed, period, hold, noise, rng):
+    """Log states with noise."""
+
+    def noisy(values, size):
+        return np.ascontiguousarray(values + noise.drawn(size, values, period, rng))
+
+    turn = Rotation.from_quat(states[:, 6:10]) * Rotation.from_rotvec(noisy(np.zeros((len(states), 3)), noise.attitude))
+    motion = Motion(
+        noisy(states[:, :3], noise.position),
+        noisy(states[:, 3:6], noise.velocity),
+        turn.as_matrix(),
+        noisy(states[:, 10:13], noise.rate),
+        period,
+    )
+    measured = noisy(speed, noise.speed)
+    return PlaybackFlight(name=name, motion=motion, speed=measured, hold=hold, stretches=(slice(0, len(states)),))
+
+
+ROTORPY_ARM = 0.1202081528
+ROTORPY = VehicleSettings(
+    mass_kg=0.5,
+    inertia_kg_m2=(0.00365, 0.00368, 0.00703),
+    rotor_speed_max_rad_s=1500.0,
+    rotors=tuple(
+        RotorSettings(
+            position_m=(x * ROTORPY_ARM, y * ROTORPY_ARM, 0.0),
+            spin=spin,
+            thrust_factor_n_s2=5.57e-6,
+            drag_factor_n_m_s2=1.36e-7,
+        )
+        for x, y, spin in ((1, 1, -1), (1, -1, 1), (-1, -1, -1), (-1, 1, 1))
+    ),
+)
+ROTORPY_HIDDEN = {
+    "none": (),
+    "com": (ModelEffect("com_offset", {}, np.array([0.010, -0.006])),),
+    "drag": (
+        ModelEffect("rotor_drag", {}, np.array([1.19e-4])),
+        ModelEffect("inflow", {}, np.array([2.32e-4])),
+        ModelEffect("translational_lift", {}, np.array([3.39e-3])),
+        ModelEffect("parasitic_drag", {}, np.array([0.005, 0.005, 0.010, 0.0, 0.0, 0.0])),
+    ),
+}
+"""What each flight of RotorPy hides, as its origin states."""
+
+
+def rotorpy_flight(name):
+    """Read a flight of RotorPy, with its measured rotor speeds; skip the test where it is absent."""
+    log = columns_of_log("rotorpy", name)
+
+    def columns(*names):
+        return np.ascontiguousarray(np.stack([log[column] for column in names], axis=1))
+
+    motion = Motion(
+        columns("x", "y", "z"),
+        columns("vx", "vy", "vz"),
+        rotation_matrix(columns("phi", "theta", "psi")),
+        columns("wx", "wy", "wz"),
+        0.01,
+    )
+    speed = columns("om1", "om2", "om3", "om4")
+    return PlaybackFlight(name=name, motion=motion, speed=speed, hold="linear", stretches=(slice(0, len(speed)),))
+
+
+def rotorpy_truth(name):
+    """Give the model that flew."""
+    return VehicleModel(vehicle=ROTORPY, effects=ROTORPY_HIDDEN[name])
