@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
-from cpfls_cli.effects.polynomial import state_terms
+from cpfls_cli.effects.polynomial import STATE_TERMS, state_terms
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, Motion, Terms, errors_of_runs
 from cpfls_cli.playback.model import (
@@ -81,6 +81,12 @@ class Player:
     along: Array | None = None
     remainder: Remainder | None = None
     fuzzy: InertiaModel | None = None
+
+    @property
+    def feels_air(self) -> bool:
+        """Whether torque or force depend on the velocity through the air."""
+        airs = [index for index, term in enumerate(STATE_TERMS) if set("uvw") & set(term)]
+        return self.remainder is not None or bool(np.any(self.table[:, airs]))
 
     def step_weights(self, part: slice) -> tuple[Terms, Array]:
         """Evaluate the weights of the terms of the motion over each step of a part of the flight.
