@@ -342,7 +342,7 @@ def where_figure(name: str, record: ReplayRecord) -> Plot:
             axes.set_ylim(bottom=0.0)
             plain_ticks(axes.yaxis)
             axes.set_title(flight)
-        figure.supylabel("error of the body rate, rad/s", fontsize=9.5)
+            axes.set_ylabel("error, rad/s")
         panels[-1].set_xlabel("begin of the window, s")
         legend_over(figure, panels[0])
 
