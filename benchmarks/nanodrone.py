@@ -33,6 +33,7 @@ pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.found_vehicles import learned
 from benchmarks.shared.nanodrone_files import TEST, TRAINING, VEHICLE, flights
 from benchmarks.shared.playback_scores import (
     SHOWN,
@@ -91,9 +92,9 @@ COLUMNS = (
 )
 
 
-def models(_training: Sequence[PlaybackFlight]) -> Mapping[str, VehicleModel]:
+def models(training: Sequence[PlaybackFlight]) -> Mapping[str, VehicleModel]:
     """Give the models that are played back, by name; those that learn see the training flights alone."""
-    return {"stated rigid body": VehicleModel(vehicle=VEHICLE)}
+    return {"stated rigid body": VehicleModel(vehicle=VEHICLE), **learned(VEHICLE, training)}
 
 
 def our_rows(training: Sequence[PlaybackFlight], test: Sequence[PlaybackFlight]) -> list[list[object]]:

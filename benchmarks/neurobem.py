@@ -29,6 +29,7 @@ pin_threads()
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from benchmarks.shared.found_vehicles import learned
 from benchmarks.shared.neurobem_files import INERTIA, MASS, VEHICLE, Segment, segments
 from benchmarks.shared.playback_scores import HORIZON, Runs, free_runs, nothing_moves, rate_stays, score
 from cpfls_cli.arrays import Array
@@ -44,9 +45,9 @@ COLUMNS = (
 UNKNOWN = ("",) * 6
 
 
-def models(_training: Sequence[PlaybackFlight]) -> Mapping[str, VehicleModel]:
+def models(training: Sequence[PlaybackFlight]) -> Mapping[str, VehicleModel]:
     """Give the models that are played back, by name; those that learn see the training segments alone."""
-    return {"stated rigid body": VehicleModel(vehicle=VEHICLE)}
+    return {"stated rigid body": VehicleModel(vehicle=VEHICLE), **learned(VEHICLE, training, baselines=False)}
 
 
 def our_rows(training: Sequence[PlaybackFlight], test: Segment) -> list[list[object]]:

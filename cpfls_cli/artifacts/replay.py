@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -55,6 +55,121 @@ class SignalErrorGroup:
             "rms_by_axis": by_axis.tolist(),
             "sum": float(self.total[prediction]),
         }
+
+
+class ErrorsByHorizon(Protocol):
+    """What says how far a model and its rivals are off by horizon."""
+
+    @property
+    def played(self) -> str:
+        """What is played back."""
+        ...
+
+    @property
+    def flown(self) -> tuple[str, ...]:
+        """Flights along which."""
+        ...
+
+    @property
+    def windows(self) -> int:
+        """Number of windows."""
+        ...
+
+    @property
+    def horizon_s(self) -> Array:
+        """Horizons, s."""
+        ...
+
+    @property
+    def errors(self) -> Mapping[str, SignalErrorGroup | None]:
+        """Errors by signal."""
+        ...
+
+
+@record
+class HeldOutGroup:
+    """A model played back along flights that it was not found in, beside what it has to beat."""
+
+    flown: tuple[str, ...] = dataset("flight", "file names", "held_out_flight")
+    windows: int = dataset("windows", "samples from which it was played back")
+    prediction: tuple[str, ...] = dataset("prediction", "as in cpfls/replay", "prediction")
+    horizon_s: Array = dataset("horizon_s", "horizons", "horizon", units="s")
+    diverged: IntArray = dataset("diverged", "windows in which a prediction ran away and was stopped", "prediction")
+    body_rate: SignalErrorGroup = group("body_rate")
+    attitude: SignalErrorGroup | None = group("attitude", default=None)
+    velocity: SignalErrorGroup | None = group("velocity", default=None)
+    position: SignalErrorGroup | None = group("position", default=None)
+
+    @property
+    def played(self) -> str:
+        """What is played back."""
+        return "the vehicle found"
+
+    @classmethod
+    def of(cls, flights: Sequence[str], replay: Replay, period: float) -> Self:
+        """Arrange a replay without its windows.
+
+        Parameters
+        ----------
+        flights : sequence of str
+            File names.
+        period : float, s
+        """
+        from cpfls_cli.playback.replay import PREDICTIONS
+
+        groups = {signal: SignalErrorGroup.of(found) for signal, found in replay.errors.items()}
+        assert groups["body_rate"] is not None, "every flight has rates"
+        return cls(
+            flown=tuple(flights),
+            windows=len(replay.windows.start),
+            prediction=PREDICTIONS,
+            horizon_s=period * np.arange(1, groups["body_rate"].mae.shape[1] + 1),
+            diverged=(replay.windows.diverged >= 0).sum(axis=1),
+            **groups,  # type: ignore[arg-type]  # only the body rate is always known
+        )
+
+    @property
+    def errors(self) -> Mapping[str, SignalErrorGroup | None]:
+        """Errors by signal, what is asked of first first."""
+        return {
+            "body_rate": self.body_rate,
+            "attitude": self.attitude,
+            "velocity": self.velocity,
+            "position": self.position,
+        }
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The replay for machines."""
+        models = {
+            name: {
+                **{signal: None if found is None else found.summary(index) for signal, found in self.errors.items()},
+                "diverged": int(self.diverged[index]),
+            }
+            for index, name in enumerate(self.prediction)
+        }
+        return {
+            "flights": list(self.flown),
+            "windows": self.windows,
+            "horizon_s": self.horizon_s.tolist(),
+            "models": models,
+        }
+
+
+def better_to(errors: ErrorsByHorizon, signal: str) -> float:
+    """Find the horizon to which the model beats both "nothing moves" and "rate stays" at every horizon.
+
+    Returns
+    -------
+    float
+        In s; 0 where it does not at the first, NaN for a signal that no flight knows.
+    """
+    group = errors.errors[signal]
+    if group is None:
+        return float("nan")
+    beaten = group.mae[_MODEL] < group.mae[1:3].min(axis=0)
+    count = len(beaten) if beaten.all() else int(np.argmin(beaten))
+    return float(errors.horizon_s[count - 1]) if count else 0.0
 
 
 @record
@@ -259,6 +374,11 @@ class ReplayRecord(Record):
             "velocity": self.velocity,
             "position": self.position,
         }
+
+    @property
+    def flown(self) -> tuple[str, ...]:
+        """Names of the flights."""
+        return self.flight.name
 
     @property
     def windows(self) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
     from cpfls_cli.playback.structure import Choice
     from cpfls_cli.playback.vehicle import FoundVehicle
     from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+
+
+CONTROL_HORIZON = 0.1
+"""Horizon in s to which a controller of the attitude relies on its model."""
 
 
 @record
@@ -351,6 +356,7 @@ class VehicleRecord(Record):
     found: FoundNumbersGroup = group("found")
     trade: TradesGroup = group("trade")
     structure: StructuresTriedGroup = group("structure")
+    held_out: HeldOutGroup | None = group("held_out", default=None)
     share: SharesGroup = group("share")
     airspeed: float = dataset(
         "airspeed", "speed in the rotor plane that 95 % of the training samples stay below", units="m/s"
@@ -361,8 +367,8 @@ class VehicleRecord(Record):
     warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
 
     @classmethod
-    def of(cls, found: FoundVehicle, warnings: Sequence[str]) -> Self:
-        """Arrange a vehicle that was found."""
+    def of(cls, found: FoundVehicle, held_out: HeldOutGroup | None, warnings: Sequence[str]) -> Self:
+        """Arrange a vehicle that was found, and how well it predicts flights that it was not found in."""
         return cls(
             vehicle=VehicleGroup.of(found.model),
             found=columns_of(
@@ -373,6 +379,7 @@ class VehicleRecord(Record):
             ),
             trade=columns_of(TradesGroup, found.trades),
             structure=StructuresTriedGroup.of(found.choice),
+            held_out=held_out,
             share=SharesGroup(
                 name=tuple(share.name for share in found.shares),
                 torque=np.array([share.wrench[:3] for share in found.shares]),
@@ -386,14 +393,31 @@ class VehicleRecord(Record):
         )
 
     @property
+    def verdict(self) -> str:
+        """What playback on flights held out says of it.
+
+        Good for simulation where rates, attitude, velocity and position are predicted better than by what knows no
+        model at every horizon, as far as the flights know them; for control where the rates are, to 0.1 s at least.
+        """
+        if self.held_out is None:
+            return "not-judged"
+        last, known = float(self.held_out.horizon_s[-1]), self.held_out.errors
+        reached = {signal: better_to(self.held_out, signal) for signal, group in known.items() if group is not None}
+        if known["velocity"] is not None and all(horizon >= last for horizon in reached.values()):
+            return "good-for-simulation"
+        return "good-for-control" if reached["body_rate"] >= min(CONTROL_HORIZON, last) else "do-not-use"
+
+    @property
     def summary(self) -> dict[str, Any]:
         """The vehicle for machines."""
         numbers = {row.pop("name"): row for row in rows_of(self.found)}
         return {
             **self.vehicle.summary,
+            "verdict": self.verdict,
             "numbers": numbers,
             "trades": [list(row.values()) for row in rows_of(self.trade)],
             "structures": rows_of(self.structure),
+            "held_out": None if self.held_out is None else self.held_out.summary,
             "shares": {row.pop("name"): row for row in rows_of(self.share)},
             "evaluated": self.evaluated,
             "complete": self.complete,

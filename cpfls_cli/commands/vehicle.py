@@ -7,14 +7,18 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.replay import HeldOutGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.compare import flight_roles
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ConfigError, InputError
-from cpfls_cli.flights.playback import flights_to_play
+from cpfls_cli.flights.playback import flights_to_play, whole
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.vehicle_model import answer
+from cpfls_cli.playback.flight import LoggedFlight
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.playback.replay import replay
 from cpfls_cli.playback.structure import SearchStoppedError
 from cpfls_cli.playback.vehicle import find_vehicle
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -63,9 +67,20 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path]) -> Outcome:
             generator(study, "vehicle"),
             progress,
         )
+    judged = _judged(found.model, rest, job) if rest else None
     warnings = [warning for flight in read for warning in flight.warnings]
-    record = finish(job, VehicleRecord.of(found, warnings), inputs)
+    record = finish(job, VehicleRecord.of(found, judged, warnings), inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
+
+
+def _judged(model: VehicleModel, flights: Sequence[LoggedFlight], job: Job) -> HeldOutGroup:
+    """Play a vehicle back along flights that it was not found in, from every sample."""
+    to_play = whole(model)
+    played = [to_play.played(flight) for flight in flights]
+    period = played[0].flight.motion.period
+    horizon = max(1, round(job.study.playback.horizon_s / period))
+    errors = replay(played, horizon, 1, lambda done: job.progress(done, 1, "plays back the flights held out"))
+    return HeldOutGroup.of([flight.name for flight in flights], errors, period)
 
 
 def _check_left_out(study: Study) -> None:

@@ -240,13 +240,13 @@ def model_to_play(path: Path, study: Study) -> ModelToPlay:
         If it is none, or of another vehicle than that of the config.
     """
     if is_vehicle(path):
-        return _whole(VehicleModel(vehicle=study.vehicle), stated=True)
+        return whole(VehicleModel(vehicle=study.vehicle), stated=True)
     if holds(path, ExtendedRecord):
         return _extended(read_of_vehicle(path, ExtendedRecord, study).rebuilt(path))
     if holds(path, VehicleRecord):
-        return _whole(read_of_vehicle(path, VehicleRecord, study).vehicle.vehicle_model())
+        return whole(read_of_vehicle(path, VehicleRecord, study).vehicle.vehicle_model())
     identified = read_of_vehicle(path, ModelRecord, study).rebuilt(path)
-    return _whole(VehicleModel(vehicle=study.vehicle, fuzzy=identified))
+    return whole(VehicleModel(vehicle=study.vehicle, fuzzy=identified))
 
 
 def is_vehicle(path: Path) -> bool:
@@ -254,7 +254,15 @@ def is_vehicle(path: Path) -> bool:
     return str(path) == VEHICLE
 
 
-def _whole(model: VehicleModel, *, stated: bool = False) -> ModelToPlay:
+def whole(model: VehicleModel, *, stated: bool = False) -> ModelToPlay:
+    """Play back the model of a whole vehicle.
+
+    Parameters
+    ----------
+    stated : bool
+        Whether it is the vehicle of the config itself.
+    """
+
     def made(flight: LoggedFlight) -> tuple[PlaybackFlight, Player]:
         logged = flight.playback
         return logged, player_of(model, logged)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.replay import VEHICLE, DrawnGroup, ReplayRecord, SignalErrorGroup
+from cpfls_cli.artifacts.replay import VEHICLE, DrawnGroup, ErrorsByHorizon, ReplayRecord, SignalErrorGroup
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import (
@@ -63,7 +63,7 @@ def answer(replay: Source[ReplayRecord], index: int = 1) -> Iterator[Block]:
 
 
 def _grounds(record: ReplayRecord, index: int) -> Iterator[Block]:
-    yield _errors_table(record, index)
+    yield errors_table(record, index)
     yield _worst_table(record, index)
     yield from (Text(words, "warning") for words in (*_diverged(record), *record.warning))
 
@@ -72,7 +72,7 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     """Say to which horizon a model is better than what it has to beat, and by how much."""
     record = replay.record
     rivals = _rivals(record)
-    sentences = [*(_sentence(record, name, *pair) for name, pair in rivals.items()), *_beside_stated(record)]
+    sentences = [*beside_rivals(record), *_beside_stated(record)]
     better = {name: group.total[_MODEL] < group.total[rival] for name, (group, rival) in rivals.items()}
     moving = [name for name, (group, rival) in rivals.items() if group.total[rival] > 0]
     if not moving:
@@ -84,17 +84,22 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     return Box("REPLAY", whole, sentences, "good" if good else "warning")
 
 
-def _name(record: ReplayRecord) -> str:
+def beside_rivals(errors: ErrorsByHorizon) -> list[str]:
+    """Say of each signal to which horizon a model is better than what it has to beat, one sentence each."""
+    return [_sentence(errors, name, group, rival) for name, (group, rival) in _rivals(errors).items()]
+
+
+def _name(record: ErrorsByHorizon) -> str:
     return "the vehicle of the config" if record.played == VEHICLE else record.played
 
 
-def _rivals(record: ReplayRecord) -> dict[str, tuple[SignalErrorGroup, int]]:
+def _rivals(record: ErrorsByHorizon) -> dict[str, tuple[SignalErrorGroup, int]]:
     """Pair each signal with what a model has to beat in it: the better of the two that know no model."""
     known = {name: group for name, group in record.errors.items() if group is not None}
     return {name: (g, _RATE if g.total[_RATE] < g.total[_NOTHING] else _NOTHING) for name, g in known.items()}
 
 
-def _sentence(record: ReplayRecord, name: str, group: SignalErrorGroup, rival: int) -> str:
+def _sentence(record: ErrorsByHorizon, name: str, group: SignalErrorGroup, rival: int) -> str:
     words, (model, other) = _SIGNALS[name][0].capitalize(), group.total[[_MODEL, rival]]
     if other == 0:
         return f"{words}: “{_WORDS[rival]}” has no error, for the flight shows no motion."
@@ -105,7 +110,7 @@ def _sentence(record: ReplayRecord, name: str, group: SignalErrorGroup, rival: i
     return f"{words}: {_where(record, group, rival)}; {much}."
 
 
-def _where(record: ReplayRecord, group: SignalErrorGroup, rival: int) -> str:
+def _where(record: ErrorsByHorizon, group: SignalErrorGroup, rival: int) -> str:
     """Say at which horizons the model is better: at the longest stretches of them, where they are many."""
     better = group.mae[_MODEL] < (1 - _ROUNDING) * group.mae[rival]
     longest = sorted(sorted(runs(better), key=lambda run: run[0] - run[1])[:_SAID])
@@ -145,18 +150,19 @@ def _first_lost(record: ReplayRecord) -> str:
     return f"in {flight} from {begin:.2f} s after {after:.3g} s"
 
 
-def _chosen_horizons(record: ReplayRecord) -> list[int]:
+def _chosen_horizons(record: ErrorsByHorizon) -> list[int]:
     """Choose the first horizon, a fifth of the longest, and the longest."""
     last = len(record.horizon_s) - 1
     return sorted({0, max((last + 1) // 5 - 1, 0), last})
 
 
-def _shown(record: ReplayRecord) -> list[int]:
+def _shown(record: ErrorsByHorizon) -> list[int]:
     """List the predictions that are shown: the stated vehicle once."""
     return [_MODEL, _NOTHING, _RATE, *([] if record.played == VEHICLE else [_STATED])]
 
 
-def _errors_table(record: ReplayRecord, index: int) -> Table:
+def errors_table(record: ErrorsByHorizon, index: int) -> Table:
+    """Show the errors of all predictions after some horizons, and their sums."""
     chosen = _chosen_horizons(record)
     rows: list[list[str | Cell]] = []
     for name, (group, rival) in _rivals(record).items():
@@ -175,7 +181,7 @@ def _errors_table(record: ReplayRecord, index: int) -> Table:
             )
     header = ("Error of", "Prediction", *(f"After {_seconds(record.horizon_s[h])}" for h in chosen), "Sum")
     caption = (
-        f"Mean error of {_name(record)} over {record.windows} windows of {joined(record.flight.name)}, played back "
+        f"Mean error of {_name(record)} over {record.windows} windows of {joined(record.flown)}, played back "
         "without correction; sum over all horizons."
     )
     return Table(f"replay-{index}", caption, header, rows, frozenset({0, 1}))
@@ -237,7 +243,7 @@ def _facts(record: ReplayRecord) -> list[tuple[str, str]]:
     ]
 
 
-def horizon_figure(name: str, record: ReplayRecord) -> Plot:
+def horizon_figure(name: str, record: ErrorsByHorizon) -> Plot:
     """Draw the mean error over the horizon, beside what a model has to beat."""
     groups = _rivals(record)
 

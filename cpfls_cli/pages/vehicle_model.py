@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.replay import better_to
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text, Tone
 from cpfls_cli.report.numbers import joined, number, percent
 
 if TYPE_CHECKING:
@@ -25,6 +27,18 @@ _NAMES = {
     "everything": "all blocks",
     "nothing": "the stated vehicle",
 }
+_LABELS = {
+    "good-for-simulation": "GOOD FOR SIMULATION AND CONTROL",
+    "good-for-control": "GOOD FOR CONTROL",
+    "do-not-use": "DO NOT USE",
+    "not-judged": "NOT JUDGED",
+}
+_TONES: dict[str, Tone] = {
+    "good-for-simulation": "good",
+    "good-for-control": "good",
+    "do-not-use": "warning",
+    "not-judged": "note",
+}
 _REMAINDER, _ROTORS = "remainder", "rotors"
 _AXES = ("x", "y", "z")
 _FAR = 3.0
@@ -34,6 +48,8 @@ _FAR = 3.0
 def answer(found: Source[VehicleRecord]) -> Iterator[Block]:
     """Say what was found, how well it predicts what it was not fitted to, and what to be careful with."""
     yield _box(found)
+    if found.record.held_out is not None:
+        yield errors_table(found.record.held_out, 1)
     yield _numbers_table(found, 1)
     yield from (Text(warning, "warning") for warning in warnings(found.record))
 
@@ -41,8 +57,7 @@ def answer(found: Source[VehicleRecord]) -> Iterator[Block]:
 def _box(found: Source[VehicleRecord]) -> Box:
     record = found.record
     errors = dict(zip(record.structure.name, record.structure.error, strict=True))
-    free = len(record.found.name)
-    title = f"{found.label}: a vehicle with {free} numbers found in its flights."
+    title = f"{found.label}: a vehicle with {len(record.found.name)} numbers found in its flights."
     judged = (
         f"On parts of the flights kept aside in turn its error is {number(errors['chosen'], 3)}; with all blocks "
         f"{number(errors['everything'], 3)}, with blocks added one by one {number(errors['greedy'], 3)}, with the "
@@ -50,7 +65,24 @@ def _box(found: Source[VehicleRecord]) -> Box:
     )
     blocks = _chosen_blocks(record)
     holds = f"It holds {joined(blocks)}." if blocks else "It holds nothing but the stated vehicle."
-    return Box("VEHICLE", title, [judged, holds], "good" if errors["chosen"] < errors["nothing"] else "warning")
+    return Box(_LABELS[record.verdict], title, [*_verdict(record), judged, holds], _TONES[record.verdict])
+
+
+def _verdict(record: VehicleRecord) -> Iterator[str]:
+    """Say what the vehicle is good for, to which horizon, and where; by playback alone."""
+    held, fast = record.held_out, number(record.airspeed, 2)
+    where = f"in flight up to {fast} m/s and about as lively as that which it was found in"
+    if held is None:
+        yield "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
+        return
+    turning, moving = better_to(held, "body_rate"), better_to(held, "velocity")
+    if record.verdict == "good-for-simulation":
+        yield f"Good for simulation and for control to {number(min(turning, moving), 2)} s, {where}."
+    elif record.verdict == "good-for-control":
+        yield f"Good for control of the attitude: it predicts body rates to {number(turning, 2)} s, {where}."
+    else:
+        yield "Do not use it: on flights held out it predicts body rates worse than what knows no model."
+    yield from beside_rivals(held)
 
 
 def _chosen_blocks(record: VehicleRecord) -> list[str]:
@@ -117,6 +149,9 @@ def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
             ("Named and learned shares of the torque", _share_in_words(record)),
         ]
     )
+    if record.held_out is not None:
+        yield errors_table(record.held_out, index)
+        yield horizon_figure(f"vehicle-errors-{index}", record.held_out)
     yield _numbers_table(found, index)
     yield from (Text(warning, "warning") for warning in warnings(record))
     yield _structures_table(record, index)

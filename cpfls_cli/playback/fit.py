@@ -233,12 +233,13 @@ def window_sums(evaluated: Evaluated, window: Windows, group: IntArray) -> tuple
     """
     flight, count, groups = window.flight, len(evaluated.values), int(group.max(initial=0)) + 1
     gradient, hessian = np.zeros((groups, count)), np.zeros((groups, count, count))
+    terms = evaluated.rotor_terms(flight, window.samples)
     loss = sensitivities(
         window.motion,
         evaluated.body,
         evaluated.used,
-        evaluated.weights(flight, window.samples),
-        evaluated.parameters(flight, window.samples),
+        evaluated.weights(terms),
+        evaluated.parameters(flight, window.samples, terms),
         window.loss,
         window.places,
         flight.translates,
@@ -356,7 +357,7 @@ def window_errors(fitted: Fitted, window: Windows) -> Array:
         window.motion,
         evaluated.body,
         evaluated.used,
-        evaluated.weights(flight, window.samples),
+        evaluated.weights(evaluated.rotor_terms(flight, window.samples)),
         window.places,
         flight.translates,
         errors,

@@ -483,13 +483,16 @@ class Evaluated:
             layout.inertia_derivatives(values),
         )
 
-    def weights(self, flight: PlaybackFlight, samples: IntArray) -> Array:
-        """Evaluate the weights over the steps that begin at samples of a flight, shape (samples, 6, active)."""
-        return weights_by_step(self.table, self.used, self.layout.rotor_terms(self.values, flight)[samples])
+    def rotor_terms(self, flight: PlaybackFlight, samples: IntArray) -> Array:
+        """Evaluate the terms of the rotors over the steps that begin at samples of a flight."""
+        return self.layout.rotor_terms(self.values, flight)[samples]
 
-    def parameters(self, flight: PlaybackFlight, samples: IntArray) -> Parameters:
+    def weights(self, terms: Array) -> Array:
+        """Evaluate the weights over these steps, shape (samples, 6, active)."""
+        return weights_by_step(self.table, self.used, terms)
+
+    def parameters(self, flight: PlaybackFlight, samples: IntArray, terms: Array) -> Parameters:
         """Differentiate the weights over these steps, and the inertia, by each number."""
-        terms = self.layout.rotor_terms(self.values, flight)[samples]
         entries, values, first = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((len(samples), 0))], [0]
         for number, derivative in zip(self.layout.numbers, self.derivatives, strict=True):
             of_response = derivative is None

@@ -68,6 +68,8 @@ def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, l
 
 def _delayed(values: Array, steps: Any) -> Numbers:
     """Shift by a number of steps; before the first sample there is its value."""
+    if steps == 0:
+        return values
     whole = int(np.floor(np.real(steps)))
     share = steps - whole
     padded = np.concatenate([np.repeat(values[:1], whole + 1, axis=0), values])
@@ -80,7 +82,7 @@ def _lagged(values: Numbers, period: float, time_constant: Any, hold: Hold) -> t
     after = np.concatenate([values[1:], values[-1:]]) if hold == "linear" else values
     if np.real(time_constant) < _SHORTEST_S and not np.imag(time_constant):
         before = values if hold == "linear" else np.concatenate([values[:1], values[:-1]])
-        return 0.5 * (values + after), after, before
+        return 0.5 * (values + after) if hold == "linear" else values, after, before
     constant = time_constant if np.real(time_constant) > _SHORTEST_S else _SHORTEST_S + 1j * np.imag(time_constant)
     ratio = constant / period
     decay = np.exp(-1 / ratio)

@@ -17,9 +17,9 @@ class PlaybackSettings(Settings):
 
     horizon_s: Annotated[float, Gt(0), Doc("how far free runs go, s")] = 0.5
     window_interval_s: Annotated[float, Gt(0), Doc("time between the starts of the windows that are fitted, s")] = 0.6
-    search_interval_s: Annotated[
-        float, Gt(0), Doc("time between the starts of the windows while the structure is searched for, s")
-    ] = 1.2
+    search_windows: Annotated[int, Ge(20), Doc("about how many windows the structures are judged on in the search")] = (
+        400
+    )
     folds: Annotated[int, Ge(2), Doc("parts of the flights, each of which is kept aside once in the search")] = 3
     population: Annotated[int, Ge(2), Doc("structures in the population of the search")] = 16
     generations: Annotated[int, Ge(0), Doc("generations bred; 0 takes the greedy choice and its neighbours alone")] = 8

@@ -236,7 +236,9 @@ def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> l
     flights : sequence of PlaybackFlight
     settings : PlaybackSettings
     """
-    windows = [_windows(flight, settings, settings.search_interval_s) for flight in flights]
+    flown = sum(len(flight) * flight.motion.period for flight in flights)
+    interval = max(settings.window_interval_s, flown / settings.search_windows)
+    windows = [_windows(flight, settings, interval) for flight in flights]
     if len(windows) > 1:
         count = min(settings.folds, len(windows))
         return [windows[part::count] for part in range(count)]

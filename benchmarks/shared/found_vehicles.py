@@ -1,0 +1,64 @@
+"""Vehicles found in training flights: the structure that is chosen, and the baselines of its choice."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from time import perf_counter
+
+import numpy as np
+
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.structure import fitted_to_all
+from cpfls_cli.playback.vehicle import find_vehicle
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+SEED = 1
+
+
+def learned(
+    vehicle: VehicleSettings,
+    training: Sequence[PlaybackFlight],
+    settings: PlaybackSettings | None = None,
+    baselines: bool = True,
+) -> dict[str, VehicleModel]:
+    """Find a vehicle with the settings of the program, and fit the baselines of the choice; what was found is printed.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        As stated.
+    training : sequence of PlaybackFlight
+    settings : PlaybackSettings, optional
+    baselines : bool
+        Whether to fit all blocks, and those added one by one.
+    """
+    used, start = settings or PlaybackSettings(), perf_counter()
+    found = find_vehicle(vehicle, training, used, np.random.default_rng(SEED), _shown)
+    choice = found.choice
+    print(f"\nfound in {perf_counter() - start:.0f} s, {choice.evaluated} structures judged on flights kept aside:")
+    for name in ("chosen", "best", "greedy", "everything", "nothing"):
+        judged = getattr(choice, name)
+        worse, uncertain = judged.worse_than(choice.best)
+        blocks = " ".join(judged.structure.blocks)
+        print(
+            f"  {name}: error {judged.error:.4f} ({worse:+.4f} +- {uncertain:.4f}), {judged.numbers} numbers: {blocks}"
+        )
+    for number in found.numbers:
+        weak = ", on a bound" if number.at_bound else "" if number.determined else ", not determined"
+        print(f"  {number.name} = {number.value:.4g} ({number.low:.4g} to {number.high:.4g}) {number.unit}{weak}")
+    models = {f"vehicle, {choice.chosen.numbers} numbers": found.model}
+    for name in ("greedy", "everything") if baselines else ():
+        judged = getattr(choice, name)
+        clock = perf_counter()
+        fitted, _ = fitted_to_all(judged.structure, vehicle, training, used, judged.fits[0])
+        print(f"  {name} fitted to all in {perf_counter() - clock:.1f} s")
+        models[f"{name}, {judged.numbers} numbers"] = fitted.layout.model(fitted.values)
+    return models
+
+
+def _shown(done: int, total: int, best: float) -> None:
+    if done % 10 == 0:
+        print(f"{done} of about {total}, smallest error {best:.4f}", file=sys.stderr, flush=True)
