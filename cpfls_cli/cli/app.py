@@ -104,7 +104,7 @@ PlayedArgument = Annotated[
     Path,
     typer.Argument(
         metavar="MODEL",
-        help="Made by `cpfls identify` or `cpfls extend`; or the word vehicle: that of the config.",
+        help="Made by `cpfls identify`, `extend` or `vehicle`; or the word vehicle: that of the config.",
     ),
 ]
 HorizonOption = Annotated[

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.commands.compare import flight_roles
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.playback import flights_to_play, is_vehicle, model_to_play
+from cpfls_cli.flights.playback import ModelToPlay, flights_to_play, is_vehicle, model_to_play
 from cpfls_cli.pages.replay import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.replay import ReplayOptions, replay
+from cpfls_cli.playback.replay import Played, ReplayOptions, replay
+from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
 
 
@@ -38,10 +39,18 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
     if job.dry_run:
         return nothing_written(job)
     errors = replay(played, horizon, options.every, lambda done: job.progress(done, 1))
-    repairs = [f"{model.name} takes a fault of the sensors out of the flights first: {r}" for r in to_play.repairs]
-    warnings = [*(warning for flight in given for warning in flight.warnings), *repairs]
+    warnings = [*(warning for flight in given for warning in flight.warnings), *_warnings(model.name, to_play, played)]
     record = finish(job, ReplayRecord.of(model.name, options, given, played, errors, warnings), inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
+
+
+def _warnings(name: str, model: ModelToPlay, played: Sequence[Played]) -> Iterator[str]:
+    """Say what a model does to flights, and what it lacks in them."""
+    for repair in model.repairs:
+        yield f"{name} takes a fault of the sensors out of the flights first: {repair}"
+    still = [each.flight.name for each in played if each.model.feels_air and not each.flight.translates]
+    if still:
+        yield f"{name} depends on the velocity through the air, which is taken as 0 in {joined(still)}"
 
 
 def _samples(horizon_s: float, flight: LoggedFlight) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import find_objects
@@ -17,12 +18,15 @@ from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import InputError
-from cpfls_cli.flights.recordings import ReadFlight, read_flight, signals_of, with_voltage
+from cpfls_cli.errors import CpflsError, InputError
+from cpfls_cli.flightlog.results import ImportedFlight
+from cpfls_cli.flights.imported import imported
+from cpfls_cli.flights.recordings import ReadFlight, read_flight, read_import, signals_of, with_voltage
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.playback import extended_player
+from cpfls_cli.logs.formats import is_log
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, Player, player_of
@@ -37,6 +41,7 @@ _PAUSE = 1.5
 _FEWEST = 8
 """Samples of a stretch, which effects with derivatives need."""
 
+_MOST_PARTS = 50
 _SAME_PERIOD = 1e-3
 
 
@@ -55,7 +60,10 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
     InputError
         If a flight is of another vehicle, has no actuation, is not uniform in time, or has another rate than the first.
     """
-    read = [read_flight(path, study) for path in paths]
+    read = [
+        read_import(path.name, _parts(path, study), study) if is_log(path) else read_flight(path, study)
+        for path in paths
+    ]
     flights = _of_full_battery([_flight(flight, study, hold) for flight in read], read)
     first = flights[0]
     for flight in flights[1:]:
@@ -67,6 +75,38 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
                 "import them with import.rate_hz"
             )
     return tuple(flights)
+
+
+def _parts(path: Path, study: Study) -> list[ImportedFlight]:
+    """Import all parts of a log between its long gaps, in time."""
+    longest = _importing(study, gap_rule="longest-part")
+    first = imported(path, longest)
+    # A delay that is estimated is estimated once, on the longest part.
+    others = _importing(longest, delay_s=first.report.delay_s)
+    found, left = [first], _around(first, study.import_.crop_s or (0.0, np.inf))
+    while left and len(found) < _MOST_PARTS:
+        begin, end = left.pop(0)
+        try:
+            part = imported(path, _importing(others, crop_s=(begin, end)))
+        except CpflsError:
+            # Too little is left there to be a flight.
+            continue
+        found.append(part)
+        left += _around(part, (begin, end))
+    return sorted(found, key=lambda part: part.report.span_s[0])
+
+
+def _importing(study: Study, **changes: Any) -> Study:
+    return study.model_copy(update={"import_": replace(study.import_, **changes)})
+
+
+def _around(part: ImportedFlight, crop: tuple[float, float]) -> list[tuple[float, float]]:
+    """List what a part leaves of a log before and behind itself, where it has a gap there."""
+    if not part.report.dropped.get("gap"):
+        return []
+    begin, end = part.report.span_s
+    apart = 0.5 / part.report.log_rate_hz
+    return [(a, b) for a, b in ((crop[0], begin - apart), (end + apart, crop[1])) if b - a > _FEWEST * apart]
 
 
 def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight:

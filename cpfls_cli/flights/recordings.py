@@ -18,6 +18,7 @@ from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
@@ -87,10 +88,27 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
 
 
 def _log(path: Path, study: Study) -> ReadFlight:
-    flight = imported(path, study)
-    done = tuple(f"{what} ({count})" for what, count in log_findings(flight.report).items())
-    signals = FlightRecord.of_import(flight, {}).signals
-    return ReadFlight(path.name, signals, _units(study), (*done, *flight.report.warnings))
+    return read_import(path.name, [imported(path, study)], study)
+
+
+def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
+    """Join the parts of a log that were imported.
+
+    Parameters
+    ----------
+    parts : sequence of ImportedFlight
+        Of one log, in time. Several are on the clock of the log, one on a clock of its own.
+    """
+    first = parts[0]
+    done = tuple(f"{what} ({count})" for what, count in log_findings(first.report).items())
+    signals = [FlightRecord.of_import(part, {}).signals for part in parts]
+    if len(parts) == 1:
+        return ReadFlight(name, signals[0], _units(study), (*done, *first.report.warnings))
+    shared = [each for each in signals[0] if all(each in own for own in signals)]
+    for own, part in zip(signals, parts, strict=True):
+        own["time"] = own["time"] + part.report.span_s[0]
+    joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
+    return ReadFlight(name, joined, _units(study), ())
 
 
 def _artifact(path: Path, study: Study) -> ReadFlight:

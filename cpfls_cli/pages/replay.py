@@ -72,12 +72,16 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     """Say to which horizon a model is better than what it has to beat, and by how much."""
     record = replay.record
     rivals = _rivals(record)
-    beaten = [group.total[_MODEL] < group.total[rival] for group, rival in rivals.values()]
-    tone, title = ("good", "predicts better") if all(beaten) else ("warning", "predicts worse")
-    signals = [_SIGNALS[name][0] for (name, _), good in zip(rivals.items(), beaten, strict=True) if good == all(beaten)]
-    horizon = _seconds(record.horizon_s[-1])
-    whole = f"{_name(record)} {title} than what it has to beat, over {horizon}: {joined(signals)}."
-    return Box("REPLAY", sentence(whole), [*beside_rivals(record), *_beside_stated(record)], tone)  # type: ignore[arg-type]
+    sentences = [*beside_rivals(record), *_beside_stated(record)]
+    better = {name: group.total[_MODEL] < group.total[rival] for name, (group, rival) in rivals.items()}
+    moving = [name for name, (group, rival) in rivals.items() if group.total[rival] > 0]
+    if not moving:
+        return Box("REPLAY", sentence(f"{_name(record)} cannot be judged: the flight shows no motion"), sentences)
+    good = all(better[name] for name in moving)
+    signals = joined(_SIGNALS[name][0] for name in moving if better[name] == good)
+    title = f"{_name(record)} predicts {'better' if good else 'worse'} than what it has to beat"
+    whole = sentence(f"{title}, over {_seconds(record.horizon_s[-1])}: {signals}")
+    return Box("REPLAY", whole, sentences, "good" if good else "warning")
 
 
 def beside_rivals(errors: ErrorsByHorizon) -> list[str]:
@@ -344,7 +348,7 @@ def where_figure(name: str, record: ReplayRecord) -> Plot:
             axes.set_ylim(bottom=0.0)
             plain_ticks(axes.yaxis)
             axes.set_title(flight)
-        figure.supylabel("error of the body rate, rad/s", fontsize=9.5)
+            axes.set_ylabel("error, rad/s")
         panels[-1].set_xlabel("begin of the window, s")
         legend_over(figure, panels[0])
 

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
-from cpfls_cli.effects.polynomial import state_terms
+from cpfls_cli.effects.polynomial import STATE_TERMS, state_terms
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, Motion, Terms, errors_of_runs
 from cpfls_cli.playback.model import (
@@ -23,6 +23,7 @@ from cpfls_cli.playback.model import (
     weights_by_step,
 )
 from cpfls_cli.playback.rotors import Hold, RotorResponse, rotor_terms_by_step
+from cpfls_cli.regressor.regressor import InertiaValues
 
 SIGNALS = ("position", "velocity", "attitude", "body_rate")
 """What errors are of, in the order of the compiled runs."""
@@ -81,6 +82,12 @@ class Player:
     along: Array | None = None
     remainder: Remainder | None = None
     fuzzy: InertiaModel | None = None
+
+    @property
+    def feels_air(self) -> bool:
+        """Whether torque or force depend on the velocity through the air."""
+        airs = [index for index, term in enumerate(STATE_TERMS) if set("uvw") & set(term)]
+        return self.remainder is not None or bool(np.any(self.table[:, airs]))
 
     def step_weights(self, part: slice) -> tuple[Terms, Array]:
         """Evaluate the weights of the terms of the motion over each step of a part of the flight.
@@ -258,6 +265,14 @@ class _Fuzzy(NamedTuple):
     exists: BoolArray
 
 
+class _BodyInertia(NamedTuple):
+    """Inertia at the attitudes of the runs, and the matrices from rate to momentum, ``W^-T J W^-1``."""
+
+    attitude: Array
+    values: InertiaValues
+    matrices: Array
+
+
 class _State(NamedTuple):
     """Free runs in momentum form: no inertia that depends on the attitude has to be differentiated in time."""
 
@@ -281,20 +296,19 @@ class _FuzzyRuns:
     def written(self, starts: IntArray, errors: Array) -> IntArray:
         """Simulate, write the errors, and give the steps at which runs diverged."""
         motion, diverged = self.motion, np.full(len(starts), -1)
-        rotation = motion.rotation[starts]
-        matrices, _ = self._body_inertia(rotation)
-        momentum = rotations.multiply(np.nan_to_num(matrices), motion.rate[starts])
+        rate, rotation = motion.rate[starts], motion.rotation[starts]
+        momentum = rotations.multiply(np.nan_to_num(self._body_inertia(rotation).matrices), rate)
         state = _State(motion.position[starts], motion.velocity[starts], rotation, momentum)
-        rate = motion.rate[starts]
+        now = self._fuzzy(state.rotation, state.momentum)
         for step in range(errors.shape[1]):
             with np.errstate(all="ignore"):
-                moved, moved_rate, exists = self._step(state, rate, self.weights[starts + step])
-            fastest = np.maximum(np.abs(moved_rate).max(axis=1), np.abs(moved.velocity).max(axis=1))
-            good = (diverged < 0) & exists & (fastest < _FASTEST)
+                moved, after = self._step(state, rate, now, self.weights[starts + step])
+            fastest = np.maximum(np.abs(after.rate).max(axis=1), np.abs(moved.velocity).max(axis=1))
+            good = (diverged < 0) & after.exists & (fastest < _FASTEST)
             # A run that no body flies stands still from there on, as that of a rigid body does.
             diverged[(diverged < 0) & ~good] = step
             state = _State(*(_kept(good, new, old) for new, old in zip(moved, state, strict=True)))
-            rate = _kept(good, moved_rate, rate)
+            rate, now = _kept(good, after.rate, rate), after
             at = starts + step + 1
             errors[:, step, 0] = state.position - motion.position[at]
             errors[:, step, 1] = state.velocity - motion.velocity[at]
@@ -302,14 +316,13 @@ class _FuzzyRuns:
             errors[:, step, 3] = rate - motion.rate[at]
         return diverged
 
-    def _step(self, state: _State, rate: Array, weights: Array) -> tuple[_State, Array, BoolArray]:
+    def _step(self, state: _State, rate: Array, now: _Fuzzy, weights: Array) -> tuple[_State, _Fuzzy]:
         period = self.motion.period
-        begin = self._fuzzy(state.rotation, state.momentum)
-        middle = self._moved(state, state, rate, begin.direct, weights, 0.5 * period)
+        middle = self._moved(state, state, rate, now.direct, weights, 0.5 * period)
         there = self._fuzzy(middle.rotation, middle.momentum)
         end = self._moved(state, middle, there.rate, there.direct, weights, period)
         after = self._fuzzy(end.rotation, end.momentum)
-        return end, after.rate, begin.exists & there.exists & after.exists
+        return end, after._replace(exists=now.exists & there.exists & after.exists)
 
     def _moved(self, start: _State, at: _State, rate: Array, direct: Array, weights: Array, interval: float) -> _State:
         """Move a state for an interval with the derivatives at another one."""
@@ -326,19 +339,19 @@ class _FuzzyRuns:
         return _State(position, start.velocity + interval * acceleration, rotation, momentum)
 
     def _fuzzy(self, rotation: Array, momentum: Array) -> _Fuzzy:
-        matrices, attitude = self._body_inertia(rotation)
-        exists = _positive_definite(matrices)
-        safe = np.where(exists[:, None, None], matrices, np.eye(3))
+        inertia = self._body_inertia(rotation)
+        exists = _positive_definite(inertia.matrices)
+        safe = np.where(exists[:, None, None], inertia.matrices, np.eye(3))
         rate: Array = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
-        _, direct = momentum_form(attitude, rate, self.fuzzy.inertia(attitude))
+        _, direct = momentum_form(inertia.attitude, rate, inertia.values)
         return _Fuzzy(rate, direct, exists)
 
-    def _body_inertia(self, rotation: Array) -> tuple[Array, Array]:
-        """Compute the matrices from rate to momentum, ``W^-T J W^-1``, and the attitudes."""
+    def _body_inertia(self, rotation: Array) -> _BodyInertia:
         attitude = rotations.euler_angles(np.nan_to_num(rotation))
+        values = self.fuzzy.inertia(attitude)
         axes = [rotations.attitude_rate(attitude, np.broadcast_to(axis, attitude.shape)) for axis in np.eye(3)]
         inverse = np.stack(axes, axis=2)
-        return inverse.swapaxes(1, 2) @ self.fuzzy.inertia(attitude).value @ inverse, attitude
+        return _BodyInertia(attitude, values, inverse.swapaxes(1, 2) @ values.value @ inverse)
 
 
 def _kept(good: BoolArray, new: Array, old: Array) -> Array:

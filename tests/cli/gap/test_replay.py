@@ -178,6 +178,17 @@ def test_windows_do_not_cross_a_pause(cpfls, replayed, gap_config, with_attitude
     assert not np.any((start > 9.49) & (start < 10.49))
 
 
+def test_a_log_is_played_back_on_both_sides_of_its_gaps(replayed, with_attitude, tmp_path):
+    lines = with_attitude[0].read_text().splitlines()
+    log = tmp_path / "paused.csv"
+    log.write_text("\n".join([lines[0], *lines[1:601], *lines[701:1001], *lines[1061:]]) + "\n")
+    answer, output = replayed("vehicle", log, options=("--every", "1"))
+    assert answer["windows"] == (600 - 50) + (300 - 50) + (2400 - 1060 - 50)
+    assert any("3 stretches without a pause, 2240 of 2240 samples" in warning for warning in answer["warnings"])
+    start = read_record(output, ReplayRecord).window.start
+    assert (start[0], start[550], start[-1]) == pytest.approx((0.0, 7.0, 23.49), abs=1e-6)
+
+
 def test_unknown_samples_part_a_flight_too(cpfls, replayed, gap_config, with_attitude, tmp_path):
     flight = imported(cpfls, gap_config, with_attitude[0], tmp_path / "flight.h5")
     with h5py.File(flight, "r+") as file:

@@ -301,6 +301,12 @@ def test_a_stated_wrench_drives_a_flight_without_speeds_late_by_the_response():
     assert np.abs(errors[0] - errors[1]).max() < 0.05
 
 
+@pytest.mark.parametrize(("effects", "feels"), [(EFFECTS[:1], False), (EFFECTS[1:], True)], ids=["damping", "drag"])
+def test_a_model_that_needs_the_velocity_says_so(effects, feels):
+    flight = flight_of()
+    assert player_of(VehicleModel(vehicle=VEHICLE, effects=effects), flight).feels_air is feels
+
+
 def test_half_a_turn_is_pi():
     half = Rotation.from_rotvec([0, np.pi, 0]).as_matrix()
     assert np.linalg.norm(rotation_vectors(np.eye(3), half)) == pytest.approx(np.pi)
