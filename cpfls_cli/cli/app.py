@@ -516,7 +516,7 @@ def export(
     *,
     common: Common,
 ) -> None:
-    """Write a model as JSON, C or Python that computes torque, D(q) and C(q, qd) without this program."""
+    """Write a model as JSON, C or Python that computes torque, and of a whole vehicle its motion, on its own."""
     with messages_for_errors():
         from cpfls_cli.artifacts.job import Job
         from cpfls_cli.commands import export as command

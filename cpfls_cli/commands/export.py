@@ -1,11 +1,13 @@
-"""Command `export`: an identified model as JSON, C or Python, for use without this program."""
+"""Command `export`: an identified model or a whole vehicle as JSON, C or Python, for use without this program."""
 
 from __future__ import annotations
 
 import keyword
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,16 +15,22 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.job import Job, take_inputs
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import check_output, write_text
+from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds, read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.export.text import checked_identifier, identifier
+from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_json, vehicle_python
+from cpfls_cli.export.vehicle_sheet import VehicleSheet
 from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
-from cpfls_cli.pages.model import export_answer
+from cpfls_cli.pages.extended import worth_in_words
+from cpfls_cli.pages.model import export_answer, vehicle_export_answer
 from cpfls_cli.report.outcome import Outcome
 
 _SEED = 1
@@ -50,13 +58,9 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     # The file that was asked for first: a message about its folder is to name it.
     for output in reversed(outputs):
         check_output(output, job.force)
-    sheet = _sheet(model, prefix, files[0].sha256)
-    if not sheet.record.complete and not job.force:
-        raise InputError(
-            f"{model}: the search for this model did not come to its end ({sheet.record.stop_reason or 'unknown'}); "
-            "`cpfls identify ... --resume` goes on, --force exports the model as it is, marked as incomplete"
-        )
-    texts = _texts(sheet, form, outputs)
+    given = next((kind for kind in (VehicleRecord, ExtendedRecord) if holds(model, kind)), None)
+    sheet = _sheet(model, prefix, files[0].sha256, job) if given is None else _vehicle(model, given, prefix, files[0])
+    texts = _texts(sheet, form, outputs) if isinstance(sheet, Sheet) else _vehicle_texts(sheet, form, outputs)
     if not job.dry_run:
         for path, text in texts.items():
             write_text(path, text)
@@ -67,6 +71,14 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
         "name": sheet.name,
         "output": list(sizes),
         "bytes": sum(sizes.values()),
+    }
+    if isinstance(sheet, VehicleSheet):
+        return Outcome(summary | _vehicle_summary(sheet), tuple(vehicle_export_answer(sheet.told, sizes, job.dry_run)))
+    return Outcome(summary | _summary(sheet), tuple(export_answer(sheet.record, model, sizes, dry_run=job.dry_run)))
+
+
+def _summary(sheet: Sheet) -> dict[str, Any]:
+    return {
         "complete": sheet.record.complete,
         "verdict": sheet.record.verdict_label,
         "parameters": sheet.model.structure.parameters,
@@ -74,17 +86,52 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
         "rigid_body": sheet.rigid,
         "region_share": sheet.region_share,
     }
-    return Outcome(summary, tuple(export_answer(sheet.record, model, sizes, dry_run=job.dry_run)))
 
 
-def _sheet(path: Path, name: str, sha256: str) -> Sheet:
-    if holds(path, ExtendedRecord):
-        raise InputError(
-            f"{path}: is a model with effects (made by `cpfls extend` or `cpfls gap`), which export cannot write; "
-            "export the model that was given to that command with --model"
-        )
+def _vehicle_summary(sheet: VehicleSheet) -> dict[str, Any]:
+    return {
+        "rotors": sheet.model.rotors,
+        "weights": len(sheet.weights),
+        "effects": [effect.name for effect in sheet.model.effects],
+        "learned": sheet.remainder is not None,
+    }
+
+
+def _sheet(path: Path, name: str, sha256: str, job: Job) -> Sheet:
     record = read_record(path, ModelRecord)
+    if not record.complete and not job.force:
+        raise InputError(
+            f"{path}: the search for this model did not come to its end ({record.stop_reason or 'unknown'}); "
+            "`cpfls identify ... --resume` goes on, --force exports the model as it is, marked as incomplete"
+        )
     return Sheet(name, _usable(record.rebuilt(path), path), record, path.name, sha256)
+
+
+def _vehicle(path: Path, kind: type[VehicleRecord | ExtendedRecord], name: str, file: InputFile) -> VehicleSheet:
+    """Read a whole vehicle, and refuse one that is more than its table of weights."""
+    record = read_record(path, kind)
+    if record.vehicle is None:
+        raise InputError(
+            f"{path}: was made before models with effects could be exported; make it again with `cpfls extend` or "
+            "`cpfls gap`"
+        )
+    if record.vehicle.not_held:
+        raise InputError(f"{path}: {_not_exported(record.vehicle.not_held)}")
+    worth = tuple(worth_in_words(record)) if isinstance(record, ExtendedRecord) else ()
+    return VehicleSheet(name, record.vehicle.vehicle_model(), worth, record.origin, path.name, file.sha256)
+
+
+def _not_exported(parts: Sequence[str]) -> str:
+    """Name what an export cannot hold, and say what to do about each."""
+    effects = [part for part in parts if part in CATALOGUE]
+    others = [part for part in parts if part not in CATALOGUE]
+    advice = []
+    if effects:
+        ignored = ", ".join(effects)
+        advice.append(f'`cpfls diagnose` with --set "gap.ignore=[{ignored}]", then `cpfls extend`, does without')
+    if others:
+        advice.append("without --model the vehicle of the config is extended, whose inertia is constant")
+    return f"export cannot write {', '.join(parts)}: no polynomial of motion and rotor speeds; {'; '.join(advice)}"
 
 
 def _usable(model: Model, path: Path) -> Model:
@@ -104,6 +151,15 @@ def _texts(sheet: Sheet, form: str, outputs: list[Path]) -> dict[Path, str]:
     if form == "python":
         return {outputs[0]: python_source(sheet, points, outputs[0].name)}
     written = c_source(sheet, points, outputs[1].stem)
+    return {outputs[0]: written.header, outputs[1]: written.source}
+
+
+def _vehicle_texts(sheet: VehicleSheet, form: str, outputs: list[Path]) -> dict[Path, str]:
+    if form == "json":
+        return {outputs[0]: vehicle_json(sheet)}
+    if form == "python":
+        return {outputs[0]: vehicle_python(sheet, outputs[0].name)}
+    written = vehicle_c(sheet, outputs[1].stem)
     return {outputs[0]: written.header, outputs[1]: written.source}
 
 

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Mapping
 from typing import Any
-
-import numpy as np
 
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import JudgedGroup
@@ -16,6 +11,7 @@ from cpfls_cli.dynamics.rigid_body import VERTICAL
 from cpfls_cli.export.points import Expected
 from cpfls_cli.export.sheet import EXPORTER, Sheet, rule_labels, rules_along
 from cpfls_cli.export.source import visited_rows
+from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
 from cpfls_cli.identification.excitation import CELLS
@@ -85,7 +81,7 @@ def json_text(sheet: Sheet, points: Expected) -> str:
         "provenance": _provenance(sheet),
         "reference_points": _points(points),
     }
-    return f"{_written(document, 0)}\n"
+    return strict_json(document)
 
 
 def _structure(sheet: Sheet) -> dict[str, Any]:
@@ -190,29 +186,3 @@ def _points(points: Expected) -> list[dict[str, Any]]:
         "inside": points.inside,
     }
     return [{name: values[index] for name, values in columns.items()} for index in range(len(points))]
-
-
-def _written(value: Any, depth: int) -> str:
-    """Write a value: mappings and lists of them over many lines, lists of numbers in one."""
-    blank = " " * (depth + 1)
-    if isinstance(value, Mapping) and value:
-        entries = [f"{blank}{json.dumps(_text(str(k)))}: {_written(v, depth + 1)}" for k, v in value.items()]
-        return "{\n" + ",\n".join(entries) + "\n" + " " * depth + "}"
-    if isinstance(value, list | tuple) and any(isinstance(item, Mapping | str) for item in value):
-        return "[\n" + ",\n".join(blank + _written(item, depth + 1) for item in value) + "\n" + " " * depth + "]"
-    return json.dumps(_plain(value), allow_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return _text(value) if isinstance(value, str) else value
-
-
-def _text(text: str) -> str:
-    """Replace halves of characters, which names of files may hold and strict readers refuse."""
-    return text.encode("utf-8", "replace").decode("utf-8")

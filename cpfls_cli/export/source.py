@@ -46,7 +46,7 @@ def c_source(sheet: Sheet, points: Expected, stem: str) -> CSource:
         **_c_tables(sheet.model),
         "points": [_c_point(points, index) for index in range(len(points))],
     }
-    return CSource(_fill("model.c.j2", words), _fill("model.h.j2", words))
+    return CSource(fill_template("model.c.j2", words), fill_template("model.h.j2", words))
 
 
 def _c_tables(model: Model) -> dict[str, Any]:
@@ -121,7 +121,7 @@ def python_source(sheet: Sheet, points: Expected, file: str) -> str:
         **_python_tables(sheet.model),
         "points": [_python_point(points, index) for index in range(len(points))],
     }
-    return _fill("model.py.j2", words)
+    return fill_template("model.py.j2", words)
 
 
 def visited_rows(model: Model) -> list[str]:
@@ -171,8 +171,14 @@ def _python_point(points: Expected, index: int) -> str:
     return "\n".join(["    {", *lines, f'        "inside": {bool(points.inside[index])},', "    },"])
 
 
-def _fill(template: str, words: dict[str, Any]) -> str:
-    """Fill a template with all that it asks for."""
+def fill_template(template: str, words: dict[str, Any]) -> str:
+    """Fill a template with all that it asks for.
+
+    Parameters
+    ----------
+    template : str
+        Name of its file.
+    """
     environment = Environment(
         loader=PackageLoader("cpfls_cli.export"),
         undefined=StrictUndefined,

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
@@ -124,3 +129,40 @@ def filled(text: str, indent: int) -> str:
     blank = " " * indent
     wide = {"break_long_words": False, "break_on_hyphens": False}
     return textwrap.fill(text, _NUMBER_COLUMNS, initial_indent=blank, subsequent_indent=blank + " ", **wide)  # type: ignore[arg-type]
+
+
+def strict_json(document: Mapping[str, Any]) -> str:
+    """Write a document as strict JSON.
+
+    Returns
+    -------
+    str
+        In ASCII; null in place of what is not finite.
+    """
+    return f"{_written(document, 0)}\n"
+
+
+def _written(value: Any, depth: int) -> str:
+    """Write a value: mappings and lists of them over many lines, lists of numbers in one."""
+    blank = " " * (depth + 1)
+    if isinstance(value, Mapping) and value:
+        entries = [f"{blank}{json.dumps(_text(str(k)))}: {_written(v, depth + 1)}" for k, v in value.items()]
+        return "{\n" + ",\n".join(entries) + "\n" + " " * depth + "}"
+    if isinstance(value, list | tuple) and any(isinstance(item, Mapping | str) for item in value):
+        return "[\n" + ",\n".join(blank + _written(item, depth + 1) for item in value) + "\n" + " " * depth + "]"
+    return json.dumps(_plain(value), allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return _text(value) if isinstance(value, str) else value
+
+
+def _text(text: str) -> str:
+    """Replace halves of characters, which names of files may hold and strict readers refuse."""
+    return text.encode("utf-8", "replace").decode("utf-8")

@@ -12,7 +12,7 @@ from cpfls_cli.pages.effects import coefficients_table, effect_sentence, interva
 from cpfls_cli.pages.gap import gap_sizes_figure, gap_table, replay_figure, replay_text
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text
-from cpfls_cli.report.numbers import joined, number
+from cpfls_cli.report.numbers import joined, number, sentence
 
 
 def answer(extended: Source[ExtendedRecord]) -> Iterator[Block]:
@@ -26,10 +26,22 @@ def answer(extended: Source[ExtendedRecord]) -> Iterator[Block]:
 def verdict_box(extended: Source[ExtendedRecord]) -> Box:
     """Say what a model was extended by, and how its largest gap changes."""
     record = extended.record
-    before, after = (float(np.nanmax(floors)) for floors in (record.gap.before_floors, record.gap.after_floors))
-    shrunk = f"On held-out flights its largest gap is {number(after, 2)} noise floors; it was {number(before, 2)}."
     effects = [effect_sentence(effect) for effect in record.effects.named]
-    return Box("EXTENDED MODEL", model_with(extended.label, record), [*effects, shrunk])
+    return Box("EXTENDED MODEL", model_with(extended.label, record), [*effects, _shrunk(record)])
+
+
+def _shrunk(record: ExtendedRecord) -> str:
+    before, after = (float(np.nanmax(floors)) for floors in (record.gap.before_floors, record.gap.after_floors))
+    return f"On held-out flights its largest gap is {number(after, 2)} noise floors; it was {number(before, 2)}."
+
+
+def worth_in_words(record: ExtendedRecord) -> Iterator[str]:
+    """Say what a model that is used elsewhere is worth, and what has to be repaired in the signals that it is given."""
+    yield _shrunk(record)
+    yield from (f"{sentence(warning)}" for warning in warnings(record))
+    yield from (
+        f"Not in the model, to be repaired in the signals that it is given: {fault}" for fault in record.audit.faults
+    )
 
 
 def model_with(label: str, record: ExtendedRecord) -> str:

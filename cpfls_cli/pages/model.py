@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -184,12 +184,30 @@ def export_answer(model: ModelRecord, path: object, sizes: Mapping[str, int], *,
     sizes : mapping of str to int
         Bytes of each file.
     """
-    verb = "would be written" if dry_run else "written"
-    for file, size in sizes.items():
-        yield Text(f"{file}: {verb} ({size} bytes)")
+    yield from _sizes_in_words(sizes, dry_run)
     yield Text(f"training visited {float(np.mean(model.model.visited)):.1%} of the circle of roll and pitch")
     yield Text(f"verdict: {model.verdict_label or 'none'}")
     yield from (Text(warning, "warning") for warning in _export_warnings(model, path))
+
+
+def vehicle_export_answer(told: Sequence[str], sizes: Mapping[str, int], dry_run: bool) -> Iterator[Text]:
+    """Say which files a whole vehicle was exported to, and what stands in them.
+
+    Parameters
+    ----------
+    told : sequence of str
+        What the vehicle is and what it is worth.
+    sizes : mapping of str to int
+        Bytes of each file.
+    """
+    yield from _sizes_in_words(sizes, dry_run)
+    yield from map(Text, told)
+
+
+def _sizes_in_words(sizes: Mapping[str, int], dry_run: bool) -> Iterator[Text]:
+    verb = "would be written" if dry_run else "written"
+    for file, size in sizes.items():
+        yield Text(f"{file}: {verb} ({size} bytes)")
 
 
 def _export_warnings(model: ModelRecord, path: object) -> Iterator[str]:

@@ -24,8 +24,8 @@ _ROBUST = 0.5
 _LEAST = 0.1
 """Error at which the loss turns from square to absolute, in those of "rate stays"; at least a share of their mean."""
 
-_PRIOR = 1e-3
-"""Weight of what is believed before the flights: as one window of a thousand."""
+_PRIOR = 1e-5
+"""Weight of what is believed before the flights, so small that it decides only what they do not tell."""
 
 _FIRST_DAMPING, _DAMPING_UP, _DAMPING_DOWN, _LEAST_DAMPING = 1e-3, 6.0, 5.0, 1e-9
 _TRIES = 8

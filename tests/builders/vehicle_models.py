@@ -54,10 +54,10 @@ def polynomial_effects(vehicle):
         shape = {one.name: one.grid[len(one.grid) // 2] for one in known.shapes}
         if known.carried is None and polynomial(known, probe, shape) is not None:
             bounds = np.array([one.bounds(vehicle) for one in known.coefficients])
-            sizes = np.abs(bounds).min(axis=1)
             count = polynomial(known, probe, shape).shape[0]
-            sizes = sizes if len(sizes) == count else np.full(count, sizes.min())
-            found.append(ModelEffect(known.name, shape, 0.02 * sizes * rng.uniform(-1, 1, count)))
+            lowest = np.abs(bounds).max(axis=1).min()
+            sizes = np.abs(bounds).max(axis=1) if len(bounds) == count else np.full(count, lowest)
+            found.append(ModelEffect(known.name, shape, 0.02 * sizes * rng.uniform(0.5, 1, count)))
     return tuple(found)
 
 

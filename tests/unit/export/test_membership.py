@@ -16,11 +16,16 @@ import pytest
 
 from cpfls_cli.export import c_source, python_source, reference_points
 from cpfls_cli.export.json_form import HOW_TO_EVALUATE
+from cpfls_cli.export.vehicle_forms import HOW_TO_EVALUATE as OF_A_VEHICLE
 from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
+from cpfls_cli.playback import kernels as playback
+from cpfls_cli.playback.model import Remainder, VehicleModel
 from cpfls_cli.regressor import Motion, Regressor, kernels
 from cpfls_cli.regressor.table import padded_breakpoints, structure_table
+from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.compiled_c import evaluate, require_gcc, written
 from tests.builders.exported_models import Case, model_of, sheet_of
+from tests.builders.exported_vehicles import FORMS
 
 METHOD = Path(__file__).parents[3] / "docs/method.md"
 FUNCTIONS = 6
@@ -106,6 +111,48 @@ def test_the_exported_python(case):
     assert_same(torque, case)
 
 
+@pytest.fixture
+def airflow():
+    """A vehicle whose torque about x is memberships of the direction of the airflow, and directions at which it is."""
+    peaks = np.array([0.0, 0.13, 0.3, 0.55, 0.7, 0.86, 1.0])
+    coefficients = np.zeros((1, 3 * (len(peaks) - 1), 2))
+    # Of each rule the constant feature, times the speed squared, which is 1.
+    coefficients[0, ::3, 1] = np.arange(len(peaks) - 1) % 2
+    learned = Remainder(breakpoints=peaks, harmonic_order=1, rows=np.array([0]), coefficients=coefficients)
+    model = VehicleModel(vehicle=VehicleSettings(), remainder=learned)
+    u = np.append(np.linspace(0.01, 0.99, 37), MIDDLE)
+    x = (peaks[:-1, None] + np.diff(peaks)[:, None] * u).ravel()
+    air = np.column_stack([np.cos(2 * np.pi * x), np.sin(2 * np.pi * x), np.zeros(len(x))])
+    return SimpleNamespace(model=model, air=air, expected=by_definition(x, peaks, True)[:, 1])
+
+
+@pytest.mark.parametrize("form", ["library", *FORMS])
+def test_the_learned_part_of_a_vehicle(airflow, form, tmp_path):
+    if form == "c":
+        require_gcc()
+    model, still = airflow.model, np.zeros_like(airflow.air)
+    rotor = np.eye(1, 1 + 4 * model.rotors).repeat(len(still), axis=0)
+    vehicle = model if form == "library" else FORMS[form](tmp_path, model)
+    torque = vehicle.wrench(airflow.air, still, rotor)[:, 0]
+    np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-12)
+
+
+def test_the_compiled_loops_of_playback(airflow):
+    """One step from rest changes the rate by the torque at its middle, where the airflow is that of the start."""
+    model, samples = airflow.model, len(airflow.air)
+    rotor = np.eye(1, 1 + 4 * model.rotors).repeat(samples, axis=0)
+    used, weights = model.step_weights(rotor)
+    still, level = np.zeros((samples + 1, 3)), np.eye(3)[None].repeat(samples + 1, axis=0)
+    velocity = np.vstack([airflow.air, airflow.air[:1]])
+    errors, period = np.zeros((samples, 1, 4, 3)), 1e-3
+    body = model.body._replace(gravity=0.0)
+    motion = playback.Motion(still, velocity, level, still, period)
+    playback.errors_of_runs(motion, body, used, weights, np.arange(samples), True, errors)
+    torque = errors[:, 0, 3, 0] / period * model.body.inertia[0, 0]
+    # Rolling for half a step turns the airflow a little.
+    np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-5)
+
+
 def formula(words):
     """Make a function of what words say: one term up to the middle, another one after it."""
     plain = " ".join(words.replace("`", "").replace("²", "^2").split()).replace("^", "**")
@@ -114,9 +161,16 @@ def formula(words):
     return lambda u: eval(left if u < 0.5 else right, {"u": u})
 
 
-@pytest.mark.parametrize("page", ["json", "method.md"])
+WORDS = {
+    "json": next(line for line in HOW_TO_EVALUATE if Z_FUNCTION in line),
+    "json of a vehicle": next(line for line in OF_A_VEHICLE if Z_FUNCTION in line),
+    "method.md": METHOD.read_text(),
+}
+
+
+@pytest.mark.parametrize("page", WORDS)
 def test_the_words(page):
-    words = next(line for line in HOW_TO_EVALUATE if Z_FUNCTION in line) if page == "json" else METHOD.read_text()
+    words = WORDS[page]
     said = formula(words[words.index("1 - 2") :])
     u = np.append(np.linspace(0, 1, 41), MIDDLE)
     np.testing.assert_allclose([said(value) for value in u], z_function(u)[0], rtol=0, atol=1e-15)

@@ -1,0 +1,230 @@
+"""Exported vehicles in all forms, each evaluated by the same calls: C is compiled with all checks, JSON as it says."""
+
+import json
+import subprocess
+
+import numpy as np
+
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_json, vehicle_python
+from cpfls_cli.export.vehicle_sheet import VehicleSheet
+from tests.builders.compiled_c import CHECKS, build, written
+
+MAIN = """
+#include "vehicle.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { ROTORS = VEHICLE_ROTORS, TERMS = VEHICLE_ROTOR_TERMS };
+
+static int put(const double *values, size_t count)
+{
+    return fwrite(values, sizeof *values, count, stdout) == count ? 0 : 1;
+}
+
+static int wrenches(void)
+{
+    double in[6 + TERMS], out[7];
+    while (fread(in, sizeof in, 1, stdin) == 1) {
+        out[6] = vehicle_wrench(in, in + 3, in + 6, out, out + 3);
+        if (put(out, 7))
+            return 1;
+    }
+    return 0;
+}
+
+static int steps(double period)
+{
+    double in[18 + TERMS], out[26];
+    while (fread(in, sizeof in, 1, stdin) == 1) {
+        vehicle_state s;
+        memcpy(&s, in, sizeof s);
+        out[24] = vehicle_accelerations(&s, in + 18, out, out + 3);
+        out[25] = vehicle_step(&s, in + 18, period);
+        memcpy(out + 6, &s, sizeof s);
+        if (put(out, 26))
+            return 1;
+    }
+    return 0;
+}
+
+static int rotors(double period, int held)
+{
+    double in[2 * ROTORS], out[TERMS + 1];
+    vehicle_rotors r;
+    int begun = 0;
+    while (fread(in, sizeof in, 1, stdin) == 1) {
+        unsigned status = begun ? 0u : vehicle_rotors_begin(&r, in, period);
+        begun = 1;
+        out[TERMS] = status | vehicle_rotors_step(&r, in, held ? 0 : in + ROTORS, out);
+        if (put(out, TERMS + 1))
+            return 1;
+    }
+    return 0;
+}
+
+int main(int count, char **words)
+{
+    const double period = atof(words[2]);
+    if (words[1][0] == 'w')
+        return wrenches();
+    return words[1][0] == 's' ? steps(period) : rotors(period, count > 3);
+}
+"""
+
+
+def sheet_of_vehicle(model, name="vehicle", **changed):
+    """Put a vehicle on a sheet."""
+    given = {"worth": ("It is worth a test.",), "origin": Header("0.1.0", 1, "seed: 1\n"), "file": "vehicle.h5"}
+    return VehicleSheet(name=name, model=model, sha256="a" * 64, **(given | changed))
+
+
+def flat(state):
+    """Arrange states for C: position, velocity, rotation, rate."""
+    return np.hstack([part.reshape(len(part), -1) for part in state])
+
+
+class InC:
+    """A vehicle as compiled C."""
+
+    def __init__(self, folder, model, *flags):
+        written(folder, "vehicle", vehicle_c(sheet_of_vehicle(model), "vehicle"))
+        (folder / "main.c").write_text(MAIN)
+        self.program = build(folder, ["main.c", "vehicle.c"], *(flags or CHECKS))
+
+    def _drive(self, given, columns, *words):
+        command = [self.program, *words]
+        done = subprocess.run(command, input=np.ascontiguousarray(given).tobytes(), capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr.decode()
+        return np.frombuffer(done.stdout).reshape(len(given), columns)
+
+    def statuses(self, kind, given, columns, *words):
+        """Give the last column, which says what speaks against a result."""
+        return self._drive(given, columns, kind, *words)
+
+    def wrench(self, air, rate, rotor):
+        out = self._drive(np.hstack([air, rate, rotor]), 7, "w", "0")
+        assert not out[:, 6].any()
+        return out[:, :6]
+
+    def motion(self, state, rotor, period):
+        """Accelerations (6 columns), then the states after a step."""
+        out = self._drive(np.hstack([flat(state), rotor]), 26, "s", repr(period))
+        assert not out[:, 24:].any()
+        return out[:, :6], out[:, 6:24]
+
+    def rotor_terms(self, speed, period, hold):
+        following = np.vstack([speed[1:], speed[-1:]])
+        words = ("held",) if hold == "previous" else ()
+        out = self._drive(np.hstack([speed, following]), 2 + 4 * speed.shape[1], "r", repr(period), *words)
+        assert not out[:, -1].any()
+        return out[:, :-1]
+
+
+class InPython:
+    """A vehicle as a module of Python."""
+
+    def __init__(self, _folder, model):
+        self.names = {"__name__": "vehicle"}
+        exec(vehicle_python(sheet_of_vehicle(model), "vehicle.py"), self.names)
+
+    def wrench(self, air, rate, rotor):
+        return np.hstack(self.names["wrench"](air, rate, rotor))
+
+    def motion(self, state, rotor, period):
+        accelerations = self.names["accelerations"](state.velocity, state.rotation, state.rate, rotor)
+        return np.hstack(accelerations), flat(self.names["step"](*state, rotor, period))
+
+    def rotor_terms(self, speed, period, hold):
+        rotors = self.names["Rotors"](speed[0], period)
+        following = [None] * len(speed) if hold == "previous" else [*speed[1:], speed[-1]]
+        return np.array([rotors.step(*pair) for pair in zip(speed, following, strict=True)])
+
+
+class InJson:
+    """A vehicle as JSON, evaluated by what its words say and slowly."""
+
+    def __init__(self, _folder, model):
+        self.document = json.loads(vehicle_json(sheet_of_vehicle(model)))
+        self.mass, self.gravity = self.document["mass_kg"], self.document["gravity_m_s2"]
+        self.inertia = np.array(self.document["inertia_kg_m2"])
+
+    def wrench(self, air, rate, rotor):
+        return np.array([self._wrench(*row) for row in zip(air, rate, rotor, strict=True)])
+
+    def _wrench(self, air, rate, rotor):
+        terms, total = self._terms(air, rate), np.zeros(6)
+        assert len(terms) == len(self.document["terms_of_motion"])
+        assert len(rotor) == len(self.document["terms_of_rotors"])
+        for row, term, of_rotor, weight in zip(*self.document["weights"].values(), strict=True):
+            total[row] += weight * terms[term] * rotor[of_rotor]
+        return total
+
+    def _terms(self, air, rate):
+        motion, length = [*air, *rate], np.linalg.norm(air)
+        products = [motion[first] * motion[second] for first, second in self.document["factors_of_products"]]
+        terms = [1.0, *motion, *products, *(length * air), *(abs(rate) * rate)]
+        plane = np.hypot(air[0], air[1])
+        return [*terms, *(column * power for column in self.columns(air) for power in (plane, plane**2))]
+
+    def columns(self, air):
+        """Columns of the learned part."""
+        learned = self.document["learned"]
+        if learned is None:
+            return []
+        angle, peaks, order = np.arctan2(air[1], air[0]), learned["breakpoints"], learned["harmonic_order"]
+        saw = np.interp(np.mod(angle, 2 * np.pi), np.pi * np.array([0, 0.5, 1.5, 2]), [0, 1, -1, 0])
+        waves = [wave(k * angle) for wave in (np.sin, np.cos) for k in range(1, order + 1)]
+        features = np.array([1.0, *waves] if order else [1.0, saw])
+        return [
+            fired * feature for fired in firing(np.mod(angle, 2 * np.pi) / (2 * np.pi), peaks) for feature in features
+        ]
+
+    def motion(self, state, rotor, period):
+        rows = [self._moved(*parts, period) for parts in zip(*state, rotor, strict=True)]
+        return tuple(map(np.array, zip(*rows, strict=True)))
+
+    def _accelerations(self, velocity, rotation, rate, rotor):
+        wrench = self._wrench(rotation.T @ velocity, rate, rotor)
+        linear = [0.0, 0.0, -self.gravity] + rotation @ wrench[3:] / self.mass
+        return linear, np.linalg.solve(self.inertia, wrench[:3] - np.cross(rate, self.inertia @ rate))
+
+    def _moved(self, position, velocity, rotation, rate, rotor, period):
+        first = self._accelerations(velocity, rotation, rate, rotor)
+        v, w = velocity + period / 2 * first[0], rate + period / 2 * first[1]
+        linear, angular = self._accelerations(v, rotation @ turn(period / 2 * rate), w, rotor)
+        after = (
+            position + period * v,
+            velocity + period * linear,
+            rotation @ turn(period * w),
+            rate + period * angular,
+        )
+        return np.concatenate(first), np.concatenate([part.ravel() for part in after])
+
+
+def firing(turn, peaks):
+    """How strongly each rule of a circle fires, by Zadeh's function alone."""
+    rules = max(len(peaks) - 1, 1)
+    degrees = np.zeros(rules)
+    if rules == 1:
+        return np.ones(1)
+    left = np.flatnonzero(np.array(peaks[:-1]) <= turn)[-1]
+    u = (turn - peaks[left]) / (peaks[left + 1] - peaks[left])
+    falling = 1 - 2 * u**2 if u < 0.5 else 2 * (1 - u) ** 2
+    degrees[left] += falling
+    degrees[(left + 1) % rules] += 1 - falling
+    return degrees
+
+
+def turn(vector):
+    """The rotation by a vector, as a series."""
+    x, y, z = vector
+    cross, term, total = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]), np.eye(3), np.eye(3)
+    for k in range(1, 30):
+        term = term @ cross / k
+        total = total + term
+    return total
+
+
+FORMS = {"c": InC, "python": InPython, "json": InJson}

@@ -1,0 +1,264 @@
+"""Exported vehicles compute what the library computes: wrench, acting rotors, accelerations, one step."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_json, vehicle_python
+from cpfls_cli.export.vehicle_sheet import reference_points, reference_run, term_sizes
+from cpfls_cli.playback.kernels import Motion, errors_of_runs
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.motion import State, accelerations, step
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.rotations import rotation_matrix
+from tests.builders.compiled_c import build, require_gcc, written
+from tests.builders.exported_vehicles import FORMS, InC, flat, sheet_of_vehicle
+from tests.builders.vehicle_models import HEXA, QUAD, RESPONSE, polynomial_effects, remainder, whole
+
+MODELS = {
+    "harmonic": whole(),
+    "seesaw, six rotors": whole(HEXA, order=0),
+    # To find the polynomials of all effects takes a second or more.
+    "one rule": whole(HEXA, effects=(), remainder=remainder(3, breakpoints=(0.0,), rows=(0, 1, 2, 3, 4, 5))),
+    "two functions": whole(effects=(), remainder=remainder(1, breakpoints=(0.0, 1.0), rows=(1,))),
+    "some effects": whole(effects=polynomial_effects(QUAD)[3:5], remainder=None),
+    "rotors alone": VehicleModel(vehicle=QUAD),
+}
+ALLOWED = 1e-12
+PERIOD = 0.01
+NOT_FINITE, HISTORY_END = 2, 8
+
+
+@pytest.fixture(scope="module")
+def exports(tmp_path_factory):
+    """Each model in each form, made once."""
+    made = {}
+
+    def of(name, form):
+        if form == "c":
+            require_gcc()
+        if (name, form) not in made:
+            made[name, form] = FORMS[form](tmp_path_factory.mktemp("vehicle"), MODELS[name])
+        return made[name, form]
+
+    return of
+
+
+def count(form):
+    return 40 if form == "json" else 3000
+
+
+def states_of(samples, seed=1):
+    """States in all attitudes, some of them without any motion."""
+    rng = np.random.default_rng(seed)
+    velocity, rate = rng.normal(0, 4, (2, samples, 3))
+    velocity[::7, :2] = 0.0
+    rate[::5] *= 1e-3
+    return State(rng.normal(0, 3, (samples, 3)), velocity, rotation_matrix(rng.uniform(-3, 3, (samples, 3))), rate)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", MODELS)
+def test_torque_and_force_are_those_of_the_library(exports, name, form):
+    points = reference_points(MODELS[name], np.random.default_rng(5), count(form))
+    found = exports(name, form).wrench(points.air, points.rate, points.rotor)
+    assert np.max(np.abs(found - points.wrench) / points.scale) < ALLOWED
+
+
+def sizes_of(model, state, rotor):
+    """Sizes of the terms of the accelerations."""
+    air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
+    sizes, rate = term_sizes(model, air, state.rate, rotor), np.abs(state.rate).max(axis=1, keepdims=True)
+    torque = sizes[:, :3].max(axis=1, keepdims=True) + np.abs(model.body.inertia).max() * rate**2
+    linear = sizes[:, 3:].max(axis=1, keepdims=True) / model.body.mass + model.body.gravity
+    return np.hstack([np.repeat(linear, 3, axis=1), np.repeat(np.abs(model.body.inverse).max() * torque, 3, axis=1)])
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", MODELS)
+def test_accelerations_and_a_step_are_those_of_the_library(exports, name, form):
+    model, samples = MODELS[name], count(form)
+    state, rotor = states_of(samples), reference_points(model, np.random.default_rng(6), samples).rotor
+    found, moved = exports(name, form).motion(state, rotor, PERIOD)
+    sizes = sizes_of(model, state, rotor)
+    assert np.max(np.abs(found - np.hstack(accelerations(model, state, rotor))) / sizes) < ALLOWED
+    size = np.max(np.abs(flat(state)), axis=1, keepdims=True) + PERIOD * sizes.max(axis=1, keepdims=True)
+    assert np.max(np.abs(moved - flat(step(model, state, rotor, PERIOD))) / size) < ALLOWED
+
+
+RESPONSES = {
+    "all": RESPONSE,
+    "nothing": RotorResponse(),
+    "lag": RotorResponse(lag_s=0.05),
+    "delay of whole samples": RotorResponse(delay_s=0.03),
+    "short times": RotorResponse(delay_s=0.001, lag_s=2e-5, slow_yaw=1.0, slow_s=1e-3),
+    "shorter than any": RotorResponse(lag_s=0.9e-5, slow_yaw=1.0, slow_s=0.9e-5),
+    "long times": RotorResponse(delay_s=0.21, lag_s=0.7, slow_yaw=0.2, slow_s=20.0),
+}
+
+
+@pytest.mark.parametrize("response", RESPONSES)
+def test_acting_rotors_are_those_of_the_library(response, tmp_path):
+    require_gcc()
+    model = whole(response=RESPONSES[response], effects=(), remainder=None)
+    rng = np.random.default_rng(7)
+    speed = rng.uniform(500, 1500, (120, 4))
+    size = np.repeat([1.0, 1.0, 1500.0, 1 / PERIOD, 1500.0], [1, 4, 4, 4, 4]) * 1500.0
+    for form in ("c", "python"):
+        exported = FORMS[form](tmp_path, model)
+        for hold in ("linear", "previous"):
+            for period in (0.01, 0.0025, 0.0371):
+                # What comes after the last sample nobody knows, and no step of a flight begins there.
+                found = exported.rotor_terms(speed, period, hold)[:-1]
+                wanted = model.rotor_terms(speed, period, hold)[:-1]
+                assert np.max(np.abs(found - wanted) / size) < ALLOWED * max(1.0, PERIOD / period), (form, hold, period)
+
+
+@pytest.mark.parametrize("form", ["c", "python"])
+@pytest.mark.parametrize("name", ["harmonic", "seesaw, six rotors"])
+def test_steps_along_a_flight_are_those_of_the_compiled_loops(exports, name, form):
+    """Each sample of a flight is taken one step further; what the loops of the library predict lies there."""
+    model = MODELS[name]
+    run = reference_run(model, np.random.default_rng(8), "linear", 200)
+    exported, rotor = exports(name, form), exports(name, form).rotor_terms(run.speed, PERIOD, "linear")
+    path = run.states
+    _, moved = exported.motion(State(*(part[:-1] for part in path)), rotor[:-1], PERIOD)
+    used, weights = model.step_weights(model.rotor_terms(run.speed, PERIOD, "linear"))
+    size = max(np.abs(part).max() for part in path)
+    for sample in range(len(moved)):
+        position, velocity, rotation, rate = np.split(moved[sample], [3, 6, 15])
+        after = (position, velocity, rotation.reshape(3, 3), rate)
+        pair = [np.stack([part[sample], own]) for part, own in zip(path, after, strict=True)]
+        errors = np.zeros((1, 1, 4, 3))
+        one = np.ascontiguousarray(weights[sample : sample + 1])
+        errors_of_runs(Motion(*pair, PERIOD), model.body, used, one, np.zeros(1, np.int64), True, errors)
+        assert np.abs(errors).max() < ALLOWED * size
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("flags", [(), ("-DCPFLS_FLOAT",)], ids=["double", "float"])
+def test_the_self_test_of_c_passes(tmp_path, name, flags):
+    require_gcc()
+    written(tmp_path, "vehicle", vehicle_c(sheet_of_vehicle(MODELS[name]), "vehicle"))
+    program = build(tmp_path, ["vehicle.c"], "-DCPFLS_SELF_TEST", *flags)
+    done = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert done.stdout.startswith("vehicle: largest relative error ")
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [("slowness = R(0.45)", "slowness = R(0.4500001)"), ("{5, 0, 5, R(", "{5, 0, 5, R(1e-15 + "), ("* falling", "")],
+    ids=["slow actuation", "weight", "nothing"],
+)
+def test_the_self_test_of_c_fails_where_the_code_was_changed(tmp_path, before, after):
+    require_gcc()
+    source = vehicle_c(sheet_of_vehicle(MODELS["harmonic"]), "vehicle")
+    changed = source.source.replace(before, after)
+    (tmp_path / "vehicle.c").write_text(changed)
+    (tmp_path / "vehicle.h").write_text(source.header)
+    program = build(tmp_path, ["vehicle.c"], "-DCPFLS_SELF_TEST")
+    done = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert done.returncode == int(changed != source.source), done.stdout
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_self_test_of_python_passes_and_fails(tmp_path, name):
+    source = vehicle_python(sheet_of_vehicle(MODELS[name]), "vehicle.py")
+    changed = source.replace("GRAVITY = 0.9, 9.81", "GRAVITY = 0.9, 9.8100001").replace("2.0, 9.81", "2.0, 9.8100001")
+    for text, code in ((source, 0), (changed, 1)):
+        (tmp_path / "vehicle.py").write_text(text)
+        command = [sys.executable, "-I", tmp_path / "vehicle.py"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == code, done.stdout + done.stderr
+
+
+def test_the_comparison_would_notice_a_wrong_weight(exports):
+    model = MODELS["harmonic"]
+    wrong = replace(model, thrust_linear=model.thrust_linear * (1 + 1e-9))
+    points = reference_points(wrong, np.random.default_rng(5), 100)
+    found = exports("harmonic", "python").wrench(points.air, points.rate, points.rotor)
+    assert np.max(np.abs(found - points.wrench) / points.scale) > ALLOWED
+
+
+def test_references_of_json_are_what_it_says(exports):
+    exported = exports("harmonic", "json")
+    for point in exported.document["reference_points"]:
+        air, rate, rotor, wanted, scale = (
+            np.array(point[name]) for name in ("air", "rate", "rotor", "wrench", "scale")
+        )
+        assert np.max(np.abs(exported.wrench(air[None], rate[None], rotor[None])[0] - wanted) / scale) < ALLOWED
+    run = exported.document["reference_runs"][0]
+    found = MODELS["harmonic"].rotor_terms(np.array(run["speed"]), exported.document["period_s"], "linear")[-2]
+    np.testing.assert_allclose(found, run["rotor"], rtol=0, atol=1e-9)
+
+
+def test_json_is_the_same_each_time_and_strict():
+    sheet = sheet_of_vehicle(MODELS["harmonic"], worth=("caf\u00e9", "\ud800"))
+    text = vehicle_json(sheet)
+    assert text == vehicle_json(sheet)
+    assert text.isascii()
+    assert json.loads(text)["worth"] == ["caf\u00e9", "?"]
+
+
+def test_the_terms_have_names(exports):
+    document = exports("two functions", "json").document
+    assert document["terms_of_motion"][:8] == ["1", "u", "v", "w", "p", "q", "r", "uu"]
+    assert document["terms_of_motion"][-2:] == ["U c2", "U^2 c2"]
+    assert document["terms_of_rotors"][:3] == ["1", "w1", "w2"]
+    assert document["terms_of_rotors"][-1] == "z4 - w4^2"
+
+
+def test_one_sample_alone_and_vehicles_side_by_side_are_taken_by_python(exports):
+    names, points = exports("harmonic", "python").names, reference_points(MODELS["harmonic"], np.random.default_rng(1))
+    alone = names["wrench"](points.air[0], points.rate[0], points.rotor[0])
+    both = names["wrench"](points.air.reshape(2, 4, 3), points.rate.reshape(2, 4, 3), points.rotor.reshape(2, 4, -1))
+    assert [part.shape for part in (*alone, *both)] == [(3,), (3,), (2, 4, 3), (2, 4, 3)]
+    np.testing.assert_allclose(both[0][0, 0], alone[0], rtol=1e-12)
+    steady = names["steady"]([1000.0] * 4)
+    still = names["step"](np.zeros(3), np.zeros(3), np.eye(3), np.zeros(3), steady, PERIOD)
+    assert [part.shape for part in still] == [(3,), (3,), (3, 3), (3,)]
+    speed = np.random.default_rng(0).uniform(800, 1200, (5, 2, 4))
+    fleet, single = names["Rotors"](speed[0], PERIOD), names["Rotors"](speed[0, 1], PERIOD)
+    for row in speed:
+        np.testing.assert_array_equal(fleet.step(row)[1], single.step(row[1]))
+
+
+def test_what_is_not_finite_is_flagged_by_c_and_nan_in_python(exports):
+    require_gcc()
+    model = MODELS["harmonic"]
+    points, state = reference_points(model, np.random.default_rng(1), 6), states_of(6)
+    given = np.hstack([points.air, points.rate, points.rotor])
+    given[np.arange(3), [0, 4, 9]] = [np.nan, np.inf, -np.inf]
+    given[3, 0] = 1e200
+    compiled = exports("harmonic", "c")
+    out = compiled.statuses("w", given, 7, "0")
+    assert out[:, 6].tolist() == [NOT_FINITE] * 4 + [0, 0]
+    assert not out[:4, :6].any()
+    rows = np.hstack([flat(state), points.rotor])
+    rows[np.arange(3), [1, 10, 20]] = np.nan
+    out = compiled.statuses("s", rows, 26, "0.01")
+    assert out[:3, 25].tolist() == [NOT_FINITE] * 3
+    np.testing.assert_array_equal(out[:3, 6:24], rows[:3, :18])
+    with np.errstate(all="ignore"):
+        torque, _ = exports("harmonic", "python").names["wrench"](given[:, :3], given[:, 3:6], given[:, 6:])
+    assert not np.isfinite(torque[:3]).all(axis=1).any()
+    assert np.isfinite(torque[4:]).all()
+
+
+def test_a_delay_longer_than_the_history_is_flagged(tmp_path):
+    require_gcc()
+    model = whole(response=RotorResponse(delay_s=0.05), effects=(), remainder=None)
+    speed = np.random.default_rng(0).uniform(900, 1100, (200, 8))
+    compiled = InC(tmp_path, model)
+    assert set(compiled.statuses("r", speed, 18, "0.001")[:, -1]) == {0}
+    assert set(compiled.statuses("r", speed, 18, "0.0005")[:, -1]) == {HISTORY_END}
+    longer = InC(tmp_path, model, "-DVEHICLE_HISTORY=102")
+    assert set(longer.statuses("r", speed, 18, "0.0005")[:, -1]) == {0}
+    broken = speed.copy()
+    broken[3, 1] = np.nan
+    assert np.flatnonzero(compiled.statuses("r", broken, 18, "0.01")[:, -1]).tolist() == [3]
