@@ -79,12 +79,7 @@ class Probe:
 
     @classmethod
     def of(cls, vehicle: VehicleSettings) -> Probe:
-        """Draw motions of the size that the vehicle has.
-
-        Parameters
-        ----------
-        vehicle : VehicleSettings
-        """
+        """Draw motions of the size that the vehicle has."""
         rng = np.random.default_rng(0)
         rotors = len(vehicle.rotors)
         speed = scales.hover_speed(vehicle) * rng.uniform(0.5, 1.5, (_PROBES, rotors))

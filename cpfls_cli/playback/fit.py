@@ -181,7 +181,7 @@ def fit(layout: Layout, windows: Sequence[Windows], known: Mapping[str, float], 
     Ljung, System Identification, section 10.2; Jategaonkar, Flight Vehicle System Identification, chapter 4 (output
     error); Bock 1983 (multiple shooting: each window starts from what was measured).
     """
-    low, high = layout.array("low"), layout.array("high")
+    low, high = layout.lows, layout.highs
     point = _evaluated(layout, windows, np.clip(layout.values(known), low, high))
     if not np.isfinite(point.objective):
         raise ComputationError("the prediction error is not finite at the stated numbers; look at the units of the log")
@@ -203,8 +203,8 @@ def _evaluated(layout: Layout, windows: Sequence[Windows], values: Array) -> _Po
         loss, by_group, curvature = window_sums(evaluated, window, np.zeros(len(window.starts), dtype=np.int64))
         total, gradient, hessian = total + loss, gradient + by_group[0], hessian + curvature[0]
     count = sum(len(window.starts) for window in windows)
-    scale, spread = layout.array("scale"), layout.array("spread")
-    away = (values - layout.array("start")) / scale
+    scale, spread = layout.scales, layout.spreads
+    away = (values - layout.starts) / scale
     belief = _PRIOR / spread**2
     return _Point(
         values,
@@ -255,7 +255,7 @@ def _better(
 ) -> tuple[_Point | None, float]:
     """Find a point with a smaller objective, with more damping where a step fails; None where none is found."""
     for _ in range(_TRIES):
-        step = _step(point, damping, bounds, layout.array("scale"))
+        step = _step(point, damping, bounds, layout.scales)
         following = _evaluated(layout, windows, np.clip(point.values + step, *bounds))
         if following.objective < point.objective:
             return following, max(damping / _DAMPING_DOWN, _LEAST_DAMPING)
@@ -327,7 +327,7 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
     White 1982 (sandwich); Ljung, section 9.4.
     """
     layout = fitted.layout
-    evaluated, scale = Evaluated.of(layout, fitted.values), layout.array("scale")
+    evaluated, scale = Evaluated.of(layout, fitted.values), layout.scales
     count = sum(len(window.starts) for window in windows)
     gradients = []
     for window in windows:
@@ -341,7 +341,7 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
     spread = inverse @ (centred.T @ centred * number / max(number - 1, 1)) @ inverse
     covariance = spread * scale[:, None] * scale
     half = student.ppf(0.975, number - 1) * np.sqrt(np.diag(covariance))
-    belief = _PRIOR / layout.array("spread") ** 2
+    belief = _PRIOR / layout.spreads**2
     conditional = np.diag(fitted.hessian) - belief
     return Uncertainty(
         covariance, fitted.values - half, fitted.values + half, number, np.asarray(conditional > _INFORMED * belief)

@@ -32,8 +32,9 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 REMAINDER = "remainder"
 _INERTIA = tuple(f"inertia.log_{name}" for name in INERTIA_PARAMETERS[:3])
-_PRODUCTS = tuple(f"products_of_inertia.{name}" for name in INERTIA_PARAMETERS[3:])
-_DELAY, _LAG, _SLOW = "command_delay.delay_s", "motor_lag.lag_s", "slow_actuation.log_slow_s"
+_PRODUCTS = tuple(f"products.{name}" for name in INERTIA_PARAMETERS[3:])
+_PRODUCTS_BLOCK = "products"
+_DELAY, _LAG, _SLOW = "delay.delay_s", "lag.time_constant_s", "slow_actuation.log_slow_s"
 _SLOW_SHARES = ("slow_actuation.roll_pitch", "slow_actuation.yaw")
 _THRUST, _DRAG, _LAW = "thrust_factor.scale", "drag_factor.scale", "thrust_law.linear"
 
@@ -83,7 +84,7 @@ class Number:
     @property
     def absent(self) -> float:
         """What it is in a model without its block."""
-        return 0.0 if self.block in ("motor_lag", "command_delay", "slow_actuation") else self.start
+        return 0.0 if self.block in ("lag", "delay", "slow_actuation") else self.start
 
 
 class Physical(NamedTuple):
@@ -110,8 +111,8 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
     "thrust_factor": (Number(_THRUST, "", 1.0, 0.2, 0.1, 10.0, 2.0),),
     "drag_factor": (Number(_DRAG, "", 1.0, 0.5, 0.01, 30.0, 4.0),),
     "thrust_law": (Number(_LAW, "", 0.0, 0.5, -0.9, 5.0, 2.0),),
-    "motor_lag": (Number(_LAG, "s", 0.01, 0.02, 0.001, 0.3, 5.0),),
-    "command_delay": (Number(_DELAY, "s", 0.002, 0.01, 0.0, 0.1, 5.0),),
+    "lag": (Number(_LAG, "s", 0.01, 0.02, 0.001, 0.3, 5.0),),
+    "delay": (Number(_DELAY, "s", 0.002, 0.01, 0.0, 0.1, 5.0),),
     "slow_actuation": (
         *(Number(name, "", -0.05, 0.3, -1.5, 3.0, 3.0) for name in _SLOW_SHARES),
         Number(_SLOW, "", float(np.log(0.3)), 0.7, float(np.log(0.03)), float(np.log(5.0)), 2.0),
@@ -126,7 +127,7 @@ def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
     effects = (
         name for name, known in CATALOGUE.items() if not known.shapes and polynomial(known, probe, {}) is not None
     )
-    return (*_OF_ROTORS, "products_of_inertia", *effects, REMAINDER)
+    return (*_OF_ROTORS, _PRODUCTS_BLOCK, *effects, REMAINDER)
 
 
 def needs_velocity(block: str) -> bool:
@@ -190,9 +191,30 @@ class Layout:
         """Place of each number by name."""
         return {number.name: place for place, number in enumerate(self.numbers)}
 
-    def array(self, attribute: str) -> Array:
-        """List an attribute of all numbers: start, scale, low, high or spread."""
-        return np.array([getattr(number, attribute) for number in self.numbers], dtype=float)
+    @cached_property
+    def starts(self) -> Array:
+        """Stated numbers, shape (number,)."""
+        return np.array([number.start for number in self.numbers], dtype=float)
+
+    @cached_property
+    def scales(self) -> Array:
+        """Natural sizes of changes, shape (number,)."""
+        return np.array([number.scale for number in self.numbers], dtype=float)
+
+    @cached_property
+    def lows(self) -> Array:
+        """Lower bounds, shape (number,)."""
+        return np.array([number.low for number in self.numbers], dtype=float)
+
+    @cached_property
+    def highs(self) -> Array:
+        """Upper bounds, shape (number,)."""
+        return np.array([number.high for number in self.numbers], dtype=float)
+
+    @cached_property
+    def spreads(self) -> Array:
+        """Standard deviations of what is believed before, in scales, shape (number,)."""
+        return np.array([number.spread for number in self.numbers], dtype=float)
 
     def values(self, known: Mapping[str, float]) -> Array:
         """Start from known values, and from the stated ones where none is known."""
@@ -210,7 +232,7 @@ class Layout:
     def _numbers(self, block: str) -> tuple[Number, ...]:
         if block in _OF_ROTORS:
             return _OF_ROTORS[block]
-        if block == "products_of_inertia":
+        if block == _PRODUCTS_BLOCK:
             size = scales.smallest_inertia(self.vehicle)
             return tuple(Number(name, "kg m^2", 0.0, 0.1 * size, -0.5 * size, 0.5 * size, 1.0) for name in _PRODUCTS)
         if block == REMAINDER:
@@ -363,7 +385,7 @@ class Layout:
 
     @cached_property
     def _template(self) -> Array:
-        return self.table(self.array("start"))
+        return self.table(self.starts)
 
     def inertia_derivatives(self, values: Array) -> Array:
         """Differentiate the inertia tensor by each number, shape (number, 3, 3)."""
@@ -444,7 +466,7 @@ class Layout:
 
 def _is_effect(block: str) -> bool:
     """Tell whether a block is an effect of the catalogue that adds a wrench."""
-    return block in CATALOGUE and block not in _OF_ROTORS and block != "products_of_inertia"
+    return block in CATALOGUE and block not in _OF_ROTORS and block != _PRODUCTS_BLOCK
 
 
 def _ratio(stated: Array, found: Array) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 _SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
 _STEPS, _TOLERANCE = 60, 3e-5
-_JUDGED_BLOCKS = 30
+_FEWEST_BLOCKS = 8
 _HALF = 2**15
 
 
@@ -61,7 +62,7 @@ class Judged:
     error : float
         Mean over windows of all parts; see `window_errors`.
     by_block : array, shape (block,)
-        The same by blocks of neighbouring windows, equal for all structures.
+        The same by flight, or by pieces of few flights; equal for all structures.
     numbers : int
     condition_number : float
         The largest of its fits.
@@ -163,9 +164,10 @@ class _Bench:
         errors = [
             window_errors(fitted, windows) for fitted, kept in zip(fits, self.parts, strict=True) for windows in kept
         ]
+        # Whole flights are what is independent; few of them are cut.
+        pieces = -(-_FEWEST_BLOCKS // len(errors))
+        by_block = np.array([piece.mean() for each in errors for piece in np.array_split(each, min(pieces, len(each)))])
         joined = np.concatenate(errors)
-        blocks = max(2, min(_JUDGED_BLOCKS, len(joined) // 2))
-        by_block = np.array([part.mean() for part in np.array_split(joined, blocks)])
         condition = max(fitted.condition_number for fitted in fits)
         return Judged(structure, float(joined.mean()), by_block, len(fits[0].values), condition, fits)
 
@@ -173,14 +175,7 @@ class _Bench:
 def tried_blocks(
     vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], settings: PlaybackSettings
 ) -> tuple[str, ...]:
-    """List the blocks that the flights can say anything of.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-    flights : sequence of PlaybackFlight
-    settings : PlaybackSettings
-    """
+    """List the blocks that the flights can say anything of."""
     moves = all(flight.translates for flight in flights)
     found = (block for block in blocks_of(vehicle) if block not in settings.leave_out)
     return tuple(block for block in found if moves or not needs_velocity(block))
@@ -229,19 +224,18 @@ def choose(
 
 
 def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> list[list[Windows]]:
-    """Split flights into parts that are kept aside in turn: whole flights, or thirds of a single one.
+    """Split flights into parts that are kept aside in turn: neighbours in their order, or pieces of a single one.
 
-    Parameters
-    ----------
-    flights : sequence of PlaybackFlight
-    settings : PlaybackSettings
+    Neighbours are kept aside together because flights of one kind usually stand side by side: what a model has to
+    predict is a kind of flight that it has not seen.
     """
     flown = sum(len(flight) * flight.motion.period for flight in flights)
     interval = max(settings.window_interval_s, flown / settings.search_windows)
     windows = [_windows(flight, settings, interval) for flight in flights]
     if len(windows) > 1:
         count = min(settings.folds, len(windows))
-        return [windows[part::count] for part in range(count)]
+        ends = np.linspace(0, len(windows), count + 1).round().astype(int).tolist()
+        return [windows[start:end] for start, end in pairwise(ends)]
     only, horizon = windows[0], windows[0].horizon
     pieces = np.array_split(only.starts, settings.folds)
     # Windows that reach into the next piece are left out, so that no sample is in two pieces.
@@ -290,7 +284,7 @@ def _shrinking(everything: Judged) -> Iterator[Structure]:
     """
     structure, fits = everything.structure, everything.fits
     layout, hessian = fits[0].layout, np.mean([fitted.hessian for fitted in fits], axis=0)
-    scale, absent = layout.array("scale"), np.array([number.absent for number in layout.numbers])
+    scale, absent = layout.scales, np.array([number.absent for number in layout.numbers])
     away = np.mean([(fitted.values - absent) / scale for fitted in fits], axis=0)
     inverse = np.linalg.inv(hessian)
     place = {block: [i for i, n in enumerate(layout.numbers) if n.block == block] for block in structure.blocks}

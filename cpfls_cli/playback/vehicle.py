@@ -160,8 +160,8 @@ def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tup
 def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
     """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that."""
     layout, values = fitted.layout, fitted.values
-    physical, scale = layout.physical(values), layout.array("scale")
-    stated = layout.physical(layout.array("start"))
+    physical, scale = layout.physical(values), layout.scales
+    stated = layout.physical(layout.starts)
     slopes = np.empty((len(values), len(values)))
     for place, step in enumerate(_STEP * scale * np.eye(len(values))):
         ahead, behind = layout.physical(values + step), layout.physical(values - step)
@@ -185,6 +185,6 @@ def _interval(value: float, half: float, *, positive: bool) -> tuple[float, floa
 
 
 def _trades(layout: Layout, spread: Uncertainty) -> Iterator[Trade]:
-    names, correlation = list(layout.physical(layout.array("start"))), spread.correlation
+    names, correlation = list(layout.physical(layout.starts)), spread.correlation
     for first, second in np.argwhere(np.triu(np.abs(correlation) > _TRADED, 1)).tolist():
         yield Trade(names[first], names[second], float(correlation[first, second]))

@@ -1,0 +1,91 @@
+"""Numbers of a vehicle: the model that they make, its derivatives, and what people read of them."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.playback.fit import Windows, fit, loss_of, uncertainty, window_errors, window_sums
+from cpfls_cli.playback.kernels import Airflow, errors_of_runs
+from cpfls_cli.playback.parameters import Evaluated, Layout, blocks_of
+from tests.builders.playback_flights import STATED, flown, truth
+
+RULES = {"one rule": Airflow(np.array([0.0, 1.0]), 2), "seesaw": Airflow(np.array([0.0, 0.3, 0.6, 1.0]), 0)}
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return flown(truth(), ("multisine",), duration_s=3.0, seed=5)[0]
+
+
+def somewhere(layout, seed=0):
+    """Numbers near the stated ones, none of them where its derivative could vanish."""
+    away = 0.05 * layout.scales * np.random.default_rng(seed).standard_normal(len(layout.numbers))
+    return np.clip(layout.starts + away, layout.lows, layout.highs)
+
+
+@pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
+def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules):
+    layout = Layout(STATED, blocks_of(STATED), rules)
+    values, scale = somewhere(layout), layout.scales
+    starts = flight.starts(20, 40)
+    windows = Windows(flight, starts, loss_of(flight, starts, 20))
+    group = np.zeros(len(starts), dtype=np.int64)
+    gradient = window_sums(Evaluated.of(layout, values), windows, group)[1][0] * scale
+    step = 1e-5
+    for place, number in enumerate(layout.numbers):
+        moved = step * scale[place] * np.eye(len(values))[place]
+        ahead, behind = (
+            window_sums(Evaluated.of(layout, v), windows, group)[0] for v in (values + moved, values - moved)
+        )
+        assert gradient[place] == pytest.approx((ahead - behind) / (2 * step), rel=1e-4, abs=1e-6), number.name
+
+
+def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
+    layout = Layout(STATED, ("inertia", "linear_damping"), RULES["one rule"])
+    windows = Windows.of(flight, 20, 30)
+    evaluated = Evaluated.of(layout, layout.starts)
+    total, by_group, _ = window_sums(evaluated, windows, np.arange(len(windows.starts), dtype=np.int64))
+    fitted = fit(layout, [windows], {}, 0, 1e-3)
+    assert window_errors(fitted, windows).sum() == pytest.approx(total, rel=1e-12)
+    assert len(by_group) == len(windows.starts)
+
+
+@pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
+def test_the_model_of_the_numbers_runs_as_they_do(flight, rules):
+    layout = Layout(STATED, blocks_of(STATED), rules)
+    values = somewhere(layout, seed=1)
+    model, evaluated, starts = layout.model(values), Evaluated.of(layout, values), flight.starts(30, 50)
+    rotor = model.rotor_terms(flight.speed, flight.motion.period, flight.hold)
+    used, weights = model.step_weights(rotor)
+    runs, expected = (np.empty((len(starts), 30, 4, 3)) for _ in range(2))
+    errors_of_runs(flight.motion, model.body, used, weights, starts, True, runs)
+    terms = evaluated.rotor_terms(flight, np.arange(len(flight)))
+    errors_of_runs(flight.motion, evaluated.body, evaluated.used, evaluated.weights(terms), starts, True, expected)
+    assert runs == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
+
+
+def test_the_stated_numbers_make_the_stated_vehicle():
+    layout = Layout(STATED, ("inertia", "thrust_factor", "drag_factor", "products"), RULES["one rule"])
+    model = layout.model(layout.starts)
+    assert model.vehicle.inertia_kg_m2[:3] == pytest.approx(STATED.inertia_kg_m2)
+    assert model.vehicle.rotors == STATED.rotors
+    assert model.effects == ()
+
+
+def test_numbers_are_read_in_si():
+    layout = Layout(STATED, ("inertia", "thrust_factor", "slow_actuation"), RULES["one rule"])
+    values = layout.values(
+        {"inertia.log_Iyy": np.log(2.0), "thrust_factor.scale": 0.9, "slow_actuation.log_slow_s": 0.0}
+    )
+    found = layout.physical(values)
+    assert found["inertia.Iyy"].value == pytest.approx(2 * STATED.inertia_kg_m2[1])
+    assert found["thrust_factor"].value == pytest.approx(0.9 * STATED.rotors[0].thrust_factor_n_s2)
+    assert found["slow_actuation.slow_s"].value == pytest.approx(1.0)
+
+
+def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
+    layout = Layout(STATED, ("rotor_gyroscopic", "linear_damping"), RULES["one rule"])
+    # Without any yaw effort the rotors' spins cancel, and nothing gyroscopic is left.
+    still = flight.speed.mean(axis=1, keepdims=True) * np.ones(4)
+    quiet = [Windows.of(type(flight)(**{**vars(flight), "speed": still}), 20, 20)]
+    spread = uncertainty(fit(layout, quiet, {}, 20, 1e-4), quiet)
+    assert spread.determined.tolist() == [False, True, True, True]
