@@ -42,8 +42,8 @@ DRAG_FACTOR = 0.024 * THRUST_FACTOR
 # The benchmark writes Izz = 3.2347e-6, less than a sixth of Ixx + Iyy. A body this flat has nearly the sum of the
 # two, so that it can only mean e-5.
 INERTIA = (2.3951e-5, 2.3951e-5, 3.2347e-5)
-# Its mixer: roll torque k a ((3 + 4) - (1 + 2)), pitch torque k a ((2 + 3) - (1 + 4)), of squared speeds. Its yaw torque
-# follows (1 + 3) - (2 + 4); on every training flight the motion says the opposite, which is what stands here.
+# Its mixer: roll torque k a ((3 + 4) - (1 + 2)), pitch torque k a ((2 + 3) - (1 + 4)), of squared speeds. Its yaw
+# torque follows (1 + 3) - (2 + 4); on every training flight the motion says the opposite, which is what stands here.
 HUBS = (((ARM, -ARM), 1), ((-ARM, -ARM), -1), ((-ARM, ARM), 1), ((ARM, ARM), -1))
 
 
