@@ -20,8 +20,9 @@ PERIOD, STEP = 0.0025, 4
 
 MASS, INERTIA = 0.772, (2.5e-3, 2.1e-3, 4.3e-3)
 THRUST_FACTOR, TORQUE_OVER_THRUST = 1.5625e-6, 0.022
-# The files do not say which rotor is which: found by regression of the torques of BEM+NN on the squared speeds.
-HUBS = (((-0.075, -0.1), 1), ((0.075, -0.1), -1), ((-0.075, 0.1), -1), ((0.075, 0.1), 1))
+# The files do not say which rotor is which. In a regression of torque on the squared speeds, torque of the motion and
+# of BEM+NN alike, each column pulls about roll and pitch like a rotor in one of the corners, and about yaw like these.
+HUBS = (((-0.075, -0.1), -1), ((0.075, -0.1), 1), ((-0.075, 0.1), 1), ((0.075, 0.1), -1))
 VEHICLE = VehicleSettings(
     mass_kg=MASS,
     inertia_kg_m2=INERTIA,
