@@ -161,8 +161,8 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
     with h5py.File(model, "r+") as file:
         file.attrs["schema_version"] = 1
         file.attrs["format"] = "cpfls/extended"
-    (line,) = refuse("export", model, *words)
-    assert line.startswith(f"{model}: is a model with effects (made by `cpfls extend` or `cpfls gap`), which export")
+    lines = refuse("export", model, *words)
+    assert lines[0].startswith(f"{model}: the cpfls/extended lacks ")
 
 
 @pytest.mark.parametrize(
