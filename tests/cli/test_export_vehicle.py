@@ -1,8 +1,10 @@
 """`cpfls export` of a whole vehicle: the files it writes, and what it refuses."""
 
 import json
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -10,6 +12,9 @@ import pytest
 
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import write_record
+from cpfls_cli.effects.polynomial import Probe, polynomial
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.playback.motion import State, step
 from tests.builders.compiled_c import build, require_gcc
 from tests.builders.vehicle_models import QUAD, polynomial_effects, record_of, whole
 
@@ -135,3 +140,65 @@ def test_a_vehicle_of_wrong_content_is_refused(refuse, vehicle, tmp_path):
         file["vehicle/mass"][()] = np.nan
     (line,) = refuse("export", vehicle, "-o", tmp_path / "m.c")
     assert line == f"{vehicle}: vehicle/mass: 1 samples are not finite, the first at index 0"
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
+FLIGHT = """
+#include <stdio.h>
+#include "uav.h"
+unsigned predict(uav_state *s, double speed[][UAV_ROTORS], int n, double period);
+int main(void)
+{
+    double speed[20][UAV_ROTORS];
+    uav_state s = {{0, 0, 0}, {1, 0, 0}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
+    unsigned status;
+    int k;
+    for (k = 0; k < 20 * UAV_ROTORS; ++k)
+        speed[k / UAV_ROTORS][k % UAV_ROTORS] = 1000 + 7 * (k % 13);
+    status = predict(&s, speed, 20, 0.01);
+    printf("%u %.17g %.17g %.17g\\n", status, s.position[0], s.velocity[2], s.rate[1]);
+    return 0;
+}
+"""
+
+
+def blocks(language):
+    """Code of the page in a language, that of the section on whole vehicles."""
+    return re.findall(rf"```{language}\n(.*?)```", PAGE[PAGE.index("## A whole vehicle") :], re.DOTALL)
+
+
+def test_the_page_predicts_what_the_library_does(cpfls, tmp_path, monkeypatch):
+    require_gcc()
+    monkeypatch.chdir(tmp_path)
+    model = whole(effects=polynomial_effects(QUAD)[:2])
+    write_record(tmp_path / "extended.h5", record_of(model))
+    (commands,), (code,), (module,) = blocks("sh"), blocks("c"), blocks("python")
+    for line in commands.splitlines():
+        assert cpfls(*line.split("#")[0].split()[1:]).exit_code == 0, line
+    (tmp_path / "main.c").write_text(FLIGHT)
+    (tmp_path / "predict.c").write_text(code)
+    program = build(tmp_path, ["main.c", "predict.c", "uav.c"])
+    said = [float(word) for word in subprocess.run([program], capture_output=True, check=True).stdout.split()]
+    speed = (1000.0 + 7 * (np.arange(80) % 13)).reshape(20, 4)
+    state = State(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), np.eye(3)[None], np.zeros((1, 3)))
+    for row in model.rotor_terms(speed, 0.01, "previous"):
+        state = step(model, state, row[None], 0.01)
+    wanted = [0, state.position[0, 0], state.velocity[0, 2], state.rate[0, 1]]
+    np.testing.assert_allclose(said, wanted, rtol=1e-9)
+    monkeypatch.syspath_prepend(tmp_path)
+    names = {"speed": speed}
+    exec(module, names)
+    assert np.isfinite(np.concatenate([part.ravel() for part in names["state"]])).all()
+
+
+def test_the_page_lists_what_an_export_cannot_hold():
+    probe, refused = Probe.of(QUAD), []
+    for known in CATALOGUE.values():
+        hooks = known.actuation
+        held = known.inertia is not None or (hooks is not None and (hooks.lag or hooks.delay))
+        if known.kind in ("wrench", "actuator") and not held:
+            shape = {one.name: one.grid[0] for one in known.shapes}
+            if known.carried is not None or polynomial(known, probe, shape) is None:
+                refused.append(known.name)
+    (said,) = re.findall(r"Not every effect is such a sum: (.*?) are not", PAGE, re.DOTALL)
+    assert sorted(re.findall(r"`(\w+)`", said)) == sorted(refused)
