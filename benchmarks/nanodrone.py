@@ -33,7 +33,8 @@ pin_threads()
 
 import numpy as np
 
-    return {"stated rigid body": VehicleModel(vehicle=STATED), **learned(VEHICLE, training)}
+from benchmarks.shared.found_vehicles import learned
+from benchmarks.shared.nanodrone_files import STATED, TEST, TRAINING, VEHICLE, flights
 from benchmarks.shared.playback_scores import (
     SHOWN,
     SIGNALS,
@@ -93,11 +94,7 @@ COLUMNS = (
 
 def models(training: Sequence[PlaybackFlight]) -> Mapping[str, VehicleModel]:
     """Give the models that are played back, by name; those that learn see the training flights alone."""
-<<<<<<< HEAD
-    return {"stated rigid body": VehicleModel(vehicle=VEHICLE), **learned(VEHICLE, training)}
-=======
-    return {"stated rigid body": VehicleModel(vehicle=STATED)}
->>>>>>> 627e39684201bf6f791375d0afaeed9c459c2818
+    return {"stated rigid body": VehicleModel(vehicle=STATED), **learned(VEHICLE, training)}
 
 
 def our_rows(training: Sequence[PlaybackFlight], test: Sequence[PlaybackFlight]) -> list[list[object]]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.extended import FUZZY_INERTIA, ExtendedRecord
 from cpfls_cli.artifacts.job import Job, take_inputs
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import check_output, write_text
@@ -118,19 +118,24 @@ def _vehicle(path: Path, kind: type[VehicleRecord | ExtendedRecord], name: str, 
     if record.vehicle.not_held:
         raise InputError(f"{path}: {_not_exported(record.vehicle.not_held)}")
     worth = tuple(worth_in_words(record)) if isinstance(record, ExtendedRecord) else ()
-    return VehicleSheet(name, record.vehicle.vehicle_model(), worth, record.origin, path.name, file.sha256)
+    try:
+        model = record.vehicle.vehicle_model()
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return VehicleSheet(name, model, worth, record.origin, path.name, file.sha256)
 
 
 def _not_exported(parts: Sequence[str]) -> str:
     """Name what an export cannot hold, and say what to do about each."""
     effects = [part for part in parts if part in CATALOGUE]
-    others = [part for part in parts if part not in CATALOGUE]
     advice = []
     if effects:
         ignored = ", ".join(effects)
-        advice.append(f'`cpfls diagnose` with --set "gap.ignore=[{ignored}]", then `cpfls extend`, does without')
-    if others:
-        advice.append("without --model the vehicle of the config is extended, whose inertia is constant")
+        advice.append(f'`cpfls diagnose --set "gap.ignore=[{ignored}]"`, then `cpfls extend`, make a model without')
+    if FUZZY_INERTIA in parts:
+        advice.append("without --model they extend the vehicle of the config, whose inertia is constant")
+    if set(parts) - {*effects, FUZZY_INERTIA}:
+        advice.append("flights that turn about all axes tell the inertia better")
     return f"export cannot write {', '.join(parts)}: no polynomial of motion and rotor speeds; {'; '.join(advice)}"
 
 

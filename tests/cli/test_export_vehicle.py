@@ -1,0 +1,204 @@
+"""`cpfls export` of a whole vehicle: the files it writes, and what it refuses."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.spec import Header, InputFile
+from cpfls_cli.artifacts.store import write_record
+from cpfls_cli.effects.polynomial import Probe, polynomial
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.playback.motion import State, step
+from tests.builders.compiled_c import build, require_gcc
+from tests.builders.vehicle_models import QUAD, polynomial_effects, record_of, whole
+
+HOSTILE = '*/ int main(void) { return 7; } /* ??/\n"""\nraise SystemExit(7)\n#error " \\ \u202e'
+ENDINGS = {"json": "json", "c": "c", "python": "py"}
+
+
+@pytest.fixture
+def vehicle(tmp_path):
+    path = tmp_path / "vehicle.h5"
+    write_record(path, record_of(whole(effects=polynomial_effects(QUAD)[:2])))
+    return path
+
+
+def self_test(output):
+    """Run the self-test of exported source."""
+    if output.suffix == ".py":
+        command = [sys.executable, "-I", output]
+    else:
+        require_gcc()
+        command = [build(output.parent, [output.name], "-DCPFLS_SELF_TEST", output="self-test")]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("form", ENDINGS)
+def test_a_vehicle_is_exported(cpfls, vehicle, tmp_path, form):
+    output = tmp_path / "out" / f"quad.{ENDINGS[form]}"
+    output.parent.mkdir()
+    result = cpfls("export", vehicle, "-o", output, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert result.stderr == ""
+    summary = json.loads(result.stdout)
+    assert sorted(summary["output"]) == sorted(str(path) for path in output.parent.iterdir())
+    assert (summary["format"], summary["name"], summary["rotors"], summary["learned"]) == (form, "quad", 4, True)
+    assert summary["effects"] == ["linear_damping", "quadratic_damping"]
+    if form == "json":
+        document = json.loads(output.read_text())
+        assert document["format"] == "cpfls/vehicle-json"
+        assert len(document["weights"]["weight"]) == summary["weights"]
+    else:
+        done = self_test(output)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_what_is_said_of_it(cpfls, vehicle, tmp_path):
+    result = cpfls("export", vehicle, "-o", tmp_path / "quad.py")
+    written, about, effects, learned = result.stdout.splitlines()
+    assert written.startswith(f"{tmp_path / 'quad.py'}: written (")
+    assert about.startswith("Vehicle: 0.9 kg, 4 rotors; delay 0.013 s, lag 0.035 s, slow actuation -0.4 (roll, pitch)")
+    assert effects == "Effects: linear rotational damping, quadratic rotational damping."
+    assert learned == "Learned, without a name: torque x, torque z, force z over the direction of the airflow."
+    assert effects in (tmp_path / "quad.py").read_text()
+
+
+def test_dry_run_names_and_existing_files(cpfls, refuse, vehicle, tmp_path):
+    output = tmp_path / "m.c"
+    assert cpfls("export", vehicle, "-o", output, "--dry-run").stdout.startswith(
+        f"{tmp_path / 'm.h'}: would be written"
+    )
+    assert not output.exists()
+    assert cpfls("export", vehicle, "-o", output, "--name", "uav").exit_code == 0
+    assert "unsigned uav_step(uav_state *s" in (tmp_path / "m.h").read_text()
+    assert refuse("export", vehicle, "-o", output) == [f"{output}: exists already; --force replaces it"]
+
+
+def test_the_same_vehicle_gives_the_same_bytes(cpfls, vehicle, tmp_path):
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        for ending in ENDINGS.values():
+            assert cpfls("export", vehicle, "-o", tmp_path / folder / f"m.{ending}").exit_code == 0
+    for path in (tmp_path / "one").iterdir():
+        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
+
+
+@pytest.mark.parametrize("form", ENDINGS)
+def test_hostile_text_stays_text(cpfls, tmp_path, form):
+    record = record_of(whole(effects=(), remainder=None))
+    header = Header("0", 1, "seed: 1\n", {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")})
+    path = tmp_path / ("x*" + "' \"; raise SystemExit(8)\n#.h5")
+    write_record(path, record.with_header(header))
+    with h5py.File(path, "r+") as file:
+        file["inputs/flight"].attrs["name"] = HOSTILE
+    output = tmp_path / f"m.{ENDINGS[form]}"
+    result = cpfls("export", path, "-o", output)
+    assert result.exit_code == 0, result.stderr
+    if form == "json":
+        assert json.loads(output.read_text())["provenance"]["inputs"]["flight"]["name"] == HOSTILE
+    else:
+        assert self_test(output).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        (
+            ("wind", "battery_sag"),
+            "export cannot write wind, battery_sag: no polynomial of motion and rotor speeds; "
+            '`cpfls diagnose --set "gap.ignore=[wind, battery_sag]"`, then `cpfls extend`, make a model without',
+        ),
+        (
+            ("inertia over attitude",),
+            "export cannot write inertia over attitude: no polynomial of motion and rotor speeds; without --model they "
+            "extend the vehicle of the config, whose inertia is constant",
+        ),
+    ],
+    ids=["effects", "inertia"],
+)
+def test_what_an_export_cannot_hold_is_named(refuse, tmp_path, parts, message):
+    path = tmp_path / "vehicle.h5"
+    write_record(path, record_of(whole(effects=(), remainder=None), parts))
+    assert refuse("export", path, "-o", tmp_path / "m.c") == [f"{path}: {message}"]
+    assert not (tmp_path / "m.c").exists()
+
+
+def test_a_vehicle_of_wrong_content_is_refused(refuse, vehicle, tmp_path):
+    with h5py.File(vehicle, "r+") as file:
+        names = np.char.encode(np.array(["linear_damping", "quadratic_dampin"]), "utf-8")
+        del file["vehicle/effect/name"]
+        file["vehicle/effect/name"] = names
+    (line,) = refuse("export", vehicle, "-o", tmp_path / "m.c")
+    assert line.startswith(f"{vehicle}: quadratic_dampin: no such effect (did you mean quadratic_damping")
+    with h5py.File(vehicle, "r+") as file:
+        file["vehicle/mass"][()] = np.nan
+    (line,) = refuse("export", vehicle, "-o", tmp_path / "m.c")
+    assert line == f"{vehicle}: vehicle/mass: 1 samples are not finite, the first at index 0"
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
+FLIGHT = """
+#include <stdio.h>
+#include "uav.h"
+unsigned predict(uav_state *s, double speed[][UAV_ROTORS], int n, double period);
+int main(void)
+{
+    double speed[20][UAV_ROTORS];
+    uav_state s = {{0, 0, 0}, {1, 0, 0}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
+    unsigned status;
+    int k;
+    for (k = 0; k < 20 * UAV_ROTORS; ++k)
+        speed[k / UAV_ROTORS][k % UAV_ROTORS] = 1000 + 7 * (k % 13);
+    status = predict(&s, speed, 20, 0.01);
+    printf("%u %.17g %.17g %.17g\\n", status, s.position[0], s.velocity[2], s.rate[1]);
+    return 0;
+}
+"""
+
+
+def blocks(language):
+    """Code of the page in a language, that of the section on whole vehicles."""
+    return re.findall(rf"```{language}\n(.*?)```", PAGE[PAGE.index("## A whole vehicle") :], re.DOTALL)
+
+
+def test_the_page_predicts_what_the_library_does(cpfls, tmp_path, monkeypatch):
+    require_gcc()
+    monkeypatch.chdir(tmp_path)
+    model = whole(effects=polynomial_effects(QUAD)[:2])
+    write_record(tmp_path / "extended.h5", record_of(model))
+    (commands,), (code,), (module,) = blocks("sh"), blocks("c"), blocks("python")
+    for line in commands.splitlines():
+        assert cpfls(*line.split("#")[0].split()[1:]).exit_code == 0, line
+    (tmp_path / "main.c").write_text(FLIGHT)
+    (tmp_path / "predict.c").write_text(code)
+    program = build(tmp_path, ["main.c", "predict.c", "uav.c"])
+    said = [float(word) for word in subprocess.run([program], capture_output=True, check=True).stdout.split()]
+    speed = (1000.0 + 7 * (np.arange(80) % 13)).reshape(20, 4)
+    state = State(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), np.eye(3)[None], np.zeros((1, 3)))
+    for row in model.rotor_terms(speed, 0.01, "previous"):
+        state = step(model, state, row[None], 0.01)
+    wanted = [0, state.position[0, 0], state.velocity[0, 2], state.rate[0, 1]]
+    np.testing.assert_allclose(said, wanted, rtol=1e-9)
+    monkeypatch.syspath_prepend(tmp_path)
+    names = {"speed": speed}
+    exec(module, names)
+    assert np.isfinite(np.concatenate([part.ravel() for part in names["state"]])).all()
+
+
+def test_the_page_lists_what_an_export_cannot_hold():
+    probe, refused = Probe.of(QUAD), []
+    for known in CATALOGUE.values():
+        hooks = known.actuation
+        held = known.inertia is not None or (hooks is not None and (hooks.lag or hooks.delay))
+        if known.kind in ("wrench", "actuator") and not held:
+            shape = {one.name: one.grid[0] for one in known.shapes}
+            if known.carried is not None or polynomial(known, probe, shape) is None:
+                refused.append(known.name)
+    (said,) = re.findall(r"Not every effect is such a sum: (.*?) are not", PAGE, re.DOTALL)
+    assert sorted(re.findall(r"`(\w+)`", said)) == sorted(refused)

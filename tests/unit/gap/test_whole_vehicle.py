@@ -1,0 +1,82 @@
+"""A model with effects as that of a whole vehicle: the same torque, force and inertia."""
+
+import numpy as np
+
+from cpfls_cli.effects.catalogue.parameter_error import coupling
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.weak_flight import Candidate, columns_of, nuisance
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain, whole_vehicle
+from cpfls_cli.inertia import symmetric
+from tests.builders.vehicle_models import QUAD
+
+STATED = symmetric(QUAD.inertia_kg_m2)
+
+
+def fitted(name, *linear, **shape):
+    return FittedEffect(Candidate(effect(name), shape), np.array(linear))
+
+
+def parameters(**values):
+    return np.array([values.get(one.name, 0.0) for one in VEHICLE_NUMBERS.coefficients])
+
+
+def signals(samples=60):
+    rng = np.random.default_rng(4)
+    return Signals(
+        time=np.arange(samples) * 0.01,
+        body_rate=rng.normal(0, 2, (samples, 3)),
+        vehicle=QUAD,
+        attitude=rng.uniform(-1, 1, (samples, 3)),
+        velocity=rng.normal(0, 3, (samples, 3)),
+        rotor_speed=rng.uniform(800, 1300, (samples, 4)),
+    )
+
+
+def test_torque_force_and_inertia_are_those_of_the_effects():
+    numbers = parameters(inertia_x=0.3, inertia_z=-0.2, coupling_y=0.4, thrust_scale=0.1, reference_x=0.2)
+    effects = (fitted("com_offset", 0.004, -0.002), fitted("linear_damping", 1e-3, 2e-3, 3e-3))
+    extended, flown = ExtendedModel(None, numbers, effects), signals()
+    whole = whole_vehicle(extended, QUAD, STATED)
+    assert whole.not_held == ()
+    steady = np.zeros((len(flown), 17))
+    steady[:, 0], steady[:, 1:5], steady[:, 5:9] = 1.0, flown.rotor_speed, flown.rotor_speed**2
+    found = whole.model.wrench(flown.air_velocity, flown.body_rate, steady)
+    wanted = flown.wrench + extended.effect_wrench(flown)
+    wanted += columns_of(nuisance(), flown).direct @ coupling(numbers)
+    wanted[:, 5] += 0.1 * flown.thrust
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+    np.testing.assert_allclose(whole.model.body.inertia, extended.inertia(flown), rtol=1e-12)
+
+
+def test_products_of_inertia_stand_in_the_inertia():
+    products = fitted("products_of_inertia", 1e-4, 2e-4, 0)
+    whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD, STATED)
+    np.testing.assert_allclose(whole.model.body.inertia, STATED + symmetric([0, 0, 0, 1e-4, 2e-4, 0]), rtol=1e-12)
+    assert (whole.model.effects, whole.not_held) == ((), ())
+
+
+def test_lag_and_delay_are_those_of_the_rotors():
+    effects = (fitted("motor_lag", time_constant_s=0.04), fitted("command_delay", delay_s=0.02))
+    whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD, STATED)
+    assert (whole.model.response.lag_s, whole.model.response.delay_s) == (0.04, 0.02)
+    assert (whole.model.effects, whole.not_held) == ((), ())
+
+
+def test_what_is_no_polynomial_is_named():
+    effects = (fitted("wind", 1.0, 0.0), fitted("torque_bias", 0.1, 0, 0), fitted("battery_sag", exponent=1.5))
+    whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD, STATED)
+    assert whole.not_held == ("wind", "battery_sag")
+    assert [one.name for one in whole.model.effects] == ["torque_bias"]
+
+
+def test_a_plain_model_is_the_vehicle():
+    whole = whole_vehicle(plain(None), QUAD, STATED)
+    assert (whole.model.vehicle, whole.model.effects, whole.not_held) == (QUAD, (), ())
+
+
+def test_an_inertia_of_no_body_is_named():
+    products = fitted("products_of_inertia", 0.1, 0.0, 0.0)
+    whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD, STATED)
+    assert whole.model.vehicle == QUAD
+    assert whole.not_held == ("inertia, which is not positive definite",)
