@@ -168,43 +168,44 @@ def terms(motion: Array, factors: IntArray, airflow: Airflow, value: Array, slop
     airflow : Airflow
     value : array, shape (terms,)
         Written to.
-    slope : array, shape (terms, 6)
-        Written to, where it has room; has to be zero elsewhere.
+    slope : array, shape (terms, 6), or (0, 6)
+        Written to, where it is not zero anyhow; without rows it is not asked for.
     """
     value[0] = 1.0
     for i in range(6):
         value[1 + i] = motion[i]
+    at = 7
+    for k in range(len(factors)):
+        value[at] = motion[factors[k, 0]] * motion[factors[k, 1]]
+        at += 1
+    speed = np.sqrt(motion[0] ** 2 + motion[1] ** 2 + motion[2] ** 2)
+    for i in range(3):
+        value[at + i] = speed * motion[i]
+        value[at + 3 + i] = abs(motion[3 + i]) * motion[3 + i]
+    if len(slope):
+        _polynomial_slopes(motion, factors, speed, slope)
+    if len(airflow.breakpoints):
+        _airflow(motion, airflow, at + 6, value, slope)
+
+
+@_compiled
+def _polynomial_slopes(motion: Array, factors: IntArray, speed: float, slope: Array) -> None:
+    for i in range(6):
         slope[1 + i, i] = 1.0
     at = 7
     for k in range(len(factors)):
         i, j = factors[k, 0], factors[k, 1]
-        value[at] = motion[i] * motion[j]
         slope[at, i] = motion[j]
         slope[at, j] = motion[i]
         if i == j:
             slope[at, i] = 2.0 * motion[i]
         at += 1
-    at = _signed_squares(motion, at, value, slope)
-    if len(airflow.breakpoints):
-        _airflow(motion, airflow, at, value, slope)
-
-
-@_compiled
-def _signed_squares(motion: Array, at: int, value: Array, slope: Array) -> int:
-    """Evaluate speed times velocity, and rates times their size; give the next index."""
-    speed = np.sqrt(motion[0] ** 2 + motion[1] ** 2 + motion[2] ** 2)
     inverse = 1.0 / speed if speed > 0.0 else 0.0
     for i in range(3):
-        value[at] = speed * motion[i]
         for j in range(3):
-            slope[at, j] = motion[i] * motion[j] * inverse
-        slope[at, i] += speed
-        at += 1
-    for i in range(3, 6):
-        value[at] = abs(motion[i]) * motion[i]
-        slope[at, i] = 2.0 * abs(motion[i])
-        at += 1
-    return at
+            slope[at + i, j] = motion[i] * motion[j] * inverse
+        slope[at + i, i] += speed
+        slope[at + 3 + i, 3 + i] = 2.0 * abs(motion[3 + i])
 
 
 @_compiled
@@ -216,10 +217,13 @@ def _airflow(motion: Array, airflow: Airflow, at: int, value: Array, slope: Arra
     column, by_angle = np.zeros(MOST_COLUMNS), np.zeros(MOST_COLUMNS)
     count = _columns(airflow, angle, column, by_angle)
     for c in range(count):
-        value[at] = column[c] * speed
+        value[at + 2 * c] = column[c] * speed
+        value[at + 2 * c + 1] = column[c] * speed * speed
+    if len(slope) == 0:
+        return
+    for c in range(count):
         slope[at, 0] = (column[c] * forward - by_angle[c] * left) * inverse
         slope[at, 1] = (column[c] * left + by_angle[c] * forward) * inverse
-        value[at + 1] = column[c] * speed * speed
         slope[at + 1, 0] = 2.0 * column[c] * forward - by_angle[c] * left
         slope[at + 1, 1] = 2.0 * column[c] * left + by_angle[c] * forward
         at += 2
@@ -325,10 +329,10 @@ def _new_state() -> _State:
 
 
 @_compiled
-def _new_space(used: Terms) -> _Space:
+def _new_space(used: Terms, slopes: bool) -> _Space:
     return _Space(
         np.zeros(used.total),
-        np.zeros((used.total, 6)),
+        np.zeros((used.total if slopes else 0, 6)),
         np.zeros(len(used.active)),
         np.zeros(9),
         np.zeros((3, 3)),
@@ -453,7 +457,7 @@ def errors_of_runs(
     """
     h = motion.period
     diverged = np.full(len(starts), -1)
-    state, middle, before, at = _new_state(), _new_state(), _new_state(), _new_space(used)
+    state, middle, before, at = _new_state(), _new_state(), _new_state(), _new_space(used, False)
     for n in range(len(starts)):
         _start(motion, starts[n], state)
         for step in range(out.shape[1]):
@@ -725,7 +729,7 @@ def sensitivities(
         Added to, the lower triangle.
     """
     h = motion.period
-    state, middle, at = _new_state(), _new_state(), _new_space(used)
+    state, middle, at = _new_state(), _new_state(), _new_space(used, True)
     count = len(parameters.inertia)
     tangent, half, change = _new_tangent(count), _new_tangent(count), np.empty((6, count))
     work = _new_columns(count)
