@@ -37,7 +37,7 @@ from tests.builders.playback_flights import KINDS, MIDDLING, STATED, TRUE_BLOCKS
 NOISE = {"white": MIDDLING, "coloured, 50 ms": replace(MIDDLING, time_constant_s=0.05)}
 TIMES, HORIZON, EVERY = 3, 50, 60
 STEPS, TOLERANCE = 60, 3e-5
-SEARCH = PlaybackSettings(search_windows=200, population=8, generations=2)
+SEARCH = PlaybackSettings(search_windows=120, population=6, generations=1)
 _STEP = 1e-5
 
 

@@ -43,7 +43,7 @@ def chosen(vehicle, flights, candidates, **asked):
 
 @pytest.fixture(scope="module")
 def noisy():
-    return flown(truth(), KINDS * 3, seed=1, noise=MIDDLING)
+    return flown(truth(), KINDS * 3, seed=1, noise=MIDDLING, duration_s=15.0)
 
 
 def test_without_noise_the_numbers_come_back():
@@ -63,14 +63,14 @@ def test_with_noise_they_come_back_and_predict_another_flight(noisy):
 
 
 def test_the_blocks_that_are_there_are_chosen_and_no_others(noisy):
-    found, _ = chosen(STATED, noisy, (*TRUE_BLOCKS, "delay"), search_windows=60)
+    found, _ = chosen(STATED, noisy, (*TRUE_BLOCKS, "delay"), search_windows=60, folds=2, horizon_s=0.3)
     assert set(found.structure.blocks) == set(TRUE_BLOCKS)
 
 
 def test_the_drag_of_another_simulator_is_found():
     flights, hidden = [rotorpy_flight("drag")], ROTORPY_HIDDEN["drag"]
-    candidates = (*(effect.name for effect in hidden), "com_offset", "flapping_moment")
-    found, settings = chosen(ROTORPY, flights, candidates, search_windows=30)
+    candidates = (*(effect.name for effect in hidden), "com_offset")
+    found, settings = chosen(ROTORPY, flights, candidates, search_windows=20, folds=2)
     final, _ = fitted_to_all(found.structure, ROTORPY, flights, settings, found.fits[0])
     layout = final.layout
     assert {effect.name for effect in hidden} <= set(layout.blocks)
