@@ -4,7 +4,7 @@
 
 Each seed is nine flights of 20 s with lag, damping, drag, flapping and wrong constants at once
 (tests/builders/playback_flights.py), logged with white and with coloured noise, and three flights that judge. SEEDS
-(20) fits have the structure that flew; SEARCHES (4) have to find it, with the white noise.
+(20) fits have the structure that flew; SEARCHES (2) have to find it, with the white noise.
 """
 
 from __future__ import annotations
@@ -139,4 +139,4 @@ def _silent(done: int, total: int, best: float) -> None:
 
 if __name__ == "__main__":
     asked = [int(text) for text in sys.argv[1:3]]
-    main(*asked, *(20, 4)[len(asked) :])
+    main(*asked, *(20, 2)[len(asked) :])
