@@ -314,7 +314,9 @@ _INFORMED = 10.0
 def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
     """Estimate how far the numbers scatter, from blocks of neighbouring windows.
 
-    The covariance is ``H^-1 (sum_b g_b g_b') H^-1`` with the gradients of the blocks, which are alike only within one.
+    Without a block b, windows within which are alike, the fit moves by ``(H - H_b)^-1 g_b``; the covariance is
+    ``(n - 1) / n`` times the sum of the squares of these moves about their mean. A block that alone tells of a number
+    has drawn the fit to itself, which a fixed ``H^-1`` would not see.
 
     Parameters
     ----------
@@ -324,22 +326,23 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
 
     References
     ----------
-    White 1982 (sandwich); Ljung, section 9.4.
+    Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023 (jackknife by cluster); Ljung, section 9.4.
     """
     layout = fitted.layout
     evaluated, scale = Evaluated.of(layout, fitted.values), layout.scales
     count = sum(len(window.starts) for window in windows)
-    gradients = []
+    sums = []
     for window in windows:
         blocks = max(2, round(_BLOCKS * len(window.starts) / count))
         group = np.arange(len(window.starts), dtype=np.int64) * blocks // len(window.starts)
-        gradients.append(window_sums(evaluated, window, group)[1] * scale)
-    joined = np.concatenate(gradients)
-    number = len(joined)
-    centred = joined - joined.mean(axis=0)
-    inverse = np.linalg.inv(fitted.hessian * count)
-    spread = inverse @ (centred.T @ centred * number / max(number - 1, 1)) @ inverse
-    covariance = spread * scale[:, None] * scale
+        sums.append(window_sums(evaluated, window, group)[1:])
+    gradient, hessian = (np.concatenate(each) for each in zip(*sums, strict=True))
+    number = len(gradient)
+    # The prior stays in the difference, so that it can be inverted whatever a block takes with it.
+    without = fitted.hessian * count - hessian * scale[:, None] * scale
+    moved = np.linalg.solve(without, (gradient * scale)[:, :, None])[:, :, 0]
+    centred = moved - moved.mean(axis=0)
+    covariance = (number - 1) / number * (centred.T @ centred) * scale[:, None] * scale
     half = student.ppf(0.975, number - 1) * np.sqrt(np.diag(covariance))
     belief = _PRIOR / layout.spreads**2
     conditional = np.diag(fitted.hessian) - belief

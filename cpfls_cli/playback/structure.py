@@ -215,11 +215,10 @@ def choose(
         path.extend(_greedy(bench, blocks, nothing))
         first = min(bench.known.values(), key=lambda each: each.error)
         _evolve(bench, blocks, [*path, *shrunk, *_neighbours(bench, first)], settings, rng)
+        _refine(bench)
     except SearchStoppedError:
         complete = False
-    judged = sorted(bench.known.values(), key=lambda each: (each.numbers, each.error))
-    best = min(judged, key=lambda each: each.error)
-    chosen = _simplest(judged, best)
+    judged, best, chosen = _preferred(bench)
     return Choice(chosen, best, path[-1], everything, nothing, _front(judged), len(judged), complete)
 
 
@@ -312,6 +311,22 @@ def _neighbours(bench: _Bench, judged: Judged) -> list[Judged]:
     fewer = [_with(structure, block, structure.blocks) for block in structure.blocks]
     other = [structure._replace(rules=rules) for rules in REMAINDERS] if REMAINDER in structure.blocks else []
     return [bench.judge(each) for each in (*fewer, *other)]
+
+
+def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
+    """Sort what is judged by numbers, and give the best and the choice."""
+    judged = sorted(bench.known.values(), key=lambda each: (each.numbers, each.error))
+    best = min(judged, key=lambda each: each.error)
+    return judged, best, _simplest(judged, best)
+
+
+def _refine(bench: _Bench) -> None:
+    """Judge the neighbours of the best and of the choice, until no block is left that nothing speaks for."""
+    asked: set[Structure] = set()
+    while new := [each for each in _preferred(bench)[1:] if each.structure not in asked]:
+        asked |= {each.structure for each in new}
+        for each in new:
+            _neighbours(bench, each)
 
 
 def _evolve(

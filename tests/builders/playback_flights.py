@@ -75,6 +75,34 @@ def truth(vehicle=STATED):
     )
 
 
+TRUE_BLOCKS = ("inertia", "thrust_factor", "drag_factor", "lag", "linear_damping", "rotor_drag", "flapping_moment")
+"""What `truth` has, as blocks of a fit."""
+
+
+def true_numbers(vehicle=STATED):
+    """Name the numbers of `truth` as a fit does, SI."""
+    model, (rotor, *_) = truth(vehicle), truth(vehicle).vehicle.rotors
+    damping, (drag,), (flapping,) = (effect.coefficients for effect in model.effects)
+    return {
+        **dict(zip(("inertia.Ixx", "inertia.Iyy", "inertia.Izz"), model.vehicle.inertia_kg_m2, strict=False)),
+        "thrust_factor": rotor.thrust_factor_n_s2,
+        "drag_factor": rotor.drag_factor_n_m_s2,
+        "lag.time_constant_s": model.response.lag_s,
+        **dict(zip((f"linear_damping.d_{axis}" for axis in "xyz"), damping.tolist(), strict=True)),
+        "rotor_drag.k_d": float(drag),
+        "flapping_moment.k_f": float(flapping),
+    }
+
+
+def judged(numbers):
+    """Divide the numbers of the yaw axis, whose scale motion hardly shows, by its inertia."""
+    of_yaw = ("drag_factor", "linear_damping.d_z")
+    return {
+        f"{name} / Izz" if name in of_yaw else name: value / (numbers["inertia.Izz"] if name in of_yaw else 1.0)
+        for name, value in numbers.items()
+    }
+
+
 def flown(model, kinds=KINDS, *, stated=STATED, duration_s=20.0, rate_hz=100.0, hold="previous", noise=None, seed=0):
     """Fly a model once for each kind of excitation, by an autopilot that knows the stated vehicle alone.
 

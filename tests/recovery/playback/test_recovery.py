@@ -1,0 +1,82 @@
+"""Fits find the vehicle that flew: its numbers, its predictions, and the blocks that are there."""
+
+import numpy as np
+import pytest
+
+from benchmarks.shared.playback_scores import free_runs, score
+from cpfls_cli.playback.fit import Windows, fit
+from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.structure import Structure, choose, fitted_to_all
+from tests.builders.playback_flights import (
+    KINDS,
+    MIDDLING,
+    ROTORPY,
+    ROTORPY_HIDDEN,
+    STATED,
+    TRUE_BLOCKS,
+    flown,
+    judged,
+    rotorpy_flight,
+    true_numbers,
+    truth,
+)
+
+RATE = 3
+
+
+def fitted(vehicle, blocks, flights):
+    windows = [Windows.of(flight, 50, 60) for flight in flights]
+    return fit(Structure(blocks).layout(vehicle), windows, {}, 60, 3e-5)
+
+
+def numbers(found):
+    return {name: number.value for name, number in found.layout.physical(found.values).items()}
+
+
+def chosen(vehicle, flights, candidates, **asked):
+    others = tuple(block for block in blocks_of(vehicle) if block not in candidates)
+    settings = PlaybackSettings(leave_out=others, population=2, generations=0, **asked)
+    choice = choose(vehicle, flights, settings, np.random.default_rng(1), lambda *_: None)
+    return choice.chosen, settings
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    return flown(truth(), KINDS * 3, seed=1, noise=MIDDLING, duration_s=15.0)
+
+
+def test_without_noise_the_numbers_come_back():
+    found = fitted(STATED, TRUE_BLOCKS, flown(truth(), duration_s=10.0, seed=1))
+    assert numbers(found) == pytest.approx(true_numbers(), rel=0.002)
+
+
+def test_with_noise_they_come_back_and_predict_another_flight(noisy):
+    found = fitted(STATED, TRUE_BLOCKS, noisy)
+    assert judged(numbers(found)) == pytest.approx(judged(true_numbers()), rel=0.05)
+    other = flown(truth(), duration_s=10.0, seed=2, noise=MIDDLING)
+    by_found, by_truth = (
+        score([free_runs(model, flight, 5) for flight in other])
+        for model in (found.layout.model(found.values), truth())
+    )
+    assert (by_found.sums < 1.1 * by_truth.sums).all()
+
+
+def test_the_blocks_that_are_there_are_chosen_and_no_others(noisy):
+    found, _ = chosen(STATED, noisy, (*TRUE_BLOCKS, "delay"), search_windows=60, folds=2, horizon_s=0.3)
+    assert set(found.structure.blocks) == set(TRUE_BLOCKS)
+
+
+def test_the_drag_of_another_simulator_is_found():
+    flights, hidden = [rotorpy_flight("drag")], ROTORPY_HIDDEN["drag"]
+    candidates = (*(effect.name for effect in hidden), "com_offset")
+    found, settings = chosen(ROTORPY, flights, candidates, search_windows=20, folds=2)
+    final, _ = fitted_to_all(found.structure, ROTORPY, flights, settings, found.fits[0])
+    layout = final.layout
+    assert {effect.name for effect in hidden} <= set(layout.blocks)
+    known = {effect.name: effect.coefficients for effect in hidden}
+    for effect in layout.model(final.values).effects:
+        scale = layout.scales[[number.block == effect.name for number in layout.numbers]]
+        # Without noise, another block may be left to make up for the step of 10 ms: it is next to nothing.
+        true = known.get(effect.name, np.zeros(len(scale)))
+        assert effect.coefficients == pytest.approx(true, rel=0.02, abs=1e-4 * scale.max())
