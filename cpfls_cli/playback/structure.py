@@ -215,11 +215,10 @@ def choose(
         path.extend(_greedy(bench, blocks, nothing))
         first = min(bench.known.values(), key=lambda each: each.error)
         _evolve(bench, blocks, [*path, *shrunk, *_neighbours(bench, first)], settings, rng)
+        _prune(bench)
     except SearchStoppedError:
         complete = False
-    judged = sorted(bench.known.values(), key=lambda each: (each.numbers, each.error))
-    best = min(judged, key=lambda each: each.error)
-    chosen = _simplest(judged, best)
+    judged, best, chosen = _ranked(bench)
     return Choice(chosen, best, path[-1], everything, nothing, _front(judged), len(judged), complete)
 
 
@@ -358,6 +357,21 @@ def _encoded(structure: Structure, blocks: tuple[str, ...]) -> list[int]:
     middle = [_HALF + _HALF // 2 if block in structure.blocks else _HALF // 2 for block in blocks]
     place = REMAINDERS.index(structure.rules)
     return [*middle, (2 * place + 1) * _HALF // len(REMAINDERS)]
+
+
+def _prune(bench: _Bench) -> None:
+    """Try the choice without each of its blocks, until all of them count."""
+    known = 0
+    while known < len(bench.known):
+        known = len(bench.known)
+        _neighbours(bench, _ranked(bench)[2])
+
+
+def _ranked(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
+    """Give all that is known by the number of numbers, the best of it, and what is chosen."""
+    judged = sorted(bench.known.values(), key=lambda each: (each.numbers, each.error))
+    best = min(judged, key=lambda each: each.error)
+    return judged, best, _simplest(judged, best)
 
 
 def _simplest(judged: Sequence[Judged], best: Judged) -> Judged:
