@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations_with_replacement, product
 
 import numpy as np
@@ -77,6 +78,18 @@ class Probe:
     rotor: Array
     state: Array
 
+    @property
+    def turning(self) -> list[int]:
+        """Terms of the rotors that the motions hold: all but the accelerations."""
+        return [index for index in range(self.rotor.shape[1]) if np.any(self.rotor[:, index])]
+
+    @cached_property
+    def joint(self) -> tuple[Array, Array, Array]:
+        """Products of the terms in their own sizes, their pseudo-inverse, and the sizes."""
+        products = (self.state[:, :, None] * self.rotor[:, None, self.turning]).reshape(len(self.state), -1)
+        scale = np.sqrt(np.mean(products**2, axis=0))
+        return products / scale, np.asarray(np.linalg.pinv(products / scale)), scale
+
     @classmethod
     def of(cls, vehicle: VehicleSettings) -> Probe:
         """Draw motions of the size that the vehicle has."""
@@ -128,16 +141,15 @@ def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array
 
 def _fitted(columns: Array, probe: Probe) -> Array | None:
     """Fit terms to columns, shape (time, 6, coefficient); None where they leave anything."""
-    used = [index for index in range(probe.rotor.shape[1]) if np.any(probe.rotor[:, index])]
-    joint = (probe.state[:, :, None] * probe.rotor[:, None, used]).reshape(len(columns), -1)
-    scale = np.sqrt(np.mean(joint**2, axis=0))
+    joint, inverse, scale = probe.joint
     values = columns.reshape(len(columns), -1)
-    weights = np.linalg.lstsq(joint / scale, values, rcond=None)[0]
+    weights = inverse @ values
     size = np.abs(weights).max(axis=0, initial=0.0)
-    left = np.abs(values - joint / scale @ weights).max(axis=0, initial=0.0)
+    left = np.abs(values - joint @ weights).max(axis=0, initial=0.0)
     if np.any(left > _EXACT * np.abs(values).max(axis=0, initial=0.0)):
         return None
     weights[np.abs(weights) < _NEGLIGIBLE * size] = 0.0
     found = np.zeros((*columns.shape[1:], probe.state.shape[1], probe.rotor.shape[1]))
+    used = probe.turning
     found[..., used] = (weights / scale[:, None]).T.reshape(*columns.shape[1:], probe.state.shape[1], len(used))
     return np.moveaxis(found, 1, 0)

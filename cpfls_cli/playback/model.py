@@ -19,7 +19,7 @@ from cpfls_cli.errors import ComputationError
 from cpfls_cli.fuzzy.basis import Consequents
 from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.kernels import Airflow, Body, Terms, airflow_terms
+from cpfls_cli.playback.kernels import MOST_COLUMNS, Airflow, Body, Terms, airflow_terms
 from cpfls_cli.playback.rotors import Hold, RotorResponse, rotor_terms_by_step
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -102,7 +102,16 @@ class VehicleModel:
         return np.asarray(sum(self.part_weights().values()))
 
     def part_weights(self) -> dict[str, Array]:
-        """Give the weights of each part alone: rotors, effects by name, remainder; shapes as `weights`."""
+        """Give the weights of each part alone: rotors, effects by name, remainder; shapes as `weights`.
+
+        Raises
+        ------
+        ComputationError
+            If the remainder has more columns than the compiled loops hold.
+        """
+        if airflow_terms(self.airflow) > 2 * MOST_COLUMNS:
+            columns = airflow_terms(self.airflow) // 2
+            raise ComputationError(f"a remainder of {columns} columns is too large; {MOST_COLUMNS} are possible")
         parts = {"rotors": np.zeros((6, self.term_count, 1 + 4 * self.rotors))}
         parts["rotors"][:, 0] = rotor_weights(self.vehicle, self.thrust_linear, self.response)
         probe = Probe.of(self.vehicle)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -121,9 +121,20 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
 """Blocks that are the same for all vehicles."""
 
 
+@lru_cache(maxsize=256)
+def _stated_weights(block: str, vehicle: VehicleSettings) -> Array:
+    """Weigh the terms for an effect on the stated vehicle; a search asks for it again and again."""
+    return effect_weights(block, {}, _probe(vehicle))
+
+
+@lru_cache(maxsize=8)
+def _probe(vehicle: VehicleSettings) -> Probe:
+    return Probe.of(vehicle)
+
+
 def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
     """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder."""
-    probe = Probe.of(vehicle)
+    probe = _probe(vehicle)
     effects = (
         name for name, known in CATALOGUE.items() if not known.shapes and polynomial(known, probe, {}) is not None
     )
@@ -260,7 +271,6 @@ class Layout:
     def _columns(self) -> dict[str, Column]:
         """What the coefficients of effects and remainder add to the weights."""
         columns: dict[str, Column] = {}
-        probe = Probe.of(self.vehicle)
         terms = len(STATE_TERMS) + airflow_terms(self.used_airflow)
         rotors = len(self.vehicle.rotors)
         for block in self.blocks:
@@ -270,7 +280,7 @@ class Layout:
             elif not _is_effect(block):
                 continue
             else:
-                weights = effect_weights(block, {}, probe)
+                weights = _stated_weights(block, self.vehicle)
                 more = np.zeros((*weights.shape[:2], terms - weights.shape[2], weights.shape[3]))
                 weights = np.concatenate([weights, more], axis=2)
             named = zip(self._numbers(block), weights, strict=True)
@@ -443,7 +453,8 @@ class Layout:
         xx, yy, zz, xy, xz, yz = (float(self.inertia(values)[entry]) for entry in INERTIA_ENTRIES)
         vehicle = replace(self.vehicle, rotors=rotors, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
         coefficients = self.coefficients(values)
-        effects = tuple(self._effect(name, coefficients, vehicle) for name in self.blocks if _is_effect(name))
+        probe = Probe.of(vehicle)
+        effects = tuple(self._effect(name, coefficients, probe) for name in self.blocks if _is_effect(name))
         learned = np.array([value for name, value in coefficients.items() if name.startswith(f"{REMAINDER}.")])
         return VehicleModel(
             vehicle=vehicle,
@@ -454,9 +465,9 @@ class Layout:
             remainder=self._remainder(learned) if len(learned) else None,
         )
 
-    def _effect(self, name: str, coefficients: Mapping[str, float], vehicle: VehicleSettings) -> ModelEffect:
+    def _effect(self, name: str, coefficients: Mapping[str, float], probe: Probe) -> ModelEffect:
         """Count the coefficients of an effect on the vehicle that was found, not on the stated one."""
-        found = effect_weights(name, {}, Probe.of(vehicle))
+        found = effect_weights(name, {}, probe)
         scaled = [
             coefficients[number.name] * _ratio(self._columns[number.name].weights[:, : len(STATE_TERMS)], weights)
             for number, weights in zip(self._numbers(name), found, strict=True)

@@ -125,6 +125,17 @@ class Grounds:
         ]
         return np.asarray(np.all(np.array(lower, dtype=bool), axis=0))
 
+    def predicts(self, predictor: str) -> BoolArray:
+        """Flag axes whose rate is replayed better than if nothing moved, on average, in each part, shape (3,).
+
+        True where no window could be replayed, so that nothing speaks against it.
+        """
+        better = np.ones(3, dtype=bool)
+        for steps in self.replayed.values():
+            mine, still = (_mean(steps.window_error[steps.model.index(name)]) for name in (predictor, NOTHING_MOVES))
+            better &= ~(mine >= still) | (still == 0)
+        return better
+
     def lost(self, predictor: str) -> int:
         """Count the windows of all judged parts in which a predictor was lost."""
         return sum(_lost(steps, predictor) for steps in self.replayed.values())

@@ -51,7 +51,8 @@ def verdict(grounds: Grounds) -> Verdict:
        body, or explains no more of the torque about an excited axis than a constant does (R2 of 0 or less).
     3. *do-not-use* where the model loses more than one in twenty windows of a held-out part; where less than 97.5 % of
        the bootstrap draws of D(q) are positive definite at all attitudes visited that are 17 degrees from a vertical
-       pitch; or where the held-out R2 of body torque about any axis is below `r2_min` in any part. Instead of R2,
+       pitch; or where the held-out R2 of body torque about any axis is below `r2_min` in any part, or its body rate,
+       replayed, is farther off than if nothing moved: R2 of torque alone is no evidence of prediction. Instead of R2,
        which then measures noise, an axis that hardly accelerates is judged by its body rate replayed: better by more
        than chance, in every part, than the prediction that it stays what it is.
     4. *good-for-control* where the model is the same rule at every attitude, training went all round, the samples
@@ -84,7 +85,7 @@ def good_axes(grounds: Grounds, predictor: str) -> BoolArray:
 
 
 def confirmed_axes(grounds: Grounds, predictor: str) -> BoolArray:
-    """Flag the body axes about which the held-out R2 of torque is at least `r2_min`.
+    """Flag the body axes about which the held-out R2 of torque is at least `r2_min`, and playback does not deny it.
 
     Parameters
     ----------
@@ -96,7 +97,7 @@ def confirmed_axes(grounds: Grounds, predictor: str) -> BoolArray:
     -------
     array of bool, shape (3,)
     """
-    return np.asarray(grounds.r2(predictor) >= grounds.r2_min)
+    return np.asarray((grounds.r2(predictor) >= grounds.r2_min) & grounds.predicts(predictor))
 
 
 def _decided(grounds: Grounds) -> tuple[Label, Reason]:
@@ -131,6 +132,11 @@ def _not_good_enough(grounds: Grounds) -> str | None:
     if np.all(good_axes(grounds, MODEL)) and np.any(confirmed_axes(grounds, MODEL)):
         return None
     r2 = numbers(grounds.r2(MODEL))
+    denied = (grounds.r2(MODEL) >= grounds.r2_min) & ~grounds.predicts(MODEL)
+    if np.any(denied):
+        return (
+            f"its body rate about {_names(denied)}, replayed, is farther off than if nothing moved (R2 of torque {r2})"
+        )
     return f"not good enough for control: R2 of held-out body torque {r2}; {grounds.r2_min:g} is asked for"
 
 

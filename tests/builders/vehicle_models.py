@@ -7,7 +7,14 @@ import numpy as np
 
 import cpfls_cli
 from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.vehicle_model import VehicleGroup, VehicleRecord
+from cpfls_cli.artifacts.vehicle_model import (
+    FoundNumbersGroup,
+    SharesGroup,
+    StructuresTriedGroup,
+    TradesGroup,
+    VehicleGroup,
+    VehicleRecord,
+)
 from cpfls_cli.effects.polynomial import Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
@@ -84,5 +91,37 @@ def whole(vehicle=QUAD, *, order=2, **changed):
 
 
 def record_of(model, not_held=(), config="seed: 1\n"):
-    """The artifact of a vehicle."""
-    return VehicleRecord(header=Header(cpfls_cli.__version__, 1, config), vehicle=VehicleGroup.of(model, not_held))
+    """The artifact of a vehicle, as if it had been found by a search over two structures."""
+    none, text = np.zeros(0), ()
+    names = ("chosen", "best", "greedy", "everything", "nothing", "front", "front")
+    worse = np.array([0.0, 0.0, 0.0, 0.1, 0.4, 0.0, 0.4])
+    return VehicleRecord(
+        header=Header(cpfls_cli.__version__, 1, config),
+        vehicle=VehicleGroup.of(model, not_held),
+        found=FoundNumbersGroup(
+            name=("inertia.Ixx", "linear_damping.d_x"),
+            unit=("kg m^2", "N m s/rad"),
+            value=np.array([0.02, 1e-3]),
+            low=np.array([0.018, 0.0]),
+            high=np.array([0.022, 2e-3]),
+            stated=np.array([0.004, np.nan]),
+            determined=np.array([True, False]),
+            at_bound=np.array([False, True]),
+        ),
+        trade=TradesGroup(first=text, second=text, correlation=none),
+        structure=StructuresTriedGroup(
+            name=names,
+            blocks=tuple("" if name == "nothing" else "inertia linear_damping" for name in names),
+            error=0.5 + worse,
+            worse=worse,
+            uncertain=np.full(len(names), 0.01),
+            numbers=np.array([4, 4, 4, 9, 0, 4, 0], dtype=np.int64),
+            condition_number=np.full(len(names), 30.0),
+        ),
+        share=SharesGroup(name=("rotors",), torque=np.ones((1, 3)), force=np.ones((1, 3))),
+        airspeed=4.0,
+        evaluated=2,
+        complete=True,
+        blocks=30,
+        warning=text,
+    )
