@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce reproduce-full quick hexarotor full-circle crazyflie gap-example test lint bench blind-study clean FORCE
+.PHONY: help reproduce reproduce-full quick hexarotor full-circle crazyflie gap-example replay-example test lint bench blind-study clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -21,6 +21,7 @@ help:
 	@echo "  make full-circle full rotations of a held vehicle: the structure that wins, and a sweep over twelve others"
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
 	@echo "  make gap-example [HIDDEN=NAME=VALUES]   a flight with a hidden effect, and what the gap workflow makes of it"
+	@echo "  make replay-example   a vehicle that is not what its config states: found in flights, and what it predicts then"
 	@echo "  make lint        formatting, lint, types, import contracts"
 	@echo "  make bench       benchmarks, as Markdown tables"
 	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
@@ -217,6 +218,47 @@ $(GAP_REPORT): $(GAP_CONFIG) $(GAP)/flight-1.h5 $(GAP)/flight-2.h5
 docs/gap-example.svg: $(GAP_REPORT)
 	sed -n '/<figure id="gap-picture-1">/,/<\/svg>/{/<figure/d;s/.*<svg/<svg/;s/<\/svg>.*/<\/svg>/;p}' $< > $@
 
+# Flights of a vehicle that is not what its config states; the last is held out. Each has a path of its own.
+REPLAY := data/replay-example
+REPLAY_CONFIG := configs/replay-example.yaml
+TRAINING := $(REPLAY)/flight-1.h5 $(REPLAY)/flight-2.h5 $(REPLAY)/flight-3.h5
+HELD_OUT := $(REPLAY)/flight-4.h5
+replay-example: $(REPLAY)/report.html $(REPLAY)/vehicle.c
+	@echo "open $<"
+
+$(REPLAY)/path-2.h5: TOWARDS := [1.0, -0.7, 0.3]
+$(REPLAY)/path-2.h5: METRES := 3.5
+$(REPLAY)/path-3.h5: TOWARDS := [-0.4, 1.0, -0.2]
+$(REPLAY)/path-3.h5: METRES := 2.0
+$(REPLAY)/path-4.h5: TOWARDS := [0.8, 1.0, 0.4]
+$(REPLAY)/path-4.h5: METRES := 3.2
+$(REPLAY)/path-%.h5: $(REPLAY_CONFIG) | $(INSTALLED)
+	@mkdir -p $(@D)
+	$(CPFLS) trajectory $< -o $@ --force $(if $(TOWARDS),--set trajectory.path=straight \
+		--set "trajectory.direction=$(TOWARDS)" --set trajectory.displacement_m=$(METRES))
+
+$(REPLAY)/flight-%.h5: $(REPLAY)/path-%.h5
+	$(CPFLS) simulate $(REPLAY_CONFIG) $< --seed $* -o $@ --force
+
+$(REPLAY)/vehicle.h5: $(REPLAY_CONFIG) $(TRAINING) $(HELD_OUT)
+	$(CPFLS) vehicle $< $(TRAINING) --held-out $(HELD_OUT) -o $@ --force
+
+$(REPLAY)/replay-stated.h5: $(REPLAY_CONFIG) $(HELD_OUT)
+	$(CPFLS) replay $< vehicle $(HELD_OUT) -o $@ --force
+
+$(REPLAY)/replay-found.h5: $(REPLAY_CONFIG) $(REPLAY)/vehicle.h5 $(HELD_OUT)
+	$(CPFLS) replay $^ -o $@ --force
+
+$(REPLAY)/vehicle.c: $(REPLAY)/vehicle.h5
+	$(CPFLS) export $< -o $@ --force
+
+$(REPLAY)/report.html: $(REPLAY_CONFIG) $(REPLAY)/vehicle.h5 $(REPLAY)/replay-found.h5 $(REPLAY)/replay-stated.h5
+	$(CPFLS) report $^ -o $@ --force
+
+# The picture of README.md: the element alone, without its page.
+docs/replay-example.svg: $(REPLAY)/report.html
+	sed -n '/<figure id="vehicle-errors-1">/,/<\/svg>/{/<figure/d;s/.*<svg/<svg/;s/<\/svg>.*/<\/svg>/;p}' $< > $@
+
 test: $(INSTALLED_DEV)
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
@@ -264,6 +306,6 @@ blind-study: $(INSTALLED_DEV)
 	$(BIN)/python -m benchmarks.blind_study run --out data/blind --seed $(SEED) --draws $(DRAWS) --none $(NONE) $(SIZE)
 
 clean:
-	rm -rf data/paper data/quick data/hexarotor data/full-circle data/crazyflie data/gap-example
+	rm -rf data/paper data/quick data/hexarotor data/full-circle data/crazyflie data/gap-example data/replay-example
 
 FORCE:

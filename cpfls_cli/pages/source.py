@@ -29,6 +29,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 R = TypeVar("R", bound=Record, default=Any)
 
 GAP_TITLE = "Where simulation and flight disagree"
+VEHICLE_TITLE = "A vehicle found in flights"
 """Heading of a page about nothing else, unless the config gives one."""
 
 
@@ -147,14 +148,16 @@ class Sources:
 
     @property
     def only_gap(self) -> bool:
-        """Whether nothing else was given than how models and flights disagree."""
-        return len(self.gap) + len(self.replays) == len(self.all)
+        """Whether nothing else was given than how models and flights disagree, and what was found then."""
+        return len(self.gap) + len(self.replays) + len(self.vehicles) == len(self.all)
 
     @property
     def title(self) -> str:
         """Heading of the page."""
         usual = self.settings.title == ReportSettings().title
-        return GAP_TITLE if usual and self.only_gap else self.settings.title
+        if not usual or not self.only_gap:
+            return self.settings.title
+        return VEHICLE_TITLE if self.vehicles else GAP_TITLE
 
     def by_hash(self, sha256: str | None) -> Source[Any] | None:
         """Look up an artifact by its hash."""

@@ -12,6 +12,7 @@ from cpfls_cli.pages.model import scores_table, solution, verdict_line
 from cpfls_cli.pages.provenance import missing
 from cpfls_cli.pages.replay import verdict_box
 from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.vehicle_model import found_box
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
 from cpfls_cli.report.numbers import ROUNDING, percent, plain, sentence
 
@@ -21,6 +22,7 @@ def summary_section(sources: Sources) -> Section:
     blocks: list[Block] = [verdict_line(model) for model in sources.models]
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
+    blocks += [found_box(vehicle) for vehicle in sources.vehicles]
     blocks += [verdict_box(replay) for replay in sources.replays]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)

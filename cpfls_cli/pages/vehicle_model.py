@@ -15,17 +15,17 @@ from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text, Tone
-from cpfls_cli.report.numbers import joined, number, percent
+from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NAMES = {
-    "chosen": "chosen: fewest numbers within one standard error of the best",
+    "chosen": "chosen",
     "best": "smallest error",
-    "greedy": "blocks added one by one",
+    "greedy": "one by one",
     "everything": "all blocks",
-    "nothing": "the stated vehicle",
+    "nothing": "stated vehicle",
 }
 _LABELS = {
     "good-for-simulation": "GOOD FOR SIMULATION AND CONTROL",
@@ -47,14 +47,15 @@ _FAR = 3.0
 
 def answer(found: Source[VehicleRecord]) -> Iterator[Block]:
     """Say what was found, how well it predicts what it was not fitted to, and what to be careful with."""
-    yield _box(found)
+    yield found_box(found)
     if found.record.held_out is not None:
         yield errors_table(found.record.held_out, 1)
     yield _numbers_table(found, 1)
     yield from (Text(warning, "warning") for warning in warnings(found.record))
 
 
-def _box(found: Source[VehicleRecord]) -> Box:
+def found_box(found: Source[VehicleRecord]) -> Box:
+    """Say what was found, and how well it predicts what it was not fitted to."""
     record = found.record
     errors = dict(zip(record.structure.name, record.structure.error, strict=True))
     title = f"{found.label}: a vehicle with {len(record.found.name)} numbers found in its flights."
@@ -94,10 +95,13 @@ def warnings(record: VehicleRecord) -> list[str]:
     """Warn of numbers that the flights do not tell, and of what is known about the flights."""
     found = record.found
     said = list(record.warning)
-    bound = [name for name, at in zip(found.name, found.at_bound, strict=True) if at]
+    bound = [row["name"] for row in rows_of(found) if row["at_bound"] and row["value"] != 0]
+    none = [row["name"] for row in rows_of(found) if row["at_bound"] and row["value"] == 0]
     open_ = [name for name, known in zip(found.name, found.determined, strict=True) if not known]
     if bound:
         said.append(f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; not a physical number")
+    if none:
+        said.append(f"{joined(none)}: 0, the least that it can be; the flights show none of it")
     if open_:
         said.append(f"{joined(open_)}: the flights say no more of it than what was believed before")
     said.extend(
@@ -141,7 +145,6 @@ def found_vehicle_section(sources: Sources) -> Section | None:
 def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
     record = found.record
     yield Heading(found.label)
-    yield _box(found)
     yield Facts(
         [
             ("Structures judged", str(record.evaluated)),
@@ -178,7 +181,7 @@ def _structures_table(record: VehicleRecord, index: int) -> Table:
         [
             _NAMES[row["name"]],
             number(row["error"], 4),
-            f"{number(row['worse'], 2)} ± {number(row['uncertain'], 2)}",
+            f"{number(row['worse'], 2)} ± {number(row['uncertain'], 2)}" if row["worse"] else UNKNOWN,
             str(row["numbers"]),
             number(row["condition_number"], 2),
             row["blocks"].replace(" ", ", "),
@@ -186,7 +189,10 @@ def _structures_table(record: VehicleRecord, index: int) -> Table:
         for row in rows_of(record.structure)
         if row["name"] in _NAMES
     ]
-    caption = "Structures, judged on parts of the flights kept aside in turn."
+    caption = (
+        "Structures, judged on parts of the flights kept aside in turn. Chosen: the fewest numbers within one standard "
+        "error of the smallest error; one by one: blocks added while they lower the error."
+    )
     header = ("Structure", "Error", "Worse than the best", "Numbers", "Condition", "Blocks")
     return Table(f"vehicle-structures-{index}", caption, header, rows, frozenset({0, 5}), frozenset({0, 5}))
 
@@ -202,8 +208,8 @@ def _structures_figure(record: VehicleRecord, index: int) -> Plot:
         markers = {"chosen": "s", "best": "^", "greedy": "v", "everything": "D", "nothing": "x"}
         for place, (name, marker) in enumerate(markers.items()):
             row = next(each for each in rows if each["name"] == name)
-            color = style_of(place)["color"]
-            axes.plot([row["numbers"]], [row["error"]], marker, label=name, color=color, markersize=7, linestyle="none")
+            look = {"label": _NAMES[name], "color": style_of(place)["color"], "markersize": 7, "linestyle": "none"}
+            axes.plot([row["numbers"]], [row["error"]], marker, **look)
         axes.axhline(1.1, label="rates stay", **BASELINE)
         axes.set_xlabel("free numbers")
         axes.set_ylabel("error on flights kept aside")

@@ -251,14 +251,15 @@ def _windows(flight: PlaybackFlight, settings: PlaybackSettings, interval_s: flo
 def _greedy(bench: _Bench, blocks: tuple[str, ...], start: Judged) -> Iterator[Judged]:
     """Add the block that lowers the error most, until none lowers it by more than its standard error.
 
-    What a block gained before bounds what it may gain now, near enough, so that few are tried again.
+    What a block gained before bounds what it may gain now, near enough, so that few are tried again; all of them are
+    before it ends, because some gain only beside others.
     """
-    present, promise = start, dict.fromkeys(blocks, np.inf)
+    present, promise, all_tried = start, dict.fromkeys(blocks, np.inf), False
     yield present
     while promise:
         best: Judged | None = None
         for block in sorted(promise, key=lambda name: -promise[name]):
-            if best is not None and promise[block] < present.error - best.error:
+            if best is not None and not all_tried and promise[block] < present.error - best.error:
                 break
             tried = bench.judge(_with(present.structure, block, blocks))
             promise[block] = present.error - tried.error
@@ -268,7 +269,11 @@ def _greedy(bench: _Bench, blocks: tuple[str, ...], start: Judged) -> Iterator[J
             return
         better, uncertain = present.worse_than(best)
         if better <= uncertain:
-            return
+            if all_tried:
+                return
+            all_tried = True
+            continue
+        all_tried = False
         for block in set(best.structure.blocks) & promise.keys():
             del promise[block]
         present = best

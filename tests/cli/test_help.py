@@ -17,6 +17,7 @@ COMMANDS = (
     "identify",
     "sweep",
     "predict",
+    "vehicle",
     "replay",
     "export",
     "report",

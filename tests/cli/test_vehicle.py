@@ -1,0 +1,245 @@
+"""`cpfls vehicle`: what it writes and prints of a vehicle found in flights, and what it refuses."""
+
+import json
+import os
+import signal
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.report.outcome import plain
+from tests.builders.command_line import undrawn
+
+TRIED = ("inertia", "linear_damping", "rotor_drag", "lag")
+DAMPING = 0.012
+CONFIG = """\
+seed: 1
+vehicle:
+  mass_kg: 0.8
+  inertia_kg_m2: [0.0040, 0.0044, 0.0075]
+  rotor_speed_max_rad_s: 1500.0
+  rotors:
+    - {position_m: [0.12, -0.11, 0.0], spin: 1, thrust_factor_n_s2: 6.0e-6, drag_factor_n_m_s2: 1.4e-7}
+    - {position_m: [-0.12, -0.11, 0.0], spin: -1, thrust_factor_n_s2: 6.0e-6, drag_factor_n_m_s2: 1.4e-7}
+    - {position_m: [-0.12, 0.11, 0.0], spin: 1, thrust_factor_n_s2: 6.0e-6, drag_factor_n_m_s2: 1.4e-7}
+    - {position_m: [0.12, 0.11, 0.0], spin: -1, thrust_factor_n_s2: 6.0e-6, drag_factor_n_m_s2: 1.4e-7}
+trajectory: {legs: 2, displacement_m: 2.0, period_s: 0.12, sample_time_s: 0.01, duration_s: 4.0, yaw_turn_rad: 4.0}
+simulation:
+  mode: closed-loop
+  closed_loop:
+    attitude_frequency_hz: 2.5
+    yaw_frequency_hz: 1.0
+    effects: {linear_damping: [0.012, 0.012, 0.012]}
+  noise: {attitude: 0.002, body_rate: 0.01, velocity: 0.01, position: 0.002, rotor_speed: 1.0}
+"""
+
+
+def left_out(tried):
+    vehicle = validate(parse_config(CONFIG, "config"), "config").vehicle
+    return [block for block in blocks_of(vehicle) if block not in tried]
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory):
+    path = tmp_path_factory.mktemp("vehicle") / "quad.yaml"
+    search = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "leave_out": left_out(TRIED)}
+    path.write_text(f"{CONFIG}playback: {json.dumps(search)}\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def flights(cpfls, config):
+    """One flight to learn from, another to judge on."""
+    folder, made = config.parent, []
+    for number, direction in ((1, "[-0.3, 1.0, 0.4]"), (2, "[1.0, -0.7, 0.3]")):
+        plan, flight = folder / f"path-{number}.h5", folder / f"flight-{number}.h5"
+        words = ("--set", "trajectory.path=straight", "--set", f"trajectory.direction={direction}")
+        for result in (
+            cpfls("trajectory", config, "-o", plan, *words),
+            cpfls("simulate", config, plan, "--seed", number, "-o", flight),
+        ):
+            assert result.exit_code == 0, result.stderr
+        made.append(flight)
+    return made
+
+
+@pytest.fixture(scope="module")
+def found(cpfls, config, flights):
+    """What is printed for machines, and the file."""
+    output = config.parent / "vehicle.h5"
+    result = cpfls("vehicle", config, flights[0], "--held-out", flights[1], "-o", output, "--json")
+    assert result.exit_code == 0, result.stderr
+    return SimpleNamespace(output=output, told=json.loads(result.stdout), record=read_record(output, VehicleRecord))
+
+
+def test_it_finds_what_was_put_in(found):
+    numbers, truth = found.told["numbers"], dict.fromkeys("xyz", DAMPING)
+    for axis, value in truth.items():
+        number = numbers[f"linear_damping.d_{axis}"]
+        assert number["value"] == pytest.approx(value, rel=0.15)
+        assert number["low"] < number["value"] < number["high"]
+        assert (number["stated"], number["determined"], number["at_bound"]) == (None, True, False)
+    assert found.told["effects"]["linear_damping"] == pytest.approx([DAMPING] * 3, rel=0.15)
+    assert found.told["mass_kg"] == 0.8
+
+
+def test_json_tells_verdict_structures_and_what_was_held_out(found):
+    told = found.told
+    assert told["verdict"] == "good-for-simulation"
+    assert told["complete"] is True
+    names = [row["name"] for row in told["structures"]]
+    assert names[:5] == ["chosen", "best", "greedy", "everything", "nothing"]
+    assert set(names[5:]) == {"front"}
+    errors = {row["name"]: row["error"] for row in told["structures"][:5]}
+    assert errors["best"] <= errors["chosen"] < 0.1 * errors["nothing"]
+    assert set(told["structures"][3]["blocks"].split()) == set(TRIED)
+    assert told["held_out"]["flights"] == ["flight-2.h5"]
+    models = told["held_out"]["models"]
+    assert models["model"]["body_rate"]["sum"] < 0.2 * models["stated"]["body_rate"]["sum"]
+    assert set(told["shares"]) == {"rotors", *told["effects"]}
+
+
+def test_the_file_keeps_to_its_format_and_says_the_same(cpfls, found):
+    assert cpfls("check", found.output).exit_code == 0
+    assert plain(found.record.summary) == found.told
+    assert "a vehicle found in flights" in cpfls("info", found.output).stdout
+
+
+def test_people_read_verdict_and_numbers(cpfls, config, flights, found, tmp_path):
+    output = tmp_path / "vehicle.h5"
+    result = cpfls("vehicle", config, flights[0], "--held-out", flights[1], "-o", output)
+    assert result.exit_code == 0, result.stderr
+    assert output.read_bytes() == found.output.read_bytes()
+    assert result.stdout.startswith("GOOD FOR SIMULATION AND CONTROL: vehicle.h5: a vehicle with ")
+    for words in ("Body rate: better than “nothing moves” at every horizon", "linear_damping.d_x", "stated vehicle"):
+        assert words in result.stdout
+
+
+def test_without_a_held_out_flight_it_is_not_judged(cpfls, config, flights, tmp_path):
+    words = ("--set", f"playback.leave_out={json.dumps(left_out(TRIED[:2]))}", "--json")
+    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", *words)
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert (told["verdict"], told["held_out"]) == ("not-judged", None)
+
+
+def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
+    replayed = cpfls("replay", config, found.output, flights[1], "-o", tmp_path / "replay.h5", "--json")
+    assert replayed.exit_code == 0, replayed.stderr
+    model = json.loads(replayed.stdout)["models"]["model"]
+    assert model["body_rate"]["sum"] == found.told["held_out"]["models"]["model"]["body_rate"]["sum"]
+    exported = cpfls("export", found.output, "-o", tmp_path / "vehicle.json")
+    assert exported.exit_code == 0, exported.stderr
+    with undrawn():
+        page = cpfls("report", config, found.output, "-o", tmp_path / "page.html", "--json")
+    told = json.loads(page.stdout)
+    assert told["sections"] == ["summary", "found-vehicle", "vehicle", "provenance"]
+    text = (tmp_path / "page.html").read_text()
+    assert "A vehicle found in flights" in text
+    assert "Not shown, because" not in text
+
+
+def test_dry_run_writes_nothing(cpfls, config, flights, tmp_path):
+    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", "--dry-run")
+    assert result.exit_code == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def interrupt_at(monkeypatch):
+    """Send this very process an interrupt when so many structures were judged."""
+
+    def at(number):
+        from cpfls_cli.commands import vehicle
+
+        find = vehicle.find_vehicle
+
+        def finding(stated, flights, settings, rng, progress):
+            def told(done, total, best):
+                if done == number:
+                    os.kill(os.getpid(), signal.SIGINT)
+                progress(done, total, best)
+
+            return find(stated, flights, settings, rng, told)
+
+        monkeypatch.setattr(vehicle, "find_vehicle", finding)
+
+    return at
+
+
+def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, interrupt_at):
+    interrupt_at(3)
+    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", "--json")
+    assert result.exit_code == 130
+    told = json.loads(result.stdout)
+    assert (told["complete"], told["evaluated"]) == (False, 3)
+    shown = cpfls("report", config, tmp_path / "v.h5", "-o", tmp_path / "page.md")
+    assert shown.exit_code == 0
+    assert "the search was stopped before its end" in (tmp_path / "page.md").read_text()
+
+
+def test_an_interrupt_before_anything_was_found_writes_nothing(config, flights, refuse, tmp_path, interrupt_at):
+    interrupt_at(1)
+    (message,) = refuse("vehicle", config, flights[0], "-o", tmp_path / "v.h5", code=130)
+    assert message == "the search was interrupted before a vehicle was found, so none is written"
+
+
+@pytest.fixture
+def refused(refuse, config, tmp_path):
+    def call(*flights, options=()):
+        (message,) = refuse("vehicle", config, *flights, "-o", tmp_path / "x.h5", *options)
+        return message
+
+    return call
+
+
+def test_an_existing_file_is_kept(refuse, config, flights, tmp_path):
+    (tmp_path / "v.h5").write_text("mine")
+    assert refuse("vehicle", config, flights[0], "-o", tmp_path / "v.h5") == [
+        f"{tmp_path / 'v.h5'}: exists already; --force replaces it"
+    ]
+
+
+def test_an_unknown_block_is_refused(refused, flights):
+    message = refused(flights[0], options=("--set", "playback.leave_out=[rotor_drga]"))
+    assert message == "playback.leave_out = rotor_drga: no such block (did you mean rotor_drag?)"
+
+
+def test_a_flight_without_rotor_speeds_is_refused(refused, flights, tmp_path):
+    still = tmp_path / "still.h5"
+    with h5py.File(flights[0]) as source, h5py.File(still, "w") as target:
+        target.attrs.update(source.attrs)
+        for name in source:
+            if name not in ("rotor_speed", "rotor_command", "torque", "body_torque"):
+                source.copy(name, target)
+    assert refused(still).startswith("still.h5: ")
+
+
+def test_a_flight_of_another_vehicle_is_refused(refused, flights):
+    message = refused(flights[0], options=("--set", "vehicle.mass_kg=0.9"))
+    assert message.startswith(f"{flights[0]}: was made with another vehicle")
+
+
+@pytest.mark.parametrize("more", [(), ("--dry-run",)])
+def test_a_flight_shorter_than_the_horizon_is_refused(refused, flights, more):
+    message = refused(flights[0], options=("--set", "playback.horizon_s=5.0", *more))
+    assert message.startswith("flight-1.h5: a horizon of 5 s is longer than its longest stretch without a pause")
+
+
+def test_a_log_of_stated_torque_is_refused(refused, tmp_path):
+    log, time = tmp_path / "stated.csv", np.arange(0.0, 4.0, 0.01)
+    np.savetxt(log, np.column_stack([time, np.zeros((len(time), 6))]), delimiter=",", header="t,p,q,r,mx,my,mz",
+               comments="")  # fmt: skip
+    signals = {
+        "body_rate": {"columns": ["p", "q", "r"], "unit": "rad/s"},
+        "body_torque": {"columns": ["mx", "my", "mz"], "unit": "N m"},
+    }
+    options = ("--set", f"import.signals={json.dumps(signals)}", "--set", "import.torque_source=column")
+    message = refused(log, options=options)
+    assert message.startswith("stated.csv: states torque and thrust instead of rotor speeds")

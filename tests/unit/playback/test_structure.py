@@ -1,0 +1,101 @@
+"""Which blocks are chosen: those that were flown, whatever else is tried."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.playback import structure
+from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, parts_of, tried_blocks
+from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
+
+TRIED = ("linear_damping", "rotor_drag", "flapping_moment", "quadratic_damping", "inertia")
+QUICK = PlaybackSettings(
+    search_windows=20,
+    folds=2,
+    population=2,
+    generations=0,
+    leave_out=tuple(block for block in blocks_of(STATED) if block not in TRIED),
+)
+
+
+@pytest.fixture(scope="module")
+def flights():
+    return flown(truth(), ("figure", "steps"), duration_s=5.0, noise=MIDDLING, seed=2)
+
+
+def chosen(flights, progress=lambda *_: None):
+    return choose(STATED, flights, QUICK, np.random.default_rng(0), progress)
+
+
+def stopping_at(number):
+    def progress(done, *_):
+        if done == number:
+            raise SearchStoppedError
+
+    return progress
+
+
+def test_a_stopped_search_gives_what_it_has(flights):
+    choice = chosen(flights, stopping_at(3))
+    assert (choice.complete, choice.evaluated) == (False, 3)
+    assert choice.best.error <= choice.chosen.error < choice.nothing.error
+
+
+def test_a_search_stopped_before_all_blocks_were_judged_has_nothing(flights):
+    with pytest.raises(SearchStoppedError):
+        chosen(flights, stopping_at(1))
+
+
+def test_a_search_tells_how_far_it_is(flights):
+    told = []
+    choice = chosen(flights, lambda done, total, best: told.append((done, total, best)))
+    assert choice.complete
+    assert [done for done, _, _ in told] == list(range(1, choice.evaluated + 1))
+    assert all(done <= total for done, total, _ in told)
+    assert told[-1][2] == choice.best.error
+    assert choice.chosen.numbers <= choice.best.numbers
+    assert "flapping_moment" in choice.chosen.structure.blocks
+    assert choice.chosen.error < 0.3 * choice.nothing.error
+
+
+class Bench:
+    """Knows the error of each structure, its blocks one letter each, with noise that no comparison sees through."""
+
+    def __init__(self, errors):
+        self.errors, self.known = errors, {}
+
+    def judge(self, tried):
+        error, count = self.errors["".join(tried.blocks)], len(tried.blocks)
+        by_block = error + 0.002 * (-1) ** count * np.array([-1.0, 1.0])
+        return self.known.setdefault(tried, structure.Judged(tried, error, by_block, count, 1.0, ()))
+
+
+def test_blocks_that_gain_only_beside_others_are_added():
+    """Alone `b` gains nothing, and beside `a` the next to be tried, `c`, gains no more than noise."""
+    bench = Bench({"": 1.0, "a": 0.5, "b": 1.0, "c": 0.98, "ab": 0.3, "ac": 0.4999, "abc": 0.1})
+    path = list(structure._greedy(bench, ("a", "b", "c"), bench.judge(Structure(()))))
+    assert ["".join(each.structure.blocks) for each in path] == ["", "a", "ab", "abc"]
+
+
+def test_no_block_can_be_left_out_of_the_choice():
+    bench = Bench({"": 1.0, "a": 0.3, "b": 0.4, "c": 0.9, "ab": 0.1004, "ac": 0.3, "bc": 0.4, "abc": 0.1})
+    bench.judge(Structure(("a", "b", "c")))
+    structure._refine(bench)
+    assert structure._preferred(bench)[2].structure.blocks == ("a", "b")
+    assert Structure(("a",)) in bench.known
+
+
+def test_flights_that_do_not_translate_are_asked_for_rotation_alone(flights):
+    still = [replace(flight, has_velocity=False) for flight in flights]
+    assert set(tried_blocks(STATED, flights, QUICK)) == set(TRIED)
+    assert set(tried_blocks(STATED, still, QUICK)) == {"linear_damping", "quadratic_damping", "inertia"}
+
+
+def test_parts_are_flights_or_pieces_of_a_single_one(flights):
+    parts = parts_of(flights, QUICK)
+    assert [[windows.flight.name for windows in part] for part in parts] == [[each.name] for each in flights]
+    first, second = (part[0].starts for part in parts_of(flights[:1], QUICK))
+    assert first[-1] + 50 < second[0]
