@@ -27,6 +27,11 @@ def _compiled(function: Function) -> Function:
     return compiled(function)
 
 
+def _compiled_sum(function: Function) -> Function:
+    """Compile, and let the processor take the terms of a sum in the order that suits its registers."""
+    return compiled(function, fastmath={"reassoc", "contract"})
+
+
 class Motion(NamedTuple):
     """Measured motion, where runs start and what they are held against.
 
@@ -230,9 +235,12 @@ def _airflow(motion: Array, airflow: Airflow, at: int, value: Array, slope: Arra
 
 
 @_compiled
-def _turn(vector: Array, matrix: Array, right: Array) -> None:
-    """Write the rotation ``exp [a]_x`` and its right Jacobian, ``exp [a + d]_x = exp [a]_x exp [J d]_x``."""
-    x, y, z = vector[0], vector[1], vector[2]
+def _turn(interval: float, rate: Array, matrix: Array, right: Array) -> None:
+    """Write the rotation ``exp [a]_x`` by ``interval * rate``, and its right Jacobian.
+
+    ``exp [a + d]_x = exp [a]_x exp [J d]_x``
+    """
+    x, y, z = interval * rate[0], interval * rate[1], interval * rate[2]
     square = x * x + y * y + z * z
     angle = np.sqrt(square)
     if angle < 1e-4:
@@ -240,34 +248,36 @@ def _turn(vector: Array, matrix: Array, right: Array) -> None:
     else:
         first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / square
         third = (1.0 - first) / square
-    for i in range(3):
-        for j in range(3):
-            outer = vector[i] * vector[j]
-            diagonal = square if i == j else 0.0
-            one = 1.0 if i == j else 0.0
-            matrix[i, j] = one + second * (outer - diagonal)
-            right[i, j] = one + third * (outer - diagonal)
-    for i, j, value in ((0, 1, -z), (0, 2, y), (1, 2, -x)):
-        matrix[i, j] += first * value
-        matrix[j, i] -= first * value
-        right[i, j] -= second * value
-        right[j, i] += second * value
+    for i, a, b in ((0, y, z), (1, x, z), (2, x, y)):
+        matrix[i, i] = 1.0 - second * (a * a + b * b)
+        right[i, i] = 1.0 - third * (a * a + b * b)
+    for i, j, product, value in ((0, 1, x * y, -z), (0, 2, x * z, y), (1, 2, y * z, -x)):
+        matrix[i, j] = second * product + first * value
+        matrix[j, i] = second * product - first * value
+        right[i, j] = third * product - second * value
+        right[j, i] = third * product + second * value
+
+
+@_compiled_sum
+def _weighted(weights: Array, row: int, value: Array) -> float:
+    total = 0.0
+    for a in range(len(value)):
+        total += weights[row, a] * value[a]
+    return total
 
 
 @_compiled
 def _slopes(body: Body, weights: Array, value: Array, rotation: Array, rate: Array, out: Array) -> None:
     """Write the accelerations, world and body frame, and the body force: shape (9,)."""
     for k in range(6):
-        total = 0.0
-        for a in range(len(value)):
-            total += weights[k, a] * value[a]
-        out[k] = total
-    inertia, inverse, momentum = body.inertia, body.inverse, np.empty(3)
-    for i in range(3):
-        momentum[i] = inertia[i, 0] * rate[0] + inertia[i, 1] * rate[1] + inertia[i, 2] * rate[2]
-    m0 = out[0] - (rate[1] * momentum[2] - rate[2] * momentum[1])
-    m1 = out[1] - (rate[2] * momentum[0] - rate[0] * momentum[2])
-    m2 = out[2] - (rate[0] * momentum[1] - rate[1] * momentum[0])
+        out[k] = _weighted(weights, k, value)
+    inertia, inverse = body.inertia, body.inverse
+    p0 = inertia[0, 0] * rate[0] + inertia[0, 1] * rate[1] + inertia[0, 2] * rate[2]
+    p1 = inertia[1, 0] * rate[0] + inertia[1, 1] * rate[1] + inertia[1, 2] * rate[2]
+    p2 = inertia[2, 0] * rate[0] + inertia[2, 1] * rate[1] + inertia[2, 2] * rate[2]
+    m0 = out[0] - (rate[1] * p2 - rate[2] * p1)
+    m1 = out[1] - (rate[2] * p0 - rate[0] * p2)
+    m2 = out[2] - (rate[0] * p1 - rate[1] * p0)
     f0, f1, f2 = out[3], out[4], out[5]
     for i in range(3):
         out[i] = (rotation[i, 0] * f0 + rotation[i, 1] * f1 + rotation[i, 2] * f2) / body.mass
@@ -312,6 +322,7 @@ class _State(NamedTuple):
 class _Space(NamedTuple):
     """What one evaluation leaves: terms with slopes, accelerations and force, turns with their right Jacobians."""
 
+    motion: Array
     value: Array
     slope: Array
     active: Array
@@ -331,6 +342,7 @@ def _new_state() -> _State:
 @_compiled
 def _new_space(used: Terms, slopes: bool) -> _Space:
     return _Space(
+        np.zeros(6),
         np.zeros(used.total),
         np.zeros((used.total if slopes else 0, 6)),
         np.zeros(len(used.active)),
@@ -353,8 +365,7 @@ def _start(motion: Motion, sample: int, state: _State) -> None:
 
 @_compiled
 def _evaluate(body: Body, used: Terms, weights: Array, state: _State, at: _Space) -> None:
-    rotation, velocity = state.rotation, state.velocity
-    motion = np.empty(6)
+    rotation, velocity, motion = state.rotation, state.velocity, at.motion
     for i in range(3):
         motion[i] = rotation[0, i] * velocity[0] + rotation[1, i] * velocity[1] + rotation[2, i] * velocity[2]
         motion[3 + i] = state.rate[i]
@@ -374,7 +385,7 @@ def _product(first: Array, second: Array, out: Array) -> None:
 @_compiled
 def _to_middle(state: _State, middle: _State, h: float, translates: bool, at: _Space) -> None:
     """Go half a step along the slopes at its begin."""
-    _turn(0.5 * h * state.rate, at.half, at.half_right)
+    _turn(0.5 * h, state.rate, at.half, at.half_right)
     for i in range(3):
         middle.velocity[i] = state.velocity[i] + (0.5 * h * at.out[i] if translates else 0.0)
         middle.rate[i] = state.rate[i] + 0.5 * h * at.out[3 + i]
@@ -384,7 +395,7 @@ def _to_middle(state: _State, middle: _State, h: float, translates: bool, at: _S
 @_compiled
 def _to_end(state: _State, middle: _State, h: float, translates: bool, at: _Space) -> None:
     """Go the whole step along the slopes in its middle."""
-    _turn(h * middle.rate, at.turn, at.right)
+    _turn(h, middle.rate, at.turn, at.right)
     _product(state.rotation, at.turn, at.moved)
     state.rotation[:] = at.moved
     for i in range(3):
@@ -405,15 +416,20 @@ def _lost(state: _State) -> bool:
 
 
 @_compiled
+def _dot(first: Array, i: int, second: Array, j: int) -> float:
+    """Multiply a column of a matrix with a column of another."""
+    return float(first[0, i] * second[0, j] + first[1, i] * second[1, j] + first[2, i] * second[2, j])
+
+
+@_compiled
 def rotation_error(measured: Array, predicted: Array, out: Array) -> None:
     """Write the rotation vector from a measured to a predicted rotation, body frame of the measured one."""
-    relative = np.empty((3, 3))
-    _product(measured.T, predicted, relative)
-    x = 0.5 * (relative[2, 1] - relative[1, 2])
-    y = 0.5 * (relative[0, 2] - relative[2, 0])
-    z = 0.5 * (relative[1, 0] - relative[0, 1])
+    x = 0.5 * (_dot(measured, 2, predicted, 1) - _dot(measured, 1, predicted, 2))
+    y = 0.5 * (_dot(measured, 0, predicted, 2) - _dot(measured, 2, predicted, 0))
+    z = 0.5 * (_dot(measured, 1, predicted, 0) - _dot(measured, 0, predicted, 1))
     sine = np.sqrt(x * x + y * y + z * z)
-    cosine = 0.5 * (relative[0, 0] + relative[1, 1] + relative[2, 2] - 1.0)
+    trace = _dot(measured, 0, predicted, 0) + _dot(measured, 1, predicted, 1) + _dot(measured, 2, predicted, 2)
+    cosine = 0.5 * (trace - 1.0)
     scale = np.arctan2(sine, cosine) / sine if sine > 1e-12 else 1.0
     if sine <= 1e-12 and cosine < 0.0:
         # Half a turn: the axis does not show in the skew part, its length is all that is used.
