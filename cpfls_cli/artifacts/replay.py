@@ -86,6 +86,21 @@ class ErrorsByHorizon(Protocol):
         ...
 
 
+def _by_signal(found: HeldOutGroup | ReplayRecord) -> dict[str, SignalErrorGroup | None]:
+    """List errors by signal, what is asked of first first."""
+    return {
+        "body_rate": found.body_rate,
+        "attitude": found.attitude,
+        "velocity": found.velocity,
+        "position": found.position,
+    }
+
+
+def _summaries(errors: ErrorsByHorizon, prediction: int) -> dict[str, Any]:
+    """Describe the errors of one prediction for machines, by signal."""
+    return {name: None if found is None else found.summary(prediction) for name, found in errors.errors.items()}
+
+
 @record
 class HeldOutGroup:
     """A model played back along flights that it was not found in, beside what it has to beat."""
@@ -131,21 +146,13 @@ class HeldOutGroup:
     @property
     def errors(self) -> Mapping[str, SignalErrorGroup | None]:
         """Errors by signal, what is asked of first first."""
-        return {
-            "body_rate": self.body_rate,
-            "attitude": self.attitude,
-            "velocity": self.velocity,
-            "position": self.position,
-        }
+        return _by_signal(self)
 
     @property
     def summary(self) -> dict[str, Any]:
         """The replay for machines."""
         models = {
-            name: {
-                **{signal: None if found is None else found.summary(index) for signal, found in self.errors.items()},
-                "diverged": int(self.diverged[index]),
-            }
+            name: {**_summaries(self, index), "diverged": int(self.diverged[index])}
             for index, name in enumerate(self.prediction)
         }
         return {
@@ -368,12 +375,7 @@ class ReplayRecord(Record):
     @property
     def errors(self) -> Mapping[str, SignalErrorGroup | None]:
         """Errors by signal, what is asked of first first."""
-        return {
-            "body_rate": self.body_rate,
-            "attitude": self.attitude,
-            "velocity": self.velocity,
-            "position": self.position,
-        }
+        return _by_signal(self)
 
     @property
     def flown(self) -> tuple[str, ...]:
@@ -422,5 +424,4 @@ class ReplayRecord(Record):
         }
 
     def _prediction(self, index: int) -> dict[str, Any]:
-        signals = {name: None if found is None else found.summary(index) for name, found in self.errors.items()}
-        return {**signals, "diverged": int(self.diverged[index])}
+        return {**_summaries(self, index), "diverged": int(self.diverged[index])}
