@@ -396,8 +396,9 @@ class VehicleRecord(Record):
     def verdict(self) -> str:
         """What playback on flights held out says of it.
 
-        Good for simulation where rates, attitude, velocity and position are predicted better than by what knows no
-        model at every horizon, as far as the flights know them; for control where the rates are, to 0.1 s at least.
+        Good for simulation where errors of rates, attitude, velocity and position, as far as the flights know them, add
+        up to less over the horizon than those of what knows no model; for control where those of the rates do, over
+        0.1 s at least.
         """
         if self.held_out is None:
             return "not-judged"

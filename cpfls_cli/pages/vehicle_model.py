@@ -82,7 +82,7 @@ def _verdict(record: VehicleRecord) -> Iterator[str]:
     elif record.verdict == "good-for-control":
         yield f"Good for control of the attitude: it predicts body rates to {number(turning, 2)} s, {where}."
     else:
-        yield "Do not use it: on flights held out it predicts body rates worse than what knows no model."
+        yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
     yield from beside_rivals(held)
 
 
