@@ -40,7 +40,7 @@ class Windows:
     flight : PlaybackFlight
     starts : array of int, shape (window,)
     loss : Loss
-        In errors of "rate stays" on windows of the flight, so that each flight counts alike.
+        In errors of "rate stays" on windows of the flight, or more for a quiet one (`windows_of`).
     """
 
     flight: PlaybackFlight
@@ -80,7 +80,33 @@ class Windows:
             Samples.
         """
         starts = flight.starts(horizon, every)
-        return cls(flight, starts, loss_of(flight, starts, horizon))
+        return cls(flight, starts, loss_of(flight, rate_stays(flight, starts, horizon)))
+
+
+def windows_of(flights: Sequence[PlaybackFlight], horizon_s: float, interval_s: float) -> list[Windows]:
+    """Take windows of flights, errors weighed so that a lively flight counts more, by the square root.
+
+    A model misses more of a lively flight, but not in proportion: the noise of rotor speeds is there in hover as well.
+    In errors of "rate stays" a quiet flight would rule the fit, in plain errors the liveliest.
+
+    Parameters
+    ----------
+    flights : sequence of PlaybackFlight
+    horizon_s, interval_s : float, s
+    """
+    periods = [flight.motion.period for flight in flights]
+    horizons = [max(1, round(horizon_s / period)) for period in periods]
+    starts = [
+        flight.starts(horizon, max(1, round(interval_s / period)))
+        for flight, horizon, period in zip(flights, horizons, periods, strict=True)
+    ]
+    scales = [rate_stays(*each) for each in zip(flights, starts, horizons, strict=True)]
+    lively = np.array([scale.mean(axis=0) for scale in scales])
+    weight = np.sqrt(lively.max(axis=0) / np.where(lively > 0, lively, np.inf))
+    return [
+        Windows(flight, start, loss_of(flight, scale * np.where(own > 0, own, 1.0)))
+        for flight, start, scale, own in zip(flights, starts, scales, weight, strict=True)
+    ]
 
 
 def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Array:
@@ -105,17 +131,14 @@ def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Array:
     return errors
 
 
-def loss_of(flight: PlaybackFlight, starts: IntArray, horizon: int) -> Loss:
-    """Weigh errors by those of "rate stays" on the same windows: 1 is as good as nothing known.
+def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
+    """Weigh errors by what is expected of a forecast that knows nothing, such as `rate_stays`.
 
     Parameters
     ----------
     flight : PlaybackFlight
-    starts : array of int, shape (window,)
-    horizon : int
-        Samples.
+    scale : array, shape (horizon, 4), m, m/s, rad, rad/s
     """
-    scale = rate_stays(flight, starts, horizon)
     known = np.array([flight.translates, flight.translates, flight.has_attitude, True])
     total = np.where(known & (scale.sum(axis=0) > 0), scale.sum(axis=0), np.inf)
     delta = np.maximum(_ROBUST * np.maximum(scale, _LEAST * scale.mean(axis=0)), 1e-12)

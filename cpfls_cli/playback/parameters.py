@@ -30,7 +30,7 @@ from cpfls_cli.playback.model import (
 from cpfls_cli.playback.rotors import Numbers, RotorResponse, rotor_terms_by_step
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-REMAINDER = "remainder"
+INERTIA, REMAINDER = "inertia", "remainder"
 _INERTIA = tuple(f"inertia.log_{name}" for name in INERTIA_PARAMETERS[:3])
 _PRODUCTS = tuple(f"products.{name}" for name in INERTIA_PARAMETERS[3:])
 _PRODUCTS_BLOCK = "products"
@@ -107,7 +107,7 @@ class Physical(NamedTuple):
 
 
 _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
-    "inertia": tuple(Number(name, "", 0.0, 0.5, -4.0, 4.0, 3.0) for name in _INERTIA),
+    INERTIA: tuple(Number(name, "", 0.0, 0.5, -4.0, 4.0, 3.0) for name in _INERTIA),
     "thrust_factor": (Number(_THRUST, "", 1.0, 0.2, 0.1, 10.0, 2.0),),
     "drag_factor": (Number(_DRAG, "", 1.0, 0.5, 0.01, 30.0, 4.0),),
     "thrust_law": (Number(_LAW, "", 0.0, 0.5, -0.9, 5.0, 2.0),),

@@ -12,10 +12,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
-from cpfls_cli.playback.fit import Fitted, Windows, fit, window_errors
+from cpfls_cli.playback.fit import Fitted, Windows, fit, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Airflow
-from cpfls_cli.playback.parameters import REMAINDER, Layout, blocks_of, needs_velocity
+from cpfls_cli.playback.parameters import INERTIA, REMAINDER, Layout, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -208,7 +208,11 @@ def choose(
     blocks = tried_blocks(vehicle, flights, settings)
     parts = parts_of(flights, settings)
     bench = _Bench(vehicle, parts, progress, 3 * len(blocks) + settings.population * (1 + settings.generations) // 2)
-    nothing, everything = bench.judge(Structure(())), bench.judge(Structure(blocks))
+    nothing = bench.judge(Structure(()))
+    # All blocks on the stated body first: a body that is free from the beginning is made so heavy that no torque that
+    # is not explained yet moves it, and then no explanation is worth anything.
+    bench.judge(Structure(tuple(block for block in blocks if block != INERTIA)))
+    everything = bench.judge(Structure(blocks))
     path, complete = [nothing], True
     try:
         shrunk = [bench.judge(structure) for structure in _shrinking(everything)]
@@ -230,7 +234,7 @@ def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> l
     """
     flown = sum(len(flight) * flight.motion.period for flight in flights)
     interval = max(settings.window_interval_s, flown / settings.search_windows)
-    windows = [_windows(flight, settings, interval) for flight in flights]
+    windows = windows_of(flights, settings.horizon_s, interval)
     if len(windows) > 1:
         count = min(settings.folds, len(windows))
         ends = np.linspace(0, len(windows), count + 1).round().astype(int).tolist()
@@ -241,11 +245,6 @@ def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> l
     ends = [*(piece[0] for piece in pieces[1:]), np.inf]
     kept = [piece[piece + horizon < end] for piece, end in zip(pieces, ends, strict=True)]
     return [[Windows(only.flight, piece, only.loss)] for piece in kept if len(piece)]
-
-
-def _windows(flight: PlaybackFlight, settings: PlaybackSettings, interval_s: float) -> Windows:
-    period = flight.motion.period
-    return Windows.of(flight, max(1, round(settings.horizon_s / period)), max(1, round(interval_s / period)))
 
 
 def _greedy(bench: _Bench, blocks: tuple[str, ...], start: Judged) -> Iterator[Judged]:
@@ -410,6 +409,6 @@ def fitted_to_all(
     start : Fitted
         The same structure on some of them.
     """
-    windows = [_windows(flight, settings, settings.window_interval_s) for flight in flights]
+    windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
     known = start.layout.named(start.values)
     return fit(structure.layout(vehicle), windows, known, _STEPS, _TOLERANCE), windows

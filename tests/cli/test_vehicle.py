@@ -174,18 +174,18 @@ def interrupt_at(monkeypatch):
 
 
 def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, interrupt_at):
-    interrupt_at(3)
+    interrupt_at(4)
     result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", "--json")
     assert result.exit_code == 130
     told = json.loads(result.stdout)
-    assert (told["complete"], told["evaluated"]) == (False, 3)
+    assert (told["complete"], told["evaluated"]) == (False, 4)
     shown = cpfls("report", config, tmp_path / "v.h5", "-o", tmp_path / "page.md")
     assert shown.exit_code == 0
     assert "the search was stopped before its end" in (tmp_path / "page.md").read_text()
 
 
 def test_an_interrupt_before_anything_was_found_writes_nothing(config, flights, refuse, tmp_path, interrupt_at):
-    interrupt_at(1)
+    interrupt_at(2)
     (message,) = refuse("vehicle", config, flights[0], "-o", tmp_path / "v.h5", code=130)
     assert message == "the search was interrupted before a vehicle was found, so none is written"
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.playback.fit import Windows, fit, loss_of, uncertainty, window_errors, window_sums
+from cpfls_cli.playback.fit import Windows, fit, loss_of, rate_stays, uncertainty, window_errors, window_sums
 from cpfls_cli.playback.kernels import Airflow, errors_of_runs
 from cpfls_cli.playback.parameters import Evaluated, Layout, blocks_of
 from tests.builders.playback_flights import STATED, flown, truth
@@ -27,7 +27,7 @@ def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules)
     layout = Layout(STATED, blocks_of(STATED), rules)
     values, scale = somewhere(layout), layout.scales
     starts = flight.starts(20, 40)
-    windows = Windows(flight, starts, loss_of(flight, starts, 20))
+    windows = Windows(flight, starts, loss_of(flight, rate_stays(flight, starts, 20)))
     group = np.zeros(len(starts), dtype=np.int64)
     gradient = window_sums(Evaluated.of(layout, values), windows, group)[1][0] * scale
     step = 1e-5

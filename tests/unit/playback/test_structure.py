@@ -39,14 +39,14 @@ def stopping_at(number):
 
 
 def test_a_stopped_search_gives_what_it_has(flights):
-    choice = chosen(flights, stopping_at(3))
-    assert (choice.complete, choice.evaluated) == (False, 3)
+    choice = chosen(flights, stopping_at(4))
+    assert (choice.complete, choice.evaluated) == (False, 4)
     assert choice.best.error <= choice.chosen.error < choice.nothing.error
 
 
 def test_a_search_stopped_before_all_blocks_were_judged_has_nothing(flights):
     with pytest.raises(SearchStoppedError):
-        chosen(flights, stopping_at(1))
+        chosen(flights, stopping_at(2))
 
 
 def test_a_search_tells_how_far_it_is(flights):
