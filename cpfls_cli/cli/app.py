@@ -588,9 +588,11 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
     """Load the study, run one command with a progress bar, and print what it says."""
     with messages_for_errors():
         from cpfls_cli.artifacts.job import Job
+        from cpfls_cli.config.unknown import require_known
 
         narration = Narration(title, common.verbose and not common.quiet)
         study = common.study(config, sweep=title == "sweep")
+        require_known(study, title)
         narration.reads(config)
         with progress_bar(title, common) as progress:
             job = Job(study, output, common.force, common.dry_run, progress, narration.reads, deferred_interrupts)

@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails
 
 from cpfls_cli.config.keys import known_keys
 from cpfls_cli.config.study import SECTIONS, Study
+from cpfls_cli.config.unknown import with_guesses
 from cpfls_cli.errors import SettingError
 from cpfls_cli.identification.settings import PRESETS
 
@@ -49,7 +50,8 @@ def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[st
         One line for each wrong key.
     """
     # A section that is named but left empty means its defaults.
-    filled = _with_preset({key: {} if value is None and key in SECTIONS else value for key, value in data.items()})
+    named = {key: {} if value is None and key in SECTIONS else value for key, value in data.items()}
+    filled = with_guesses(_with_preset(named))
     try:
         return Study.model_validate_json(json.dumps(filled)), []
     except ValidationError as error:

@@ -133,12 +133,16 @@ def _probe(vehicle: VehicleSettings) -> Probe:
 
 
 def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
-    """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder."""
+    """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder.
+
+    What is not known of it is no choice, and in every layout.
+    """
     probe = _probe(vehicle)
     effects = (
         name for name, known in CATALOGUE.items() if not known.shapes and polynomial(known, probe, {}) is not None
     )
-    return (*_OF_ROTORS, _PRODUCTS_BLOCK, *effects, REMAINDER)
+    known = (block for block in _OF_ROTORS if block not in vehicle.unknown)
+    return (*known, _PRODUCTS_BLOCK, *effects, REMAINDER)
 
 
 def needs_velocity(block: str) -> bool:
@@ -180,7 +184,8 @@ class Layout:
     ----------
     vehicle : VehicleSettings
         As stated.
-    blocks : tuple of str
+    chosen : tuple of str
+        Blocks, beside those of what is not known of the vehicle.
     airflow : Airflow
         Rules of the remainder, where it is among the blocks.
     rows : tuple of int
@@ -188,9 +193,14 @@ class Layout:
     """
 
     vehicle: VehicleSettings
-    blocks: tuple[str, ...]
+    chosen: tuple[str, ...]
     airflow: Airflow
     rows: tuple[int, ...] = (0, 1, 2)
+
+    @cached_property
+    def blocks(self) -> tuple[str, ...]:
+        """All blocks."""
+        return (*sorted(set(self.vehicle.unknown) - set(self.chosen)), *self.chosen)
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
@@ -339,19 +349,22 @@ class Layout:
         """Give all numbers as people know them, in order: moments of inertia, factors of the first rotor, SI."""
         inertia, coefficients = self.inertia(values), self.coefficients(values)
         rotor, found = self.vehicle.rotors[0], {}
+        stated = {block: block not in self.vehicle.unknown for block in self.blocks}
         for number, value in zip(self.numbers, values.tolist(), strict=True):
             name = number.name
             if name in _INERTIA:
                 axis = _INERTIA.index(name)
-                known = Physical(float(inertia[axis, axis]), "kg m^2", positive=True, stated=True)
+                known = Physical(float(inertia[axis, axis]), "kg m^2", positive=True, stated=stated[number.block])
                 found[f"inertia.{INERTIA_PARAMETERS[axis]}"] = known
             elif name in _PRODUCTS:
                 row, column = INERTIA_ENTRIES[3 + _PRODUCTS.index(name)]
                 found[name] = Physical(float(inertia[row, column]), "kg m^2", stated=True)
             elif name == _THRUST:
-                found["thrust_factor"] = Physical(value * rotor.thrust_factor_n_s2, "N s^2", positive=True, stated=True)
+                factor = value * rotor.thrust_factor_n_s2
+                found["thrust_factor"] = Physical(factor, "N s^2", positive=True, stated=stated[number.block])
             elif name == _DRAG:
-                found["drag_factor"] = Physical(value * rotor.drag_factor_n_m_s2, "N m s^2", positive=True, stated=True)
+                factor = value * rotor.drag_factor_n_m_s2
+                found["drag_factor"] = Physical(factor, "N m s^2", positive=True, stated=stated[number.block])
             elif name == _SLOW:
                 found["slow_actuation.slow_s"] = Physical(float(np.exp(value)), "s", positive=True)
             else:
@@ -451,7 +464,7 @@ class Layout:
             for rotor in self.vehicle.rotors
         )
         xx, yy, zz, xy, xz, yz = (float(self.inertia(values)[entry]) for entry in INERTIA_ENTRIES)
-        vehicle = replace(self.vehicle, rotors=rotors, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
+        vehicle = replace(self.vehicle, rotors=rotors, inertia_kg_m2=(xx, yy, zz, xy, xz, yz), unknown=())
         coefficients = self.coefficients(values)
         probe = Probe.of(vehicle)
         effects = tuple(self._effect(name, coefficients, probe) for name in self.blocks if _is_effect(name))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.playback.fit import Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel, wrench_of
-from cpfls_cli.playback.parameters import Layout
+from cpfls_cli.playback.parameters import Layout, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Choice, Progress, choose, fitted_to_all
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -124,9 +124,10 @@ def find_vehicle(
     rng : numpy.random.Generator
     progress : callable
     """
-    choice = choose(vehicle, flights, settings, rng, progress)
+    begun = _begun(vehicle, flights)
+    choice = choose(begun, flights, settings, rng, progress)
     chosen = choice.chosen
-    fitted, windows = fitted_to_all(chosen.structure, vehicle, flights, settings, chosen.fits[0])
+    fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0])
     spread = uncertainty(fitted, windows)
     model = fitted.layout.model(fitted.values)
     return FoundVehicle(
@@ -138,6 +139,33 @@ def find_vehicle(
         fitted.condition_number,
         spread.blocks,
     )
+
+
+def _begun(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> VehicleSettings:
+    """Replace guesses of the thrust factor by what carries the weight; drag factor and linear terms scale with it.
+
+    Without velocity nothing tells thrust from weight in flight, so that this guess stays as it is.
+    """
+    if "thrust_factor" not in vehicle.unknown:
+        return vehicle
+    squares = np.concatenate([(flight.speed**2).sum(axis=1) for flight in flights])
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    factor = weight / float(np.mean(squares)) / (_thrust_factors(vehicle).mean())
+    rotors = tuple(
+        replace(
+            rotor,
+            thrust_factor_n_s2=factor * rotor.thrust_factor_n_s2,
+            drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * (factor if "drag_factor" in vehicle.unknown else 1.0),
+        )
+        for rotor in vehicle.rotors
+    )
+    moves = all(flight.translates for flight in flights)
+    unknown = tuple(name for name in vehicle.unknown if moves or not needs_velocity(name))
+    return replace(vehicle, rotors=rotors, unknown=unknown)
+
+
+def _thrust_factors(vehicle: VehicleSettings) -> Array:
+    return np.array([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
 
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:

@@ -14,6 +14,8 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.settings import Settings
 
 _Moment = Annotated[float, Gt(0)]
+Unknown = Literal["thrust_factor", "drag_factor", "inertia"]
+"""Numbers of a vehicle that hardly anybody knows, and that flights tell."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +55,10 @@ class VehicleSettings(Settings):
     ] = (0.6, 0.6, 1.2)
     rotors: Annotated[tuple[RotorSettings, ...], MinLen(1), Doc("the rotors, one entry each")] = _QUAD_PLUS
     rotor_speed_max_rad_s: Annotated[float, Gt(0), Doc("largest speed of a rotor, rad/s")] = 1000.0
+    unknown: Annotated[
+        tuple[Unknown, ...],
+        Doc("numbers above that are guesses, for `cpfls vehicle` to find; a null in their place says the same"),
+    ] = ()
 
     def __post_init__(self) -> None:
         """Refuse an inertia that is not positive definite.

@@ -1,0 +1,98 @@
+"""Numbers of a vehicle that a config leaves open: null there, a guess in the study, and a refusal where they count."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from cpfls_cli.config.study import Study
+from cpfls_cli.errors import ConfigError
+from cpfls_cli.vehicle.guess import guessed_drag_factor, guessed_inertia, guessed_thrust_factor
+from cpfls_cli.vehicle.settings import Unknown, VehicleSettings
+
+KEYS: Final[dict[Unknown, str]] = {
+    "thrust_factor": "thrust_factor_n_s2",
+    "drag_factor": "drag_factor_n_m_s2",
+    "inertia": "inertia_kg_m2",
+}
+"""Keys of the numbers that may be null."""
+
+_TAKEN = frozenset({"import", "vehicle", "replay", "report", "export"})
+"""Commands that work with guesses; a report and an export are of a model, which has its own numbers."""
+
+
+def with_guesses(data: dict[str, Any]) -> dict[str, Any]:
+    """Put guesses in the place of what the section `vehicle` leaves null, and name them under its key `unknown`.
+
+    Parameters
+    ----------
+    data : dict
+        Plain data of a config, not yet validated; what is wrong in it stays, for the validation to say.
+    """
+    vehicle = data.get("vehicle")
+    if not isinstance(vehicle, dict):
+        return data
+    rotors = vehicle.get("rotors")
+    listed = [rotor for rotor in rotors if isinstance(rotor, dict)] if isinstance(rotors, list) else []
+    open_ = [
+        name
+        for name, key in KEYS.items()
+        if (key in vehicle and vehicle[key] is None) or any(key in rotor and rotor[key] is None for rotor in listed)
+    ]
+    if not open_:
+        return data
+    try:
+        guesses = _guesses(vehicle, listed)
+    except (TypeError, ValueError, ZeroDivisionError, OverflowError, IndexError):
+        return data
+    filled = {**vehicle, "unknown": sorted({*(vehicle.get("unknown") or ()), *open_})}
+    if KEYS["inertia"] in vehicle and vehicle[KEYS["inertia"]] is None:
+        filled[KEYS["inertia"]] = guesses["inertia"]
+    if listed:
+        filled["rotors"] = [_filled(rotor, guesses) for rotor in listed] if len(listed) == len(rotors) else rotors
+    return {**data, "vehicle": filled}
+
+
+def _filled(rotor: dict[str, Any], guesses: dict[Unknown, Any]) -> dict[str, Any]:
+    given: dict[Unknown, str] = {name: key for name, key in KEYS.items() if key in rotor and rotor[key] is None}
+    return {**rotor, **{key: guesses[name] for name, key in given.items()}}
+
+
+def _guesses(vehicle: dict[str, Any], rotors: list[dict[str, Any]]) -> dict[Unknown, Any]:
+    usual = VehicleSettings()
+    mass = float(vehicle.get("mass_kg", usual.mass_kg))
+    gravity = float(vehicle.get("gravity_m_s2", usual.gravity_m_s2))
+    positions = [rotor["position_m"] for rotor in rotors] if rotors else [rotor.position_m for rotor in usual.rotors]
+    fastest = float(vehicle.get("rotor_speed_max_rad_s", usual.rotor_speed_max_rad_s))
+    stated = [rotor.get(KEYS["thrust_factor"]) for rotor in rotors]
+    thrust = next((float(value) for value in stated if value is not None), None)
+    thrust = thrust or guessed_thrust_factor(mass, gravity, len(positions), fastest)
+    return {
+        "thrust_factor": thrust,
+        "drag_factor": guessed_drag_factor(thrust, positions),
+        "inertia": list(guessed_inertia(mass, positions)),
+    }
+
+
+def require_known(study: Study, command: str) -> None:
+    """Refuse a vehicle with unknown numbers for a command that would take their guesses for facts.
+
+    Raises
+    ------
+    ConfigError
+        Naming the keys and what finds them.
+    """
+    unknown = study.vehicle.unknown
+    torque = study.import_.torque_source
+    of_rotors = command == "import" and torque in ("rotor-speed", "rotor-command")
+    if not unknown or (command in _TAKEN and not of_rotors):
+        return
+    keys = ", ".join(f"vehicle.{'' if name == 'inertia' else 'rotors.'}{KEYS[name]}" for name in unknown)
+    if of_rotors:
+        raise ConfigError(
+            f"import.torque_source = {torque}: needs {keys}, not known in this config; set it to null: `cpfls vehicle` "
+            "needs no torque"
+        )
+    raise ConfigError(
+        f"{keys}: not known in this config, and `cpfls {command}` needs what is null there; `cpfls vehicle` finds it "
+        "in flights and writes it (--write-config), or state it"
+    )
