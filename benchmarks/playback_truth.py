@@ -30,7 +30,7 @@ from cpfls_cli.playback.fit import Fitted, Windows, fit, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Structure
+from cpfls_cli.playback.structure import Judged, Structure
 from cpfls_cli.playback.vehicle import find_vehicle
 from tests.builders.playback_flights import KINDS, MIDDLING, STATED, TRUE_BLOCKS, flown, judged, true_numbers, truth
 
@@ -132,9 +132,10 @@ def searched(seed: int) -> tuple[str, ...]:
     return str(seed), ", ".join(more) or "none", ", ".join(missed) or "none", f"{ratio(found.model, judging)[3]:.3f}"
 
 
-def _silent(done: int, total: int, best: float) -> None:
-    if done % 10 == 0:
-        print(f"{done} of about {total}, smallest error {best:.4f}", file=sys.stderr, flush=True)
+def _silent(known: Sequence[Judged], total: int) -> None:
+    if len(known) % 10 == 0:
+        best = min(each.error for each in known)
+        print(f"{len(known)} of about {total}, smallest error {best:.4f}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import fitted_to_all
+from cpfls_cli.playback.structure import Judged, fitted_to_all
 from cpfls_cli.playback.vehicle import find_vehicle
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -59,6 +59,7 @@ def learned(
     return models
 
 
-def _shown(done: int, total: int, best: float) -> None:
-    if done % 10 == 0:
-        print(f"{done} of about {total}, smallest error {best:.4f}", file=sys.stderr, flush=True)
+def _shown(judged: Sequence[Judged], total: int) -> None:
+    if len(judged) % 10 == 0:
+        best = min(each.error for each in judged)
+        print(f"{len(judged)} of about {total}, smallest error {best:.4f}", file=sys.stderr, flush=True)

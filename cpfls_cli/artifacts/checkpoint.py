@@ -1,11 +1,12 @@
-"""The artifact of a search that has not come to its end."""
+"""The artifacts of searches that have not come to their end: for a model, and for the structure of a vehicle."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -17,9 +18,12 @@ if TYPE_CHECKING:
     from cpfls_cli.evolution.archive import Evaluation
     from cpfls_cli.evolution.state import EvolutionState
     from cpfls_cli.identification.search import Unfinished
+    from cpfls_cli.playback.structure import Judged, Kept
 
 _BEFORE_ALL = -1
 _NO_GENERATOR = "null"
+
+_Checkpoint = TypeVar("_Checkpoint", bound="CheckpointRecord | VehicleCheckpointRecord")
 
 
 @dataclass(frozen=True)
@@ -137,7 +141,7 @@ class CheckpointRecord(Record):
             unfinished=UnfinishedGroup(**_stored(none, none, state.objectives[:0])),
             sha256="",
         )
-        return unsealed._sealed()
+        return _sealed(unsealed)
 
     @classmethod
     def of_nothing(cls, unfinished: Unfinished) -> Self:
@@ -160,7 +164,7 @@ class CheckpointRecord(Record):
         """Replace what was evaluated of the next generation."""
         evaluation = unfinished.evaluation
         stored = _stored(unfinished.submitted, evaluation.genes, evaluation.objectives)
-        return replace(self, unfinished=UnfinishedGroup(**stored))._sealed()
+        return _sealed(replace(self, unfinished=UnfinishedGroup(**stored)))
 
     def stopped_search(self) -> StoppedSearch:
         """Rebuild what the search left, equal to what was stored down to the last bit.
@@ -170,8 +174,7 @@ class CheckpointRecord(Record):
         ValueError
             If the datasets are not those that were written.
         """
-        if self.sha256 != self._seal():
-            raise ValueError("its datasets were changed after it was written (sha256 differs)")
+        _require_seal(self)
         from cpfls_cli.identification.search import Unfinished
 
         unfinished = Unfinished(*_evaluated(self.unfinished))
@@ -193,17 +196,6 @@ class CheckpointRecord(Record):
             rng,
         )
 
-    def _sealed(self) -> Self:
-        return replace(self, sha256=self._seal())
-
-    def _seal(self) -> str:
-        """Hash the datasets in the order of the format."""
-        digest, seal = hashlib.sha256(), self.path("sha256")
-        for path, value in self.data.items():
-            if path != seal:
-                digest.update(str(value).encode() if value.ndim == 0 else value.tobytes())
-        return digest.hexdigest()
-
 
 def _stored(submitted: IntArray, genes: IntArray, objectives: Array) -> dict[str, Any]:
     return {"submitted": submitted.astype(np.uint16), "genes": genes.astype(np.uint16), "objectives": objectives}
@@ -217,3 +209,88 @@ def _evaluated(stored: ArchiveGroup | UnfinishedGroup) -> tuple[IntArray, Evalua
 
 def _genes(stored: Any) -> IntArray:
     return np.asarray(stored, dtype=np.int64)
+
+
+@record
+class StructuresKeptGroup:
+    """Structures that were judged, in the order of the search."""
+
+    blocks: tuple[str, ...] = dataset("blocks", "blocks of each, one space between two", "structure")
+    rules: IntArray = dataset("rules", "of its remainder: number of rules, order of the harmonics", "structure", "2")
+    numbers: IntArray = dataset("numbers", "free numbers", "structure")
+
+
+@record
+class VehicleCheckpointRecord(Record):
+    """The artifact `cpfls/vehicle-checkpoint`."""
+
+    FORMAT: ClassVar = Format(
+        "cpfls/vehicle-checkpoint",
+        "a search for the structure of a vehicle that has not come to its end: what was fitted so far",
+        "vehicle",
+        ("flight-1", "held-out-1"),
+    )
+
+    structure: StructuresKeptGroup = group("structure")
+    loss: Array = dataset("loss", "of the fit without each part of the flights", "structure", "part")
+    values: Array = dataset("values", "numbers of all fits, one fit after another", "fitted", units="SI")
+    hessian: Array = dataset("hessian", "their curvatures by rows, one fit after another", "curvature")
+    sha256: str = dataset("sha256", "of the bytes of all datasets above, in this order")
+
+    @classmethod
+    def of(cls, judged: Sequence[Judged]) -> Self:
+        """Arrange the structures that were judged, at least one."""
+        fits = [fitted for each in judged for fitted in each.fits]
+        return _sealed(
+            cls(
+                structure=StructuresKeptGroup(
+                    blocks=tuple(" ".join(each.structure.blocks) for each in judged),
+                    rules=np.array([each.structure.rules for each in judged], dtype=np.int64),
+                    numbers=np.array([each.numbers for each in judged], dtype=np.int64),
+                ),
+                loss=np.array([[fitted.loss for fitted in each.fits] for each in judged]),
+                values=np.concatenate([fitted.values for fitted in fits]),
+                hessian=np.concatenate([fitted.hessian.ravel() for fitted in fits]),
+                sha256="",
+            )
+        )
+
+    def kept(self) -> Kept:
+        """Rebuild what the search left, equal to what was stored down to the last bit.
+
+        Raises
+        ------
+        ValueError
+            If the datasets are not those that were written.
+        """
+        _require_seal(self)
+        from cpfls_cli.playback.structure import Rules, Solution, Structure
+
+        counts = np.repeat(self.structure.numbers, self.loss.shape[1])
+        values = iter(np.split(self.values, np.cumsum(counts)[:-1]))
+        hessians = iter(np.split(self.hessian, np.cumsum(counts**2)[:-1]))
+        names = zip(self.structure.blocks, self.structure.rules.tolist(), self.loss.tolist(), strict=True)
+        return {
+            Structure(tuple(blocks.split()), Rules(*rules)): [
+                Solution(found := next(values), loss, next(hessians).reshape(2 * (len(found),))) for loss in losses
+            ]
+            for blocks, rules, losses in names
+        }
+
+
+def _sealed(unsealed: _Checkpoint) -> _Checkpoint:
+    return replace(unsealed, sha256=_seal(unsealed))
+
+
+def _require_seal(kept: CheckpointRecord | VehicleCheckpointRecord) -> None:
+    if kept.sha256 != _seal(kept):
+        raise ValueError("its datasets were changed after it was written (sha256 differs)")
+
+
+def _seal(kept: CheckpointRecord | VehicleCheckpointRecord) -> str:
+    """Hash the datasets in the order of the format."""
+    digest, seal = hashlib.sha256(), kept.path("sha256")
+    for path, value in kept.data.items():
+        if path != seal:
+            digest.update(str(value).encode() if value.ndim == 0 else value.tobytes())
+    return digest.hexdigest()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from textwrap import fill
 
-from cpfls_cli.artifacts.checkpoint import CheckpointRecord
+from cpfls_cli.artifacts.checkpoint import CheckpointRecord, VehicleCheckpointRecord
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
@@ -34,6 +34,7 @@ RECORDS: tuple[type[Record], ...] = (
     DiagnosisRecord,
     ExtendedRecord,
     VehicleRecord,
+    VehicleCheckpointRecord,
 )
 """Every artifact format."""
 

@@ -340,6 +340,7 @@ def vehicle(
     flights: FlightsArgument,
     output: OutputOption,
     held_out: HeldOutOption = None,
+    resume: ResumeOption = False,
     *,
     common: Common,
 ) -> None:
@@ -348,7 +349,7 @@ def vehicle(
     def call(job: Job) -> Outcome:
         from cpfls_cli.commands import vehicle as command
 
-        return command.run(job, flights, held_out or [])
+        return command.run(job, flights, held_out or [], resume=resume)
 
     _run("vehicle", config, output, common, call)
 

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
-from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.job import Job, finish
 from cpfls_cli.artifacts.replay import HeldOutGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.compare import flight_roles
+from cpfls_cli.commands.stopped import stopped, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
-from cpfls_cli.errors import ConfigError, InputError, StoppedError
+from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flights.playback import flights_to_play, whole
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.vehicle_model import answer
@@ -19,15 +20,17 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.replay import replay
-from cpfls_cli.playback.structure import SearchStoppedError
+from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError
 from cpfls_cli.playback.vehicle import FoundVehicle, find_vehicle
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.search.checkpoint import VehicleCheckpoint
+from cpfls_cli.search.resumable import Watch, begin_vehicle_search
 
-_FROM_SIGNAL = 128
-"""What a shell adds to the number of the signal that ended a program."""
+_KEPT_EVERY = 10
+"""Structures after which the checkpoint is written again: what a killed search has to judge anew at most."""
 
 
-def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path]) -> Outcome:
+def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], *, resume: bool = False) -> Outcome:
     """Find a vehicle and write it.
 
     Parameters
@@ -36,58 +39,77 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path]) -> Outcome:
         Artifacts, or logs that the config describes; the vehicle is found in them.
     held_out : sequence of Path
         Others to judge it on, once.
+    resume : bool
+        Go on with a search that was stopped.
 
     Raises
     ------
     InputError
-        If a flight has no rotor speeds or commands, or is shorter than the horizon.
+        If a flight has no rotor speeds or commands, or is shorter than the horizon; also for a checkpoint that is not
+        asked for, or cannot be resumed.
     """
     study = job.study
-    inputs = begin(job, flight_roles("flight", flights) | flight_roles("held-out", held_out))
+    roles = flight_roles("flight", flights) | flight_roles("held-out", held_out)
+    inputs, checkpoint, kept = begin_vehicle_search(job, roles, resume=resume)
     _check_left_out(study)
     read = flights_to_play([*flights, *held_out], study)
     for flight in read:
-        if flight.playback.wrench is not None:
-            raise InputError(
-                f"{flight.name}: states torque and thrust instead of rotor speeds; a vehicle is found from rotor_speed "
-                "or rotor_command, name their columns in import.signals"
-            )
+        _require_rotors(flight)
         flight.playback.starts(_horizon(job, flight), 1)
     training, rest = read[: len(flights)], read[len(flights) :]
     if job.dry_run:
         return nothing_written(job)
-    found, signal = _found(job, training)
-    judged = _judged(found.model, rest, job) if rest else None
-    warnings = [warning for flight in read for warning in flight.warnings]
-    record = finish(job, VehicleRecord.of(found, judged, warnings), inputs)
-    code = 0 if record.complete or signal is None else _FROM_SIGNAL + signal
-    return Outcome(record.summary, tuple(answer(source_of(job, record))), code)
+    checkpoint.tidy()
+    if kept is None:
+        checkpoint.remove()
+    with checkpoint.kept():
+        found, signal = _found(job, training, checkpoint, kept or {})
+        judged = _judged(found.model, rest, job) if rest else None
+        warnings = [warning for flight in read for warning in flight.warnings]
+        record = finish(job, VehicleRecord.of(found, judged, warnings), inputs)
+    if record.complete:
+        checkpoint.remove()
+    outcome = Outcome(record.summary, tuple(answer(source_of(job, record))))
+    return stopped(outcome, "generations" if record.complete else "interrupted", signal, job.output)
 
 
-def _found(job: Job, flights: Sequence[LoggedFlight]) -> tuple[FoundVehicle, int | None]:
+def _require_rotors(flight: LoggedFlight) -> None:
+    if flight.playback.wrench is not None:
+        raise InputError(
+            f"{flight.name}: states torque and thrust instead of rotor speeds; a vehicle is found from rotor_speed or "
+            "rotor_command, name their columns in import.signals"
+        )
+
+
+def _found(
+    job: Job, flights: Sequence[LoggedFlight], checkpoint: VehicleCheckpoint, kept: Kept
+) -> tuple[FoundVehicle, int | None]:
     """Search; an interrupt ends the search, and its number is given beside what has been found until then.
 
     Raises
     ------
-    StoppedError
+    CpflsError
         If there is nothing to take yet.
     """
-    study = job.study
+    study, watch = job.study, Watch(job, None)
     job.progress(0.0, 1, "loads compiled loops; at the first use on a machine compiles them")
-    with settings_of("playback", study), job.deferred_interrupts() as interrupted:
 
-        def progress(done: int, total: int, best: float) -> None:
-            job.progress(done, total, f"structure {done}, smallest error {best:.3g}")
-            if interrupted() is not None:
-                raise SearchStoppedError
+    def progress(judged: Sequence[Judged], total: int) -> None:
+        best = min(each.error for each in judged)
+        job.progress(len(judged), total, f"structure {len(judged)}, smallest error {best:.3g}")
+        stop = watch.should_stop()
+        if stop or len(judged) % _KEPT_EVERY == 0:
+            checkpoint.write(judged)
+        if stop:
+            raise SearchStoppedError
 
-        along = [flight.playback for flight in flights]
+    along = [flight.playback for flight in flights]
+    with settings_of("playback", study), watch.deferring():
         try:
-            found = find_vehicle(study.vehicle, along, study.playback, generator(study, "vehicle"), progress)
-        except SearchStoppedError:
-            message = "the search was interrupted before a vehicle was found, so none is written"
-            raise StoppedError(message, _FROM_SIGNAL + (interrupted() or 0)) from None
-    return found, interrupted()
+            found = find_vehicle(study.vehicle, along, study.playback, generator(study, "vehicle"), progress, kept)
+        except SearchStoppedError as error:
+            raise (without_model("interrupted", watch.signal) or error) from None
+    return found, watch.signal
 
 
 def _judged(model: VehicleModel, flights: Sequence[LoggedFlight], job: Job) -> HeldOutGroup:

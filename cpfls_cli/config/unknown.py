@@ -47,8 +47,8 @@ def with_guesses(data: dict[str, Any]) -> dict[str, Any]:
     filled = {**vehicle, "unknown": sorted({*(vehicle.get("unknown") or ()), *open_})}
     if KEYS["inertia"] in vehicle and vehicle[KEYS["inertia"]] is None:
         filled[KEYS["inertia"]] = guesses["inertia"]
-    if listed:
-        filled["rotors"] = [_filled(rotor, guesses) for rotor in listed] if len(listed) == len(rotors) else rotors
+    if isinstance(rotors, list):
+        filled["rotors"] = [_filled(rotor, guesses) if isinstance(rotor, dict) else rotor for rotor in rotors]
     return {**data, "vehicle": filled}
 
 

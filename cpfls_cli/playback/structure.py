@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import pairwise
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -112,33 +113,53 @@ class Choice:
     complete: bool
 
 
-Progress = Callable[[int, int, float], None]
-"""Told the structures judged, about how many there will be, and the smallest error so far; may raise the next."""
+Progress = Callable[[Sequence[Judged], int], None]
+"""Told the structures judged so far, and about how many there will be, after each new one; may raise the next."""
 
 
 class SearchStoppedError(Exception):
     """Somebody asks the search to stop; what it has found so far is taken."""
 
 
+class Solution(NamedTuple):
+    """What a fit came to: `Fitted` without the layout, which follows from structure and vehicle."""
+
+    values: Array
+    loss: float
+    hessian: Array
+
+
+Kept = Mapping[Structure, Sequence[Solution]]
+"""Structures that a stopped search has judged, with a fit for each part of the flights."""
+
+
 @dataclass
 class _Bench:
-    """Judges structures; remembers all, and starts each fit from the nearest that is known."""
+    """Judges structures; remembers all, and starts each fit from the nearest that is known.
+
+    What a stopped search has kept becomes known only when it is asked for, so that the fits after it start from where
+    they would have started.
+    """
 
     vehicle: VehicleSettings
     parts: Sequence[Sequence[Windows]]
     progress: Progress
     expected: int
+    kept: Kept
     known: dict[Structure, Judged] = field(default_factory=dict)
 
     def judge(self, structure: Structure) -> Judged:
         if structure not in self.known:
-            near = self._nearest(structure)
-            with ThreadPoolExecutor(2) as threads:
-                fits = list(threads.map(lambda part: self._fit(structure, part, near), range(len(self.parts))))
-            self.known[structure] = self._judged(structure, tuple(fits))
-            best = min(judged.error for judged in self.known.values())
-            self.progress(len(self.known), max(self.expected, len(self.known)), best)
+            kept = self.kept.get(structure)
+            self.known[structure] = self._judged(structure, self._fits(structure) if kept is None else kept)
+            if kept is None:
+                self.progress(tuple(self.known.values()), max(self.expected, len(self.known)))
         return self.known[structure]
+
+    def _fits(self, structure: Structure) -> list[Solution]:
+        near = self._nearest(structure)
+        with ThreadPoolExecutor(2) as threads:
+            return list(threads.map(lambda part: self._fit(structure, part, near), range(len(self.parts))))
 
     def _nearest(self, structure: Structure) -> Judged | None:
         """Find the known structure that differs in the fewest blocks; the better one of two."""
@@ -151,16 +172,19 @@ class _Bench:
 
         return min(self.known.values(), key=away, default=None)
 
-    def _fit(self, structure: Structure, part: int, near: Judged | None) -> Fitted:
+    def _fit(self, structure: Structure, part: int, near: Judged | None) -> Solution:
         training = [windows for other, kept in enumerate(self.parts) if other != part for windows in kept]
         known = {}
         if near is not None:
             known = near.fits[part].layout.named(near.fits[part].values)
             if near.structure.rules != structure.rules:
                 known = {name: value for name, value in known.items() if not name.startswith(f"{REMAINDER}.")}
-        return fit(structure.layout(self.vehicle), training, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
+        fitted = fit(structure.layout(self.vehicle), training, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
+        return Solution(fitted.values, fitted.loss, fitted.hessian)
 
-    def _judged(self, structure: Structure, fits: tuple[Fitted, ...]) -> Judged:
+    def _judged(self, structure: Structure, solutions: Sequence[Solution]) -> Judged:
+        layout = structure.layout(self.vehicle)
+        fits = tuple(Fitted(layout, *solution) for solution in solutions)
         errors = [
             window_errors(fitted, windows) for fitted, kept in zip(fits, self.parts, strict=True) for windows in kept
         ]
@@ -187,6 +211,7 @@ def choose(
     settings: PlaybackSettings,
     rng: np.random.Generator,
     progress: Progress,
+    kept: Kept = MappingProxyType({}),
 ) -> Choice:
     """Search for the structure: all blocks, fewer and fewer of them, greedy addition, then the genetic algorithm.
 
@@ -199,6 +224,8 @@ def choose(
     settings : PlaybackSettings
     rng : numpy.random.Generator
     progress : callable
+    kept : mapping of Structure to sequence of Solution
+        Of the same search, stopped before; it goes on to the same end.
 
     Raises
     ------
@@ -207,7 +234,8 @@ def choose(
     """
     blocks = tried_blocks(vehicle, flights, settings)
     parts = parts_of(flights, settings)
-    bench = _Bench(vehicle, parts, progress, 3 * len(blocks) + settings.population * (1 + settings.generations) // 2)
+    expected = 3 * len(blocks) + settings.population * (1 + settings.generations) // 2
+    bench = _Bench(vehicle, parts, progress, expected, kept)
     nothing = bench.judge(Structure(()))
     # All blocks on the stated body first: a body that is free from the beginning is made so heavy that no torque that
     # is not explained yet moves it, and then no explanation is worth anything.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel, wrench_of
 from cpfls_cli.playback.parameters import Layout, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Choice, Progress, choose, fitted_to_all
+from cpfls_cli.playback.structure import Choice, Kept, Progress, choose, fitted_to_all
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _TRADED = 0.95
@@ -112,6 +113,7 @@ def find_vehicle(
     settings: PlaybackSettings,
     rng: np.random.Generator,
     progress: Progress,
+    kept: Kept = MappingProxyType({}),
 ) -> FoundVehicle:
     """Find structure and numbers of a vehicle in training flights.
 
@@ -123,9 +125,11 @@ def find_vehicle(
     settings : PlaybackSettings
     rng : numpy.random.Generator
     progress : callable
+    kept : mapping of Structure to sequence of Solution
+        Of the same search, stopped before.
     """
     begun = _begun(vehicle, flights)
-    choice = choose(begun, flights, settings, rng, progress)
+    choice = choose(begun, flights, settings, rng, progress, kept)
     chosen = choice.chosen
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0])
     spread = uncertainty(fitted, windows)

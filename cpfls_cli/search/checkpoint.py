@@ -5,26 +5,32 @@ from __future__ import annotations
 import glob
 import json
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
-from cpfls_cli.artifacts.checkpoint import CheckpointRecord, StoppedSearch
+from cpfls_cli.artifacts.checkpoint import CheckpointRecord, StoppedSearch, VehicleCheckpointRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import format_name, read_any, read_record, write_record
 from cpfls_cli.artifacts.sweep import SweepRecord
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.evolution.state import EvolutionState
 from cpfls_cli.identification.search import Unfinished
 
+if TYPE_CHECKING:
+    # A search for a model does not wait for the compiled loops that play a vehicle back.
+    from cpfls_cli.playback.structure import Judged, Kept
+
 R = TypeVar("R", bound=Record)
 
 _SECTION = "identification"
 _GENERATIONS = f"{_SECTION}.generations"
+_OF_VEHICLE = ("vehicle", "import", "playback")
 _LONGEST = 120
 _START_AGAIN = "--force without --resume starts again"
 
@@ -43,7 +49,7 @@ class Leftover:
     header: Header
     WORK: ClassVar[str]
     SUFFIX: ClassVar[str]
-    OUTPUT: ClassVar[type[ModelRecord | SweepRecord]]
+    OUTPUT: ClassVar[type[ModelRecord | SweepRecord | VehicleRecord]]
 
     @classmethod
     def beside(cls, output: Path, header: Header) -> Self:
@@ -111,7 +117,15 @@ class Leftover:
         except InputError as error:
             raise InputError(f"{error}; {_START_AGAIN}") from None
 
-    def _written(self) -> ModelRecord | SweepRecord | None:
+    @contextmanager
+    def _damaged(self) -> Iterator[None]:
+        """Say that what was left cannot be rebuilt."""
+        try:
+            yield
+        except (ValueError, LookupError, TypeError) as error:
+            raise InputError(f"{self.path}: damaged: {error}; {_START_AGAIN}") from None
+
+    def _written(self) -> ModelRecord | SweepRecord | VehicleRecord | None:
         """Read the output; None where there is none, or another file."""
         if not self.output.is_file() or format_name(self.output) != self.OUTPUT.FORMAT.name:
             return None
@@ -169,11 +183,9 @@ class Checkpoint(Leftover):
         InputError
             If there is none, if it is damaged, or if it is of another search.
         """
-        try:
-            record = self._read(CheckpointRecord)
+        record = self._read(CheckpointRecord)
+        with self._damaged():
             stopped = record.stopped_search()
-        except (ValueError, LookupError, TypeError) as error:
-            raise InputError(f"{self.path}: damaged: {error}; {_START_AGAIN}") from None
         self._require_same_search(record.origin, 0 if stopped.state is None else stopped.state.index)
         return stopped
 
@@ -186,10 +198,45 @@ class Checkpoint(Leftover):
         self._require_same(differing)
 
 
-def _keys(header: Header) -> dict[str, Any]:
+@dataclass(frozen=True)
+class VehicleCheckpoint(Leftover):
+    """Where a search for the structure of a vehicle leaves what it has judged."""
+
+    WORK: ClassVar = "search"
+    SUFFIX: ClassVar = ".checkpoint"
+    OUTPUT: ClassVar = VehicleRecord
+
+    def write(self, judged: Sequence[Judged]) -> None:
+        """Replace what was there by these structures, or leave it as it was.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        write_record(self.path, VehicleCheckpointRecord.of(judged).with_header(self.header))
+
+    def read(self) -> Kept:
+        """Take up what was left.
+
+        Raises
+        ------
+        InputError
+            If there is none, if it is damaged, or if it is of another search.
+        """
+        record = self._read(VehicleCheckpointRecord)
+        with self._damaged():
+            kept = record.kept()
+        old, new = (_keys(header, _OF_VEHICLE) for header in (record.origin, self.header))
+        self._require_same(differences(record.origin, self.header, old, new, unimportant="held-out"))
+        return kept
+
+
+def _keys(header: Header, sections: Sequence[str] = (_SECTION,)) -> dict[str, Any]:
     """List the keys that a search depends on, with dots."""
     config = parse_config(header.config, "/config")
-    return {"seed": header.seed, **dict(_flat(_SECTION, config[_SECTION]))}
+    flat = (_flat(section, config[section]) for section in sections)
+    return {"seed": header.seed, **{key: value for listed in flat for key, value in listed}}
 
 
 def _flat(prefix: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

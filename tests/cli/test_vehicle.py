@@ -160,23 +160,38 @@ def interrupt_at(monkeypatch):
 
         find = vehicle.find_vehicle
 
-        def finding(stated, flights, settings, rng, progress):
-            def told(done, total, best):
-                if done == number:
+        def finding(stated, flights, settings, rng, progress, kept):
+            def told(judged, total):
+                evaluated.append(len(judged))
+                if len(judged) == number:
                     os.kill(os.getpid(), signal.SIGINT)
-                progress(done, total, best)
+                progress(judged, total)
 
-            return find(stated, flights, settings, rng, told)
+            return find(stated, flights, settings, rng, told, kept)
 
+        evaluated = []
         monkeypatch.setattr(vehicle, "find_vehicle", finding)
+        return evaluated
 
     return at
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+RESUME = "the same command with --resume goes on"
 
 
 def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, interrupt_at):
     interrupt_at(4)
     result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", "--json")
     assert result.exit_code == 130
+    assert names(tmp_path) == ["v.h5", "v.h5.checkpoint"]
+    assert result.stderr.splitlines()[-1] == (
+        f"cpfls: note: {tmp_path / 'v.h5'}: is incomplete, because the search was interrupted; {RESUME}"
+    )
+    assert cpfls("check", tmp_path / "v.h5.checkpoint").exit_code == 0
     told = json.loads(result.stdout)
     assert (told["complete"], told["evaluated"]) == (False, 4)
     shown = cpfls("report", config, tmp_path / "v.h5", "-o", tmp_path / "page.md")
@@ -184,10 +199,76 @@ def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, int
     assert "the search was stopped before its end" in (tmp_path / "page.md").read_text()
 
 
-def test_an_interrupt_before_anything_was_found_writes_nothing(config, flights, refuse, tmp_path, interrupt_at):
+def test_an_interrupt_before_anything_was_found_keeps_the_checkpoint_alone(
+    cpfls, config, flights, tmp_path, interrupt_at
+):
     interrupt_at(2)
-    (message,) = refuse("vehicle", config, flights[0], "-o", tmp_path / "v.h5", code=130)
-    assert message == "the search was interrupted before a vehicle was found, so none is written"
+    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5")
+    assert (result.exit_code, result.stdout) == (130, "")
+    assert result.stderr == (
+        f"cpfls: error: the search was interrupted before a model was found, so none is written; {RESUME}\n"
+    )
+    assert names(tmp_path) == ["v.h5.checkpoint"]
+
+
+@pytest.mark.parametrize("number", [1, 3, 8])
+def test_an_interrupted_search_goes_on_to_the_same_end(
+    cpfls, config, flights, found, tmp_path, interrupt_at, monkeypatch, number
+):
+    words = ("vehicle", config, flights[0], "--held-out", flights[1], "-o", tmp_path / "vehicle.h5")
+    before = interrupt_at(number)
+    assert cpfls(*words).exit_code == 130
+    monkeypatch.undo()
+    after = interrupt_at(None)
+    result = cpfls(*words, "--resume")
+    assert result.exit_code == 0, result.stderr
+    assert [*before, *after] == list(range(1, found.told["evaluated"] + 1))
+    assert (tmp_path / "vehicle.h5").read_bytes() == found.output.read_bytes()
+    assert names(tmp_path) == ["vehicle.h5"]
+
+
+def test_a_search_is_killed_and_goes_on(cpfls, config, flights, found, tmp_path, monkeypatch):
+    """Whatever ends the program, some structures before are kept."""
+    from cpfls_cli.commands import vehicle
+
+    monkeypatch.setattr(vehicle, "_KEPT_EVERY", 4)
+    written, write = [], vehicle.VehicleCheckpoint.write
+
+    def dying(checkpoint, judged):
+        write(checkpoint, judged)
+        written.append(len(judged))
+        raise MemoryError
+
+    monkeypatch.setattr(vehicle.VehicleCheckpoint, "write", dying)
+    words = ("vehicle", config, flights[0], "--held-out", flights[1], "-o", tmp_path / "vehicle.h5")
+    assert cpfls(*words).exit_code != 0
+    assert written == [4]
+    assert names(tmp_path) == ["vehicle.h5.checkpoint"]
+    monkeypatch.undo()
+    assert cpfls(*words, "--resume").exit_code == 0
+    assert (tmp_path / "vehicle.h5").read_bytes() == found.output.read_bytes()
+
+
+def test_what_cannot_be_resumed_is_refused(cpfls, refuse, config, flights, tmp_path, interrupt_at):
+    output = tmp_path / "v.h5"
+    (message,) = refuse("vehicle", config, flights[0], "-o", output, "--resume")
+    assert message == f"{output}.checkpoint: no such file, so nothing to resume; start without --resume"
+    interrupt_at(1)
+    assert cpfls("vehicle", config, flights[0], "-o", output).exit_code == 130
+    (message,) = refuse("vehicle", config, flights[0], "-o", output)
+    assert message.startswith(f"{output}.checkpoint: a search for {output} was stopped here; --resume continues it")
+    for words, named in (
+        ((flights[1],), "flight-1 = flight-1.h5 ("),
+        ((flights[0], "--set", "playback.folds=3"), "playback.folds = 2 there, 3 here"),
+        ((flights[0], "--set", "seed=2"), "seed = 1 there, 2 here"),
+    ):
+        (message,) = refuse("vehicle", config, *words, "-o", output, "--resume")
+        assert message.startswith(f"{output}.checkpoint: is of another search: ")
+        assert named in message
+    with h5py.File(tmp_path / "v.h5.checkpoint", "r+") as file:
+        file["loss"][0] += 1e-9
+    (message,) = refuse("vehicle", config, flights[0], "-o", output, "--resume")
+    assert "damaged: its datasets were changed after it was written (sha256 differs)" in message
 
 
 @pytest.fixture

@@ -1,10 +1,12 @@
 """Which blocks are chosen: those that were flown, whatever else is tried."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from cpfls_cli.artifacts.checkpoint import VehicleCheckpointRecord
 from cpfls_cli.playback import structure
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -26,13 +28,13 @@ def flights():
     return flown(truth(), ("figure", "steps"), duration_s=5.0, noise=MIDDLING, seed=2)
 
 
-def chosen(flights, progress=lambda *_: None):
-    return choose(STATED, flights, QUICK, np.random.default_rng(0), progress)
+def chosen(flights, progress=lambda *_: None, kept=None):
+    return choose(STATED, flights, QUICK, np.random.default_rng(0), progress, kept or {})
 
 
 def stopping_at(number):
-    def progress(done, *_):
-        if done == number:
+    def progress(judged, _):
+        if len(judged) == number:
             raise SearchStoppedError
 
     return progress
@@ -51,14 +53,37 @@ def test_a_search_stopped_before_all_blocks_were_judged_has_nothing(flights):
 
 def test_a_search_tells_how_far_it_is(flights):
     told = []
-    choice = chosen(flights, lambda done, total, best: told.append((done, total, best)))
+    choice = chosen(flights, lambda judged, total: told.append((judged, total)))
     assert choice.complete
-    assert [done for done, _, _ in told] == list(range(1, choice.evaluated + 1))
-    assert all(done <= total for done, total, _ in told)
-    assert told[-1][2] == choice.best.error
+    assert [len(judged) for judged, _ in told] == list(range(1, choice.evaluated + 1))
+    assert all(len(judged) <= total for judged, total in told)
+    assert min(each.error for each in told[-1][0]) == choice.best.error
     assert choice.chosen.numbers <= choice.best.numbers
     assert "flapping_moment" in choice.chosen.structure.blocks
     assert choice.chosen.error < 0.3 * choice.nothing.error
+
+
+@pytest.mark.parametrize("number", [1, 7])
+def test_a_search_goes_on_from_what_was_kept(flights, number):
+    """Nothing is judged twice, and every fit starts from where it would have started."""
+    whole, parts = [], []
+
+    def stopping(judged, _):
+        parts.append(judged)
+        if len(judged) == number:
+            raise SearchStoppedError
+
+    without = chosen(flights, lambda judged, _: whole.append(judged))
+    with suppress(SearchStoppedError):
+        chosen(flights, stopping)
+    kept = VehicleCheckpointRecord.of(parts[-1]).kept()
+    resumed = chosen(flights, lambda judged, _: parts.append(judged), kept)
+    assert [len(judged) for judged in parts] == list(range(1, without.evaluated + 1))
+    pairs = list(zip(whole[-1], parts[-1], strict=True))
+    assert [one.structure for one, _ in pairs] == [other.structure for _, other in pairs]
+    assert all(a.error == b.error and np.array_equal(a.by_block, b.by_block) for a, b in pairs)
+    assert resumed.chosen.structure == without.chosen.structure
+    assert resumed.complete
 
 
 class Bench:
