@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.parameters import Parameter, parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
@@ -365,6 +366,9 @@ class VehicleRecord(Record):
     complete: bool = dataset("complete", "1 where the search came to its end")
     blocks: int = dataset("blocks", "blocks of windows that the intervals come from")
     warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
+    guess: tuple[str, ...] | None = dataset(
+        "guess", "numbers of /vehicle that are guesses still: no flight tells them", "guess", default=None
+    )
 
     @classmethod
     def of(cls, found: FoundVehicle, held_out: HeldOutGroup | None, warnings: Sequence[str]) -> Self:
@@ -390,6 +394,7 @@ class VehicleRecord(Record):
             complete=found.choice.complete,
             blocks=found.blocks,
             warning=tuple(warnings),
+            guess=found.guessed or None,
         )
 
     @property
@@ -415,6 +420,7 @@ class VehicleRecord(Record):
         return {
             **self.vehicle.summary,
             "verdict": self.verdict,
+            "parameters": {each.key: _but_key(each) for each in parameters_of(self)},
             "numbers": numbers,
             "trades": [list(row.values()) for row in rows_of(self.trade)],
             "structures": rows_of(self.structure),
@@ -424,3 +430,7 @@ class VehicleRecord(Record):
             "complete": self.complete,
             "warnings": list(self.warning),
         }
+
+
+def _but_key(parameter: Parameter) -> dict[str, Any]:
+    return {name: value for name, value in parameter._asdict().items() if name != "key"}

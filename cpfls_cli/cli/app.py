@@ -57,6 +57,10 @@ ModelOption = Annotated[
         help="Made by `cpfls identify` (`compare` takes one of `extend` too); without, the vehicle of the config.",
     ),
 ]
+WriteConfigOption = Annotated[
+    Path | None,
+    typer.Option("--write-config", metavar="FILE", help="Write the config again with the numbers that were found."),
+]
 HeldOutOption = Annotated[
     list[Path] | None,
     typer.Option("--held-out", metavar="FLIGHT", help="Judge on this flight, learn nothing of it; may be repeated."),
@@ -341,6 +345,7 @@ def vehicle(
     output: OutputOption,
     held_out: HeldOutOption = None,
     resume: ResumeOption = False,
+    write_config: WriteConfigOption = None,
     *,
     common: Common,
 ) -> None:
@@ -349,7 +354,8 @@ def vehicle(
     def call(job: Job) -> Outcome:
         from cpfls_cli.commands import vehicle as command
 
-        return command.run(job, flights, held_out or [], resume=resume)
+        copy = None if write_config is None else command.ConfigCopy(config, write_config)
+        return command.run(job, flights, held_out or [], copy, resume=resume)
 
     _run("vehicle", config, output, common, call)
 

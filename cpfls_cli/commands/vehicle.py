@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from typing import NamedTuple
 
 from cpfls_cli.artifacts.job import Job, finish
+from cpfls_cli.artifacts.output import check_output, write_text
+from cpfls_cli.artifacts.parameters import vehicle_section
 from cpfls_cli.artifacts.replay import HeldOutGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.compare import flight_roles
 from cpfls_cli.commands.stopped import stopped, without_model
+from cpfls_cli.config.load import read_config
 from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flights.playback import flights_to_play, whole
 from cpfls_cli.pages.source import source_of
@@ -30,7 +35,21 @@ _KEPT_EVERY = 10
 """Structures after which the checkpoint is written again: what a killed search has to judge anew at most."""
 
 
-def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], *, resume: bool = False) -> Outcome:
+class ConfigCopy(NamedTuple):
+    """A config to be written again with the numbers that were found."""
+
+    config: Path
+    copy: Path
+
+
+def run(
+    job: Job,
+    flights: Sequence[Path],
+    held_out: Sequence[Path],
+    config: ConfigCopy | None = None,
+    *,
+    resume: bool = False,
+) -> Outcome:
     """Find a vehicle and write it.
 
     Parameters
@@ -39,6 +58,8 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], *, resume: 
         Artifacts, or logs that the config describes; the vehicle is found in them.
     held_out : sequence of Path
         Others to judge it on, once.
+    config : ConfigCopy or None
+        Written beside the artifact.
     resume : bool
         Go on with a search that was stopped.
 
@@ -50,6 +71,8 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], *, resume: 
     """
     study = job.study
     roles = flight_roles("flight", flights) | flight_roles("held-out", held_out)
+    if config is not None:
+        check_output(config.copy, job.force)
     inputs, checkpoint, kept = begin_vehicle_search(job, roles, resume=resume)
     _check_left_out(study)
     read = flights_to_play([*flights, *held_out], study)
@@ -67,10 +90,18 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], *, resume: 
         judged = _judged(found.model, rest, job) if rest else None
         warnings = [warning for flight in read for warning in flight.warnings]
         record = finish(job, VehicleRecord.of(found, judged, warnings), inputs)
+    if config is not None:
+        _write_config(config, record)
     if record.complete:
         checkpoint.remove()
     outcome = Outcome(record.summary, tuple(answer(source_of(job, record))))
     return stopped(outcome, "generations" if record.complete else "interrupted", signal, job.output)
+
+
+def _write_config(config: ConfigCopy, record: VehicleRecord) -> None:
+    """Write a config with the numbers that were found in the place of its section `vehicle`."""
+    data = read_config(config.config) | {"vehicle": vehicle_section(record)}
+    write_text(config.copy, f"# {config.config.name}, with the vehicle that `cpfls vehicle` found\n{to_yaml(data)}")
 
 
 def _require_rotors(flight: LoggedFlight) -> None:

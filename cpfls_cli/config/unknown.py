@@ -36,7 +36,7 @@ def with_guesses(data: dict[str, Any]) -> dict[str, Any]:
     open_ = [
         name
         for name, key in KEYS.items()
-        if (key in vehicle and vehicle[key] is None) or any(key in rotor and rotor[key] is None for rotor in listed)
+        if any(key in holder and _has_null(holder[key]) for holder in (vehicle, *listed))
     ]
     if not open_:
         return data
@@ -45,11 +45,19 @@ def with_guesses(data: dict[str, Any]) -> dict[str, Any]:
     except (TypeError, ValueError, ZeroDivisionError, OverflowError, IndexError):
         return data
     filled = {**vehicle, "unknown": sorted({*(vehicle.get("unknown") or ()), *open_})}
-    if KEYS["inertia"] in vehicle and vehicle[KEYS["inertia"]] is None:
-        filled[KEYS["inertia"]] = guesses["inertia"]
+    if "inertia" in open_:
+        given = vehicle[KEYS["inertia"]] or [None, None, None]
+        guessed = [*guesses["inertia"], 0.0, 0.0, 0.0]
+        filled[KEYS["inertia"]] = [
+            guess if value is None else value for value, guess in zip(given, guessed, strict=False)
+        ]
     if isinstance(rotors, list):
         filled["rotors"] = [_filled(rotor, guesses) if isinstance(rotor, dict) else rotor for rotor in rotors]
     return {**data, "vehicle": filled}
+
+
+def _has_null(value: Any) -> bool:
+    return value is None or (isinstance(value, list) and None in value)
 
 
 def _filled(rotor: dict[str, Any], guesses: dict[Unknown, Any]) -> dict[str, Any]:

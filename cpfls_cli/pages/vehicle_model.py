@@ -11,6 +11,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.replay import better_to
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.pages.constants import constants, section_to_paste
 from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, stacked, style_of
@@ -50,7 +51,9 @@ def answer(found: Source[VehicleRecord]) -> Iterator[Block]:
     yield found_box(found)
     if found.record.held_out is not None:
         yield errors_table(found.record.held_out, 1)
+    yield from constants(found.record, 1)
     yield _numbers_table(found, 1)
+    yield section_to_paste(found.record)
     yield from (Text(warning, "warning") for warning in warnings(found.record))
 
 
@@ -103,7 +106,7 @@ def warnings(record: VehicleRecord) -> list[str]:
     if none:
         said.append(f"{joined(none)}: 0, the least that it can be; the flights show none of it")
     if open_:
-        said.append(f"{joined(open_)}: the flights say no more of it than what was believed before")
+        said.append(f"{joined(open_)}: not determined, the flights say too little of it")
     said.extend(
         f"{row['first']} and {row['second']} trade against each other (correlation {row['correlation']:.3f}): only "
         "together do they mean anything"
@@ -155,7 +158,9 @@ def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
     if record.held_out is not None:
         yield errors_table(record.held_out, index)
         yield horizon_figure(f"vehicle-errors-{index}", record.held_out)
+    yield from constants(record, index)
     yield _numbers_table(found, index)
+    yield section_to_paste(record)
     yield from (Text(warning, "warning") for warning in warnings(record))
     yield _structures_table(record, index)
     yield _structures_figure(record, index)

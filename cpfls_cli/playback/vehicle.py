@@ -22,6 +22,9 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 _TRADED = 0.95
 """Size of a correlation from which on two numbers trade against each other."""
 
+_KNOWN = 2.0
+"""Ratio of the ends of an interval from which on a number that cannot be negative is not determined."""
+
 _AT_BOUND = 1e-6
 _STEP = 1e-5
 
@@ -39,7 +42,8 @@ class FoundNumber(NamedTuple):
     stated : float
         In the config; NaN for what no config states.
     determined : bool
-        Whether the flights say more of it than what was believed before.
+        Whether the flights say more of it than what was believed before, and to a factor of two where it cannot be
+        negative.
     at_bound : bool
         Whether it lies on a bound, so that the interval says little.
     """
@@ -95,6 +99,8 @@ class FoundVehicle:
         Of the last fit.
     blocks : int
         Blocks of windows that the intervals come from.
+    guessed : tuple of str
+        What is not known of the vehicle and no flight tells.
     """
 
     model: VehicleModel
@@ -105,6 +111,7 @@ class FoundVehicle:
     choice: Choice
     condition_number: float
     blocks: int
+    guessed: tuple[str, ...]
 
 
 def find_vehicle(
@@ -142,6 +149,7 @@ def find_vehicle(
         choice,
         fitted.condition_number,
         spread.blocks,
+        tuple(sorted(set(vehicle.unknown) - set(begun.unknown))),
     )
 
 
@@ -205,7 +213,8 @@ def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
         bound = min(values[place] - number.low, number.high - values[place]) <= span
         low, high = _interval(found.value, float(half[place]), positive=found.positive)
         known = stated[name].value if found.stated else np.nan
-        yield FoundNumber(name, found.unit, found.value, low, high, known, bool(spread.determined[place]), bool(bound))
+        determined = spread.determined[place] and not (found.positive and high > _KNOWN * low)
+        yield FoundNumber(name, found.unit, found.value, low, high, known, bool(determined), bool(bound))
 
 
 def _interval(value: float, half: float, *, positive: bool) -> tuple[float, float]:

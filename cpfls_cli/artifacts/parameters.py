@@ -1,0 +1,154 @@
+"""What flights tell of the constants of a vehicle, by the keys of a config: values, intervals, and what stays open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cpfls_cli.artifacts.spec import rows_of
+from cpfls_cli.inertia import INERTIA_PARAMETERS
+
+if TYPE_CHECKING:
+    from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+
+_DIGITS = 6
+THRUST, DRAG = "rotors.thrust_factor_n_s2", "rotors.drag_factor_n_m_s2"
+INERTIA = tuple(f"inertia_kg_m2.{place}" for place in range(6))
+LAG, DELAY, CENTRE = "motor_lag_s", "delay_s", ("com_m.0", "com_m.1")
+_FOUND_AS = {
+    THRUST: "thrust_factor",
+    DRAG: "drag_factor",
+    **dict(zip(INERTIA[:3], (f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]), strict=True)),
+    **dict(zip(INERTIA[3:], (f"products.{name}" for name in INERTIA_PARAMETERS[3:]), strict=True)),
+    LAG: "lag.time_constant_s",
+    DELAY: "delay.delay_s",
+    **dict(zip(CENTRE, ("com_offset.c_x", "com_offset.c_y"), strict=True)),
+}
+"""Numbers of a fit, by the keys under which people look for them."""
+
+_UNITS = {THRUST: "N s^2", DRAG: "N m s^2", LAG: "s", DELAY: "s", **dict.fromkeys(CENTRE, "m")}
+_GUESSES = {"thrust_factor": (THRUST,), "drag_factor": (DRAG,), "inertia": INERTIA[:3]}
+
+
+class Parameter(NamedTuple):
+    """A constant of a vehicle.
+
+    Attributes
+    ----------
+    key : str
+        Below the section `vehicle` of a config, where that has it.
+    value : float or None
+        None: no flight and no config tells it.
+    low, high : float or None
+        95 % interval of what was found.
+    determined : bool
+        Whether the flights tell it.
+    reason : str
+        Why, or why not.
+    """
+
+    key: str
+    value: float | None
+    unit: str
+    low: float | None
+    high: float | None
+    determined: bool
+    reason: str
+
+
+def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:
+    """List the constants of a vehicle that was found, known or not."""
+    found = {row["name"]: row for row in rows_of(record.found)}
+    guesses = {key for name in record.guess or () for key in _GUESSES[name]}
+    for key, name in _FOUND_AS.items():
+        unit = _UNITS.get(key, "kg m^2")
+        if name in found:
+            row = found[name]
+            reason = _reason(record, row)
+            yield Parameter(key, row["value"], unit, row["low"], row["high"], not reason, reason or "found in flights")
+        elif key in guesses:
+            yield Parameter(
+                key, None, unit, None, None, False, "not known: the flights lack what tells it (velocity for thrust)"
+            )
+        else:
+            yield Parameter(key, _held(record, key), unit, None, None, False, _why_not_fitted(key))
+
+
+def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
+    """Say why a number is not determined; empty where it is."""
+    name = row["name"]
+    if row["at_bound"]:
+        return "on a bound of what is tried"
+    others = [
+        each["second"] if each["first"] == name else each["first"]
+        for each in rows_of(record.trade)
+        if name in (each["first"], each["second"])
+    ]
+    if row["determined"]:
+        return ""
+    if others:
+        return f"only its ratio to {' and '.join(others)} is known: they trade against each other"
+    return "the flights say too little of it: its interval is too wide"
+
+
+def _held(record: VehicleRecord, key: str) -> float:
+    vehicle = record.vehicle
+    if key in INERTIA:
+        return float(vehicle.inertia[INERTIA.index(key)])
+    of_rotors = {THRUST: vehicle.rotor.thrust_factor, DRAG: vehicle.rotor.drag_factor}
+    if key in of_rotors:
+        return float(np.mean(of_rotors[key]))
+    return {LAG: vehicle.response.lag, DELAY: vehicle.response.delay}.get(key, 0.0)
+
+
+def _why_not_fitted(key: str) -> str:
+    if key in (LAG, DELAY, *CENTRE, *INERTIA[3:]):
+        return "none: with it the error on flights kept aside is no lower"
+    return "stated; another value does not lower the error on flights kept aside"
+
+
+def vehicle_section(record: VehicleRecord) -> dict[str, Any]:
+    """Write the section `vehicle` of a config with what was found; null for what was not known and still is not.
+
+    Returns
+    -------
+    dict
+        Plain data, in the order of a config.
+    """
+    known = {each.key: each for each in parameters_of(record)}
+    vehicle, rotors = record.vehicle, record.vehicle.rotor
+
+    def factor(key: str, held: float) -> float | None:
+        return None if _open(known[key]) else _rounded(held)
+
+    inertia = [
+        None if _open(known[key]) else _rounded(value) for key, value in zip(INERTIA, vehicle.inertia, strict=True)
+    ]
+    section: dict[str, Any] = {
+        "gravity_m_s2": vehicle.gravity,
+        "mass_kg": _rounded(vehicle.mass),
+        "inertia_kg_m2": inertia if any(inertia[3:]) else inertia[:3],
+        "rotors": [
+            {
+                "position_m": [_rounded(value) for value in rotors.position[place]],
+                "spin": int(rotors.spin[place]),
+                "thrust_factor_n_s2": factor(THRUST, rotors.thrust_factor[place]),
+                "drag_factor_n_m_s2": factor(DRAG, rotors.drag_factor[place]),
+                "radius_m": _rounded(rotors.radius[place]) if np.isfinite(rotors.radius[place]) else None,
+            }
+            for place in range(len(rotors.spin))
+        ],
+        "rotor_speed_max_rad_s": rotors.speed_max,
+    }
+    return section
+
+
+def _open(parameter: Parameter) -> bool:
+    """Tell whether a number that a fit was free to choose is not to be relied on."""
+    return not parameter.determined and (parameter.low is not None or parameter.value is None)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
