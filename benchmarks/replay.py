@@ -29,14 +29,14 @@ from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.model import VehicleModel, remainder_terms
 from cpfls_cli.playback.motion import State
-from cpfls_cli.playback.parameters import REMAINDER, Layout, blocks_of
+from cpfls_cli.playback.parameters import LEARNED, Layout, blocks_of
 from cpfls_cli.playback.replay import Played, Player, free_runs, player_of, replay, rotation_vectors
 from cpfls_cli.rotations import turns
 from tests.builders.playback_flights import KINDS, MIDDLING, STATED, flown, truth
 
 HORIZON = 50
-BLOCKS = tuple(block for block in blocks_of(STATED) if block != REMAINDER)
-LEARNED = Airflow(np.linspace(0.0, 1.0, 4), 4)
+BLOCKS = tuple(block for block in blocks_of(STATED) if block not in LEARNED)
+RULES = Airflow(np.linspace(0.0, 1.0, 4), 4)
 """Three rules of fourth order: 54 terms beside the 34 of the effects."""
 
 Along = Sequence[tuple[Player, PlaybackFlight]]
@@ -60,7 +60,7 @@ def players(flights: Sequence[PlaybackFlight]) -> dict[str, Along]:
         "rotors alone": VehicleModel(vehicle=STATED),
         "what flew": truth(),
         "all effects": drawn(BLOCKS),
-        "all effects and a remainder": drawn((*BLOCKS, REMAINDER)),
+        "all effects and a remainder": drawn((*BLOCKS, *LEARNED)),
     }
     along = {name: [(player_of(model, flight), flight) for flight in flights] for name, model in models.items()}
     last, rng = list(along.values())[-1], np.random.default_rng(2)
@@ -71,7 +71,7 @@ def players(flights: Sequence[PlaybackFlight]) -> dict[str, Along]:
 
 def drawn(blocks: tuple[str, ...]) -> VehicleModel:
     """Draw numbers near the stated ones, none of them 0."""
-    layout = Layout(STATED, blocks, LEARNED, tuple(range(6)))
+    layout = Layout(STATED, blocks, RULES)
     away = 0.05 * layout.scales * abs(np.random.default_rng(1).standard_normal(len(layout.numbers)))
     return layout.model(np.clip(layout.starts + away, layout.lows, layout.highs))
 
