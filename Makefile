@@ -280,6 +280,7 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python benchmarks/reduction_streamed.py --samples 100000
 	$(BIN)/python benchmarks/evolution_hypervolume.py
 	$(BIN)/python benchmarks/gap.py
+	$(BIN)/python benchmarks/replay.py
 	$(MAKE) data/paper/selection.h5
 	$(BIN)/python benchmarks/judging.py $(STUDY)
 	$(BIN)/python benchmarks/time_to_quality.py $(STUDY)

@@ -15,7 +15,7 @@ from time import process_time
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.shared.measure import pin_threads, ratio_of, table
+from benchmarks.shared.measure import in_turn, pin_threads, table
 
 pin_threads()
 
@@ -111,8 +111,8 @@ def timed(name: str, model: Model, folder: Path, call: str) -> tuple:
     states = np.hstack([rng.uniform(-np.pi, np.pi, (BATCH, 3)), rng.normal(0, 3, (BATCH, 6))])
     double = compiled(folder / "double.so", call, states)
     single = compiled(folder / "float.so", call, states.astype(np.float32))
-    many, one = in_turn(library(model, call, states), double), in_turn(ones(model, call, states), double)
-    in_float = in_turn(double, single)
+    pairs = ((library(model, call, states), double), (ones(model, call, states), double), (double, single))
+    many, one, in_float = (in_turn(slow, fast, clock=process_time) for slow, fast in pairs)
     c = 1e9 * many.fast_s / (PASSES * BATCH)
     batch, alone = 1e9 * many.slow_s / BATCH, 1e9 * one.slow_s / SINGLES
     shares = (scaled(many, PASSES), scaled(one, PASSES * BATCH / SINGLES))
@@ -127,18 +127,6 @@ def timed(name: str, model: Model, folder: Path, call: str) -> tuple:
         shares[1],
         f"{c / BUDGET_NS:.1%}",
     )
-
-
-def in_turn(slow, fast, repeats: int = 5):
-    """Time two things in turn by the processor's clock, which other programs on the machine disturb least."""
-    slow(), fast()
-    return ratio_of([(processor_seconds(slow), processor_seconds(fast)) for _ in range(repeats)])
-
-
-def processor_seconds(work) -> float:
-    start = process_time()
-    work()
-    return process_time() - start
 
 
 def scaled(ratio, factor: float) -> str:

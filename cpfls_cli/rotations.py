@@ -194,3 +194,22 @@ def multiply(matrices: Array, vectors: Array) -> Array:
     """
     product: Array = np.einsum("nij,nj->ni", matrices, vectors)
     return product
+
+
+def turns(vector: Array) -> Array:
+    """Compute the rotations ``exp [a]_x``.
+
+    Parameters
+    ----------
+    vector : array, shape (samples, 3), rad
+
+    Returns
+    -------
+    array, shape (samples, 3, 3)
+    """
+    angle = np.linalg.norm(vector, axis=1)[:, None, None]
+    x, y, z = vector.T
+    none = np.zeros_like(x)
+    cross = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
+    half = np.sinc(angle / (2 * np.pi))
+    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * half**2 * (cross @ cross))

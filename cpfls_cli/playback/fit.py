@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from scipy.stats import t as student
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import ComputationError
@@ -304,21 +303,17 @@ def _step(point: _Point, damping: float, bounds: tuple[Array, Array], scale: Arr
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Intervals of the numbers of a fit, from the scatter of blocks of windows.
+    """How far the numbers of a fit scatter, from blocks of windows.
 
     Attributes
     ----------
     covariance : array, shape (number, number)
-    low, high : array, shape (number,)
-        95 % intervals.
     blocks : int
     determined : array of bool, shape (number,)
         Whether the flights say more of a number than what was believed before.
     """
 
     covariance: Array
-    low: Array
-    high: Array
     blocks: int
     determined: BoolArray
 
@@ -366,12 +361,9 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
     moved = np.linalg.solve(without, (gradient * scale)[:, :, None])[:, :, 0]
     centred = moved - moved.mean(axis=0)
     covariance = (number - 1) / number * (centred.T @ centred) * scale[:, None] * scale
-    half = student.ppf(0.975, number - 1) * np.sqrt(np.diag(covariance))
     belief = _PRIOR / layout.spreads**2
     conditional = np.diag(fitted.hessian) - belief
-    return Uncertainty(
-        covariance, fitted.values - half, fitted.values + half, number, np.asarray(conditional > _INFORMED * belief)
-    )
+    return Uncertainty(covariance, number, np.asarray(conditional > _INFORMED * belief))
 
 
 def window_errors(fitted: Fitted, window: Windows) -> Array:

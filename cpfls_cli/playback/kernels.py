@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.regressor.kernels import compiled
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -27,9 +28,14 @@ def _compiled(function: Function) -> Function:
     return compiled(function)
 
 
-def _compiled_sum(function: Function) -> Function:
-    """Compile, and let the processor take the terms of a sum in the order that suits its registers."""
-    return compiled(function, fastmath={"reassoc", "contract"})
+def _inlined(function: Function) -> Function:
+    """Compile into the caller: to hand over tuples of arrays takes longer than what most of these functions do."""
+    return compiled(function, forceinline=True)
+
+
+def _inlined_sum(function: Function) -> Function:
+    """Compile into the caller, and let the processor take the terms of a sum in the order that suits its registers."""
+    return compiled(function, fastmath={"reassoc", "contract"}, forceinline=True)
 
 
 class Motion(NamedTuple):
@@ -82,6 +88,7 @@ class Airflow(NamedTuple):
 
 
 _POWERS = 2
+_POLYNOMIAL = len(STATE_TERMS)
 
 
 @_compiled
@@ -93,20 +100,22 @@ def airflow_terms(airflow: Airflow) -> int:
     return max(len(airflow.breakpoints) - 1, 1) * features * _POWERS
 
 
-@_compiled
+@_inlined
 def _falling(u: float) -> tuple[float, float]:
     """Zadeh's z-function and its derivative: the copy of `cpfls_cli.fuzzy.membership.z_function`."""
     rest = 1.0 - u
     return (1.0 - 2.0 * u * u, -4.0 * u) if u < 0.5 else (2.0 * rest * rest, -4.0 * rest)
 
 
-@_compiled
-def _degrees(airflow: Airflow, angle: float, rule: IntArray, degree: Array, slope: Array) -> int:
-    """Fire the rules of a periodic partition; one rule alone always fires."""
+@_inlined
+def _degree(airflow: Airflow, angle: float) -> tuple[int, float, float]:
+    """Find the first of the two rules of a periodic partition that fire, its degree and the slope of that.
+
+    The next rule fires by what is left of 1; one rule alone always fires.
+    """
     rules = len(airflow.breakpoints) - 1
-    rule[0], degree[0], slope[0] = 0, 1.0, 0.0
     if rules < 2:
-        return 1
+        return 0, 1.0, 0.0
     turn = angle / (2.0 * np.pi)
     turn -= np.floor(turn)
     interval = 0
@@ -115,26 +124,25 @@ def _degrees(airflow: Airflow, angle: float, rule: IntArray, degree: Array, slop
     start, end = airflow.breakpoints[interval], airflow.breakpoints[interval + 1]
     width = end - start if end > start else 1.0
     falling, by_position = _falling(min((turn - start) / width, 1.0) if end > start else 1.0)
-    by_angle = by_position / (width * 2.0 * np.pi)
-    rule[0], degree[0], slope[0] = interval, falling, by_angle
-    rule[1], degree[1], slope[1] = (interval + 1) % rules, 1.0 - falling, -by_angle
-    return 2
+    return interval, falling, by_position / (width * 2.0 * np.pi)
 
 
-@_compiled
-def _consequents(airflow: Airflow, angle: float, value: Array, slope: Array) -> int:
-    """Evaluate the consequent features: 1, and a seesaw or harmonics of the angle."""
-    value[0], slope[0] = 1.0, 0.0
+@_inlined
+def _consequents(airflow: Airflow, angle: float, feature: Array) -> int:
+    """Write the consequent features and their slopes: 1, and a seesaw or harmonics of the angle."""
+    feature[0, 0], feature[1, 0] = 1.0, 0.0
     if airflow.order == 0:
         wrapped = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
         outer = abs(wrapped) > 0.5 * np.pi
-        value[1] = (np.copysign(np.pi, wrapped) - wrapped if outer else wrapped) * (2.0 / np.pi)
-        slope[1] = -2.0 / np.pi if outer else 2.0 / np.pi
+        feature[0, 1] = (np.copysign(np.pi, wrapped) - wrapped if outer else wrapped) * (2.0 / np.pi)
+        feature[1, 1] = -2.0 / np.pi if outer else 2.0 / np.pi
         return 2
+    sine, cosine = np.sin(angle), np.cos(angle)
+    one_sine, one_cosine = sine, cosine
     for k in range(1, airflow.order + 1):
-        sine, cosine = np.sin(k * angle), np.cos(k * angle)
-        value[k], slope[k] = sine, k * cosine
-        value[airflow.order + k], slope[airflow.order + k] = cosine, -k * sine
+        feature[0, k], feature[1, k] = sine, k * cosine
+        feature[0, airflow.order + k], feature[1, airflow.order + k] = cosine, -k * sine
+        sine, cosine = sine * one_cosine + cosine * one_sine, cosine * one_cosine - sine * one_sine
     return 1 + 2 * airflow.order
 
 
@@ -142,37 +150,19 @@ MOST_COLUMNS = 64
 """Columns of a remainder at most: rules times features of a rule."""
 
 
-@_compiled
-def _columns(airflow: Airflow, angle: float, value: Array, slope: Array) -> int:
-    """Evaluate the columns of a periodic system of one angle and their slopes; see `cpfls_cli.fuzzy.basis.basis`."""
-    rule, degree, degree_slope = np.zeros(2, np.int64), np.zeros(2), np.zeros(2)
-    feature, feature_slope = np.zeros(MOST_COLUMNS), np.zeros(MOST_COLUMNS)
-    firing = _degrees(airflow, angle, rule, degree, degree_slope)
-    features = _consequents(airflow, angle, feature, feature_slope)
-    count = max(len(airflow.breakpoints) - 1, 1) * features
-    value[:count] = 0.0
-    slope[:count] = 0.0
-    for i in range(firing):
-        for f in range(features):
-            at = rule[i] * features + f
-            value[at] += degree[i] * feature[f]
-            slope[at] += degree_slope[i] * feature[f] + degree[i] * feature_slope[f]
-    return count
-
-
-@_compiled
-def terms(motion: Array, factors: IntArray, airflow: Airflow, value: Array, slope: Array) -> None:
+@_inlined
+def _write_terms(motion: Array, airflow: Airflow, feature: Array, value: Array, slope: Array) -> None:
     """Evaluate the terms of a motion and their derivatives.
 
     Parameters
     ----------
     motion : array, shape (6,)
         Air velocity and rate, body frame.
-    factors : array of int, shape (21, 2)
-        See `cpfls_cli.effects.polynomial.FACTORS`.
     airflow : Airflow
+    feature : array, shape (2, MOST_COLUMNS)
+        Work space.
     value : array, shape (terms,)
-        Written to.
+        Written to, in the order of `cpfls_cli.effects.polynomial.STATE_TERMS`.
     slope : array, shape (terms, 6), or (0, 6)
         Written to, where it is not zero anyhow; without rows it is not asked for.
     """
@@ -180,61 +170,67 @@ def terms(motion: Array, factors: IntArray, airflow: Airflow, value: Array, slop
     for i in range(6):
         value[1 + i] = motion[i]
     at = 7
-    for k in range(len(factors)):
-        value[at] = motion[factors[k, 0]] * motion[factors[k, 1]]
-        at += 1
+    for part in range(3):
+        first, second = 3 * (part // 2), 3 * ((part + 1) // 2)
+        for i in range(3):
+            for j in range(0 if part == 1 else i, 3):
+                value[at] = motion[first + i] * motion[second + j]
+                at += 1
     speed = np.sqrt(motion[0] ** 2 + motion[1] ** 2 + motion[2] ** 2)
     for i in range(3):
-        value[at + i] = speed * motion[i]
-        value[at + 3 + i] = abs(motion[3 + i]) * motion[3 + i]
+        value[28 + i] = speed * motion[i]
+        value[31 + i] = abs(motion[3 + i]) * motion[3 + i]
     if len(slope):
-        _polynomial_slopes(motion, factors, speed, slope)
+        _write_slopes(motion, speed, slope)
     if len(airflow.breakpoints):
-        _airflow(motion, airflow, at + 6, value, slope)
+        _write_airflow(motion, airflow, feature, value, slope)
 
 
-@_compiled
-def _polynomial_slopes(motion: Array, factors: IntArray, speed: float, slope: Array) -> None:
+@_inlined
+def _write_slopes(motion: Array, speed: float, slope: Array) -> None:
     for i in range(6):
         slope[1 + i, i] = 1.0
     at = 7
-    for k in range(len(factors)):
-        i, j = factors[k, 0], factors[k, 1]
-        slope[at, i] = motion[j]
-        slope[at, j] = motion[i]
-        if i == j:
-            slope[at, i] = 2.0 * motion[i]
-        at += 1
+    for part in range(3):
+        first, second = 3 * (part // 2), 3 * ((part + 1) // 2)
+        for i in range(first, first + 3):
+            for j in range(second if part == 1 else i, second + 3):
+                slope[at, i] = motion[j]
+                slope[at, j] = motion[i] if i != j else 2.0 * motion[i]
+                at += 1
     inverse = 1.0 / speed if speed > 0.0 else 0.0
     for i in range(3):
         for j in range(3):
-            slope[at + i, j] = motion[i] * motion[j] * inverse
-        slope[at + i, i] += speed
-        slope[at + 3 + i, 3 + i] = 2.0 * abs(motion[3 + i])
+            slope[28 + i, j] = motion[i] * motion[j] * inverse
+        slope[28 + i, i] += speed
+        slope[31 + i, 3 + i] = 2.0 * abs(motion[3 + i])
 
 
-@_compiled
-def _airflow(motion: Array, airflow: Airflow, at: int, value: Array, slope: Array) -> None:
+@_inlined
+def _write_airflow(motion: Array, airflow: Airflow, feature: Array, value: Array, slope: Array) -> None:
+    """Write the terms of a remainder: each column of the system (see `cpfls_cli.fuzzy.basis.basis`) by the speed."""
     forward, left = motion[0], motion[1]
-    speed = np.sqrt(forward * forward + left * left)
-    angle = np.arctan2(left, forward)
+    speed, angle = np.sqrt(forward * forward + left * left), np.arctan2(left, forward)
     inverse = 1.0 / speed if speed > 0.0 else 0.0
-    column, by_angle = np.zeros(MOST_COLUMNS), np.zeros(MOST_COLUMNS)
-    count = _columns(airflow, angle, column, by_angle)
-    for c in range(count):
-        value[at + 2 * c] = column[c] * speed
-        value[at + 2 * c + 1] = column[c] * speed * speed
-    if len(slope) == 0:
-        return
-    for c in range(count):
-        slope[at, 0] = (column[c] * forward - by_angle[c] * left) * inverse
-        slope[at, 1] = (column[c] * left + by_angle[c] * forward) * inverse
-        slope[at + 1, 0] = 2.0 * column[c] * forward - by_angle[c] * left
-        slope[at + 1, 1] = 2.0 * column[c] * left + by_angle[c] * forward
-        at += 2
+    features, rules = _consequents(airflow, angle, feature), max(len(airflow.breakpoints) - 1, 1)
+    rule, degree, by_angle = _degree(airflow, angle)
+    value[_POLYNOMIAL:] = 0.0
+    slope[_POLYNOMIAL:, :2] = 0.0
+    for _ in range(min(rules, 2)):
+        for f in range(features):
+            at = _POLYNOMIAL + 2 * (rule * features + f)
+            column = degree * feature[0, f]
+            value[at], value[at + 1] = column * speed, column * speed * speed
+            if len(slope):
+                turned = by_angle * feature[0, f] + degree * feature[1, f]
+                slope[at, 0] = (column * forward - turned * left) * inverse
+                slope[at, 1] = (column * left + turned * forward) * inverse
+                slope[at + 1, 0] = 2.0 * column * forward - turned * left
+                slope[at + 1, 1] = 2.0 * column * left + turned * forward
+        rule, degree, by_angle = (rule + 1) % rules, 1.0 - degree, -by_angle
 
 
-@_compiled
+@_inlined
 def _turn(interval: float, rate: Array, matrix: Array, right: Array) -> None:
     """Write the rotation ``exp [a]_x`` by ``interval * rate``, and its right Jacobian.
 
@@ -258,7 +254,7 @@ def _turn(interval: float, rate: Array, matrix: Array, right: Array) -> None:
         right[j, i] = third * product + second * value
 
 
-@_compiled_sum
+@_inlined_sum
 def _weighted(weights: Array, row: int, value: Array) -> float:
     total = 0.0
     for a in range(len(value)):
@@ -266,7 +262,7 @@ def _weighted(weights: Array, row: int, value: Array) -> float:
     return total
 
 
-@_compiled
+@_inlined
 def _slopes(body: Body, weights: Array, value: Array, rotation: Array, rate: Array, out: Array) -> None:
     """Write the accelerations, world and body frame, and the body force: shape (9,)."""
     for k in range(6):
@@ -295,8 +291,6 @@ class Terms(NamedTuple):
 
     Attributes
     ----------
-    factors : array of int, shape (21, 2)
-        See `cpfls_cli.effects.polynomial.FACTORS`.
     airflow : Airflow
     active : array of int, shape (active,)
         Indices of the terms that have weights.
@@ -304,7 +298,6 @@ class Terms(NamedTuple):
         Number of all terms.
     """
 
-    factors: IntArray
     airflow: Airflow
     active: IntArray
     total: int
@@ -323,6 +316,7 @@ class _Space(NamedTuple):
     """What one evaluation leaves: terms with slopes, accelerations and force, turns with their right Jacobians."""
 
     motion: Array
+    feature: Array
     value: Array
     slope: Array
     active: Array
@@ -343,6 +337,7 @@ def _new_state() -> _State:
 def _new_space(used: Terms, slopes: bool) -> _Space:
     return _Space(
         np.zeros(6),
+        np.zeros((2, MOST_COLUMNS)),
         np.zeros(used.total),
         np.zeros((used.total if slopes else 0, 6)),
         np.zeros(len(used.active)),
@@ -355,34 +350,36 @@ def _new_space(used: Terms, slopes: bool) -> _Space:
     )
 
 
-@_compiled
+@_inlined
 def _start(motion: Motion, sample: int, state: _State) -> None:
-    state.position[:] = motion.position[sample]
-    state.velocity[:] = motion.velocity[sample]
-    state.rotation[:] = motion.rotation[sample]
-    state.rate[:] = motion.rate[sample]
+    for i in range(3):
+        state.position[i] = motion.position[sample, i]
+        state.velocity[i] = motion.velocity[sample, i]
+        state.rate[i] = motion.rate[sample, i]
+        for j in range(3):
+            state.rotation[i, j] = motion.rotation[sample, i, j]
 
 
-@_compiled
+@_inlined
 def _evaluate(body: Body, used: Terms, weights: Array, state: _State, at: _Space) -> None:
     rotation, velocity, motion = state.rotation, state.velocity, at.motion
     for i in range(3):
         motion[i] = rotation[0, i] * velocity[0] + rotation[1, i] * velocity[1] + rotation[2, i] * velocity[2]
         motion[3 + i] = state.rate[i]
-    terms(motion, used.factors, used.airflow, at.value, at.slope)
+    _write_terms(motion, used.airflow, at.feature, at.value, at.slope)
     for a in range(len(used.active)):
         at.active[a] = at.value[used.active[a]]
     _slopes(body, weights, at.active, rotation, state.rate, at.out)
 
 
-@_compiled
+@_inlined
 def _product(first: Array, second: Array, out: Array) -> None:
     for i in range(3):
         for j in range(3):
             out[i, j] = first[i, 0] * second[0, j] + first[i, 1] * second[1, j] + first[i, 2] * second[2, j]
 
 
-@_compiled
+@_inlined
 def _to_middle(state: _State, middle: _State, h: float, translates: bool, at: _Space) -> None:
     """Go half a step along the slopes at its begin."""
     _turn(0.5 * h, state.rate, at.half, at.half_right)
@@ -392,20 +389,21 @@ def _to_middle(state: _State, middle: _State, h: float, translates: bool, at: _S
     _product(state.rotation, at.half, middle.rotation)
 
 
-@_compiled
+@_inlined
 def _to_end(state: _State, middle: _State, h: float, translates: bool, at: _Space) -> None:
     """Go the whole step along the slopes in its middle."""
     _turn(h, middle.rate, at.turn, at.right)
     _product(state.rotation, at.turn, at.moved)
-    state.rotation[:] = at.moved
     for i in range(3):
+        for j in range(3):
+            state.rotation[i, j] = at.moved[i, j]
         state.rate[i] += h * at.out[3 + i]
         if translates:
             state.position[i] += h * middle.velocity[i]
             state.velocity[i] += h * at.out[i]
 
 
-@_compiled
+@_inlined
 def _lost(state: _State) -> bool:
     """Tell whether a state is beyond what any vehicle flies; what is no number is."""
     fastest = 0.0
@@ -415,13 +413,13 @@ def _lost(state: _State) -> bool:
     return not fastest < _FASTEST
 
 
-@_compiled
+@_inlined
 def _dot(first: Array, i: int, second: Array, j: int) -> float:
     """Multiply a column of a matrix with a column of another."""
     return float(first[0, i] * second[0, j] + first[1, i] * second[1, j] + first[2, i] * second[2, j])
 
 
-@_compiled
+@_inlined
 def rotation_error(measured: Array, predicted: Array, out: Array) -> None:
     """Write the rotation vector from a measured to a predicted rotation, body frame of the measured one."""
     x = 0.5 * (_dot(measured, 2, predicted, 1) - _dot(measured, 1, predicted, 2))
@@ -437,7 +435,7 @@ def rotation_error(measured: Array, predicted: Array, out: Array) -> None:
     out[0], out[1], out[2] = scale * x, scale * y, scale * z
 
 
-@_compiled
+@_inlined
 def _write_errors(motion: Motion, sample: int, state: _State, out: Array) -> None:
     for i in range(3):
         out[0, i] = state.position[i] - motion.position[sample, i]
@@ -491,12 +489,14 @@ def errors_of_runs(
     return diverged
 
 
-@_compiled
+@_inlined
 def _copy(source: _State, target: _State) -> None:
-    target.position[:] = source.position
-    target.velocity[:] = source.velocity
-    target.rotation[:] = source.rotation
-    target.rate[:] = source.rate
+    for i in range(3):
+        target.position[i] = source.position[i]
+        target.velocity[i] = source.velocity[i]
+        target.rate[i] = source.rate[i]
+        for j in range(3):
+            target.rotation[i, j] = source.rotation[i, j]
 
 
 class Parameters(NamedTuple):
@@ -551,19 +551,21 @@ def _new_tangent(count: int) -> _Tangent:
     return _Tangent(np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, count)))
 
 
-@_compiled
+@_inlined
 def _by_motion(used: Terms, weights: Array, slope: Array, out: Array) -> None:
     """Write derivatives of the wrench by air velocity and rate, shape (6, 6)."""
-    out[:] = 0.0
     for k in range(6):
-        for a in range(len(used.active)):
+        for i in range(6):
+            out[k, i] = 0.0
+    for a in range(len(used.active)):
+        row = used.active[a]
+        for k in range(6):
             weight = weights[k, a]
-            if weight != 0.0:
-                for i in range(6):
-                    out[k, i] += weight * slope[used.active[a], i]
+            for i in range(6):
+                out[k, i] += weight * slope[row, i]
 
 
-@_compiled
+@_inlined
 def _cross(first: Array, second: Array, out: Array) -> None:
     """Write cross products of a vector with each column, or of each column of a matrix with a vector's."""
     for c in range(out.shape[1]):
@@ -572,7 +574,7 @@ def _cross(first: Array, second: Array, out: Array) -> None:
         out[2, c] = first[0] * second[1, c] - first[1] * second[0, c]
 
 
-@_compiled
+@_inlined
 def _times(matrix: Array, vectors: Array, out: Array) -> None:
     """Multiply a small matrix with columns; the loop over columns is the inner one, so that it runs in registers."""
     for i in range(matrix.shape[0]):
@@ -601,7 +603,7 @@ def _new_columns(count: int) -> _Columns:
     )
 
 
-@_compiled
+@_inlined
 def _own_change(parameters: Parameters, sample: int, rate: Array, at: _Space, wrench: Array) -> None:
     """Add the derivatives of the wrench by the parameters, less those of ``I omega'`` by the inertia."""
     turned, pushed = np.empty(3), np.empty(3)
@@ -618,7 +620,7 @@ def _own_change(parameters: Parameters, sample: int, rate: Array, at: _Space, wr
             wrench[2, c] -= pushed[2] + rate[0] * turned[1] - rate[1] * turned[0]
 
 
-@_compiled
+@_inlined
 def _linearise(
     body: Body,
     used: Terms,
@@ -655,7 +657,7 @@ def _linearise(
     _times(body.inverse, work.wrench[:3], out[3:])
 
 
-@_compiled
+@_inlined
 def _turning_change(body: Body, rate: Array, change: Array, work: _Columns) -> None:
     """Take the derivatives of ``omega x I omega`` off those of the torque."""
     momentum = np.empty(3)
@@ -669,7 +671,7 @@ def _turning_change(body: Body, rate: Array, change: Array, work: _Columns) -> N
             work.wrench[i, c] += work.first[i, c] - work.second[i, c]
 
 
-@_compiled
+@_inlined
 def _move_rotation(turn: Array, right: Array, h: float, rotation: Array, rate: Array, out: Array) -> None:
     """Write derivatives of a rotation after a turn: ``turn' rotation + h right rate``; `out` may be `rotation`."""
     for c in range(rotation.shape[1]):
@@ -679,7 +681,7 @@ def _move_rotation(turn: Array, right: Array, h: float, rotation: Array, rate: A
             out[i, c] = moved + h * (right[i, 0] * rate[0, c] + right[i, 1] * rate[1, c] + right[i, 2] * rate[2, c])
 
 
-@_compiled
+@_inlined
 def _tangent_to_middle(tangent: _Tangent, middle: _Tangent, change: Array, h: float, moves: bool, at: _Space) -> None:
     for i in range(3):
         for c in range(change.shape[1]):
@@ -688,7 +690,7 @@ def _tangent_to_middle(tangent: _Tangent, middle: _Tangent, change: Array, h: fl
     _move_rotation(at.half, at.half_right, 0.5 * h, tangent.rotation, tangent.rate, middle.rotation)
 
 
-@_compiled
+@_inlined
 def _tangent_to_end(tangent: _Tangent, middle: _Tangent, change: Array, h: float, moves: bool, at: _Space) -> None:
     _move_rotation(at.turn, at.right, h, tangent.rotation, middle.rate, tangent.rotation)
     for i in range(3):
@@ -699,7 +701,7 @@ def _tangent_to_end(tangent: _Tangent, middle: _Tangent, change: Array, h: float
                 tangent.velocity[i, c] += h * change[i, c]
 
 
-@_compiled
+@_inlined
 def _add(error: Array, rows: Array, weight: float, delta: float, gradient: Array, hessian: Array) -> float:
     """Add one error to gradient and Hessian; give its loss."""
     root = np.sqrt(1.0 + (error[0] ** 2 + error[1] ** 2 + error[2] ** 2) / (delta * delta))

@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.polynomial import FACTORS, STATE_TERMS, Probe, polynomial, state_terms
+from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial, state_terms
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
@@ -224,7 +224,7 @@ def body_of(vehicle: VehicleSettings, inertia: Array) -> Body:
 def used_terms(table: Array, airflow: Airflow) -> Terms:
     """List the terms of the motion that have weights."""
     active = np.flatnonzero(np.any(table, axis=(0, 2))).astype(np.int64)
-    return Terms(FACTORS.astype(np.int64), airflow, active, table.shape[1])
+    return Terms(airflow, active, table.shape[1])
 
 
 def weights_by_step(table: Array, used: Terms, rotor: Array) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.rotations import turns
 from cpfls_cli.vehicle.rotors import rotor_demand
 
 _STEPS = 40
@@ -82,28 +83,16 @@ def step(model: VehicleModel, state: State, rotor: Array, period: float) -> Stat
     middle = State(
         state.position,
         state.velocity + half * linear,
-        state.rotation @ _turn(half * state.rate),
+        state.rotation @ turns(half * state.rate),
         state.rate + half * angular,
     )
     linear, angular = accelerations(model, middle, rotor)
     return State(
         state.position + period * middle.velocity,
         state.velocity + period * linear,
-        state.rotation @ _turn(period * middle.rate),
+        state.rotation @ turns(period * middle.rate),
         state.rate + period * angular,
     )
-
-
-def _turn(vector: Array) -> Array:
-    """Compute the rotation ``exp [a]_x``, shape (samples, 3, 3)."""
-    square = np.sum(vector**2, axis=1)
-    angle = np.sqrt(square)
-    small = angle < _SMALL
-    safe, safe_square = np.where(small, 1.0, angle), np.where(small, 1.0, square)
-    first = np.where(small, 1.0 - square / 6.0, np.sin(safe) / safe)
-    second = np.where(small, 0.5 - square / 24.0, (1.0 - np.cos(safe)) / safe_square)
-    cross = np.cross(vector[:, None], np.eye(3)).swapaxes(1, 2)
-    return np.asarray(np.eye(3) + first[:, None, None] * cross + second[:, None, None] * (cross @ cross))
 
 
 def rotor_speeds(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -30,7 +30,10 @@ from cpfls_cli.playback.model import (
 from cpfls_cli.playback.rotors import Numbers, RotorResponse, rotor_terms_by_step
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-INERTIA, REMAINDER = "inertia", "remainder"
+INERTIA = "inertia"
+LEARNED: Mapping[str, tuple[int, ...]] = {"remainder": (0, 1, 2), "remainder_force": (3, 4, 5)}
+"""Blocks of the learned remainder, of torque and of force, with the rows of the wrench that each adds to."""
+
 _INERTIA = tuple(f"inertia.log_{name}" for name in INERTIA_PARAMETERS[:3])
 _PRODUCTS = tuple(f"products.{name}" for name in INERTIA_PARAMETERS[3:])
 _PRODUCTS_BLOCK = "products"
@@ -133,7 +136,7 @@ def _probe(vehicle: VehicleSettings) -> Probe:
 
 
 def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
-    """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder.
+    """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder's.
 
     What is not known of it is no choice, and in every layout.
     """
@@ -142,12 +145,12 @@ def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
         name for name, known in CATALOGUE.items() if not known.shapes and polynomial(known, probe, {}) is not None
     )
     known = (block for block in _OF_ROTORS if block not in vehicle.unknown)
-    return (*known, _PRODUCTS_BLOCK, *effects, REMAINDER)
+    return (*known, _PRODUCTS_BLOCK, *effects, *LEARNED)
 
 
 def needs_velocity(block: str) -> bool:
     """Tell whether a block can only be found where the velocity was measured."""
-    return block in (REMAINDER, "thrust_factor", "thrust_law") or (
+    return block in (*LEARNED, "thrust_factor", "thrust_law") or (
         block in CATALOGUE and bool(CATALOGUE[block].needs & {"velocity", "force"})
     )
 
@@ -188,14 +191,11 @@ class Layout:
         Blocks, beside those of what is not known of the vehicle.
     airflow : Airflow
         Rules of the remainder, where it is among the blocks.
-    rows : tuple of int
-        Rows of the wrench that the remainder adds to.
     """
 
     vehicle: VehicleSettings
     chosen: tuple[str, ...]
     airflow: Airflow
-    rows: tuple[int, ...] = (0, 1, 2)
 
     @cached_property
     def blocks(self) -> tuple[str, ...]:
@@ -248,7 +248,7 @@ class Layout:
     @property
     def used_airflow(self) -> Airflow:
         """Rules of the remainder; none where it is no block."""
-        return self.airflow if REMAINDER in self.blocks else Airflow(np.zeros(0), 0)
+        return self.airflow if LEARNED.keys() & set(self.blocks) else Airflow(np.zeros(0), 0)
 
     def _numbers(self, block: str) -> tuple[Number, ...]:
         if block in _OF_ROTORS:
@@ -256,8 +256,8 @@ class Layout:
         if block == _PRODUCTS_BLOCK:
             size = scales.smallest_inertia(self.vehicle)
             return tuple(Number(name, "kg m^2", 0.0, 0.1 * size, -0.5 * size, 0.5 * size, 1.0) for name in _PRODUCTS)
-        if block == REMAINDER:
-            return self._remainder_numbers()
+        if block in LEARNED:
+            return self._remainder_numbers(block)
         return tuple(self._coefficient(block, place) for place in range(len(CATALOGUE[block].coefficients)))
 
     def _coefficient(self, block: str, place: int) -> Number:
@@ -267,12 +267,12 @@ class Layout:
         name = f"{block}.{coefficient.name}"
         return Number(name, coefficient.unit, 0.0, scale, _ROOM * low, _ROOM * high, 1.0)
 
-    def _remainder_numbers(self) -> tuple[Number, ...]:
+    def _remainder_numbers(self, block: str) -> tuple[Number, ...]:
         vehicle, hover = self.vehicle, scales.hover_speed(self.vehicle)
         sizes = [*(_TURNED * moment for moment in vehicle.inertia_kg_m2[:3]), *[_PUSHED * vehicle.mass_kg] * 3]
         return tuple(
-            Number(f"{REMAINDER}.{row}_{column}_{power}", "SI", 0.0, sizes[row] / rotor, -np.inf, np.inf, 1.0)
-            for row in self.rows
+            Number(f"{block}.{row}_{column}_{power}", "SI", 0.0, sizes[row] / rotor, -np.inf, np.inf, 1.0)
+            for row in LEARNED[block]
             for column in range(airflow_terms(self.airflow) // 2)
             for power, rotor in ((0, hover), (1, 1.0))
         )
@@ -284,9 +284,9 @@ class Layout:
         terms = len(STATE_TERMS) + airflow_terms(self.used_airflow)
         rotors = len(self.vehicle.rotors)
         for block in self.blocks:
-            if block == REMAINDER:
+            if block in LEARNED:
                 units = np.eye(len(self._numbers(block)))
-                weights = np.array([remainder_weights(self._remainder(unit), rotors) for unit in units])
+                weights = np.array([remainder_weights(self._remainder((block,), unit), rotors) for unit in units])
             elif not _is_effect(block):
                 continue
             else:
@@ -297,8 +297,8 @@ class Layout:
             columns |= {number.name: Column.of(column) for number, column in named}
         return columns
 
-    def _remainder(self, coefficients: Array) -> Remainder:
-        rows = np.array(self.rows, dtype=np.int64)
+    def _remainder(self, blocks: Sequence[str], coefficients: Array) -> Remainder:
+        rows = np.array([row for block in blocks for row in LEARNED[block]], dtype=np.int64)
         shaped = coefficients.reshape(len(rows), -1, 2)
         return Remainder(
             breakpoints=self.airflow.breakpoints,
@@ -468,14 +468,15 @@ class Layout:
         coefficients = self.coefficients(values)
         probe = Probe.of(vehicle)
         effects = tuple(self._effect(name, coefficients, probe) for name in self.blocks if _is_effect(name))
-        learned = np.array([value for name, value in coefficients.items() if name.startswith(f"{REMAINDER}.")])
+        learned = [block for block in self.blocks if block in LEARNED]
+        unnamed = np.array([coefficients[number.name] for block in learned for number in self._numbers(block)])
         return VehicleModel(
             vehicle=vehicle,
             response=self.response(values),
             # The speed that hovers goes with the root of the thrust factor.
             thrust_linear=self._get(values, _LAW, 0.0) * float(np.sqrt(thrust)),
             effects=effects,
-            remainder=self._remainder(learned) if len(learned) else None,
+            remainder=self._remainder(learned, unnamed) if learned else None,
         )
 
     def _effect(self, name: str, coefficients: Mapping[str, float], probe: Probe) -> ModelEffect:

@@ -193,7 +193,7 @@ def still_runs(flight: PlaybackFlight, starts: IntArray, horizon: int, *, rate_s
     """
     motion, moves = flight.motion, float(rate_stays)
     velocity, rate, held = motion.velocity[starts], motion.rate[starts], motion.rotation[starts]
-    turn = _turns(moves * motion.period * rate)
+    turn = rotations.turns(moves * motion.period * rate)
     errors = np.empty((len(starts), horizon, 4, 3))
     for step in range(horizon):
         at = starts + step + 1
@@ -235,16 +235,6 @@ def rotation_vectors(measured: Array, predicted: Array) -> Array:
     # Half a turn: the axis does not show in the skew part, its length is all that is used.
     half_turn = np.asarray((sine <= _TINY) & (cosine < 0.0), dtype=bool)
     return np.asarray(np.where(np.expand_dims(half_turn, -1), [np.pi, 0.0, 0.0], vector))
-
-
-def _turns(vector: Array) -> Array:
-    """Compute the rotations ``exp [a]_x``, shape (run, 3, 3)."""
-    angle = np.linalg.norm(vector, axis=1)[:, None, None]
-    x, y, z = vector.T
-    none = np.zeros_like(x)
-    cross = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
-    half = np.sinc(angle / (2 * np.pi))
-    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * half**2 * (cross @ cross))
 
 
 class _Fuzzy(NamedTuple):
@@ -330,7 +320,7 @@ class _FuzzyRuns:
         terms = np.hstack([state_terms(air, rate), remainder_terms(self.player.remainder, air)])[:, self.used.active]
         wrench = np.einsum("nka,na->nk", weights, terms)
         momentum = start.momentum + interval * (wrench[:, :3] - direct)
-        rotation = start.rotation @ _turns(interval * rate)
+        rotation = start.rotation @ rotations.turns(interval * rate)
         if not self.translates:
             return _State(start.position, start.velocity, rotation, momentum)
         acceleration = rotations.multiply(at.rotation, wrench[:, 3:]) / self.player.body.mass

@@ -25,5 +25,5 @@ class PlaybackSettings(Settings):
     generations: Annotated[int, Ge(0), Doc("generations bred; 0 takes the greedy choice and its neighbours alone")] = 8
     leave_out: Annotated[
         tuple[str, ...],
-        Doc("blocks that are not tried, such as inertia, lag, an effect or remainder (docs/playback.md)"),
+        Doc("blocks that are not tried, such as inertia, an effect, remainder or remainder_force (docs/playback.md)"),
     ] = ()

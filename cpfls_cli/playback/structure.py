@@ -16,13 +16,16 @@ from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
 from cpfls_cli.playback.fit import Fitted, Windows, fit, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Airflow
-from cpfls_cli.playback.parameters import INERTIA, REMAINDER, Layout, blocks_of, needs_velocity
+from cpfls_cli.playback.parameters import INERTIA, LEARNED, Layout, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
 _STEPS, _TOLERANCE = 60, 3e-5
 _FEWEST_BLOCKS = 8
+_VISIBLE = 0.02
+"""Share of the error that is worth a name: on long flights less is significant, and is the step of the integrator."""
+
 _HALF = 2**15
 
 
@@ -47,6 +50,11 @@ class Structure(NamedTuple):
 
     blocks: tuple[str, ...]
     rules: Rules = REMAINDERS[0]
+
+    @property
+    def learns(self) -> bool:
+        """Whether it has a remainder."""
+        return not LEARNED.keys().isdisjoint(self.blocks)
 
     def layout(self, vehicle: VehicleSettings) -> Layout:
         """Lay out its numbers."""
@@ -167,7 +175,7 @@ class _Bench:
 
         def away(judged: Judged) -> tuple[int, float]:
             other = judged.structure
-            rules = REMAINDER in asked and REMAINDER in other.blocks and structure.rules != other.rules
+            rules = structure.learns and other.learns and structure.rules != other.rules
             return len(asked ^ set(other.blocks)) + 2 * int(rules), judged.error
 
         return min(self.known.values(), key=away, default=None)
@@ -178,7 +186,7 @@ class _Bench:
         if near is not None:
             known = near.fits[part].layout.named(near.fits[part].values)
             if near.structure.rules != structure.rules:
-                known = {name: value for name, value in known.items() if not name.startswith(f"{REMAINDER}.")}
+                known = {name: value for name, value in known.items() if name.split(".")[0] not in LEARNED}
         fitted = fit(structure.layout(self.vehicle), training, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
         return Solution(fitted.values, fitted.loss, fitted.hessian)
 
@@ -246,8 +254,8 @@ def choose(
         shrunk = [bench.judge(structure) for structure in _shrinking(everything)]
         path.extend(_greedy(bench, blocks, nothing))
         first = min(bench.known.values(), key=lambda each: each.error)
-        _evolve(bench, blocks, [*path, *shrunk, *_neighbours(bench, first)], settings, rng)
-        _refine(bench)
+        _evolve(bench, blocks, [*path, *shrunk, *_neighbours(bench, first, blocks)], settings, rng)
+        _refine(bench, blocks)
     except SearchStoppedError:
         complete = False
     judged, best, chosen = _preferred(bench)
@@ -337,12 +345,16 @@ def _with(structure: Structure, block: str, order: Sequence[str]) -> Structure:
     return Structure(tuple(name for name in order if name in kept), structure.rules)
 
 
-def _neighbours(bench: _Bench, judged: Judged) -> list[Judged]:
-    """Judge the structures with one block less, or with other rules of the remainder."""
+def _neighbours(bench: _Bench, judged: Judged, blocks: tuple[str, ...]) -> list[Judged]:
+    """Judge the structures with one block less, an effect in the place of what is learned, or other rules of that."""
     structure = judged.structure
     fewer = [_with(structure, block, structure.blocks) for block in structure.blocks]
-    other = [structure._replace(rules=rules) for rules in REMAINDERS] if REMAINDER in structure.blocks else []
-    return [bench.judge(each) for each in (*fewer, *other)]
+    learned = [block for block in structure.blocks if block in LEARNED]
+    # What is learned can stand for several effects; none of them alone may then gain anything beside it.
+    absent = [block for block in blocks if needs_velocity(block) and block not in (*structure.blocks, *LEARNED)]
+    named = [_with(_with(structure, block, blocks), effect, blocks) for block in learned for effect in absent]
+    other = [structure._replace(rules=rules) for rules in REMAINDERS] if learned else []
+    return [bench.judge(each) for each in (*fewer, *named, *other)]
 
 
 def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
@@ -352,13 +364,13 @@ def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
     return judged, best, _simplest(judged, best)
 
 
-def _refine(bench: _Bench) -> None:
+def _refine(bench: _Bench, blocks: tuple[str, ...]) -> None:
     """Judge the neighbours of the best and of the choice, until no block is left that nothing speaks for."""
     asked: set[Structure] = set()
     while new := [each for each in _preferred(bench)[1:] if each.structure not in asked]:
         asked |= {each.structure for each in new}
         for each in new:
-            _neighbours(bench, each)
+            _neighbours(bench, each, blocks)
 
 
 def _evolve(
@@ -392,8 +404,8 @@ def _objectives(judged: Judged) -> tuple[float, float, float]:
 
 def _decoded(genes: IntArray, blocks: tuple[str, ...]) -> Structure:
     chosen = tuple(block for block, gene in zip(blocks, genes, strict=False) if gene >= _HALF)
-    rules = REMAINDERS[int(genes[-1]) * len(REMAINDERS) // (2 * _HALF)] if REMAINDER in chosen else REMAINDERS[0]
-    return Structure(chosen, rules)
+    found = Structure(chosen, REMAINDERS[int(genes[-1]) * len(REMAINDERS) // (2 * _HALF)])
+    return found if found.learns else Structure(chosen)
 
 
 def _encoded(structure: Structure, blocks: tuple[str, ...]) -> list[int]:
@@ -403,10 +415,10 @@ def _encoded(structure: Structure, blocks: tuple[str, ...]) -> list[int]:
 
 
 def _simplest(judged: Sequence[Judged], best: Judged) -> Judged:
-    """Choose the fewest numbers within one standard error of the best."""
+    """Choose the fewest numbers within one standard error of the best, or not visibly worse."""
     for each in judged:
         worse, uncertain = each.worse_than(best)
-        if worse <= uncertain:
+        if worse <= max(uncertain, _VISIBLE * best.error):
             return each
     return best
 

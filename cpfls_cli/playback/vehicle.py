@@ -211,10 +211,21 @@ def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
     for place, (number, (name, found)) in enumerate(zip(layout.numbers, physical.items(), strict=True)):
         span = _AT_BOUND * number.scale
         bound = min(values[place] - number.low, number.high - values[place]) <= span
-        low, high = _interval(found.value, float(half[place]), positive=found.positive)
+        ends = _interval(found.value, float(half[place]), positive=found.positive)
+        low, high = np.clip(ends, *_bounds(layout, values, place)).tolist()
         known = stated[name].value if found.stated else np.nan
         determined = spread.determined[place] and not (found.positive and high > _KNOWN * low)
         yield FoundNumber(name, found.unit, found.value, low, high, known, bool(determined), bool(bound))
+
+
+def _bounds(layout: Layout, values: Array, place: int) -> tuple[float, float]:
+    """Give the bounds of a number as people know it, the others being what they are."""
+    number, ends = layout.numbers[place], []
+    for bound in (number.low, number.high):
+        at = values.copy()
+        at[place] = bound
+        ends.append(list(layout.physical(at).values())[place].value if np.isfinite(bound) else bound)
+    return min(ends), max(ends)
 
 
 def _interval(value: float, half: float, *, positive: bool) -> tuple[float, float]:

@@ -9,9 +9,10 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.effects.polynomial import state_terms
+from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Motion
-from cpfls_cli.playback.model import ModelEffect, VehicleModel, remainder_terms
+from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel, remainder_terms
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.vehicle import RotorSettings, VehicleSettings
@@ -77,6 +78,22 @@ def truth(vehicle=STATED):
 
 TRUE_BLOCKS = ("inertia", "thrust_factor", "drag_factor", "lag", "linear_damping", "rotor_drag", "flapping_moment")
 """What `truth` has, as blocks of a fit."""
+
+
+def pushed(vehicle=STATED):
+    """Put a force that has no name in the place of the drag: sideways in forward flight, and a lift to one side."""
+    model, hover = truth(vehicle), hover_speed(vehicle)
+    effects = tuple(effect for effect in model.effects if effect.name != "rotor_drag")
+    # By row of the force: constant, sine and cosine of the direction; by speed times rotor speed, and by its square.
+    shares = np.zeros((3, 3, 2))
+    shares[0, 1:, 0] = 0.12, -0.25
+    shares[1, 1] = -0.1, -0.06
+    shares[2, :, 0] = 0.25, 0.0, 0.2
+    coefficients = vehicle.mass_kg * shares * [1 / hover, 1.0]
+    remainder = Remainder(
+        breakpoints=np.array([0.0, 1.0]), harmonic_order=1, rows=np.array([3, 4, 5]), coefficients=coefficients
+    )
+    return replace(model, effects=effects, remainder=remainder)
 
 
 def true_numbers(vehicle=STATED):

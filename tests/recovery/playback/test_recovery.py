@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.shared.playback_scores import free_runs, score
+from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.fit import Windows, fit
+from cpfls_cli.playback.model import wrench_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure, choose, fitted_to_all
@@ -17,6 +19,7 @@ from tests.builders.playback_flights import (
     TRUE_BLOCKS,
     flown,
     judged,
+    pushed,
     rotorpy_flight,
     true_numbers,
     truth,
@@ -65,6 +68,25 @@ def test_with_noise_they_come_back_and_predict_another_flight(noisy):
 def test_the_blocks_that_are_there_are_chosen_and_no_others(noisy):
     found, _ = chosen(STATED, noisy, (*TRUE_BLOCKS, "delay"), search_windows=60, folds=2, horizon_s=0.3)
     assert set(found.structure.blocks) == set(TRUE_BLOCKS)
+
+
+def test_a_force_without_a_name_is_learned_and_what_has_a_name_is_not():
+    """A learned torque would do for flapping as well, with 18 numbers instead of one."""
+    flights = flown(pushed(), KINDS * 2, seed=1, noise=MIDDLING, duration_s=15.0)
+    true = {*TRUE_BLOCKS, "remainder_force"} - {"rotor_drag"}
+    found, settings = chosen(STATED, flights, (*true, "remainder"), search_windows=60, folds=2, horizon_s=0.3)
+    assert set(found.structure.blocks) == true
+    final, _ = fitted_to_all(found.structure, STATED, flights, settings, found.fits[0])
+    learned, flew = (pushes(model) for model in (final.layout.model(final.values), pushed()))
+    assert np.abs(learned - flew).max() < 0.1 * np.abs(flew).max()
+
+
+def pushes(model, speed=2.0):
+    """The learned force over the direction of flight, near hover."""
+    angle = np.linspace(0, 2 * np.pi, 36)
+    velocity = speed * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    rotor = model.rotor_terms(np.full((len(angle), model.rotors), hover_speed(STATED)), 0.01, "previous")
+    return wrench_of(model.part_weights()["remainder"], model.terms(velocity, 0 * velocity), rotor)[:, 3:]
 
 
 def test_the_drag_of_another_simulator_is_found():

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.playback import vehicle
 from cpfls_cli.playback.fit import Windows, fit, loss_of, rate_stays, uncertainty, window_errors, window_sums
 from cpfls_cli.playback.kernels import Airflow, errors_of_runs
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import Evaluated, Layout, blocks_of
-from tests.builders.playback_flights import STATED, flown, truth
+from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 
 RULES = {"one rule": Airflow(np.array([0.0, 1.0]), 2), "seesaw": Airflow(np.array([0.0, 0.3, 0.6, 1.0]), 0)}
 
@@ -89,3 +91,16 @@ def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
     quiet = [Windows.of(type(flight)(**{**vars(flight), "speed": still}), 20, 20)]
     spread = uncertainty(fit(layout, quiet, {}, 20, 1e-4), quiet)
     assert spread.determined.tolist() == [False, True, True, True]
+
+
+def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
+    """Rotors that follow at once are asked for their lag, of which at least 1 ms is believed."""
+    flights = flown(VehicleModel(vehicle=STATED), ("multisine", "steps"), duration_s=4.0, noise=MIDDLING, seed=1)
+    windows = [Windows.of(each, 20, 20) for each in flights]
+    fitted = fit(Layout(STATED, ("lag", "inertia"), RULES["one rule"]), windows, {}, 30, 1e-5)
+    lag, *inertia = vehicle._numbers(fitted, uncertainty(fitted, windows))
+    assert (lag.value, lag.low, lag.at_bound) == (0.001, 0.001, True)
+    assert 0.001 < lag.high < 0.003
+    for number in inertia:
+        assert number.low < number.value < number.high
+        assert not number.at_bound

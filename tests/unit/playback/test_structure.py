@@ -108,7 +108,7 @@ def test_blocks_that_gain_only_beside_others_are_added():
 def test_no_block_can_be_left_out_of_the_choice():
     bench = Bench({"": 1.0, "a": 0.3, "b": 0.4, "c": 0.9, "ab": 0.1004, "ac": 0.3, "bc": 0.4, "abc": 0.1})
     bench.judge(Structure(("a", "b", "c")))
-    structure._refine(bench)
+    structure._refine(bench, ("a", "b", "c"))
     assert structure._preferred(bench)[2].structure.blocks == ("a", "b")
     assert Structure(("a",)) in bench.known
 
