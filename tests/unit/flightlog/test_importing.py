@@ -171,7 +171,7 @@ def test_saturated_values_are_counted_and_left_alone():
     columns["q"] = np.clip(columns["q"], -0.5, 0.5)
     signals = read_signals(columns, settings())
     assert signals.report.saturated == {"q": int((np.abs(columns["q"]) == 0.5).sum())}
-    assert any(sentence.startswith("q stands at its extreme") for sentence in signals.report.warnings)
+    assert any(sentence.startswith("column q stands at its extreme") for sentence in signals.report.warnings)
     np.testing.assert_allclose(signals.body_rate[:, 1], columns["q"], atol=1e-12)
 
 
