@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 
 class CpflsError(Exception):
     """Base of every error that ends a command with a message instead of a traceback."""
@@ -35,6 +37,20 @@ class InputError(CpflsError):
     """A file, an artifact or an option is not what the command needs (exit code 2)."""
 
     exit_code = 2
+
+
+class NotAnArtifactError(InputError):
+    """A file that an artifact was expected in holds something else (exit code 2).
+
+    Attributes
+    ----------
+    path : Path
+        Of the file.
+    """
+
+    def __init__(self, path: Path, message: str) -> None:
+        super().__init__(message)
+        self.path = path
 
 
 class ConfigError(InputError):

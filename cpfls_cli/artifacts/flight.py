@@ -31,17 +31,32 @@ class QualityGroup:
     )
     count: IntArray | None = dataset("count", "rows, gaps or values by reason", "reason", default=None)
     warning: tuple[str, ...] | None = dataset("warning", "what to know about the log", "warning", default=None)
+    filtered: tuple[str, ...] | None = dataset(
+        "filtered", "signals of the log that were low-passed before it was logged", "filtered", default=None
+    )
+    cut_off: Array | None = dataset(
+        "cut_off", "where that filter halves the amplitude, seen in the spectrum", "filtered", units="Hz", default=None
+    )
 
     @classmethod
-    def of(cls, findings: Mapping[str, int], warnings: Sequence[str]) -> Self | None:
-        """Arrange what was found in a log, with how often, and the warnings; None where there is neither."""
-        if not findings and not warnings:
+    def of(cls, findings: Mapping[str, int], warnings: Sequence[str], cut_off_hz: Mapping[str, float]) -> Self | None:
+        """Arrange what was found in a log, with how often, the warnings and the cut-offs; None where there is none."""
+        if not findings and not warnings and not cut_off_hz:
             return None
         return cls(
             reason=tuple(findings) if findings else None,
             count=np.array(list(findings.values()), dtype=np.int64) if findings else None,
             warning=tuple(warnings) if warnings else None,
+            filtered=tuple(cut_off_hz) if cut_off_hz else None,
+            cut_off=np.array(list(cut_off_hz.values())) if cut_off_hz else None,
         )
+
+    @property
+    def cut_off_hz(self) -> dict[str, float]:
+        """Cut-off of the filter before the log, by signal of `import.signals`; those in which none is seen lack."""
+        if self.filtered is None or self.cut_off is None:
+            return {}
+        return dict(zip(self.filtered, self.cut_off.tolist(), strict=True))
 
     @property
     def findings(self) -> dict[str, int]:
@@ -335,7 +350,7 @@ class FlightRecord(Record):
         signals = {name: values for name in cls._signal_names() if (values := getattr(flight, name)) is not None}
         return cls(
             **signals,
-            quality=QualityGroup.of(findings, report.warnings),
+            quality=QualityGroup.of(findings, report.warnings, report.cut_off_hz),
             delay=DelayGroup(
                 value=report.delay_s,
                 tried=None if estimate is None else estimate.delays,

@@ -31,7 +31,7 @@ from cpfls_cli.artifacts.spec import (
     InputFile,
     Record,
 )
-from cpfls_cli.errors import InputError, OutputError
+from cpfls_cli.errors import InputError, NotAnArtifactError, OutputError
 
 R = TypeVar("R", bound=Record)
 
@@ -211,7 +211,7 @@ def _open(path: Path) -> Iterator[h5py.File]:
         file = h5py.File(path, "r")
     except OSError as error:
         reason = "truncated" if "truncated" in str(error) else "not an HDF5 file, or damaged"
-        raise InputError(f"{path}: cannot be read as an artifact: {reason}") from None
+        raise NotAnArtifactError(path, f"{path}: cannot be read as an artifact: {reason}") from None
     with file:
         yield file
 

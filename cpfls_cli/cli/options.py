@@ -5,12 +5,13 @@ from __future__ import annotations
 import functools
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
+from typer.models import ArgumentInfo
 
 if TYPE_CHECKING:
     from cpfls_cli.config.study import Study
@@ -61,6 +62,7 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     """
     hints = get_type_hints(command, include_extras=True)
     common_hints = get_type_hints(Common, include_extras=True)
+    arguments = [name for name, hint in hints.items() if any(isinstance(o, ArgumentInfo) for o in get_args(hint))]
     command_parameters = [
         parameter.replace(annotation=hints[name])
         for name, parameter in inspect.signature(command).parameters.items()
@@ -74,6 +76,7 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
         common = Common(**{f.name: kwargs.pop(f.name) for f in fields(Common)})
+        _check_order(command.__name__.rstrip("_"), {name: kwargs[name] for name in arguments}, kwargs.get("output"))
         command(*args, common=common, **kwargs)
 
     parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in command_parameters]
@@ -81,6 +84,18 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return wrapped
+
+
+def _check_order(command: str, arguments: Mapping[str, Any], output: Path | None) -> None:
+    """Refuse arguments that do not begin with the config where one is asked for."""
+    from cpfls_cli.cli.misplaced import refuse_misplaced_config
+    from cpfls_cli.cli.terminal import messages_for_errors
+
+    if arguments.get("config") is None:
+        return
+    given = [path for value in arguments.values() for path in (value if isinstance(value, list) else [value])]
+    with messages_for_errors():
+        refuse_misplaced_config(command, given, output)
 
 
 def seconds(text: str) -> float:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from cpfls_cli.cli.misplaced import what_it_is
 from cpfls_cli.cli.options import Common
-from cpfls_cli.errors import CpflsError, InputError
+from cpfls_cli.errors import CpflsError, InputError, NotAnArtifactError
 
 if TYPE_CHECKING:
     from cpfls_cli.report.outcome import Outcome
@@ -33,7 +34,8 @@ def messages_for_errors() -> Iterator[None]:
     try:
         yield
     except CpflsError as error:
-        _complain(str(error))
+        instead = what_it_is(error.path) if isinstance(error, NotAnArtifactError) else None
+        _complain(instead or str(error))
         for note in getattr(error, "__notes__", ()):
             _complain(note, "note")
         raise typer.Exit(error.exit_code) from None

@@ -46,6 +46,7 @@ def _summary(report: ImportReport, record: FlightRecord) -> dict[str, Any]:
         "samples_read": report.samples_read,
         "rate_hz": report.rate_hz,
         "log_rate_hz": report.log_rate_hz,
+        "cut_off_hz": dict(report.cut_off_hz),
         "lowpass_hz": report.lowpass_hz,
         "span_s": list(report.span_s),
         "gaps": report.gaps,

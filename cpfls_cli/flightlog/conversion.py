@@ -23,6 +23,8 @@ _WORLD_SIGNALS = ("position", "velocity", "acceleration")
 _BODY_SIGNALS = ("body_rate", "body_torque")
 _ROTOR_SIGNALS = ("rotor_speed", "rotor_command")
 _SCALAR_SIGNALS = ("thrust", "voltage")
+_MOST_NEAREST, _MOST_LISTED = 3, 20
+_ALIKE, _ALIKE_SHORT, _SHORT_NAME = 0.5, 0.7, 2
 BodyFrame = Literal["FLU", "FRD"]
 WorldFrame = Literal["ENU", "NED"]
 _BODY = {"FLU": np.eye(3), "FRD": np.diag([1.0, -1.0, -1.0])}
@@ -121,23 +123,38 @@ def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> 
         for name, signal in settings.signals.items()
         for column in signal.columns
     ]
-    missing = [
-        f"{key}: the log has no column {name!r}{_hint(name, columns)}" for key, name in wanted if name not in columns
-    ]
+    hints = [(key, name, _hint(name, columns)) for key, name in wanted if name not in columns]
+    missing = [f"{key}: the log has no column {name!r}{hint}" for key, name, hint in hints]
+    if not all(hint for _, _, hint in hints):
+        missing.append(f"import.signals: {_columns_in_words(columns)}")
     if missing:
         raise InputError("\n".join(missing))
 
 
 def _hint(name: str, columns: Mapping[str, Array]) -> str:
-    by_lower = {column.lower(): column for column in columns}
-    nearest = [by_lower[match] for match in get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)]
-    if nearest:
-        return f" (nearest: {', '.join(nearest)})"
-    # A log of topics has hundreds of columns.
-    topics = sorted({column.partition(".")[0] for column in columns})
-    if all("." in column for column in columns):
-        return f" (topics: {', '.join(topics)})"
-    return f" (columns: {', '.join(columns)})"
+    """Name the nearest columns, by the whole name or by its part after the last dot."""
+    whole = {column.lower(): column for column in columns}
+    last = {column.lower().rpartition(".")[2]: column for column in columns}
+    # Two letters are alike by chance.
+    cutoff = _ALIKE if len(name) > _SHORT_NAME else _ALIKE_SHORT
+    nearest = [
+        by_name[match]
+        for by_name in (last, whole)
+        for match in get_close_matches(name.lower(), by_name, n=_MOST_NEAREST, cutoff=cutoff)
+    ]
+    shown = ", ".join(list(dict.fromkeys(nearest))[:_MOST_NEAREST])
+    return f" (nearest: {shown})" if nearest else ""
+
+
+def _columns_in_words(columns: Mapping[str, Array]) -> str:
+    """Say once what the log holds; of a log of topics, which has hundreds of columns, its topics."""
+    of_topics = all("." in column for column in columns)
+    names = sorted({column.partition(".")[0] for column in columns}) if of_topics else list(columns)
+    more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
+    what = "topics" if of_topics else "columns"
+    return (
+        f"the log has the {what} {', '.join(names[:_MOST_LISTED])}{more}; `cpfls init LOG` proposes what maps to what"
+    )
 
 
 def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:

@@ -14,6 +14,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.flightlog.alignment import align_commands, apply_rotor_lag
+from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals, warn_of_cut_offs, warn_of_slow
 from cpfls_cli.flightlog.clock import longest_stretch
 from cpfls_cli.flightlog.conversion import drop_absent_signals, select_columns, to_program_frames
 from cpfls_cli.flightlog.quality import (
@@ -34,6 +35,7 @@ from cpfls_cli.flightlog.repair import (
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
+from cpfls_cli.flightlog.stretches import rotors_at_rest, warn_of_dead, warn_of_rest
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10
@@ -111,11 +113,14 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
     stretch = longest_stretch(table.time, np.isfinite(repaired.columns()), settings)
     dropped |= {"incomplete_ends": stretch.incomplete_ends, "gap": stretch.beyond_gap}
     table, repaired = table.rows(stretch.rows), repaired.rows(stretch.rows)
-    counts = count_values(table, {name: marked[stretch.rows] for name, marked in spikes.items()}, settings)
+    resting = rotors_at_rest(table, settings)
+    counts = count_values(table, {name: marked[stretch.rows] for name, marked in spikes.items()}, resting, settings)
     clock, rate_hz = _uniform_clock(table.time)
     on_clock = {name: fill(table.time, values, clock) for name, values in repaired.signals.items()}
     refuse_steep_pitch(on_clock)
     gaps, longest_gap_s = _gaps(table.time)
+    slow = slow_signals(table)
+    filtered = cut_offs(on_clock, rate_hz, slow)
     report = ImportReport(
         samples_read=len(read.time),
         samples=len(clock),
@@ -129,7 +134,16 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         span_s=(float(clock[0]), float(clock[-1])),
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,
-        warnings=(*warn_of_values(counts), *_warn_of_gap(stretch.beyond_gap), *warn_of_angles(read.signals)),
+        cut_off_hz=filtered,
+        warnings=(
+            *warn_of_values(counts),
+            *warn_of_dead(table, tuple(counts.saturated), settings),
+            *warn_of_rest(table, resting, settings),
+            *warn_of_slow(slow, rate_hz),
+            *warn_of_cut_offs(filtered, settings),
+            *_warn_of_gap(stretch.beyond_gap),
+            *warn_of_angles(read.signals),
+        ),
     )
     return LogSignals(time=clock - clock[0], report=report, **to_program_frames(on_clock, settings))
 

@@ -53,7 +53,9 @@ class ValueCounts:
     saturated: dict[str, int]
 
 
-def count_values(table: SignalTable, spikes: Mapping[str, BoolArray], settings: ImportSettings) -> ValueCounts:
+def count_values(
+    table: SignalTable, spikes: Mapping[str, BoolArray], resting: Mapping[str, BoolArray], settings: ImportSettings
+) -> ValueCounts:
     """Count the bad values of each column of the log.
 
     Parameters
@@ -62,6 +64,8 @@ def count_values(table: SignalTable, spikes: Mapping[str, BoolArray], settings: 
         The part that is kept, as logged.
     spikes : mapping from signal name to array of bool, shape (sample, column)
         Where its spikes are.
+    resting : mapping from signal name to array of bool, shape (sample,)
+        Where no rotor turns, which is not saturated.
     settings : ImportSettings
         The names of the columns, `spike_deviations` and `saturation_samples`.
     """
@@ -71,14 +75,14 @@ def count_values(table: SignalTable, spikes: Mapping[str, BoolArray], settings: 
         missing=_by_column(table.signals, settings, lambda column: int(np.isnan(column).sum())),
         spikes=counts if repaired else {},
         suspected_spikes={} if repaired else counts,
-        saturated=_saturated(table, settings),
+        saturated=_saturated(table, resting, settings),
     )
 
 
-def _saturated(table: SignalTable, settings: ImportSettings) -> dict[str, int]:
+def _saturated(table: SignalTable, resting: Mapping[str, BoolArray], settings: ImportSettings) -> dict[str, int]:
     """Count saturated values, but not a quaternion at hover (1), parked rotors (0), or a coarse voltage."""
     length = settings.saturation_samples
-    rotors = {name: signal for name, signal in table.signals.items() if name.startswith("rotor")}
+    rotors = {name: np.where(rest[:, None], np.nan, table.signals[name]) for name, rest in resting.items()}
     others = {name: signal for name, signal in table.signals.items() if name not in _NEVER_SATURATED | rotors.keys()}
     return _by_column(rotors, settings, lambda column: count_saturated(column, length, rest=0.0)) | _by_column(
         others, settings, lambda column: count_saturated(column, length)
@@ -88,7 +92,7 @@ def _saturated(table: SignalTable, settings: ImportSettings) -> dict[str, int]:
 def warn_of_values(counts: ValueCounts) -> tuple[str, ...]:
     """Describe the columns whose suspicious values are used unchanged."""
     saturated = (
-        f"{column} stands at its extreme for {count} samples in all: saturated?"
+        f"column {column} stands at its extreme for {count} samples in all: saturated?"
         for column, count in counts.saturated.items()
     )
     suspected = (

@@ -60,6 +60,9 @@ class ImportReport:
         column's extremes; reported only, not changed.
     gaps : int
         Gaps in the time stamps (more than 1.5 times the median step) that were interpolated.
+    cut_off_hz : mapping from str to float
+        Cut-off of the low-pass filter that a signal of the log went through before it was logged, Hz, where one is
+        seen; by the name in `import.signals`.
     longest_gap_s : float
         Longest step between time stamps in the part that is kept, s.
     span_s : tuple of float
@@ -88,6 +91,7 @@ class ImportReport:
     span_s: tuple[float, float]
     log_rate_hz: float
     rate_hz: float
+    cut_off_hz: Mapping[str, float] = field(default_factory=dict)
     lowpass_hz: float | None = None
     delay_s: float = 0.0
     delay: DelayEstimate | None = None

@@ -75,8 +75,24 @@ def test_missing_columns_are_all_named_with_the_nearest_ones(wrong, dry_run):
         "LOG: import.time_column: the log has no column 't'",
         "LOG: import.signals.attitude.columns: the log has no column 'roll'",
         "LOG: import.signals.body_torque.columns: the log has no column 'mz'",
+        "LOG: import.signals: the log has the columns time, Roll, pitch, yaw, mx, my, torque_z; `cpfls init LOG`"
+        " proposes what maps to what",
     ]
     assert "nearest: Roll" in lines[1]
+
+
+def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):
+    """Eighty columns, six of them missing: nearest names where there are any, three at most."""
+    names = ["time", "state.roll", "state.pitch", "state.yaw", "roll_cmd", "roll_ref", "roll_std"]
+    names += [f"debug_{number}" for number in range(73)]
+    content = ",".join(names) + "\n" + ",".join("0" * len(names)) + "\n"
+    lines = wrong(content)
+    assert len(lines) == 8
+    assert lines[1].endswith("no column 'roll' (nearest: state.roll, roll_std, roll_ref)")
+    assert lines[2].endswith("no column 'pitch' (nearest: state.pitch)")
+    assert lines[4].endswith("no column 'mx'")
+    assert lines[-1].startswith("LOG: import.signals: the log has the columns time, state.roll, ")
+    assert "debug_12 and 60 more; `cpfls init LOG` proposes" in lines[-1]
 
 
 @pytest.mark.parametrize(

@@ -152,7 +152,7 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
     (line,) = refuse("export", pipeline.flight, *words)
     assert line == f"{pipeline.flight}: is a cpfls/flight; this command needs a cpfls/model (made by `cpfls identify`)"
     (line,) = refuse("export", study, *words)
-    assert line == f"{study}: cannot be read as an artifact: not an HDF5 file, or damaged"
+    assert line == f"{study}: is a config, and this takes what cpfls made; `cpfls config {study}` shows it"
     assert refuse("export", tmp_path / "none.h5", *words) == [f"{tmp_path / 'none.h5'}: no such file"]
     with h5py.File(model, "r+") as file:
         file.attrs["schema_version"] = 99

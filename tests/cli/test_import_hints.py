@@ -4,6 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
+from cpfls_cli.flightlog.smoothing import low_pass
+
 TIME = np.arange(0.0, 4.0, 0.02)
 SIGNALS = {
     "attitude": "attitude: {columns: [roll, pitch, yaw], unit: rad}",
@@ -79,3 +81,66 @@ def test_measured_speeds_are_named_and_a_column_needs_no_words(imported):
     assert "body torque: of vehicle.rotors at their measured speeds" in lines
     lines, _, _ = imported("attitude", "body_torque", source="column")
     assert not any("body torque" in line for line in lines)
+
+
+NOISE = np.random.default_rng(5).standard_normal((2000, 10))
+
+
+@pytest.fixture
+def notes_of(cpfls, tmp_path):
+    """Import a log of forty seconds at 50 Hz with some columns replaced; give its notes and the flight."""
+    time = np.arange(2000) / 50
+    signals = ("attitude", "body_rate", "rotor_command")
+
+    def call(*words, **changes):
+        motion = {name: 0.3 * np.sin((1 + i) * time) + 0.02 * NOISE[:, i] for i, name in enumerate("pqr")}
+        angles = {name: -0.3 * np.cos((1 + i) * time) / (1 + i) for i, name in enumerate(("roll", "pitch", "yaw"))}
+        rotors = {f"u{i}": 0.5 + 0.05 * NOISE[:, 5 + i] for i in range(1, 5)}
+        columns = {"t": time} | angles | motion | rotors | changes
+        log, config, flight = (tmp_path / name for name in ("log.csv", "study.yaml", "flight.h5"))
+        table = np.column_stack(list(columns.values()))
+        np.savetxt(log, table, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
+        mapped = ", ".join(SIGNALS[signal] for signal in signals)
+        config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: rotor-command}}")
+        result = cpfls("import", config, log, "-o", flight, "--force", *words)
+        assert result.exit_code == 0, result.stderr
+        return result.stderr.splitlines(), flight
+
+    return call
+
+
+def test_a_good_log_has_no_notes(notes_of):
+    notes, flight = notes_of()
+    assert notes == []
+    with h5py.File(flight) as file:
+        assert "quality" not in file
+
+
+def test_motors_slower_than_the_log_are_said(notes_of):
+    (note,), _ = notes_of(**{f"u{i}": np.repeat(0.5 + 0.05 * NOISE[:400, i], 5) for i in range(1, 5)})
+    assert note.startswith("cpfls: note: rotor_command is updated 10 times a second and the log has 50 rows a second;")
+
+
+def test_motors_on_the_ground_are_said_and_the_crop_that_is_named_mends_it(notes_of):
+    grounded = {f"u{i}": np.r_[np.full(200, -0.1), 0.5 + 0.05 * NOISE[200:, i]] for i in range(1, 5)}
+    (rest, below), _ = notes_of(**grounded)
+    assert "rotor_command stands at -0.1 on all rotors from 0.00 s to 3.98 s" in rest
+    assert "rotor_command is below zero in 200 of 2000 rows" in below
+    crop = rest[rest.index("import.crop_s: ") :].partition(" keeps")[0].replace(": ", "=").replace(" ", "")
+    assert notes_of("--set", crop, **grounded)[0] == []
+
+
+def test_a_dead_and_a_clipped_column_are_said_by_name(notes_of):
+    clipped = np.clip(1.6 * np.sin(2 * np.arange(2000) / 50) + 0.02 * NOISE[:, 1], -2, 1.3)
+    notes, _ = notes_of(u3=np.full(2000, 0.4), q=clipped, pitch=-0.8 * np.cos(2 * np.arange(2000) / 50))
+    assert any("column u3 of import.signals.rotor_command does not change in 2000 rows: dead" in note for note in notes)
+    assert any("column q stands at its extreme" in note for note in notes)
+
+
+def test_a_filter_before_the_log_is_said_and_its_cut_off_is_kept(notes_of):
+    filtered = low_pass(0.3 * NOISE[:, :3] + 0.3, 50.0, 12.0, 4)
+    notes, flight = notes_of(**dict(zip("pqr", filtered.T, strict=True)))
+    assert "the spectrum falls off a cliff in body_rate at about 12 Hz: low-passed before it was logged" in notes[0]
+    with h5py.File(flight) as file:
+        assert list(file["quality/filtered"].asstr()) == ["body_rate"]
+        assert file["quality/cut_off"][0] == pytest.approx(12.0, rel=0.1)

@@ -8,17 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.alignment import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
+from cpfls_cli.flightlog.stretches import clipped
 from cpfls_cli.gap.balance.windows import Windows
 
-# A gyroscope at its limit stays there for several samples, and far longer than at the level just before it; the peak
-# of a slow signal that is rounded stays too, but longer at the level before.
-_CLIPPED_SAMPLES = 5
-_CLIPPED_TO_NEXT = 3
 # No gyroscope of a multirotor has its limit lower; a common smallest range is 125 deg/s.
 _LOWEST_LIMIT_RAD_S = 1.0
 # Rounding to this step adds as much noise as a poor gyroscope has.
@@ -76,23 +73,11 @@ def _gyro_warnings(body_rate: Array) -> Iterator[str]:
     for axis, column in zip(_AXES, body_rate.T, strict=True):
         if np.ptp(column) == 0:
             continue
-        if _clipped(column) or _clipped(-column):
+        if clipped(column, _LOWEST_LIMIT_RAD_S) or clipped(-column, _LOWEST_LIMIT_RAD_S):
             yield f"The gyroscope about {axis} is clipped at {np.abs(column).max():.3g} rad/s."
         step = float(np.diff(np.unique(column)).min())
         if step > _COARSE_STEP_RAD_S:
             yield f"The gyroscope about {axis} is rounded to steps of {step:.3g} rad/s."
-
-
-def _clipped(column: Array) -> bool:
-    before, last = np.unique(column)[-2:]
-    highest = column == last
-    crowded = highest.sum() > _CLIPPED_TO_NEXT * (column == before).sum()
-    return bool(crowded and last >= _LOWEST_LIMIT_RAD_S and _longest_run(highest) >= _CLIPPED_SAMPLES)
-
-
-def _longest_run(mask: BoolArray) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return int(np.max(edges[1::2] - edges[::2]))
 
 
 class ChannelMatch(NamedTuple):

@@ -34,11 +34,11 @@ def test_a_flight_turns_where_roll_or_pitch_goes_round():
 
 
 def test_warnings_are_added_to_those_of_the_log():
-    quality = QualityGroup.of({"gaps: interpolated": 2}, ["a fault"])
+    quality = QualityGroup.of({"gaps: interpolated": 2}, ["a fault"], {"body_rate": 18.0})
     flight = FlightRecord(time=TIME, quality=quality).with_warnings(["no attitude"])
     assert flight.quality.warning == ("a fault", "no attitude")
     assert flight.quality.findings == {"gaps: interpolated": 2}
-    assert QualityGroup.of({}, []) is None
+    assert QualityGroup.of({}, [], {}) is None
     assert FlightRecord(time=TIME).with_warnings(["no attitude"]).quality.findings == {}
 
 

@@ -171,7 +171,7 @@ def test_saturated_values_are_counted_and_left_alone():
     columns["q"] = np.clip(columns["q"], -0.5, 0.5)
     signals = read_signals(columns, settings())
     assert signals.report.saturated == {"q": int((np.abs(columns["q"]) == 0.5).sum())}
-    assert any(sentence.startswith("q stands at its extreme") for sentence in signals.report.warnings)
+    assert any(sentence.startswith("column q stands at its extreme") for sentence in signals.report.warnings)
     np.testing.assert_allclose(signals.body_rate[:, 1], columns["q"], atol=1e-12)
 
 
@@ -205,9 +205,10 @@ def test_yaw_logged_between_minus_and_plus_180_degrees_turns_on():
 
 
 def attitude(columns, **angles):
+    """Add an attitude that moves a little where it is not given: one that stands still is warned of as dead."""
     names = ("roll", "pitch", "yaw")
-    zero = {name: np.zeros(len(columns["t"])) for name in names}
-    return columns | zero | angles, {"attitude": SignalMap(columns=names, unit="rad")}
+    little = dict.fromkeys(names, 0.001 * columns["q"])
+    return columns | little | angles, {"attitude": SignalMap(columns=names, unit="rad")}
 
 
 def test_degrees_taken_for_radians_stop_at_the_pitch():
@@ -217,7 +218,7 @@ def test_degrees_taken_for_radians_stop_at_the_pitch():
 
 
 def test_a_nose_straight_up_is_no_degrees():
-    columns, mapped = attitude(log(), pitch=np.full(201, np.pi / 2 + 0.01))
+    columns, mapped = attitude(log(), pitch=np.pi / 2 + 0.01 + 1e-3 * log()["p"])
     assert read_signals(columns, settings(signals=mapped)).report.warnings == ()
 
 

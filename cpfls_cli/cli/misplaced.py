@@ -1,0 +1,68 @@
+"""Files in the place of others: what a file is, and the command that was meant."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+from cpfls_cli.errors import ConfigError
+from cpfls_cli.logs.formats import is_log
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_CONFIGS = (".yaml", ".yml")
+
+Kind = Literal["log", "artifact", "config"]
+
+
+def _kind(path: Path) -> Kind | None:
+    """Tell what a file is: by its first bytes, then by its name."""
+    if not path.is_file():
+        return None
+    with path.open("rb") as stream:
+        if stream.read(len(_HDF5)) == _HDF5:
+            return "artifact"
+    if is_log(path):
+        return "log"
+    return "config" if path.suffix.lower() in _CONFIGS else None
+
+
+def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | None) -> None:
+    """Refuse a log or an artifact in the place of the config, and give the command with the two exchanged.
+
+    Parameters
+    ----------
+    command : str
+        Its name.
+    given : sequence of Path
+        Its arguments, the config first.
+    output : Path or None
+        Its option ``-o``.
+
+    Raises
+    ------
+    ConfigError
+    """
+    kind = _kind(given[0])
+    if kind not in ("log", "artifact"):
+        return
+    what = "a log" if kind == "log" else "an artifact"
+    config = next((path for path in given if _kind(path) == "config"), None)
+    if config is not None:
+        exchanged = [config, *(given[0] if path == config else path for path in given[1:])]
+        words = ["cpfls", command, *map(str, exchanged), *([] if output is None else ["-o", str(output)])]
+        raise ConfigError(f"{given[0]}: is {what}, and the config comes first: {shlex.join(words)}")
+    made = f"`cpfls init {given[0]} -o study.yaml` writes one for it, and " if kind == "log" else ""
+    raise ConfigError(f"{given[0]}: is {what}, not a config (YAML); {made}`cpfls config` prints a commented default")
+
+
+def what_it_is(path: Path) -> str | None:
+    """Say of a file in the place of an artifact what it is and what to do with it; None where that is not known."""
+    kind = _kind(path)
+    if kind == "log":
+        flight = path.name.partition(".")[0] + ".h5"
+        return f"{path}: is a log, and this takes what cpfls made: cpfls import CONFIG {path} -o {flight}"
+    if kind == "config":
+        return f"{path}: is a config, and this takes what cpfls made; `cpfls config {path}` shows it"
+    return None

@@ -1,0 +1,218 @@
+"""How fast a signal of a log really is: updates that come slower than the clock, and a filter before the log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.signal import welch
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.flightlog.repair import SignalTable
+from cpfls_cli.flightlog.settings import ImportSettings
+
+# A coarse voltage hardly changes, and nothing is derived from it.
+_NOT_JUDGED = frozenset({"voltage"})
+# A rigid body hardly answers what is faster than half of this.
+_FAST_HZ = 100.0
+_FEWEST_UPDATES = 20
+_REGULAR_SHARE = 0.8
+_LARGEST_SHARE_AT_ONCE = 0.2
+# A knot between two rows bends the line at both of them.
+_ROWS_OF_KNOT = 2
+_STRAIGHT = 1e-3
+
+# Measured on logs of six vehicles: a flight that ends at its motion's own bandwidth falls by 29 dB below its trend at
+# most, logs that were filtered by 30 to 98 dB.
+_CLIFF_DB = 30.0
+_STEEPEST_BEFORE_DB = 24.0
+# A line of vibration is above its trend; a filter leaves no band beyond it near any band before it.
+_CLEARANCE_DB = 25.0
+_LOWEST_HZ = 8.0
+_HIGHEST_SHARE = 0.48
+_BANDS_PER_OCTAVE = 8
+_FEWEST_BANDS = 5
+_LEAST_OCTAVES_BEYOND = 0.3
+_LONGEST_SEGMENT = 2048
+_SEGMENTS = 4
+_FEWEST_IN_SEGMENT = 64
+_LINES_OF_WINDOW = 8
+_HALVED_DB = 6.0
+# The trend that the cut-off is read against, clear of the fall itself.
+_TREND_OCTAVES, _CLEAR_OCTAVES = 2.0, 0.5
+_SMALLEST_POWER = 1e-300
+
+
+@dataclass(frozen=True)
+class SlowSignal:
+    """A signal that is updated slower than the clock of its log.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Of its updates.
+    between : {"repeated", "interpolated"}
+        What the rows between two updates hold.
+    """
+
+    name: str
+    rate_hz: float
+    between: Literal["repeated", "interpolated"]
+
+
+def slow_signals(table: SignalTable) -> tuple[SlowSignal, ...]:
+    """Find signals whose updates come at less than half the rate of the rows.
+
+    Between updates the rows repeat the last value, or lie on a straight line. What a coarse resolution repeats is
+    none: its steps are irregular.
+
+    Parameters
+    ----------
+    table : SignalTable
+        The part that is kept, as logged.
+    """
+    found = (_slow(name, table.time, values) for name, values in table.signals.items() if name not in _NOT_JUDGED)
+    return tuple(signal for signal in found if signal is not None)
+
+
+def _slow(name: str, time: Array, values: Array) -> SlowSignal | None:
+    known = np.isfinite(values).all(axis=1)
+    time, values = time[known], values[known]
+    if len(time) < _FEWEST_UPDATES:
+        return None
+    steps = np.diff(values, axis=0)
+    updates = np.flatnonzero((steps != 0).any(axis=1))
+    if _regular(updates, fewest=2):
+        return SlowSignal(name, _rate(time, updates), "repeated")
+    bends = np.abs(np.diff(steps / np.diff(time)[:, None], axis=0))
+    straight = np.all(bends <= _STRAIGHT * np.quantile(bends, 0.95, axis=0), axis=1)
+    knots = np.flatnonzero(~straight & np.concatenate([[True], straight[:-1]]))
+    if _regular(knots, fewest=_ROWS_OF_KNOT + 1) and _mostly_straight(straight, knots):
+        return SlowSignal(name, _rate(time, knots), "interpolated")
+    return None
+
+
+def _rate(time: Array, updates: IntArray) -> float:
+    return float(1 / (np.median(np.diff(time)) * np.diff(updates).mean()))
+
+
+def _regular(updates: IntArray, fewest: int) -> bool:
+    """Tell whether updates are some rows apart, and nearly always the same number of them."""
+    if len(updates) < _FEWEST_UPDATES:
+        return False
+    apart = np.diff(updates)
+    usual = float(np.median(apart))
+    near = np.abs(apart - usual) <= max(1.0, 0.25 * usual)
+    return bool(usual >= fewest and near.mean() >= _REGULAR_SHARE and (apart < fewest).mean() <= _LARGEST_SHARE_AT_ONCE)
+
+
+def _mostly_straight(straight: BoolArray, knots: IntArray) -> bool:
+    usual = float(np.median(np.diff(knots)))
+    return bool(straight.mean() >= _REGULAR_SHARE * (usual - _ROWS_OF_KNOT) / usual)
+
+
+def warn_of_slow(slow: tuple[SlowSignal, ...], rate_hz: float) -> Iterator[str]:
+    """Say of signals that are slower than the clock, and slower than 100 Hz, how slow they are and what that costs."""
+    for signal in slow:
+        if signal.rate_hz >= _FAST_HZ:
+            continue
+        between, cost = {
+            "repeated": ("repeat the last value", f"is {500 / signal.rate_hz:.3g} ms late on average, and knows"),
+            "interpolated": ("lie on a straight line between two", "knows"),
+        }[signal.between]
+        yield (
+            f"{signal.name} is updated {signal.rate_hz:.3g} times a second and the log has {rate_hz:.4g} rows a second;"
+            f" the rows between {between}: it {cost} nothing of motion above {signal.rate_hz / 2:.3g} Hz; log it"
+            " faster, or expect a model of slow motion only"
+        )
+
+
+def cut_offs(signals: Mapping[str, Array], rate_hz: float, slow: tuple[SlowSignal, ...]) -> dict[str, float]:
+    """Find the cut-off of the low-pass filter that a signal went through before it was logged.
+
+    Its spectrum falls off a cliff there: within an octave by 30 dB more than its trend of the octave before. A filter
+    of low order falls too gently to be told from motion, and one below 8 Hz from motion that ends there.
+
+    Parameters
+    ----------
+    signals : mapping from signal name to array, shape (time, column)
+        Uniform in time, without absent values.
+    rate_hz : float
+    slow : tuple of SlowSignal
+        Not judged: straight lines between updates have a spectrum of their own.
+
+    Returns
+    -------
+    dict from signal name to float, Hz
+        Where the amplitude is halved, median over the columns that show it; signals where most columns do not are
+        left out.
+    """
+    left_out = _NOT_JUDGED | {signal.name for signal in slow}
+    found = {}
+    for name, values in signals.items():
+        edges = [] if name in left_out else [_cut_off(column, rate_hz) for column in values.T]
+        seen = [edge for edge in edges if edge is not None]
+        if 2 * len(seen) > len(edges):
+            found[name] = float(np.median(seen))
+    return found
+
+
+def _cut_off(values: Array, rate_hz: float) -> float | None:
+    octave, level = _spectrum(values, rate_hz)
+    cliffs = [(drop, at) for at in octave if 2**at >= _LOWEST_HZ and (drop := _cliff(octave, level, at)) > _CLIFF_DB]
+    return _halved(octave, level, max(cliffs)[1]) if cliffs else None
+
+
+def _spectrum(values: Array, rate_hz: float) -> tuple[Array, Array]:
+    """Estimate the spectrum in dB in bands of an eighth of an octave, by the logarithm of their frequency."""
+    length = min(len(values) // _SEGMENTS, _LONGEST_SEGMENT)
+    if length < _FEWEST_IN_SEGMENT or np.ptp(values) == 0:
+        return np.empty(0), np.empty(0)
+    frequency, power = welch(values, rate_hz, window="blackmanharris", nperseg=length)
+    # The window smears what is slower over its first lines.
+    known = (frequency >= _LINES_OF_WINDOW * frequency[1]) & (frequency <= _HIGHEST_SHARE * rate_hz)
+    octave, power = np.log2(frequency[known]), power[known]
+    band = np.floor(_BANDS_PER_OCTAVE * (octave - octave[0])).astype(int)
+    lines = np.maximum(np.bincount(band), 1)
+    level = 10 * np.log10(np.bincount(band, power) / lines + _SMALLEST_POWER)
+    filled = np.bincount(band) > 0
+    return (np.bincount(band, octave) / lines)[filled], level[filled]
+
+
+def _cliff(octave: Array, level: Array, at: float) -> float:
+    """Measure how far a spectrum falls within an octave below its trend of the octave before, dB; 0 where no cliff."""
+    before, beyond = (octave >= at - 1) & (octave <= at), octave >= min(at + 1, octave[-1])
+    if before.sum() < _FEWEST_BANDS or octave[-1] - at < _LEAST_OCTAVES_BEYOND:
+        return 0.0
+    slope, offset = np.polyfit(octave[before], level[before], 1)
+    if slope < -_STEEPEST_BEFORE_DB or level[before].min() - level[beyond].max() < _CLEARANCE_DB:
+        return 0.0
+    first = int(np.argmax(beyond))
+    return float(offset + slope * at + min(slope, 0.0) * (octave[first] - at) - level[first])
+
+
+def _halved(octave: Array, level: Array, cliff: float) -> float:
+    """Find where a spectrum is a quarter of its trend, and the amplitude half; Hz."""
+    before = (octave >= cliff - _TREND_OCTAVES) & (octave <= cliff - _CLEAR_OCTAVES)
+    slope = min(0.0, float(np.polyfit(octave[before], level[before], 1)[0])) if before.sum() > 1 else 0.0
+    trend = slope * octave + (level[before] - slope * octave[before]).mean()
+    below = trend - level
+    first = int(np.argmax((octave > cliff - _CLEAR_OCTAVES) & (below > _HALVED_DB)))
+    if first == 0 or below[first] <= _HALVED_DB:
+        return float(2**cliff)
+    share = np.clip((_HALVED_DB - below[first - 1]) / (below[first] - below[first - 1]), 0.0, 1.0)
+    return float(2 ** (octave[first - 1] + share * (octave[first] - octave[first - 1])))
+
+
+def warn_of_cut_offs(found: Mapping[str, float], settings: ImportSettings) -> Iterator[str]:
+    """Name the cut-offs of signals that were filtered before, unless the filter of the import lies below them all."""
+    if not found or (settings.lowpass_hz is not None and settings.lowpass_hz <= min(found.values())):
+        return
+    named = ", ".join(f"{name} at about {cut_off:.2g} Hz" for name, cut_off in found.items())
+    yield (
+        f"the spectrum falls off a cliff in {named}: low-passed before it was logged (or simulated without noise)."
+        " Nothing above is known, and noise looks smaller than it was; signals that were filtered unlike each other"
+        f" no longer fit together: log them unfiltered, or set import.lowpass_hz to {min(found.values()):.2g} or less"
+    )

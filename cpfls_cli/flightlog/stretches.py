@@ -1,0 +1,215 @@
+"""Parts of a log that measure no flight: rotors at rest or below zero; columns dead, clipped or at a standstill."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import ceil, floor
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.flightlog.repair import SignalTable
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.units import KNOWN_UNITS
+
+_ROTORS = ("rotor_speed", "rotor_command")
+_SHORTEST_REST_S = 0.5
+# A speed that is measured, or a command that was filtered, may undershoot zero a little.
+_UNDERSHOOT = 0.01
+_SMALLEST_SHARE_KEPT = 0.1
+_MOST_LISTED = 3
+# A sensor at its limit stays there for several samples, and far longer than at the level just before it; the peak of a
+# slow signal that is rounded stays too, but longer at the level before.
+_CLIPPED_SAMPLES = 5
+_CLIPPED_TO_NEXT = 3
+# By signal: no sensor of a multirotor has its limit lower. A common smallest range of a gyroscope is 125 deg/s.
+_LOWEST_LIMIT = {"body_rate": 1.0, "attitude_rate": 1.0, "acceleration": 15.0, "rotor_command": 0.0}
+_MEASURED = frozenset({"attitude", "quaternion", "body_rate", "attitude_rate", "position", "velocity", "acceleration"})
+_SHORTEST_PAUSE_S = 0.5
+_FEWEST_IN_PAUSE = 20
+_USUAL_STEPS = 10
+
+
+def rotors_at_rest(table: SignalTable, settings: ImportSettings) -> dict[str, BoolArray]:
+    """Mark the rows of stretches in which no rotor turns: all of them at zero or below, or at their smallest value.
+
+    Parameters
+    ----------
+    table : SignalTable
+        The part that is kept, as logged.
+    settings : ImportSettings
+        `saturation_samples`, the fewest rows of a stretch.
+
+    Returns
+    -------
+    dict from signal name to array of bool, shape (sample,)
+        For each signal that has a column for each rotor.
+    """
+    return {
+        name: _at_rest(table.time, table.signals[name], settings.saturation_samples)
+        for name in _ROTORS
+        if name in table.signals
+    }
+
+
+def _at_rest(time: Array, values: Array, samples: int) -> BoolArray:
+    lowest = np.maximum(np.nanmin(values, axis=0), 0.0)
+    resting = np.asarray((values <= lowest).all(axis=1), dtype=bool)
+    kept = np.zeros(len(time), dtype=bool)
+    # Commands that never change are a matter of dead columns.
+    for first, last in [] if np.ptp(values) == 0 else _runs(resting):
+        if last - first + 1 >= samples and time[last] - time[first] >= _SHORTEST_REST_S:
+            kept[first : last + 1] = True
+    return kept
+
+
+def warn_of_rest(table: SignalTable, resting: Mapping[str, BoolArray], settings: ImportSettings) -> Iterator[str]:
+    """Say where rotors do not turn, and which crop leaves the longest flight; and where they would turn backward.
+
+    Parameters
+    ----------
+    table : SignalTable
+        The part that is kept, as logged.
+    resting : mapping from signal name to array of bool, shape (sample,)
+        See `rotors_at_rest`.
+    settings : ImportSettings
+        The columns and units.
+    """
+    for name, signal in settings.signals.items():
+        if name in resting:
+            yield from _warn_of_rest(name, signal, table, resting[name])
+
+
+def _warn_of_rest(name: str, signal: SignalMap, table: SignalTable, rest: BoolArray) -> Iterator[str]:
+    time, values = table.time, table.signals[name]
+    if rest.any():
+        low, high = float(np.nanmin(values[rest])), float(np.nanmax(values[rest]))
+        level = _shown(low, signal) if low == high else f"{low:.4g} to {_shown(high, signal)}"
+        yield (
+            f"{name} stands at {level} on all rotors {_when(time, rest)}: on the ground, or falling, and no part of a"
+            f" flight; {_crop(time, rest)}"
+        )
+    backward = (values < -_UNDERSHOOT * np.nanmax(np.abs(values))).any(axis=1)
+    if backward.any():
+        lowest = np.nanmin(values, axis=0)
+        column = signal.columns[int(np.argmin(lowest))]
+        yield (
+            f"{name} is below zero in {backward.sum()} of {len(backward)} rows, down to"
+            f" {_shown(float(lowest.min()), signal)} in column {column}, and no rotor turns backward: where it rests,"
+            f" cut it off with import.crop_s; otherwise check import.signals.{name}.scale, offset and sign"
+        )
+
+
+def _shown(value: float, signal: SignalMap) -> str:
+    unit = KNOWN_UNITS[signal.unit].si
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
+
+def _when(time: Array, marked: BoolArray) -> str:
+    stretches = [f"from {time[first]:.2f} s to {time[last]:.2f} s" for first, last in _runs(marked)]
+    more = len(stretches) - _MOST_LISTED
+    listed = ", ".join(stretches[:_MOST_LISTED])
+    return f"{listed} and in {more} more stretches" if more > 0 else listed
+
+
+def _crop(time: Array, rest: BoolArray) -> str:
+    flown = [(time[first], time[last]) for first, last in _runs(~rest)]
+    begin, end = max(flown, key=lambda part: float(part[1] - part[0]), default=(0.0, 0.0))
+    if end - begin < _SMALLEST_SHARE_KEPT * (time[-1] - time[0]):
+        return "hardly anything else is in the log"
+    return f"import.crop_s: [{ceil(100 * begin) / 100:g}, {floor(100 * end) / 100:g}] keeps the longest part without"
+
+
+def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSettings) -> Iterator[str]:
+    """Name columns that are constant, clipped at a limit of their sensor, or stand still for a while.
+
+    Parameters
+    ----------
+    table : SignalTable
+        The part that is kept, as logged.
+    known : sequence of str
+        Columns that are known to stand at an extreme, and said to.
+    settings : ImportSettings
+        The columns.
+    """
+    for name, signal in settings.signals.items():
+        values = table.signals[name]
+        by_column = dict(zip(signal.columns, values.T, strict=True))
+        constant = [column for column, of in by_column.items() if _spread(of) == 0]
+        if constant:
+            yield _constant(name, constant, len(values))
+        for column in (each for each in by_column if each not in {*constant, *known}):
+            limit = _limit(name, by_column[column])
+            if limit is not None:
+                count = int((by_column[column] == limit).sum())
+                yield f"column {column} is clipped at {_shown(limit, signal)}, for {count} samples: the rest is lost"
+        if name in _MEASURED and len(constant) < len(by_column):
+            yield from _warn_of_pause(name, table.time, values)
+
+
+def _constant(name: str, columns: Sequence[str], rows: int) -> str:
+    subject, others = ("columns", "do") if len(columns) > 1 else ("column", "does")
+    return (
+        f"{subject} {', '.join(columns)} of import.signals.{name} {others} not change in {rows} rows: dead, or never"
+        " updated; map what changes, or leave the signal out"
+    )
+
+
+def _spread(values: Array) -> float:
+    return float(np.nanmax(values) - np.nanmin(values))
+
+
+def _limit(name: str, values: Array) -> float | None:
+    """Find the limit at which a channel is clipped; a rotor's command has no lower one."""
+    if name not in _LOWEST_LIMIT:
+        return None
+    signs = (1.0,) if name in _ROTORS else (1.0, -1.0)
+    return next(
+        (sign * np.nanmax(sign * values) for sign in signs if clipped(sign * values, _LOWEST_LIMIT[name])), None
+    )
+
+
+def clipped(values: Array, lowest_limit: float) -> bool:
+    """Tell whether a channel is clipped at its largest value.
+
+    Parameters
+    ----------
+    values : array, shape (sample,)
+    lowest_limit : float
+        In their unit, from which a limit is believed.
+    """
+    levels = np.unique(values[np.isfinite(values)])
+    if len(levels) < 2 or levels[-1] < lowest_limit:
+        return False
+    highest = values == levels[-1]
+    crowded = highest.sum() > _CLIPPED_TO_NEXT * (values == levels[-2]).sum()
+    return bool(crowded and max(last - first + 1 for first, last in _runs(highest)) >= _CLIPPED_SAMPLES)
+
+
+def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
+    """Say where a signal that is measured stands still on all axes for far longer than between its updates."""
+    known = np.isfinite(values).all(axis=1)
+    time, values = time[known], values[known]
+    same = (np.diff(values, axis=0) == 0).all(axis=1)
+    updates = np.flatnonzero(~same)
+    usual = float(np.median(np.diff(updates))) if len(updates) > _FEWEST_IN_PAUSE else np.inf
+    pauses = [
+        (first, last + 1)
+        for first, last in _runs(same)
+        if last - first + 2 >= max(_FEWEST_IN_PAUSE, _USUAL_STEPS * usual)
+        and time[last + 1] - time[first] >= _SHORTEST_PAUSE_S
+    ]
+    if pauses:
+        marked = np.zeros(len(time), dtype=bool)
+        for first, last in pauses:
+            marked[first : last + 1] = True
+        yield (
+            f"{name} does not change on any axis {_when(time, marked)}: its source was silent there, and the last value"
+            " was repeated; cut it off with import.crop_s"
+        )
+
+
+def _runs(marked: BoolArray) -> list[tuple[int, int]]:
+    """List the first and the last row of each run of marked rows."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
+    return [(int(first), int(after) - 1) for first, after in edges.reshape(-1, 2)]
