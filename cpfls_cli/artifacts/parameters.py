@@ -17,7 +17,7 @@ _DIGITS = 6
 THRUST, DRAG = "rotors.thrust_factor_n_s2", "rotors.drag_factor_n_m_s2"
 INERTIA = tuple(f"inertia_kg_m2.{place}" for place in range(6))
 LAG, DELAY, CENTRE = "motor_lag_s", "delay_s", ("com_m.0", "com_m.1")
-_FOUND_AS = {
+FOUND_AS = {
     THRUST: "thrust_factor",
     DRAG: "drag_factor",
     **dict(zip(INERTIA[:3], (f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]), strict=True)),
@@ -29,6 +29,9 @@ _FOUND_AS = {
 """Numbers of a fit, by the keys under which people look for them."""
 
 _UNITS = {THRUST: "N s^2", DRAG: "N m s^2", LAG: "s", DELAY: "s", **dict.fromkeys(CENTRE, "m")}
+STATED = (THRUST, DRAG, *INERTIA)
+"""What a config states, where it states anything."""
+
 _GUESSES = {"thrust_factor": (THRUST,), "drag_factor": (DRAG,), "inertia": INERTIA[:3]}
 
 
@@ -43,6 +46,8 @@ class Parameter(NamedTuple):
         None: no flight and no config tells it.
     low, high : float or None
         95 % interval of what was found.
+    stated : float or None
+        In the config.
     determined : bool
         Whether the flights tell it.
     reason : str
@@ -54,6 +59,7 @@ class Parameter(NamedTuple):
     unit: str
     low: float | None
     high: float | None
+    stated: float | None
     determined: bool
     reason: str
 
@@ -62,18 +68,20 @@ def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:
     """List the constants of a vehicle that was found, known or not."""
     found = {row["name"]: row for row in rows_of(record.found)}
     guesses = {key for name in record.guess or () for key in _GUESSES[name]}
-    for key, name in _FOUND_AS.items():
+    for key, name in FOUND_AS.items():
         unit = _UNITS.get(key, "kg m^2")
         if name in found:
             row = found[name]
-            reason = _reason(record, row)
-            yield Parameter(key, row["value"], unit, row["low"], row["high"], not reason, reason or "found in flights")
+            stated = row["stated"] if np.isfinite(row["stated"]) else None
+            ends, reason = (row["low"], row["high"]), _reason(record, row)
+            yield Parameter(key, row["value"], unit, *ends, stated, not reason, reason or "found in flights")
         elif key in guesses:
-            yield Parameter(
-                key, None, unit, None, None, False, "not known: the flights lack what tells it (velocity for thrust)"
-            )
+            reason = "not known: no flight has the velocity, which tells thrust from weight"
+            yield Parameter(key, None, unit, None, None, None, False, reason)
         else:
-            yield Parameter(key, _held(record, key), unit, None, None, False, _why_not_fitted(key))
+            held = _held(record, key)
+            stated = held if key in STATED else None
+            yield Parameter(key, held, unit, None, None, stated, False, _why_not_fitted(key))
 
 
 def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
+import numpy as np
+
+from cpfls_cli.arrays import Array
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ConfigError
-from cpfls_cli.vehicle.guess import guessed_drag_factor, guessed_inertia, guessed_thrust_factor
 from cpfls_cli.vehicle.settings import Unknown, VehicleSettings
 
 KEYS: Final[dict[Unknown, str]] = {
@@ -15,6 +18,16 @@ KEYS: Final[dict[Unknown, str]] = {
     "inertia": "inertia_kg_m2",
 }
 """Keys of the numbers that may be null."""
+
+_GYRATION = (0.5, 0.5, 0.7)
+"""Radii of gyration in arms: of published quadrotors from 30 g to 6 kg, those about roll are 0.45 to 1."""
+
+_DRAG_LEVER = 0.1
+"""Drag factor over thrust factor in arms; it is a tenth to a fifth of a propeller's radius."""
+
+_HOVER = 0.55
+"""Rotor speed in hover, share of the largest: a vehicle lifts about three times its weight."""
+
 
 _TAKEN = frozenset({"import", "vehicle", "replay", "report", "export"})
 """Commands that work with guesses; a report and an export are of a model, which has its own numbers."""
@@ -73,11 +86,11 @@ def _guesses(vehicle: dict[str, Any], rotors: list[dict[str, Any]]) -> dict[Unkn
     fastest = float(vehicle.get("rotor_speed_max_rad_s", usual.rotor_speed_max_rad_s))
     stated = [rotor.get(KEYS["thrust_factor"]) for rotor in rotors]
     thrust = next((float(value) for value in stated if value is not None), None)
-    thrust = thrust or guessed_thrust_factor(mass, gravity, len(positions), fastest)
+    thrust = thrust or _thrust_factor(mass, gravity, len(positions), fastest)
     return {
         "thrust_factor": thrust,
-        "drag_factor": guessed_drag_factor(thrust, positions),
-        "inertia": list(guessed_inertia(mass, positions)),
+        "drag_factor": _drag_factor(thrust, positions),
+        "inertia": list(_inertia(mass, positions)),
     }
 
 
@@ -104,3 +117,46 @@ def require_known(study: Study, command: str) -> None:
         f"{keys}: not known in this config, and `cpfls {command}` needs what is null there; `cpfls vehicle` finds it "
         "in flights and writes it (--write-config), or state it"
     )
+
+
+def _inertia(mass: float, positions: Sequence[Sequence[float]]) -> tuple[float, float, float]:
+    """Guess moments of inertia, kg m^2.
+
+    Parameters
+    ----------
+    mass : float, kg
+    positions : sequence of (float, float, float), m
+        Of the hubs.
+    """
+    x, y, z = (mass * (share * _arm(positions)) ** 2 for share in _GYRATION)
+    return x, y, z
+
+
+def _thrust_factor(mass: float, gravity: float, rotors: int, speed_max: float) -> float:
+    """Guess the thrust factor of each rotor, N s^2, from the speed at which such vehicles hover.
+
+    Parameters
+    ----------
+    mass : float, kg
+    gravity : float, m/s^2
+    rotors : int
+    speed_max : float, rad/s
+    """
+    return mass * gravity / (rotors * (_HOVER * speed_max) ** 2)
+
+
+def _drag_factor(thrust_factor: float, positions: Sequence[Sequence[float]]) -> float:
+    """Guess the drag factor, N m s^2.
+
+    Parameters
+    ----------
+    thrust_factor : float, N s^2
+    positions : sequence of (float, float, float), m
+        Of the hubs.
+    """
+    return _DRAG_LEVER * _arm(positions) * thrust_factor
+
+
+def _arm(positions: Sequence[Sequence[float]]) -> float:
+    hubs: Array = np.array(positions, dtype=float)
+    return float(np.hypot(hubs[:, 0], hubs[:, 1]).max())

@@ -8,14 +8,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.parameters import (
+    CENTRE,
+    DELAY,
+    DRAG,
+    FOUND_AS,
+    INERTIA,
+    LAG,
+    THRUST,
+    Parameter,
+    parameters_of,
+    vehicle_section,
+)
 from cpfls_cli.artifacts.replay import better_to
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-from cpfls_cli.pages.constants import constants, section_to_paste
+from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text, Tone
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Listing, Plot, Section, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent
 
 if TYPE_CHECKING:
@@ -42,6 +54,22 @@ _TONES: dict[str, Tone] = {
 }
 _REMAINDER, _ROTORS = "remainder", "rotors"
 _AXES = ("x", "y", "z")
+_FLIGHTS = {
+    THRUST: "log velocity (or position), and climb and descend: the known mass then tells thrust",
+    DRAG: "turn about yaw with fast steps while rolling and pitching, or state Izz; else only their ratio is known",
+    INERTIA[0]: "roll with fast steps or a multisine: several changes of direction a second",
+    INERTIA[1]: "pitch with fast steps or a multisine: several changes of direction a second",
+    INERTIA[
+        2
+    ]: "turn about yaw fast while rolling and pitching fast: the gyroscopic torque alone tells Izz from the drag "
+    "factor; or state one of the two",
+    **dict.fromkeys(INERTIA[3:], "roll and yaw fast at once"),
+    LAG: "steps of thrust, with rotor speeds or commands logged at 100 Hz or faster",
+    DELAY: "steps of thrust, with rotor speeds or commands logged at 100 Hz or faster",
+    **dict.fromkeys(CENTRE, "climb and descend with much and little thrust: what an offset turns grows with thrust"),
+}
+"""What would tell a constant that the flights do not."""
+
 _FAR = 3.0
 """Factor from the stated number from which on a found one is called effective, and no property of a part."""
 
@@ -51,9 +79,9 @@ def answer(found: Source[VehicleRecord]) -> Iterator[Block]:
     yield found_box(found)
     if found.record.held_out is not None:
         yield errors_table(found.record.held_out, 1)
-    yield from constants(found.record, 1)
+    yield from _constants(found.record, 1)
     yield _numbers_table(found, 1)
-    yield section_to_paste(found.record)
+    yield _section_to_paste(found.record)
     yield from (Text(warning, "warning") for warning in warnings(found.record))
 
 
@@ -128,16 +156,82 @@ def _far(value: float, stated: float) -> bool:
 
 
 def _numbers_table(found: Source[VehicleRecord], index: int) -> Table:
-    rows: list[list[str | Cell]] = []
-    for row in rows_of(found.record.found):
-        weak = row["at_bound"] or not row["determined"]
-        value = Cell(number(row["value"]), "warning" if weak else "plain")
-        rows.append(
-            [row["name"], row["unit"], value, number(row["low"], 3), number(row["high"], 3), number(row["stated"], 3)]
-        )
-    caption = "Numbers of the vehicle with 95 % intervals from blocks of the flights; stated: in the config."
-    header = ("Number", "Unit", "Value", "From", "To", "Stated")
+    """Show what was found beside the constants."""
+    rows = [
+        [
+            row["name"],
+            row["unit"],
+            Cell(number(row["value"]), "warning" if row["at_bound"] or not row["determined"] else "plain"),
+            number(row["low"], 3),
+            number(row["high"], 3),
+        ]
+        for row in rows_of(found.record.found)
+        if row["name"] not in FOUND_AS.values()
+    ]
+    caption = "Other numbers of the vehicle with 95 % intervals from blocks of the flights."
+    header = ("Number", "Unit", "Value", "From", "To")
     return Table(f"vehicle-numbers-{index}", caption, header, rows, frozenset({0, 1}))
+
+
+def _constants(record: VehicleRecord, index: int) -> Iterator[Block]:
+    """Show the constants of a vehicle by key, say what scale they have and what would tell the open ones."""
+    listed = list(parameters_of(record))
+    yield _constants_table(listed, index)
+    yield Text(" ".join(_scale(record, {each.key: each for each in listed})))
+    yield from (Text(f"To know {each.key}: {_FLIGHTS[each.key]}.", "warning") for each in filter(_wanting, listed))
+
+
+def _wanting(parameter: Parameter) -> bool:
+    """Tell whether a number was looked for and not found."""
+    return parameter.value is None or (parameter.low is not None and not parameter.determined)
+
+
+def _section_to_paste(record: VehicleRecord) -> Listing:
+    """Write the section of the config with what was found."""
+    text = to_yaml({"vehicle": vehicle_section(record)})
+    return Listing("The section vehicle with what was found, ready to paste", text)
+
+
+def _constants_table(listed: list[Parameter], index: int) -> Table:
+    rows: list[list[str | Cell]] = [
+        [
+            each.key,
+            each.unit,
+            Cell(_or_unknown(each.value, 4), "warning" if _wanting(each) else "plain"),
+            *(_or_unknown(value, 3) for value in (each.low, each.high, each.stated)),
+            each.reason,
+        ]
+        for each in listed
+    ]
+    caption = "Constants of the vehicle by key of the config, with 95 % intervals; stated: in the config."
+    header = ("Key", "Unit", "Value", "From", "To", "Stated", "Why")
+    return Table(f"vehicle-constants-{index}", caption, header, rows, frozenset({0, 1, 6}), frozenset({6}))
+
+
+def _or_unknown(value: float | None, digits: int) -> str:
+    return UNKNOWN if value is None else number(value, digits)
+
+
+def _scale(record: VehicleRecord, known: dict[str, Parameter]) -> Iterator[str]:
+    """Say what gives the numbers their size in N and kg m^2, and what stays a ratio."""
+    mass = number(record.vehicle.mass, 4)
+    if known[THRUST].value is None:
+        yield (
+            "The flights lack velocity, so nothing tells thrust from weight: of thrust, inertia and drag factor only "
+            "ratios are known."
+        )
+        return
+    if known[THRUST].low is not None:
+        yield f"The mass of {mass} kg, which the thrust lifts, gives all forces their size, and the arms all torques."
+    else:
+        yield "The stated thrust factor gives all forces and torques their size."
+    yaw = [known[DRAG], known[INERTIA[2]]]
+    if all(each.low is not None for each in yaw):
+        told = [each.key for each in yaw if each.determined]
+        if len(told) == len(yaw):
+            yield "About yaw the gyroscopic torque tells the drag factor from Izz."
+        else:
+            yield f"About yaw {joined(each.key for each in yaw)} are known as a ratio alone."
 
 
 def found_vehicle_section(sources: Sources) -> Section | None:
@@ -158,9 +252,9 @@ def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
     if record.held_out is not None:
         yield errors_table(record.held_out, index)
         yield horizon_figure(f"vehicle-errors-{index}", record.held_out)
-    yield from constants(record, index)
+    yield from _constants(record, index)
     yield _numbers_table(found, index)
-    yield section_to_paste(record)
+    yield _section_to_paste(record)
     yield from (Text(warning, "warning") for warning in warnings(record))
     yield _structures_table(record, index)
     yield _structures_figure(record, index)
