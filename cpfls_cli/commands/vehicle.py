@@ -89,7 +89,8 @@ def run(
         found, signal = _found(job, training, checkpoint, kept or {})
         judged = _judged(found.model, rest, job) if rest else None
         warnings = [warning for flight in read for warning in flight.warnings]
-        record = finish(job, VehicleRecord.of(found, judged, warnings), inputs)
+        commanded = any(flight.parts[0].commanded for flight in training)
+        record = finish(job, VehicleRecord.of(found, judged, warnings, commanded=commanded), inputs)
     if config is not None:
         _write_config(config, record)
     if record.complete:

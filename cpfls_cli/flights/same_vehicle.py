@@ -11,6 +11,7 @@ from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import read_header, read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ConfigError, InputError
@@ -69,6 +70,21 @@ def base_of(path: Path | None, study: Study) -> BaseGroup:
         If it was identified with another vehicle.
     """
     return BaseGroup.of(None if path is None else read_of_vehicle(path, ModelRecord, study))
+
+
+def read_vehicle(path: Path, study: Study) -> VehicleRecord:
+    """Read a whole vehicle, all of which stands in its table of weights.
+
+    Raises
+    ------
+    InputError
+        If it is no good artifact, was made with another vehicle, or has parts that the table does not hold.
+    """
+    record = read_of_vehicle(path, VehicleRecord, study)
+    if record.vehicle.not_held:
+        parts = ", ".join(record.vehicle.not_held)
+        raise InputError(f"{path}: has {parts} beside its table of weights, which is all that is evaluated")
+    return record
 
 
 def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
