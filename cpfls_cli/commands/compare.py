@@ -38,26 +38,24 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     """
     inputs = begin(job, flight_roles("flight", flights) | ({} if model is None else {"model": model}))
     check_ignored(job.study)
-    given = read_flights(flights, job.study)
-    if model is not None and holds(model, VehicleRecord):
-        whole = read_vehicle(model, job.study).vehicle.vehicle_model()
-        given = replace(given, recordings=tuple(of_vehicle(flight, whole) for flight in given.recordings))
-        extended, base = with_effects(whole), BaseGroup.of(None)
-    else:
-        extended, base = _model(model, job.study)
+    given, extended, base = _with_model(read_flights(flights, job.study), model, job.study)
     if job.dry_run:
         return nothing_written(job)
     record = finish(job, compared(job.study, given, extended, base, progress_of(job.progress)), inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
-def _model(path: Path | None, study: Study) -> tuple[ExtendedModel, BaseGroup]:
-    """Read a model, with or without effects, and the identified model under it."""
+def _with_model(given: Flights, path: Path | None, study: Study) -> tuple[Flights, ExtendedModel, BaseGroup]:
+    """Read a model, with or without effects, and the identified model under it; flights are those of its vehicle."""
+    if path is not None and holds(path, VehicleRecord):
+        whole = read_vehicle(path, study).vehicle.vehicle_model()
+        recordings = tuple(of_vehicle(flight, whole) for flight in given.recordings)
+        return replace(given, recordings=recordings), with_effects(whole), BaseGroup.of(None)
     if path is not None and holds(path, ExtendedRecord):
         record = read_of_vehicle(path, ExtendedRecord, study)
-        return record.rebuilt(path), record.base
+        return given, record.rebuilt(path), record.base
     base = base_of(path, study)
-    return plain(base.rebuilt(path)), base
+    return given, plain(base.rebuilt(path)), base
 
 
 def compared(

@@ -132,7 +132,7 @@ class SimulatedModel:
         for one in asked.listed:
             name = one.effect.name
             if name in own:
-                raise SettingError(_key(name), "the model has it already")
+                raise SettingError(_key(name), "the model has it already; leave it out")
             by_name[name] = _added(by_name[name], one) if name in by_name else one
         effects = SimulatedEffects(tuple(by_name.values()))
         _refuse_conflict(effects)
