@@ -61,10 +61,11 @@ def _errors_of_vehicle(record: PredictionRecord) -> Iterator[Text]:
     """Say how far torque and force of a whole vehicle are off at a sample, and what that does not tell."""
     if record.held_against is None:
         return
-    for name, unit, rms in (("torque", "N m", record.body_torque_rms), ("force", "N", record.force_rms)):
+    rows = (("torque about", "N m", record.body_torque_rms), ("force along", "N", record.force_rms))
+    for name, unit, rms in rows:
         if rms is not None:
             values = " ".join(number(value, 3) for value in rms.tolist())
-            yield Text(f"rms error of the {name} about x, y, z of the body: {values} {unit}")
+            yield Text(f"rms error of the {name} x, y, z of the body: {values} {unit}")
     if record.force_rms is None:
         yield Text("the flight knows neither acceleration nor velocity, so there is no force to hold the model against")
     yield Text("a torque that is right at each sample may still predict nothing; `cpfls replay` says what it predicts")
