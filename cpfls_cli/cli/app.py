@@ -62,7 +62,9 @@ ModelOption = Annotated[
 ]
 WriteConfigOption = Annotated[
     Path | None,
-    typer.Option("--write-config", metavar="FILE", help="Write the config again with the numbers that were found."),
+    typer.Option(
+        "--write-config", metavar="FILE", help="Write the config again with the numbers that a search to its end found."
+    ),
 ]
 HeldOutOption = Annotated[
     list[Path] | None,
