@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.job import Job, Progress, begin, finish
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study, generator
+from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.recordings import Flights, read_flights
@@ -38,6 +39,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     """
     inputs = begin(job, flight_roles("flight", flights) | ({} if model is None else {"model": model}))
     check_ignored(job.study)
+    require_known(job.study, "compare", whole=model is not None and holds(model, VehicleRecord))
     given, extended, base = _with_model(read_flights(flights, job.study), model, job.study)
     if job.dry_run:
         return nothing_written(job)

@@ -18,6 +18,7 @@ from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
+from cpfls_cli.config.unknown import require_known
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
@@ -44,6 +45,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         Identified, one with effects, or of a whole vehicle.
     """
     inputs = begin(job, {"model": model, "flight": flight})
+    require_known(job.study, "predict", whole=holds(model, VehicleRecord))
     with_more = {ExtendedRecord: _with_effects, VehicleRecord: _of_vehicle}
     predicted = next((predict for kind, predict in with_more.items() if holds(model, kind)), None)
     if predicted is not None:

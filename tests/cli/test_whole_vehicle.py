@@ -249,25 +249,38 @@ def test_a_flight_that_lacks_what_the_model_needs_is_refused(
     assert line == lacks
 
 
-def test_a_torque_that_was_logged_is_what_a_prediction_is_held_against(cpfls, config, vehicle, flight, tmp_path):
+@pytest.fixture
+def written_log(flight, tmp_path):
+    """Write what a flight measured as a log, and give the settings that import it."""
+
+    def call(**more):
+        flown = read_record(flight, FlightRecord)
+        columns = {
+            "attitude": ("rad", flown.attitude),
+            "body_rate": ("rad/s", flown.body_rate),
+            "velocity": ("m/s", flown.velocity),
+            "rotor_speed": ("rad/s", flown.rotor_speed),
+            **more,
+        }
+        names = {signal: [f"{signal}{k}" for k in range(values.shape[1])] for signal, (_, values) in columns.items()}
+        table = np.column_stack([flown.time, *(values for _, values in columns.values())])
+        header = ",".join(["t", *(name for listed in names.values() for name in listed)])
+        np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
+        signals = {signal: {"columns": names[signal], "unit": unit} for signal, (unit, _) in columns.items()}
+        return tmp_path / "log.csv", {"time_column": "t", "signals": signals}
+
+    return call
+
+
+def test_a_torque_that_was_logged_is_what_a_prediction_is_held_against(
+    cpfls, config, vehicle, flight, written_log, tmp_path
+):
     """A log of the true torque, which no rotor of the config tells, beside the measured rotor speeds."""
     _, record = predicted(cpfls, config, vehicle, flight, tmp_path / "p.h5")
-    flown = read_record(flight, FlightRecord)
-    columns = {
-        "attitude": ("rad", flown.attitude),
-        "body_rate": ("rad/s", flown.body_rate),
-        "velocity": ("m/s", flown.velocity),
-        "rotor_speed": ("rad/s", flown.rotor_speed),
-        "body_torque": ("N m", record.body_torque),
-    }
-    names = {signal: [f"{signal}{k}" for k in range(values.shape[1])] for signal, (_, values) in columns.items()}
-    table = np.column_stack([flown.time, *(values for _, values in columns.values())])
-    header = ",".join(["t", *(name for listed in names.values() for name in listed)])
-    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
-    signals = {signal: {"columns": names[signal], "unit": unit} for signal, (unit, _) in columns.items()}
-    settings = {"time_column": "t", "torque_source": "column", "signals": signals}
+    log, settings = written_log(body_torque=("N m", record.body_torque))
+    settings["torque_source"] = "column"
     options = ("--set", f"import={json.dumps(settings)}")
-    result = cpfls("import", config, tmp_path / "log.csv", "-o", tmp_path / "log.h5", *options)
+    result = cpfls("import", config, log, "-o", tmp_path / "log.h5", *options)
     assert result.exit_code == 0, result.stderr
     told, held = predicted(cpfls, config, vehicle, tmp_path / "log.h5", tmp_path / "q.h5")
     assert told["held_against"] == "recorded"
@@ -290,3 +303,35 @@ def test_the_true_vehicle_leaves_noise_alone(cpfls, refuse, config, vehicle, fli
     assert (stated > 3 * true).all()
     (line,) = refuse("diagnose", config, tmp_path / "true.h5", "-o", tmp_path / "d.h5")
     assert line.startswith(f"{tmp_path / 'true.h5'}: was made with a model that has effects already")
+
+
+@pytest.fixture
+def open_config(tmp_path, written_log):
+    """Leave inertia and the factors of the rotors open; give the config and a log."""
+    log, settings = written_log()
+    settings["torque_source"] = None
+    rotors = [{**asdict(rotor), "thrust_factor_n_s2": None, "drag_factor_n_m_s2": None} for rotor in STATED.rotors]
+    stated = {**asdict(STATED), "inertia_kg_m2": None, "rotors": rotors}
+    (tmp_path / "open.yaml").write_text(json.dumps({"seed": 1, "vehicle": stated, "import": settings}))
+    return tmp_path / "open.yaml", log
+
+
+def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_config, tmp_path):
+    left_open, log = open_config
+    vehicle = tmp_path / "vehicle.h5"
+    write_record(vehicle, record_of(WHOLE, config=resolved_yaml(load_study(left_open))))
+    assert cpfls("import", left_open, log, "-o", tmp_path / "f.h5").exit_code == 0
+    told, _ = predicted(cpfls, left_open, vehicle, tmp_path / "f.h5", tmp_path / "p.h5")
+    assert min(told["r2_body"]) > 0.999
+    assert (gap(cpfls, left_open, tmp_path / "gap.h5", log, "--model", vehicle) < 1).all()
+    # An autopilot needs numbers, and the model is of the vehicle that they were left open of.
+    flown = cpfls("simulate", config, path, "--model", vehicle, "-o", tmp_path / "flown.h5")
+    assert flown.exit_code == 0, flown.stderr
+
+
+@pytest.mark.parametrize("command", ["compare", "predict"])
+def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_config, tmp_path, command):
+    left_open, log = open_config
+    words = (log,) if command == "compare" else (log, log)
+    (line,) = refuse(command, left_open, *words, "-o", tmp_path / "x.h5")
+    assert f"not known in this config, and `cpfls {command}` needs what is null there" in line
