@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_effects import ReplayErrors, above_noise, gap_summary
 from cpfls_cli.artifacts.gap_flights import AuditGroup, BaseGroup, FlightsGroup, NotExcitedGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.balance.windows import Recording
@@ -259,6 +261,12 @@ class DisagreementRecord(Record):
             base=base,
             flights=FlightsGroup.of(recordings, ["given"] * len(recordings)),
         )
+
+    @property
+    def has_effects(self) -> bool:
+        """Whether the model that was compared has effects already, which `cpfls diagnose` cannot start from."""
+        model = self.origin.inputs.get("model")
+        return model is not None and model.format in {kind.FORMAT.name for kind in (ExtendedRecord, VehicleRecord)}
 
     @property
     def summary(self) -> dict[str, Any]:

@@ -94,7 +94,7 @@ class ExtendedRecord(Record):
 
 def _vehicle(model: ExtendedModel, vehicle: VehicleSettings, base: BaseGroup) -> VehicleGroup:
     """Arrange the whole vehicle, as far as it is a table of polynomials."""
-    from cpfls_cli.gap.extended import whole_vehicle
+    from cpfls_cli.gap.whole_vehicle import whole_vehicle
 
     known = base.constant_inertia(vehicle)
     whole = whole_vehicle(model, vehicle, symmetric(vehicle.inertia_kg_m2 if known is None else known))

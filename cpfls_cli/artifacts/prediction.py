@@ -33,10 +33,33 @@ class PredictionRecord(Record):
     torque: Array = dataset("torque", "generalised torque of the model", "time", "axis", units="N m", frame=EULER)
     body_torque: Array = dataset("body_torque", "body torque of the model", "time", "axis", units="N m", frame=BODY)
     measured_torque: Array | None = dataset(
-        "measured_torque", "generalised torque of the flight", "time", "axis", units="N m", frame=EULER, default=None
+        "measured_torque",
+        "generalised torque that the model is held against",
+        "time",
+        "axis",
+        units="N m",
+        frame=EULER,
+        default=None,
     )
     error: Array | None = dataset(
         "error", "measured minus model torque", "time", "axis", units="N m", frame=EULER, default=None
+    )
+    held_against: str | None = dataset(
+        "held_against",
+        "of a whole vehicle, what measured_torque is: motion, which takes it with the model's inertia, or recorded",
+        default=None,
+    )
+    force: Array | None = dataset(
+        "force", "force of a whole vehicle, without weight", "time", "axis", units="N", frame=BODY, default=None
+    )
+    measured_force: Array | None = dataset(
+        "measured_force",
+        "force that the motion takes, without weight",
+        "time",
+        "axis",
+        units="N",
+        frame=BODY,
+        default=None,
     )
     inertia: Array = dataset("inertia", "inertia matrix D_ij(q)", "time", "axis", "axis", units="kg m^2", frame=EULER)
     inertia_low: Array | None = dataset(
@@ -135,6 +158,24 @@ class PredictionRecord(Record):
         return score(TorqueData(self.time, Motion(self.attitude, nothing, nothing), self.measured_torque), self.torque)
 
     @property
+    def body_torque_rms(self) -> Array | None:
+        """Root mean square error of the torque about the body axes, shape (3,), N m; None where nothing is known."""
+        from cpfls_cli.dynamics.rigid_body import vertical
+        from cpfls_cli.rotations import body_torque
+
+        if self.error is None:
+            return None
+        usable = ~vertical(self.attitude)
+        return _rms(body_torque(self.attitude[usable], self.error[usable]))
+
+    @property
+    def force_rms(self) -> Array | None:
+        """The same of the force, N."""
+        if self.force is None or self.measured_force is None:
+            return None
+        return _rms(self.measured_force - self.force)
+
+    @property
     def summary(self) -> dict[str, Any]:
         """The prediction for machines."""
         score = self.score
@@ -145,4 +186,17 @@ class PredictionRecord(Record):
             "outside": self.outside_count,
             "not_positive_definite": self.not_positive_definite,
         }
-        return summary if score is None else summary | {"r2": score.r2.tolist(), "r2_body": score.r2_body.tolist()}
+        if score is not None:
+            summary |= {"r2": score.r2.tolist(), "r2_body": score.r2_body.tolist()}
+        if self.held_against is not None:
+            rms, force = self.body_torque_rms, self.force_rms
+            summary |= {
+                "held_against": self.held_against,
+                "body_torque_rms": None if rms is None else rms.tolist(),
+                "force_rms": None if force is None else force.tolist(),
+            }
+        return summary
+
+
+def _rms(values: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(values**2, axis=0)))

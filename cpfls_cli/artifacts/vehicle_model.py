@@ -369,9 +369,14 @@ class VehicleRecord(Record):
     guess: tuple[str, ...] | None = dataset(
         "guess", "numbers of /vehicle that are guesses still: no flight tells them", "guess", default=None
     )
+    commanded: bool | None = dataset(
+        "commanded", "1 where its rotors were driven by commands, 0 by measured speeds", default=None
+    )
 
     @classmethod
-    def of(cls, found: FoundVehicle, held_out: HeldOutGroup | None, warnings: Sequence[str]) -> Self:
+    def of(
+        cls, found: FoundVehicle, held_out: HeldOutGroup | None, warnings: Sequence[str], *, commanded: bool
+    ) -> Self:
         """Arrange a vehicle that was found, and how well it predicts flights that it was not found in."""
         return cls(
             vehicle=VehicleGroup.of(found.model),
@@ -395,6 +400,7 @@ class VehicleRecord(Record):
             blocks=found.blocks,
             warning=tuple(warnings),
             guess=found.guessed or None,
+            commanded=commanded,
         )
 
     @property

@@ -37,7 +37,9 @@ TrainingArgument = Annotated[
     list[Path], typer.Argument(metavar="FLIGHT...", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
 ]
 LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help=f"Flight log: {suffixes_in_words()}.")]
-ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`.")]
+ModelArgument = Annotated[
+    Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`, `extend` or `vehicle`.")
+]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
 FlightsArgument = Annotated[
@@ -54,12 +56,15 @@ ModelOption = Annotated[
     typer.Option(
         "--model",
         metavar="MODEL",
-        help="Made by `cpfls identify` (`compare` takes one of `extend` too); without, the vehicle of the config.",
+        help="Made by `cpfls identify` (`compare` takes one of `extend` or `vehicle` too); without, the vehicle of the "
+        "config.",
     ),
 ]
 WriteConfigOption = Annotated[
     Path | None,
-    typer.Option("--write-config", metavar="FILE", help="Write the config again with the numbers that were found."),
+    typer.Option(
+        "--write-config", metavar="FILE", help="Write the config again with the numbers that a search to its end found."
+    ),
 ]
 HeldOutOption = Annotated[
     list[Path] | None,
@@ -213,7 +218,7 @@ def simulate(
             metavar="MODEL",
             help="Control the attitude with this model of `cpfls identify`, and compare its tracking error with those "
             "of a rigid body and of PD alone. With --mode closed-loop: fly it, or one of `cpfls extend`, in place of "
-            "the vehicle of the config; effects given come on top.",
+            "the vehicle of the config; one of `cpfls vehicle` is always flown. Effects given come on top.",
         ),
     ] = None,
     mode: Annotated[

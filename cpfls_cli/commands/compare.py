@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -11,13 +12,16 @@ from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.job import Job, Progress, begin, finish
 from cpfls_cli.artifacts.store import holds
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study, generator
+from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.recordings import Flights, read_flights
-from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle
+from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle, read_vehicle
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.extended import ExtendedModel, plain
+from cpfls_cli.gap.whole_vehicle import of_vehicle, with_effects
 from cpfls_cli.pages.disagreement import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -31,25 +35,29 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     flights : sequence of Path
         Artifacts, or logs that the config describes.
     model : Path or None
-        An identified model, or one with effects; None for the rigid body of the vehicle.
+        Identified, with effects, or of a whole vehicle; None for the rigid body of the vehicle.
     """
     inputs = begin(job, flight_roles("flight", flights) | ({} if model is None else {"model": model}))
     check_ignored(job.study)
-    given = read_flights(flights, job.study)
-    extended, base = _model(model, job.study)
+    require_known(job.study, "compare", whole=model is not None and holds(model, VehicleRecord))
+    given, extended, base = _with_model(read_flights(flights, job.study), model, job.study)
     if job.dry_run:
         return nothing_written(job)
     record = finish(job, compared(job.study, given, extended, base, progress_of(job.progress)), inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
 
 
-def _model(path: Path | None, study: Study) -> tuple[ExtendedModel, BaseGroup]:
-    """Read a model, with or without effects, and the identified model under it."""
+def _with_model(given: Flights, path: Path | None, study: Study) -> tuple[Flights, ExtendedModel, BaseGroup]:
+    """Read a model, with or without effects, and the identified model under it; flights are those of its vehicle."""
+    if path is not None and holds(path, VehicleRecord):
+        whole = read_vehicle(path, study).vehicle.vehicle_model()
+        recordings = tuple(of_vehicle(flight, whole) for flight in given.recordings)
+        return replace(given, recordings=recordings), with_effects(whole), BaseGroup.of(None)
     if path is not None and holds(path, ExtendedRecord):
         record = read_of_vehicle(path, ExtendedRecord, study)
-        return record.rebuilt(path), record.base
+        return given, record.rebuilt(path), record.base
     base = base_of(path, study)
-    return plain(base.rebuilt(path)), base
+    return given, plain(base.rebuilt(path)), base
 
 
 def compared(

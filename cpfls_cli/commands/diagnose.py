@@ -8,7 +8,6 @@ from typing import Any
 
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
-from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_effects import effect_summary, estimate_summary
 from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.job import Job, begin, finish
@@ -40,7 +39,7 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     inputs = begin(job, {"disagreement": disagreement} | flight_roles("held-out", held_out))
     check_ignored(job.study)
     compared = read_of_vehicle(disagreement, DisagreementRecord, job.study)
-    if any(file.format == ExtendedRecord.FORMAT.name for file in compared.origin.inputs.values()):
+    if compared.has_effects:
         raise InputError(
             f"{disagreement}: was made with a model that has effects already; `cpfls diagnose` names what a base model "
             "misses, so compare without --model, or with an identified model"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,18 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.store import holds, read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
+from cpfls_cli.config.unknown import require_known
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import read_flights
-from cpfls_cli.flights.same_vehicle import other_vehicles, read_of_vehicle
+from cpfls_cli.flights.same_vehicle import other_vehicles, read_of_vehicle, read_vehicle
+from cpfls_cli.gap.extended import ExtendedModel, inertial_force
+from cpfls_cli.gap.whole_vehicle import of_vehicle, with_effects
 from cpfls_cli.identification.model import Model
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
@@ -35,11 +42,14 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     Parameters
     ----------
     model : Path
-        Identified, or one with effects.
+        Identified, one with effects, or of a whole vehicle.
     """
     inputs = begin(job, {"model": model, "flight": flight})
-    if holds(model, ExtendedRecord):
-        prediction = _with_effects(model, flight, job.study)
+    require_known(job.study, "predict", whole=holds(model, VehicleRecord))
+    with_more = {ExtendedRecord: _with_effects, VehicleRecord: _of_vehicle}
+    predicted = next((predict for kind, predict in with_more.items() if holds(model, kind)), None)
+    if predicted is not None:
+        prediction = predicted(model, flight, job.study)
         if job.dry_run:
             return nothing_written(job)
         record = finish(job, prediction, inputs)
@@ -67,21 +77,65 @@ def _with_effects(path: Path, flight: Path, study: Study) -> PredictionRecord:
     logged = read_flights([flight], study).recordings[0].signals
     if logged.attitude is None or logged.torque is None:
         raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
-    signals, attitude = model.repaired(logged), logged.attitude
-    body_torque = model.rotor_torque(signals)
-    torque = rotations.generalised_torque(attitude, body_torque)
-    measured = rotations.generalised_torque(attitude, logged.torque)
+    signals = model.repaired(logged)
+    prediction = _prediction(signals, model, model.rotor_torque(signals), logged.torque)
+    if not isinstance(model.base, Model):
+        return prediction
+    return replace(prediction, outside=model.base.outside(logged.attitude))
+
+
+def _of_vehicle(path: Path, flight: Path, study: Study) -> PredictionRecord:
+    """Predict torque and force on a whole vehicle; they are held against what the motion takes.
+
+    A torque that was logged beside the rotor speeds is taken in its place.
+
+    Raises
+    ------
+    InputError
+        If the flight lacks the attitude or a signal that the model needs.
+    """
+    model = read_vehicle(path, study).vehicle.vehicle_model()
+    signals = of_vehicle(read_flights([flight], study).recordings[0], model).signals
+    if signals.attitude is None:
+        raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
+    extended = with_effects(model)
+    wrench = signals.wrench + extended.effect_wrench(signals)
+    recorded = _recorded_torque(flight, signals)
+    against = extended.inertial_torque(signals) if recorded is None else recorded
+    return replace(
+        _prediction(signals, extended, wrench[:, :3], against),
+        held_against="motion" if recorded is None else "recorded",
+        force=wrench[:, 3:],
+        measured_force=inertial_force(signals) if signals.has_force else None,
+    )
+
+
+def _recorded_torque(path: Path, signals: Signals) -> Array | None:
+    """Give the body torque of a flight, where a sensor told it and no rotor of the config."""
+    record = read_record(path, FlightRecord)
+    config = parse_config(record.origin.config, f"{path}: /config")
+    told = record.made_from("log") is not None and config["import"]["torque_source"] == "column"
+    if not told or record.body_torque is None:
+        return None
+    return np.asarray(record.body_torque[np.isin(record.time, signals.time)])
+
+
+def _prediction(signals: Signals, model: ExtendedModel, body_torque: Array, measured: Array) -> PredictionRecord:
+    """Arrange torques along a flight with attitude, shape (time, 3) each, N m, body frame."""
+    attitude = signals.attitude
+    assert attitude is not None, "checked before"
+    torque, given = (rotations.generalised_torque(attitude, each) for each in (body_torque, measured))
     inertia = _inertia(model.inertia(signals), attitude)
     return PredictionRecord(
         time=signals.time,
         attitude=attitude,
         torque=torque,
         body_torque=body_torque,
-        measured_torque=measured,
-        error=measured - torque,
+        measured_torque=given,
+        error=given - torque,
         inertia=inertia.value,
         coriolis=coriolis_matrix(inertia, rotations.attitude_rate(attitude, signals.body_rate)),
-        outside=model.base.outside(attitude) if isinstance(model.base, Model) else np.zeros(len(attitude), dtype=bool),
+        outside=np.zeros(len(attitude), dtype=bool),
     )
 
 

@@ -17,12 +17,13 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands import tracking
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError, SettingError
-from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle
+from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle, read_vehicle
 from cpfls_cli.pages.flight import answer, autopilot_text
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import violation_sentence
@@ -36,7 +37,9 @@ from cpfls_cli.simulation import (
     simulate,
     simulated_effects,
     simulated_model,
+    simulated_vehicle,
 )
+from cpfls_cli.simulation.settings import Mode
 
 _MOVED = ("position", "velocity", "acceleration")
 _EFFECT_FORM = "write NAME=VALUE[,VALUE...] or NAME.coefficient=VALUE, see `cpfls effects NAME`"
@@ -48,8 +51,9 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
     Parameters
     ----------
     model : Path or None
-        In mode closed-loop flown in place of the vehicle of the config: one with effects, or an identified one. Without
-        a mode an identified one, with which the attitude of that vehicle is controlled.
+        In mode closed-loop flown in place of the vehicle of the config: that of a whole vehicle, one with effects, or
+        an identified one. Without a mode that of a whole vehicle is flown so; with an identified one the attitude of
+        the vehicle is controlled.
     mode : str or None
         Of the command line, which the config has too; None where it gives none.
 
@@ -62,7 +66,8 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
         loop loses its path.
     """
     if model is not None and mode is None:
-        job = replace(job, study=_with_a_model(job.study))
+        whole = holds(model, VehicleRecord)
+        job = replace(job, study=_with_mode(job.study, "closed-loop" if whole else "computed-torque"))
     if job.study.simulation.mode == "computed-torque":
         return tracking.run(job, trajectory, _required(model))
     closed = job.study.simulation.mode == "closed-loop"
@@ -83,12 +88,12 @@ def run(job: Job, trajectory: Path, model: Path | None = None, mode: str | None 
     return _inverse(job, inputs, time, planned, trajectory)
 
 
-def _with_a_model(study: Study) -> Study:
-    """Let a model control the attitude, where nothing else is said."""
+def _with_mode(study: Study, usual: Mode) -> Study:
+    """Take the mode that is usual for a model, where nothing else is said."""
     if study.simulation.mode != "inverse":
         return study
     with settings_of("simulation", study):
-        return study.model_copy(update={"simulation": replace(study.simulation, mode="computed-torque")})
+        return study.model_copy(update={"simulation": replace(study.simulation, mode=usual)})
 
 
 def _required(model: Path | None) -> Path:
@@ -98,13 +103,16 @@ def _required(model: Path | None) -> Path:
 
 
 def _modelled(path: Path, study: Study) -> SimulatedModel:
-    """Read the model that is to be flown in place of the vehicle: one with effects, or an identified one.
+    """Read the model that is to be flown in place of the vehicle: whole, one with effects, or an identified one.
 
     Raises
     ------
     InputError
-        If the file is neither, was made with another vehicle, or has an effect that cannot be flown.
+        If the file is none, was made with another vehicle, or has an effect that cannot be flown.
     """
+    if holds(path, VehicleRecord):
+        whole = read_vehicle(path, study)
+        return simulated_vehicle(whole.vehicle.vehicle_model(), commanded=bool(whole.commanded))
     if not holds(path, ExtendedRecord):
         return SimulatedModel(base_of(path, study).rebuilt(path))
     record = read_of_vehicle(path, ExtendedRecord, study)

@@ -15,6 +15,7 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.control import (
     AttitudeLoop,
@@ -86,7 +87,7 @@ def run(job: Job, trajectory: Path, model: Path) -> Outcome:
 
 
 def _identified(path: Path, study: Study) -> ModelRecord:
-    if holds(path, ExtendedRecord):
+    if holds(path, ExtendedRecord) or holds(path, VehicleRecord):
         raise InputError(
             f"{path}: a model with effects is flown in closed loop only; add --mode closed-loop, or give a model that "
             "`cpfls identify` made"

@@ -59,7 +59,7 @@ def run(
     held_out : sequence of Path
         Others to judge it on, once.
     config : ConfigCopy or None
-        Written beside the artifact.
+        Written beside the artifact, at the end of the search.
     resume : bool
         Go on with a search that was stopped.
 
@@ -89,10 +89,12 @@ def run(
         found, signal = _found(job, training, checkpoint, kept or {})
         judged = _judged(found.model, rest, job) if rest else None
         warnings = [warning for flight in read for warning in flight.warnings]
-        record = finish(job, VehicleRecord.of(found, judged, warnings), inputs)
-    if config is not None:
-        _write_config(config, record)
+        commanded = any(flight.parts[0].commanded for flight in training)
+        record = finish(job, VehicleRecord.of(found, judged, warnings, commanded=commanded), inputs)
     if record.complete:
+        # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
+        if config is not None:
+            _write_config(config, record)
         checkpoint.remove()
     outcome = Outcome(record.summary, tuple(answer(source_of(job, record))))
     return stopped(outcome, "generations" if record.complete else "interrupted", signal, job.output)

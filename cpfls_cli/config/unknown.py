@@ -28,9 +28,11 @@ _DRAG_LEVER = 0.1
 _HOVER = 0.55
 """Rotor speed in hover, share of the largest: a vehicle lifts about three times its weight."""
 
+_TAKEN = frozenset({"import", "vehicle", "replay", "report", "export", "predict", "compare"})
+"""Commands that work with guesses; a report and an export are of a model, which has its own numbers.
 
-_TAKEN = frozenset({"import", "vehicle", "replay", "report", "export"})
-"""Commands that work with guesses; a report and an export are of a model, which has its own numbers."""
+`predict` and `compare` do with that of a whole vehicle, and ask `require_known` themselves where theirs is another.
+"""
 
 
 def with_guesses(data: dict[str, Any]) -> dict[str, Any]:
@@ -94,8 +96,13 @@ def _guesses(vehicle: dict[str, Any], rotors: list[dict[str, Any]]) -> dict[Unkn
     }
 
 
-def require_known(study: Study, command: str) -> None:
+def require_known(study: Study, command: str, *, whole: bool = True) -> None:
     """Refuse a vehicle with unknown numbers for a command that would take their guesses for facts.
+
+    Parameters
+    ----------
+    whole : bool
+        False for a command whose model, known by now, is none of a whole vehicle with numbers of its own.
 
     Raises
     ------
@@ -105,7 +112,7 @@ def require_known(study: Study, command: str) -> None:
     unknown = study.vehicle.unknown
     torque = study.import_.torque_source
     of_rotors = command == "import" and torque in ("rotor-speed", "rotor-command")
-    if not unknown or (command in _TAKEN and not of_rotors):
+    if not unknown or (command in _TAKEN and whole and not of_rotors):
         return
     keys = ", ".join(f"vehicle.{'' if name == 'inertia' else 'rotors.'}{KEYS[name]}" for name in unknown)
     if of_rotors:

@@ -22,7 +22,7 @@ from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import ReadFlight, read_flight, read_import, signals_of, with_voltage
-from cpfls_cli.flights.same_vehicle import read_of_vehicle
+from cpfls_cli.flights.same_vehicle import read_of_vehicle, read_vehicle
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.playback import extended_player
@@ -244,7 +244,7 @@ def model_to_play(path: Path, study: Study) -> ModelToPlay:
     if holds(path, ExtendedRecord):
         return _extended(read_of_vehicle(path, ExtendedRecord, study).rebuilt(path))
     if holds(path, VehicleRecord):
-        return whole(read_of_vehicle(path, VehicleRecord, study).vehicle.vehicle_model())
+        return whole(read_vehicle(path, study).vehicle.vehicle_model())
     identified = read_of_vehicle(path, ModelRecord, study).rebuilt(path)
     return whole(VehicleModel(vehicle=study.vehicle, fuzzy=identified))
 

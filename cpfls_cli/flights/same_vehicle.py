@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -11,8 +11,10 @@ from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.spec import Header, Record
 from cpfls_cli.artifacts.store import read_header, read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
+from cpfls_cli.config.unknown import KEYS
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -69,6 +71,34 @@ def base_of(path: Path | None, study: Study) -> BaseGroup:
         If it was identified with another vehicle.
     """
     return BaseGroup.of(None if path is None else read_of_vehicle(path, ModelRecord, study))
+
+
+def read_vehicle(path: Path, study: Study) -> VehicleRecord:
+    """Read a whole vehicle, all of which stands in its table of weights.
+
+    Raises
+    ------
+    InputError
+        If it is no good artifact, was made with another vehicle, or has parts that the table does not hold.
+    """
+    record = read_record(path, VehicleRecord)
+    made_with = _with_what_was_open(_vehicle_of(path, record.origin), study.vehicle)
+    require_same_vehicle(path, made_with, study.vehicle)
+    if record.vehicle.not_held:
+        parts = ", ".join(record.vehicle.not_held)
+        raise InputError(f"{path}: has {parts} beside its table of weights, which is all that is evaluated")
+    return record
+
+
+def _with_what_was_open(given: VehicleSettings, wanted: VehicleSettings) -> VehicleSettings:
+    """Take from the config what the one of a whole vehicle left open: the model has numbers of its own."""
+    rotors = given.rotors
+    if len(rotors) == len(wanted.rotors):
+        open_ = [KEYS[name] for name in given.unknown if name != "inertia"]
+        pairs = zip(rotors, wanted.rotors, strict=True)
+        rotors = tuple(replace(own, **{key: getattr(other, key) for key in open_}) for own, other in pairs)
+    inertia = wanted.inertia_kg_m2 if "inertia" in given.unknown else given.inertia_kg_m2
+    return replace(given, rotors=rotors, inertia_kg_m2=inertia, unknown=wanted.unknown)
 
 
 def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:

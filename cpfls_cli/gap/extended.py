@@ -15,8 +15,6 @@ from cpfls_cli.dynamics.integration import ReplayModel
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 from cpfls_cli.effects.catalogue.parameter_error import coupling, inertia_correction
 from cpfls_cli.effects.effect import Columns
-from cpfls_cli.effects.polynomial import Probe, polynomial
-from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, scatter_size, scatter_variance, system
@@ -29,6 +27,7 @@ from cpfls_cli.gap.balance.weak_flight import (
     columns_of,
     nuisance,
     rotation_balance,
+    translation_balance,
 )
 from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
@@ -37,11 +36,7 @@ from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.naming.search import best_floor, block_index
 from cpfls_cli.gap.sensors.audit import Audit, Preparation
 from cpfls_cli.gap.settings import CLEAR, GapSettings
-from cpfls_cli.inertia import INERTIA_ENTRIES
-from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.regressor.regressor import InertiaValues
-from cpfls_cli.vehicle.settings import VehicleSettings
 
 _TOUCHED = 0.2
 """Root mean square in floors by which effects and refit move a channel, from which on it has to get better."""
@@ -225,65 +220,6 @@ class ExtendedModel:
         return np.asarray(self.inertial_torque(signals) - self.effect_wrench(signals)[:, :3])
 
 
-class WholeVehicle(NamedTuple):
-    """A model with effects as one table of weights, as far as it is one.
-
-    Attributes
-    ----------
-    model : VehicleModel
-    not_held : tuple of str
-        Effects that are no polynomials of motion and rotor speeds.
-    """
-
-    model: VehicleModel
-    not_held: tuple[str, ...]
-
-
-def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Array) -> WholeVehicle:
-    """Turn a model with effects into that of a whole vehicle.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        That the effects were fitted with.
-    inertia : array, shape (3, 3), kg m^2
-        Of the base, where it does not depend on the attitude.
-    """
-    acting = [one for one in extended.effects if one.candidate.effect.kind in ("wrench", "actuator")]
-    corrected = inertia + inertia_correction(extended.parameters, vehicle)
-    effects = list(_numbers(extended.parameters, vehicle, corrected))
-    probe, times, not_held = Probe.of(vehicle), {"delay_s": 0.0, "lag_s": 0.0}, []
-    for (known, shape), linear in acting:
-        hooks = known.actuation
-        if known.inertia is not None:
-            corrected = corrected + known.inertia(linear)
-        elif hooks is not None and (hooks.lag or hooks.delay):
-            times |= {"lag_s": hooks.lag(shape)} if hooks.lag else {}
-            times |= {"delay_s": hooks.delay(shape)} if hooks.delay else {}
-        elif known.carried is None and polynomial(known, probe, shape) is not None:
-            effects.append(ModelEffect(known.name, dict(shape), linear))
-        else:
-            not_held.append(known.name)
-    xx, yy, zz, xy, xz, yz = (float(corrected[entry]) for entry in INERTIA_ENTRIES)
-    if np.linalg.eigvalsh(corrected).min() > 0:
-        vehicle = replace(vehicle, inertia_kg_m2=(xx, yy, zz, xy, xz, yz))
-    else:
-        not_held.append("inertia, which is not positive definite")
-    return WholeVehicle(
-        VehicleModel(vehicle=vehicle, response=RotorResponse(**times), effects=tuple(effects)), tuple(not_held)
-    )
-
-
-def _numbers(parameters: Array, vehicle: VehicleSettings, corrected: Array) -> tuple[ModelEffect, ...]:
-    """Keep what no inertia holds: coupling of the rates, scale of the thrust; nothing where there is none of it."""
-    stated, found = np.array(vehicle.inertia_kg_m2[:3]), np.diag(corrected)
-    kept = coupling(parameters)
-    # A coupling multiplies the mean of two moments of inertia, which are now the corrected ones.
-    kept[3:6] *= [stated[list(pair)].sum() / found[list(pair)].sum() for pair in ((1, 2), (2, 0), (0, 1))]
-    kept[6] = parameters[6]
-    return (ModelEffect(VEHICLE_NUMBERS.name, {}, kept),) if kept.any() else ()
-
-
 @dataclass(frozen=True)
 class Corrected:
     """An inertia model plus a correction of its inertia tensor.
@@ -313,6 +249,22 @@ class Corrected:
 def plain(base: InertiaModel | None) -> ExtendedModel:
     """Make a model without effects."""
     return ExtendedModel(base, np.zeros(len(nuisance().effect.coefficients)))
+
+
+def inertial_force(signals: Signals) -> Array:
+    """Compute the force that the motion takes, without weight.
+
+    Parameters
+    ----------
+    signals : Signals
+        With `has_force`, and the faults of sensors taken out.
+
+    Returns
+    -------
+    array, shape (time, 3), N, body frame
+    """
+    balance = translation_balance(signals)
+    return np.asarray(balance.direct + CubicSpline(signals.time, balance.momentum)(signals.time, 1))
 
 
 def instantaneous(columns: Columns, coefficients: Array, time: Array) -> Array:

@@ -79,7 +79,12 @@ def verdict_box(disagreement: Source[DisagreementRecord]) -> Box:
     title = f"The gap is largest in the {channel_words(channel)}: {number(floors, 3)} noise floors."
     signals = [signal for signal, _ in record.dependence.followed(channel)][:_NAMED_SIGNALS]
     follows = [f"It follows {joined(signals)} most."] if signals else []
-    return Box("GAP", title, [*follows, "Run `cpfls diagnose` to learn what is missing."])
+    on = (
+        "The model has effects already; `cpfls diagnose` needs a comparison without them."
+        if record.has_effects
+        else "Run `cpfls diagnose` to learn what is missing."
+    )
+    return Box("GAP", title, [*follows, on])
 
 
 def flight_warnings(record: DisagreementRecord) -> Iterator[Text]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.artifacts.flight import DelayGroup, FlightRecord
 from cpfls_cli.artifacts.scores import AXES
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.flights.imported import SPEED_UNITS
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
@@ -129,7 +130,10 @@ def _effects(flight: Source[FlightRecord]) -> Iterator[Text]:
     """List the effects that were flown beyond the model, where a flight in closed loop could have any."""
     if flight.made_from("trajectory") and flight.config["simulation"]["mode"] == "closed-loop":
         effects = {} if flight.record.effects is None else flight.record.effects.by_name
-        yield Text(f"effects: {', '.join(f'{name} = {value:g}' for name, value in effects.items()) or 'none'}")
+        model = flight.header.inputs.get("model")
+        whole = model is not None and model.format == VehicleRecord.FORMAT.name
+        beside = " beside those of the whole vehicle" if whole else ""
+        yield Text(f"effects{beside}: {', '.join(f'{name} = {value:g}' for name, value in effects.items()) or 'none'}")
 
 
 def flight_section(sources: Sources) -> Section | None:

@@ -12,6 +12,7 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import Record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.uncertainty import MISFIT_WORDS, OUTSIDE_WORDS
 from cpfls_cli.report.canvas import BASELINE, band, legend_above, line, plot, runs, stacked, style_of
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_AGAINST = {
+    "motion": "what the motion takes with its inertia, noise of the differentiated rates included",
+    "recorded": "the torque that was logged",
+}
 _INERTIA_PANELS = (("D22", "D33"), ("D13", "D23"))
 
 
@@ -35,7 +40,10 @@ def answer(prediction: Source[PredictionRecord], model: Record | None = None) ->
     """
     record = prediction.record
     samples = len(record.time)
-    yield Text(f"{samples} samples, {record.outside_count} outside the region that the training data visited")
+    if record.held_against is None:
+        yield Text(f"{samples} samples, {record.outside_count} outside the region that the training data visited")
+    else:
+        yield Text(f"{samples} samples; torque of the whole vehicle, held against {_AGAINST[record.held_against]}")
     score = record.score
     if score is None:
         yield Text("the flight holds no torque, so there is no error to show")
@@ -45,7 +53,22 @@ def answer(prediction: Source[PredictionRecord], model: Record | None = None) ->
         left_out = record.vertical_count
         without = f" (without {left_out} samples near a vertical pitch)" if left_out else ""
         yield from (Text(error), Text(f"R2 of body torque, roll pitch yaw: {r2}{without}"))
+    yield from _errors_of_vehicle(record)
     yield from trust_along(record.outside_count, record.not_positive_definite, samples, model)
+
+
+def _errors_of_vehicle(record: PredictionRecord) -> Iterator[Text]:
+    """Say how far torque and force of a whole vehicle are off at a sample, and what that does not tell."""
+    if record.held_against is None:
+        return
+    rows = (("torque about", "N m", record.body_torque_rms), ("force along", "N", record.force_rms))
+    for name, unit, rms in rows:
+        if rms is not None:
+            values = " ".join(number(value, 3) for value in rms.tolist())
+            yield Text(f"rms error of the {name} x, y, z of the body: {values} {unit}")
+    if record.force_rms is None:
+        yield Text("the flight knows neither acceleration nor velocity, so there is no force to hold the model against")
+    yield Text("a torque that is right at each sample may still predict nothing; `cpfls replay` says what it predicts")
 
 
 def trust_along(outside: int, not_positive_definite: int, samples: int, model: Record | None) -> Iterator[Text]:
@@ -104,6 +127,8 @@ def _prediction(prediction: Source[PredictionRecord], index: int, sources: Sourc
     if prediction.record.error is not None:
         yield error_figure(f"figure-7-error-{index}", prediction)
     yield torques_figure(f"torques-{index}", prediction)
+    if prediction.record.force is not None:
+        yield forces_figure(f"forces-{index}", prediction)
     yield inertia_figure(f"inertia-matrix-{index}", prediction)
 
 
@@ -112,12 +137,16 @@ def _seen(prediction: Source[PredictionRecord], model: Source | None) -> str:
     names = _model_and_flight(prediction)
     if model is None:
         return f"{names}. The model was not given, so it is not known here whether it learned from this flight."
-    if model.made_from("flight") != prediction.made_from("flight"):
-        return f"{names}: a flight that it did not learn from."
-    samples = len(prediction.record.time)
-    training = int(model.record.judged.samples[0])
-    part = "" if training == samples else f" (its first {training} of {samples} samples; the rest was held out)"
-    return f"{names}: the flight that it learned from{part}."
+    if isinstance(model.record, VehicleRecord):
+        learned = {file.sha256 for role, file in model.header.inputs.items() if role.startswith("flight")}
+        if prediction.made_from("flight") in learned:
+            return f"{names}: one of the flights that it was found in."
+    elif model.made_from("flight") == prediction.made_from("flight"):
+        samples = len(prediction.record.time)
+        training = int(model.record.judged.samples[0])
+        part = "" if training == samples else f" (its first {training} of {samples} samples; the rest was held out)"
+        return f"{names}: the flight that it learned from{part}."
+    return f"{names}: a flight that it did not learn from."
 
 
 def _model_and_flight(prediction: Source[PredictionRecord]) -> str:
@@ -177,6 +206,27 @@ def torques_figure(name: str, prediction: Source[PredictionRecord]) -> Plot:
     words = f" {OUTSIDE_WORDS} {MISFIT_WORDS}" if ends else ""
     caption = f"Generalised torque of {_model_and_flight(prediction)}{banded}.{_shaded(prediction)}{words}"
     return plot(name, caption, "Torque of the model and of the flight over time", 4.8, draw)
+
+
+def forces_figure(name: str, prediction: Source[PredictionRecord]) -> Plot:
+    """Draw the force of a whole vehicle over what the motion takes."""
+    record = prediction.record
+    force, measured = record.force, record.measured_force
+    assert force is not None, "asked for by the caller"
+
+    def draw(figure: Figure) -> None:
+        panels = stacked(figure, 3)
+        for index, (axes, axis) in enumerate(zip(panels, "xyz", strict=True)):
+            line(axes, record.time, force[:, index], label="model", **style_of(0))
+            if measured is not None:
+                line(axes, record.time, measured[:, index], label="flight", **BASELINE)
+            axes.set_title(f"force along {axis}", loc="left" if index else "right")
+            axes.set_ylabel("N")
+        legend_above(panels[0])
+        panels[-1].set_xlabel("time, s")
+
+    caption = f"Force on the body without weight, body axes, of {_model_and_flight(prediction)}."
+    return plot(name, caption, "Force of the model and of the flight over time", 4.8, draw)
 
 
 def inertia_figure(name: str, prediction: Source[PredictionRecord]) -> Plot:

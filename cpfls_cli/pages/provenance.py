@@ -18,6 +18,7 @@ from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import InputFile, Record
 from cpfls_cli.artifacts.sweep import SweepRecord
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.content import HASH_SHOWN, Block, Listing, Section, Table, Text
 
@@ -91,6 +92,7 @@ _COMMANDS: dict[type[Record], _Command] = {
     DisagreementRecord: _Command("compare", ("flight",), ("model",)),
     DiagnosisRecord: _Command("diagnose", ("disagreement",), ("held-out",)),
     ExtendedRecord: _Command("extend", ("diagnosis",), ("model",)),
+    VehicleRecord: _Command("vehicle", ("flight",), ("held-out",)),
 }
 _IMPORT = _Command("import", ("log",))
 
@@ -144,7 +146,7 @@ def _lines(source: Source, paths: dict[str, str]) -> Iterator[str]:
     if command is None:
         yield f"# {output}: no command is known that makes it"
         return
-    if isinstance(source.record, ModelRecord) and not source.record.complete:
+    if isinstance(source.record, ModelRecord | VehicleRecord) and not source.record.complete:
         yield f"# the search for {output} was stopped before its end; this one goes on to it"
     words = ["cpfls", command.name, _config_name(source)]
     for role in command.arguments:

@@ -20,7 +20,7 @@ from cpfls_cli.fuzzy.basis import Consequents
 from cpfls_cli.fuzzy.periodic_system import PeriodicStructure
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.kernels import MOST_COLUMNS, Airflow, Body, Terms, airflow_terms
-from cpfls_cli.playback.rotors import Hold, RotorResponse, rotor_terms_by_step
+from cpfls_cli.playback.rotors import Hold, RotorResponse, rotor_terms_at_samples, rotor_terms_by_step
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -156,6 +156,17 @@ class VehicleModel:
         response = self.response
         terms = rotor_terms_by_step(speed, period, hold, response.delay_s, response.lag_s, response.slow_s)
         return np.asarray(terms, dtype=float)
+
+    def rotor_terms_at(self, speed: Array, period: float, hold: Hold) -> Array:
+        """Evaluate the terms of the rotors at the samples of a stretch; parameters and shape as `rotor_terms`."""
+        return rotor_terms_at_samples(speed, period, hold, self.response)
+
+    @property
+    def needs_velocity(self) -> bool:
+        """Whether torque or force depend on the velocity through the air."""
+        of_velocity = np.array([any(axis in term for axis in "uvw") for term in STATE_TERMS])
+        learned = np.ones(self.term_count - len(STATE_TERMS), dtype=bool)
+        return bool(np.any(self.weights[:, np.concatenate([of_velocity, learned])]))
 
     def step_weights(self, rotor: Array) -> tuple[Terms, Array]:
         """Evaluate the weights of the terms of the motion over each step.

@@ -66,6 +66,33 @@ def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, l
     return np.hstack([one, mean, squared, (end - start) / period, slow - squared])
 
 
+def rotor_terms_at_samples(speed: Array, period: float, hold: Hold, response: RotorResponse) -> Array:
+    """Evaluate the terms of the rotors at the samples themselves, where torque and force are asked for.
+
+    A speed that stays until the next sample jumps there: taken is the middle of the jump.
+
+    Parameters
+    ----------
+    speed : array, shape (time, rotor), rad/s
+        Of one stretch without pauses.
+    period : float, s
+    hold : {"linear", "previous"}
+        As in `rotor_terms_by_step`.
+
+    Returns
+    -------
+    array, shape (time, 1 + 4 rotors)
+    """
+    mean, end, start = _lagged(_delayed(speed, response.delay_s / period), period, response.lag_s, hold)
+    jumps = hold == "previous" and response.lag_s < _SHORTEST_S
+    acting = 0.5 * (start + mean) if jumps else start
+    _, _, slow = _lagged(mean**2, period, response.slow_s, "previous")
+    change = (end - start) / period
+    acceleration = 0.5 * (change + np.concatenate([change[:1], change[:-1]]))
+    one = np.ones((len(speed), 1))
+    return np.asarray(np.hstack([one, acting, acting**2, acceleration, slow - acting**2]), dtype=float)
+
+
 def _delayed(values: Array, steps: Any) -> Numbers:
     """Shift by a number of steps; before the first sample there is its value."""
     if steps == 0:

@@ -8,6 +8,7 @@ from cpfls_cli.simulation.model import (
     SimulatedModel,
     simulated_effects,
     simulated_model,
+    simulated_vehicle,
 )
 from cpfls_cli.simulation.settings import ClosedLoopSettings, ComputedTorqueSettings, SimulationSettings
 
@@ -27,4 +28,5 @@ __all__ = [
     "simulate",
     "simulated_effects",
     "simulated_model",
+    "simulated_vehicle",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import exp, prod
 
@@ -12,7 +12,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import Link, RotorMotion
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.simulation.model import SimulatedModel
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -124,17 +125,85 @@ class Rotors:
     command : array, shape (rotor,), rad/s
     lagged : array, shape (rotor,), rad/s
         The command after the lag.
+    measured : array, shape (rotor,), rad/s
+        Speed that is logged: at the end of the chain.
     speed, acceleration : array, shape (rotor,), rad/s and rad/s^2
-        What the rotors do: at the end of the chain.
+        What acts: the same, or later where the model of a whole vehicle says so.
+    slow : array, shape (rotor,), rad^2/s^2
+        Squared speed that slow actuation has come to.
     voltage : float
         Share of the full battery.
     """
 
     command: Array
     lagged: Array
+    measured: Array
     speed: Array
     acceleration: Array
+    slow: Array
     voltage: float
+
+    @classmethod
+    def settled(cls, speed: Array) -> Rotors:
+        """Turn at constant speeds, with a full battery."""
+        return cls(speed, speed, speed, speed, np.zeros_like(speed), speed**2, 1.0)
+
+
+@dataclass
+class Response:
+    """Delay, lag and slow actuation of the model of a whole vehicle, behind the speed that is logged.
+
+    Attributes
+    ----------
+    of : RotorResponse
+    step : float, s
+    speed, slow : array, shape (rotor,), rad/s and rad^2/s^2
+        After the lag, and squared after the slow actuation, at the start of the next step.
+    past : list of RotorMotion
+        What is still under way.
+    """
+
+    of: RotorResponse
+    step: float
+    speed: Array
+    slow: Array
+    past: list[RotorMotion] = field(default_factory=list)
+
+    def advance(self, measured: RotorMotion) -> tuple[RotorMotion, Array]:
+        """Take one step, exactly for speeds that stay the same during it.
+
+        Parameters
+        ----------
+        measured : RotorMotion
+            In the middle of the step.
+
+        Returns
+        -------
+        acting : RotorMotion
+        slow : array, shape (rotor,), rad^2/s^2
+        """
+        acting = self._delayed(measured)
+        if self.of.lag_s > 0:
+            wanted, half = acting.speed, exp(-0.5 * self.step / self.of.lag_s)
+            late = wanted + half * (self.speed - wanted)
+            acting = RotorMotion(late, (wanted - late) / self.of.lag_s)
+            self.speed = wanted + half**2 * (self.speed - wanted)
+        squared, half = acting.speed**2, exp(-0.5 * self.step / self.of.slow_s)
+        slow = squared + half * (self.slow - squared)
+        self.slow = squared + half**2 * (self.slow - squared)
+        return acting, slow
+
+    def _delayed(self, measured: RotorMotion) -> RotorMotion:
+        """Interpolate the past linearly; before it there is the first speed, standing still."""
+        self.past.append(measured)
+        steps = self.of.delay_s / self.step
+        whole = int(steps)
+        del self.past[: max(len(self.past) - whole - 2, 0)]
+        if len(self.past) < whole + 2:
+            first = self.past[0].speed
+            return measured if steps == 0 else RotorMotion(first, np.zeros_like(first))
+        share, late, later = steps - whole, self.past[1], self.past[0]
+        return RotorMotion(*((1 - share) * new + share * old for old, new in zip(later, late, strict=True)))
 
 
 @dataclass
@@ -151,6 +220,8 @@ class Actuators:
     step : float, s
     speed : array, shape (rotor,), rad/s
         After the lag, at the start of the next step.
+    response : Response
+        Of the model of a whole vehicle.
     steps : int
         Taken so far.
     """
@@ -161,6 +232,7 @@ class Actuators:
     battery: Battery
     step: float
     speed: Array
+    response: Response
     steps: int = 0
 
     def advance(self, command: Array) -> Rotors:
@@ -185,11 +257,13 @@ class Actuators:
             motion = link(motion)
         voltage = self.battery.voltage((self.steps - 0.5) * self.step, motion.speed)
         factor = prod(supply(voltage) for supply in self.supplies)
-        return Rotors(command, lagged, factor * motion.speed, factor * motion.acceleration, voltage)
+        measured = RotorMotion(factor * motion.speed, factor * motion.acceleration)
+        acting, slow = self.response.advance(measured)
+        return Rotors(command, lagged, measured.speed, acting.speed, acting.acceleration, slow, voltage)
 
 
 def actuators(
-    effects: SimulatedEffects,
+    model: SimulatedModel,
     vehicle: VehicleSettings,
     settings: ClosedLoopSettings,
     speed: Array,
@@ -200,14 +274,15 @@ def actuators(
 
     Parameters
     ----------
-    effects : SimulatedEffects
+    model : SimulatedModel
     vehicle : VehicleSettings
     settings : ClosedLoopSettings
     speed : array, shape (rotor,), rad/s
         At the start.
     step, duration : float, s
     """
-    acting = [(one.effect.actuation, one.values) for one in effects.ordered if one.effect.actuation is not None]
+    listed = model.effects.ordered
+    acting = [(one.effect.actuation, one.values) for one in listed if one.effect.actuation is not None]
     lags = [each.lag(values) for each, values in acting if each.lag is not None]
     hover = len(vehicle.rotors) * hover_speed(vehicle) ** 3
     return Actuators(
@@ -217,4 +292,5 @@ def actuators(
         battery=Battery(settings.battery_use, settings.battery_load, duration, hover),
         step=step,
         speed=speed,
+        response=Response(RotorResponse() if model.whole is None else model.whole.response, step, speed, speed**2),
     )

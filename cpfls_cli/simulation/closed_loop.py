@@ -357,16 +357,18 @@ def _loop(
 ) -> Loop:
     """Set up the loop at the start of the plan, with the rotors at their commanded speed."""
     autopilot = Autopilot(vehicle, settings, reference(planned, time, clock.instants))
+    flown = vehicle if model.whole is None else model.whole.vehicle
     carried = tuple(
-        one.effect.carried(vehicle, one.values) for one in model.effects.ordered if one.effect.carried is not None
+        one.effect.carried(flown, one.values) for one in model.effects.ordered if one.effect.carried is not None
     )
     state = _start(planned, carried)
     mix = mixer(vehicle)
     speed = mix.command(_wrench(autopilot, 0, state))
-    turning = rigid_turning(inertia_tensor(vehicle)) if model.base is None else identified_turning(model.base)
-    plant = Plant(vehicle, turning, effect_wrench(model.effects, instant(vehicle, state, speed)), carried)
-    change = plant.derivative(state, Rotors(speed, speed, speed, np.zeros_like(speed), 1.0))
-    chain = actuators(model.effects, vehicle, settings, speed, clock.step, float(time[-1] - time[0]))
+    turning = rigid_turning(inertia_tensor(flown)) if model.base is None else identified_turning(model.base)
+    effects = effect_wrench(model.effects, instant(flown, state, speed))
+    plant = Plant(flown, turning, effects, carried, model.whole)
+    change = plant.derivative(state, Rotors.settled(speed))
+    chain = actuators(model, vehicle, settings, speed, clock.step, float(time[-1] - time[0]))
     return Loop(autopilot, mix, chain, plant, state, change)
 
 
@@ -403,7 +405,7 @@ def _sampled(states: Array, steps: Sequence[LoopStep], parts: int) -> SimulatedM
     rotors = [step.rotors for step in steps]
     command, lagged, speed, voltage = (
         between(np.array([getattr(one, name) for one in rotors]))[::parts]
-        for name in ("command", "lagged", "speed", "voltage")
+        for name in ("command", "lagged", "measured", "voltage")
     )
     change_, demand_ = (between(np.array(values))[::parts] for values in (change, demand))
     return SimulatedMotion(states, change_, command, lagged, speed, voltage, demand_)

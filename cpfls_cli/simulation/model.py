@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import SettingError
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -109,10 +111,13 @@ class SimulatedModel:
     base : InertiaModel or None
         None for the rigid body of the vehicle.
     effects : SimulatedEffects
+    whole : VehicleModel or None
+        Of constant inertia; flown in place of the vehicle, with the effects beside its own.
     """
 
     base: InertiaModel | None = None
     effects: SimulatedEffects = field(default_factory=SimulatedEffects)
+    whole: VehicleModel | None = None
 
     def with_effects(self, asked: SimulatedEffects) -> SimulatedModel:
         """Add effects to those of the model; errors of the vehicle's own numbers add up.
@@ -123,12 +128,45 @@ class SimulatedModel:
             If the model has one of them already, or two of them do not go together.
         """
         by_name = {one.effect.name: one for one in self.effects.listed}
+        own = () if self.whole is None else tuple(effect.name for effect in self.whole.effects)
         for one in asked.listed:
             name = one.effect.name
+            if name in own:
+                raise SettingError(_key(name), "the model has it already; leave it out")
             by_name[name] = _added(by_name[name], one) if name in by_name else one
         effects = SimulatedEffects(tuple(by_name.values()))
         _refuse_conflict(effects)
-        return SimulatedModel(self.base, effects)
+        return replace(self, effects=effects)
+
+
+def simulated_vehicle(model: VehicleModel, *, commanded: bool) -> SimulatedModel:
+    """Build the model of a whole vehicle for the simulation.
+
+    Parameters
+    ----------
+    model : VehicleModel
+        Of constant inertia.
+    commanded : bool
+        Whether it was found from commands: lag and delay then stand between command and rotors, as effects do, and the
+        commands are logged. Otherwise they stand behind the speeds that are logged.
+    """
+    if not commanded:
+        return SimulatedModel(whole=model)
+    response = model.response
+    late = [(effect, value) for effect, value in _late(response) if value > 0]
+    effects = tuple(SimulatedEffect(effect, {effect.shapes[0].name: value}) for effect, value in late)
+    return SimulatedModel(
+        effects=SimulatedEffects(effects), whole=replace(model, response=replace(response, delay_s=0.0, lag_s=0.0))
+    )
+
+
+def _late(response: RotorResponse) -> Iterator[tuple[Effect, float]]:
+    """Find the effects of the catalogue that are a lag or a delay, with their only value."""
+    for effect in CATALOGUE.values():
+        if effect.actuation is not None and effect.actuation.lag is not None:
+            yield effect, response.lag_s
+        elif effect.actuation is not None and effect.actuation.delay is not None:
+            yield effect, response.delay_s
 
 
 def simulated_model(

@@ -12,6 +12,7 @@ from cpfls_cli.dynamics.equations_of_motion import TurningLaw
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.hooks import CarriedBody, Carrier
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.actuators import Rotors
 from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -119,12 +120,15 @@ class Plant:
         Of the model.
     wrench : EffectWrench
     carried : tuple of CarriedBody
+    whole : VehicleModel or None
+        Gives torque and force in place of the rotors alone; then `vehicle` is its own.
     """
 
     vehicle: VehicleSettings
     turning: TurningLaw
     wrench: EffectWrench
     carried: tuple[CarriedBody, ...]
+    whole: VehicleModel | None = None
 
     def derivative(self, state: Array, rotors: Rotors) -> Array:
         """Differentiate the state.
@@ -140,13 +144,13 @@ class Plant:
         """
         body_rate = state[BODY_RATE]
         signals = instant(self.vehicle, state, rotors.speed)
-        wrench = signals.wrench[0] + self.wrench.direct(signals)
+        wrench = self._rotor_wrench(signals, rotors) + self.wrench.direct(signals)
         inertial = self.turning(state[ATTITUDE], body_rate)
         torque = wrench[:3] - inertial.direct + self.wrench.rotor_coupling @ rotors.acceleration
         acceleration = signals.rotation[0] @ wrench[3:] / self.vehicle.mass_kg
         acceleration[2] -= self.vehicle.gravity_m_s2
         inertia = inertial.inertia + self.wrench.added_inertia
-        turning = np.linalg.solve(inertia, torque)
+        turning = np.asarray(np.linalg.solve(inertia, torque), dtype=float)
         change = np.zeros(len(state))
         first = VEHICLE_STATES
         for body in self.carried:
@@ -159,6 +163,13 @@ class Plant:
         change[ATTITUDE] = rotations.attitude_rate(state[None, ATTITUDE], body_rate[None])[0]
         change[BODY_RATE] = turning
         return change
+
+    def _rotor_wrench(self, signals: Signals, rotors: Rotors) -> Array:
+        if self.whole is None:
+            return np.asarray(signals.wrench[0])
+        squared = rotors.speed**2
+        terms = np.concatenate([[1.0], rotors.speed, squared, rotors.acceleration, rotors.slow - squared])
+        return np.asarray(self.whole.wrench(signals.air_velocity, signals.body_rate, terms[None])[0])
 
 
 def instant(vehicle: VehicleSettings, state: Array, rotor_speed: Array) -> Signals:

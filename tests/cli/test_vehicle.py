@@ -134,6 +134,15 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert replayed.exit_code == 0, replayed.stderr
     model = json.loads(replayed.stdout)["models"]["model"]
     assert model["body_rate"]["sum"] == found.told["held_out"]["models"]["model"]["body_rate"]["sum"]
+    predicted = cpfls("predict", config, found.output, flights[1], "-o", tmp_path / "prediction.h5", "--json")
+    assert predicted.exit_code == 0, predicted.stderr
+    assert json.loads(predicted.stdout)["held_against"] == "motion"
+    compared = cpfls("compare", config, flights[1], "--model", found.output, "-o", tmp_path / "gap.h5", "--json")
+    assert compared.exit_code == 0, compared.stderr
+    assert max(json.loads(compared.stdout)["gap"]["floors"]) < 1.5
+    alone = ("--model", found.output, "--set", "simulation.closed_loop.effects={}")
+    flown = cpfls("simulate", config, flights[1].parent / "path-2.h5", *alone, "-o", tmp_path / "f.h5")
+    assert flown.exit_code == 0, flown.stderr
     exported = cpfls("export", found.output, "-o", tmp_path / "vehicle.json")
     assert exported.exit_code == 0, exported.stderr
     with undrawn():

@@ -1,13 +1,20 @@
 """A model with effects as that of a whole vehicle: the same torque, force and inertia."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from cpfls_cli.effects.catalogue.parameter_error import coupling
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate, columns_of, nuisance
-from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain, whole_vehicle
+from cpfls_cli.gap.balance.windows import Recording
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
+from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects
 from cpfls_cli.inertia import symmetric
+from tests.builders import vehicle_models
 from tests.builders.vehicle_models import QUAD
 
 STATED = symmetric(QUAD.inertia_kg_m2)
@@ -80,3 +87,32 @@ def test_an_inertia_of_no_body_is_named():
     whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD, STATED)
     assert whole.model.vehicle == QUAD
     assert whole.not_held == ("inertia, which is not positive definite",)
+
+
+def test_a_whole_vehicle_as_a_model_with_one_effect_has_its_torque_force_and_inertia():
+    model = vehicle_models.whole(effects=vehicle_models.whole().effects[:4])
+    recording = of_vehicle(Recording("flight", replace(signals(), vehicle=replace(QUAD, mass_kg=1.0))), model)
+    flown, extended = recording.signals, with_effects(model)
+    assert flown.vehicle == model.vehicle
+    rotor = model.rotor_terms_at(flown.rotor_speed, flown.period, "linear")
+    wanted = model.wrench(flown.air_velocity, flown.body_rate, rotor)
+    found = flown.wrench + extended.effect_wrench(flown)
+    np.testing.assert_allclose(found, wanted, atol=1e-12 * np.abs(wanted).max())
+    np.testing.assert_array_equal(extended.inertia(flown), symmetric(model.vehicle.inertia_kg_m2))
+
+
+@pytest.mark.parametrize(
+    ("model", "lacking", "needed"),
+    [
+        (vehicle_models.whole(), {"velocity": None}, "lacks velocity,"),
+        (vehicle_models.whole(), {"velocity": None, "rotor_speed": None}, "lacks rotor speed and velocity,"),
+        (vehicle_models.whole(effects=(), remainder=None), {"velocity": None}, None),
+    ],
+)
+def test_a_flight_has_to_have_what_the_model_depends_on(model, lacking, needed):
+    recording = Recording("flight", replace(signals(), **lacking))
+    if needed is None:
+        assert of_vehicle(recording, model).signals.vehicle == model.vehicle
+        return
+    with pytest.raises(InputError, match=f"^flight: {needed} which the model of the whole vehicle needs$"):
+        of_vehicle(recording, model)

@@ -1,0 +1,337 @@
+"""A whole vehicle flies, predicts and is compared: nothing of its model is left out on the way."""
+
+import json
+from dataclasses import asdict, replace
+
+import h5py
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import resolved_yaml
+from cpfls_cli.playback.model import ModelEffect
+from cpfls_cli.playback.rotors import RotorResponse
+from tests.builders.playback_flights import STATED, truth
+from tests.builders.vehicle_models import record_of, remainder
+
+CONFIG = f"""\
+seed: 1
+vehicle: {json.dumps(asdict(STATED))}
+trajectory:
+  path: straight
+  direction: [1.0, -0.7, 0.3]
+  legs: 2
+  displacement_m: 3.0
+  period_s: 0.17
+  sample_time_s: 0.01
+  duration_s: 8.0
+  yaw_turn_rad: 2.0
+"""
+RESPONSE = RotorResponse(delay_s=0.013, lag_s=0.02, slow_roll_pitch=-0.3, slow_yaw=0.4, slow_s=0.3)
+# Reaction and flapping are the smallest parts of a gentle flight.
+WHOLE = replace(
+    truth(),
+    response=RESPONSE,
+    thrust_linear=0.1,
+    effects=(*truth().effects, ModelEffect("rotor_acceleration", {}, np.array([6e-6]))),
+    remainder=remainder(1, rows=(0, 1, 5), size=1e-5),
+)
+NOISE = {"attitude": 0.002, "body_rate": 0.01, "velocity": 0.01, "position": 0.002, "rotor_speed": 1.0}
+SIGNALS = ("body_rate", "attitude", "velocity", "position")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("whole")
+
+
+@pytest.fixture(scope="module")
+def config(folder):
+    (folder / "quad.yaml").write_text(CONFIG)
+    return folder / "quad.yaml"
+
+
+@pytest.fixture(scope="module")
+def written(config, folder):
+    """Write the file of a vehicle model, as if it had been found in flights of the config's vehicle."""
+
+    def call(name, model=WHOLE, not_held=(), **changed):
+        record = record_of(model, not_held, resolved_yaml(load_study(config)))
+        write_record(folder / name, replace(record, **changed))
+        return folder / name
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def vehicle(written):
+    return written("vehicle.h5")
+
+
+@pytest.fixture(scope="module")
+def path(cpfls, config, folder):
+    assert cpfls("trajectory", config, "-o", folder / "path.h5").exit_code == 0
+    return folder / "path.h5"
+
+
+@pytest.fixture(scope="module")
+def fly(cpfls, config, path, folder):
+    def call(name, model, *options):
+        result = cpfls("simulate", config, path, "--model", model, "-o", folder / name, *options)
+        assert result.exit_code == 0, result.stderr
+        return folder / name
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def flight(fly, vehicle):
+    """Without noise."""
+    return fly("flight.h5", vehicle)
+
+
+@pytest.fixture(scope="module")
+def noisy(fly, vehicle):
+    return fly("noisy.h5", vehicle, "--mode", "closed-loop", "--set", f"simulation.noise={json.dumps(NOISE)}")
+
+
+@pytest.fixture
+def sums(cpfls, config, tmp_path):
+    """Play a model back along a flight: sums of the mean errors, by prediction and signal."""
+
+    def call(model, flown, *options):
+        words = ("replay", config, model, flown, "-o", tmp_path / "r.h5", "--every", "5", "--force", "--json", *options)
+        result = cpfls(*words)
+        assert result.exit_code == 0, result.stderr
+        models = json.loads(result.stdout)["models"]
+        return {name: np.array([models[name][signal]["sum"] for signal in SIGNALS]) for name in models}
+
+    return call
+
+
+def test_a_flown_vehicle_is_played_back_by_its_own_model(sums, vehicle, flight):
+    errors = sums(vehicle, flight)
+    rivals = np.minimum(errors["nothing-moves"], errors["rate-stays"])
+    assert (errors["model"] < 0.005 * rivals).all()
+    assert (errors["model"] < 0.005 * errors["stated"]).all()
+
+
+def response(**changed):
+    return replace(WHOLE, response=replace(RESPONSE, **changed))
+
+
+WITHOUT = {
+    "delay": response(delay_s=0.0),
+    "lag": response(lag_s=0.0),
+    "slow roll and pitch": response(slow_roll_pitch=0.0),
+    "slow yaw": response(slow_yaw=0.0),
+    "time of slow actuation": response(slow_s=0.1),
+    "law": replace(WHOLE, thrust_linear=0.0),
+    "remainder": replace(WHOLE, remainder=None),
+    **{one.name: replace(WHOLE, effects=tuple(e for e in WHOLE.effects if e is not one)) for one in WHOLE.effects},
+}
+
+
+@pytest.mark.parametrize("part", WITHOUT)
+def test_every_part_of_the_model_flies(sums, written, vehicle, flight, part):
+    """A model that lacks a part does not play the flight back."""
+    lacking = sums(written("lacking.h5", WITHOUT[part]), flight)["model"]
+    assert (lacking / sums(vehicle, flight)["model"]).max() > 4
+
+
+def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
+    commanded = written("commanded.h5", commanded=True)
+    flown = fly("commanded-flight.h5", commanded)
+    record = read_record(flown, FlightRecord)
+    assert record.rotor_speed is None
+    assert record.effects.by_name == {"motor_lag.time_constant_s": 0.02, "command_delay.delay_s": 0.013}
+    errors = sums(commanded, flown, "--hold", "linear")
+    assert (errors["model"] < 0.005 * np.minimum(errors["nothing-moves"], errors["rate-stays"])).all()
+
+
+def test_people_read_what_was_flown(cpfls, config, path, vehicle, tmp_path):
+    top = ("--mode", "closed-loop", "--effect", "torque_bias.M_z=0.01")
+    words = ("simulate", config, path, "--model", vehicle, *top, "-o", tmp_path / "f.h5")
+    result = cpfls(*words)
+    assert result.exit_code == 0, result.stderr
+    assert "effects beside those of the whole vehicle: torque_bias.M_x = 0, torque_bias.M_y = 0" in result.stdout
+    assert "with vehicle.h5" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--mode", "inverse"), "{model}: no model is flown in mode inverse; "),
+        (("--mode", "computed-torque"), "{model}: a model with effects is flown in closed loop only; "),
+        (("--set", "vehicle.mass_kg=0.9"), "{model}: was made with another vehicle; not the same: vehicle.mass_kg"),
+        (
+            ("--mode", "closed-loop", "--effect", "rotor_drag=1e-4"),
+            "simulation.closed_loop.effects.rotor_drag = [0.0001]: the model has it already",
+        ),
+    ],
+)
+def test_what_cannot_be_flown_is_refused(refuse, config, path, vehicle, tmp_path, options, message):
+    (line,) = refuse("simulate", config, path, "--model", vehicle, "-o", tmp_path / "x.h5", *options)
+    assert line.startswith(message.format(model=vehicle))
+
+
+@pytest.mark.parametrize("command", ["simulate", "predict", "compare", "replay"])
+def test_a_vehicle_with_more_than_its_table_is_refused(refuse, config, path, flight, written, tmp_path, command):
+    model, output = written("more.h5", not_held=("wind",)), ("-o", tmp_path / "x.h5")
+    words = {
+        "simulate": (path, "--model", model),
+        "compare": (flight, "--model", model),
+        "predict": (model, flight),
+        "replay": (model, flight),
+    }
+    (line,) = refuse(command, config, *words[command], *output)
+    assert line == f"{model}: has wind beside its table of weights, which is all that is evaluated"
+
+
+def predicted(cpfls, config, model, flown, output):
+    result = cpfls("predict", config, model, flown, "-o", output, "--json")
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout), read_record(output, PredictionRecord)
+
+
+def test_torque_and_force_are_what_the_motion_takes(cpfls, config, vehicle, flight, tmp_path):
+    told, record = predicted(cpfls, config, vehicle, flight, tmp_path / "p.h5")
+    assert cpfls("check", tmp_path / "p.h5").exit_code == 0
+    assert told["held_against"] == "motion"
+    assert min(told["r2_body"]) > 0.999
+    size = record.measured_force.std(axis=0)
+    assert (np.array(told["force_rms"]) < 1e-3 * size).all()
+    assert np.diag(record.inertia[0]) == pytest.approx(WHOLE.vehicle.inertia_kg_m2, rel=0.01)
+
+
+def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, noisy, tmp_path):
+    result = cpfls("predict", config, vehicle, noisy, "-o", tmp_path / "p.h5")
+    assert result.exit_code == 0, result.stderr
+    first, *_, last = result.stdout.splitlines()
+    assert first.endswith(
+        "held against what the motion takes with its inertia, noise of the differentiated rates included"
+    )
+    assert last.startswith("a torque that is right at each sample may still predict nothing; `cpfls replay`")
+    page = cpfls("report", config, tmp_path / "p.h5", vehicle, "-o", tmp_path / "page.md")
+    assert page.exit_code == 0, page.stderr
+    text = (tmp_path / "page.md").read_text()
+    assert "Force on the body without weight" in text
+    assert "vehicle.h5 along noisy.h5: a flight that it did not learn from." in text
+
+
+def without(flown, target, *names):
+    """Copy a flight without some of its signals."""
+    with h5py.File(flown) as source, h5py.File(target, "w") as file:
+        file.attrs.update(source.attrs)
+        for name in source:
+            if name not in names:
+                source.copy(name, file)
+    return target
+
+
+@pytest.mark.parametrize(
+    ("names", "lacks"),
+    [
+        (("velocity",), "x.h5: lacks velocity, which the model of the whole vehicle needs"),
+        (("rotor_speed", "rotor_command"), "x.h5: lacks rotor speed, which the model of the whole vehicle needs"),
+    ],
+)
+@pytest.mark.parametrize("command", ["predict", "compare"])
+def test_a_flight_that_lacks_what_the_model_needs_is_refused(
+    refuse, config, vehicle, flight, tmp_path, command, names, lacks
+):
+    flown = without(flight, tmp_path / "x.h5", *names)
+    words = (vehicle, flown) if command == "predict" else (flown, "--model", vehicle)
+    (line,) = refuse(command, config, *words, "-o", tmp_path / "out.h5")
+    assert line == lacks
+
+
+@pytest.fixture
+def written_log(flight, tmp_path):
+    """Write what a flight measured as a log, and give the settings that import it."""
+
+    def call(**more):
+        flown = read_record(flight, FlightRecord)
+        columns = {
+            "attitude": ("rad", flown.attitude),
+            "body_rate": ("rad/s", flown.body_rate),
+            "velocity": ("m/s", flown.velocity),
+            "rotor_speed": ("rad/s", flown.rotor_speed),
+            **more,
+        }
+        names = {signal: [f"{signal}{k}" for k in range(values.shape[1])] for signal, (_, values) in columns.items()}
+        table = np.column_stack([flown.time, *(values for _, values in columns.values())])
+        header = ",".join(["t", *(name for listed in names.values() for name in listed)])
+        np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
+        signals = {signal: {"columns": names[signal], "unit": unit} for signal, (unit, _) in columns.items()}
+        return tmp_path / "log.csv", {"time_column": "t", "signals": signals}
+
+    return call
+
+
+def test_a_torque_that_was_logged_is_what_a_prediction_is_held_against(
+    cpfls, config, vehicle, flight, written_log, tmp_path
+):
+    """A log of the true torque, which no rotor of the config tells, beside the measured rotor speeds."""
+    _, record = predicted(cpfls, config, vehicle, flight, tmp_path / "p.h5")
+    log, settings = written_log(body_torque=("N m", record.body_torque))
+    settings["torque_source"] = "column"
+    options = ("--set", f"import={json.dumps(settings)}")
+    result = cpfls("import", config, log, "-o", tmp_path / "log.h5", *options)
+    assert result.exit_code == 0, result.stderr
+    told, held = predicted(cpfls, config, vehicle, tmp_path / "log.h5", tmp_path / "q.h5")
+    assert told["held_against"] == "recorded"
+    assert np.abs(held.error[5:-5]).max() < 1e-3 * np.abs(held.torque).max()
+
+
+def gap(cpfls, config, output, *words):
+    result = cpfls("compare", config, *words, "-o", output, "--json")
+    assert result.exit_code == 0, result.stderr
+    return np.array(json.loads(result.stdout)["gap"]["floors"])
+
+
+def test_the_true_vehicle_leaves_noise_alone(cpfls, refuse, config, vehicle, flight, noisy, tmp_path):
+    """Behind a lag the noise of the speeds is slower than a floor counts on: a little more than one is noise too."""
+    exact = gap(cpfls, config, tmp_path / "exact.h5", flight, "--model", vehicle)
+    true = gap(cpfls, config, tmp_path / "true.h5", noisy, "--model", vehicle)
+    stated = gap(cpfls, config, tmp_path / "stated.h5", noisy)
+    assert (exact < 1).all()
+    assert ((true > 0.7) & (true < 1.5)).all()
+    assert (stated > 3 * true).all()
+    (line,) = refuse("diagnose", config, tmp_path / "true.h5", "-o", tmp_path / "d.h5")
+    assert line.startswith(f"{tmp_path / 'true.h5'}: was made with a model that has effects already")
+
+
+@pytest.fixture
+def open_config(tmp_path, written_log):
+    """Leave inertia and the factors of the rotors open; give the config and a log."""
+    log, settings = written_log()
+    settings["torque_source"] = None
+    rotors = [{**asdict(rotor), "thrust_factor_n_s2": None, "drag_factor_n_m_s2": None} for rotor in STATED.rotors]
+    stated = {**asdict(STATED), "inertia_kg_m2": None, "rotors": rotors}
+    (tmp_path / "open.yaml").write_text(json.dumps({"seed": 1, "vehicle": stated, "import": settings}))
+    return tmp_path / "open.yaml", log
+
+
+def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_config, tmp_path):
+    left_open, log = open_config
+    vehicle = tmp_path / "vehicle.h5"
+    write_record(vehicle, record_of(WHOLE, config=resolved_yaml(load_study(left_open))))
+    assert cpfls("import", left_open, log, "-o", tmp_path / "f.h5").exit_code == 0
+    told, _ = predicted(cpfls, left_open, vehicle, tmp_path / "f.h5", tmp_path / "p.h5")
+    assert min(told["r2_body"]) > 0.999
+    assert (gap(cpfls, left_open, tmp_path / "gap.h5", log, "--model", vehicle) < 1).all()
+    # An autopilot needs numbers, and the model is of the vehicle that they were left open of.
+    flown = cpfls("simulate", config, path, "--model", vehicle, "-o", tmp_path / "flown.h5")
+    assert flown.exit_code == 0, flown.stderr
+
+
+@pytest.mark.parametrize("command", ["compare", "predict"])
+def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_config, tmp_path, command):
+    left_open, log = open_config
+    words = (log,) if command == "compare" else (log, log)
+    (line,) = refuse(command, left_open, *words, "-o", tmp_path / "x.h5")
+    assert f"not known in this config, and `cpfls {command}` needs what is null there" in line
