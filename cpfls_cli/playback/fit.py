@@ -12,8 +12,11 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.groups import JointLayout
 from cpfls_cli.playback.kernels import Loss, Motion, errors_of_runs, sensitivities
 from cpfls_cli.playback.parameters import Evaluated, Layout
+
+AnyLayout = Layout | JointLayout
 
 POSITION, VELOCITY, ATTITUDE, RATE = range(4)
 _SIGNAL_WEIGHTS = (0.0, 0.3, 0.5, 1.0)
@@ -150,7 +153,7 @@ class Fitted:
 
     Attributes
     ----------
-    layout : Layout
+    layout : Layout or JointLayout
     values : array, shape (number,)
     loss : float
         Mean over windows, without the prior; about 1.1 for rates that stay.
@@ -158,7 +161,7 @@ class Fitted:
         Gauss-Newton, of the mean loss with the prior, in scales of the numbers.
     """
 
-    layout: Layout
+    layout: AnyLayout
     values: Array
     loss: float
     hessian: Array
@@ -179,12 +182,14 @@ class _Point:
     hessian: Array
 
 
-def fit(layout: Layout, windows: Sequence[Windows], known: Mapping[str, float], steps: int, tolerance: float) -> Fitted:
+def fit(
+    layout: AnyLayout, windows: Sequence[Windows], known: Mapping[str, float], steps: int, tolerance: float
+) -> Fitted:
     """Minimise the robust prediction error over windows by a damped Gauss-Newton method within bounds.
 
     Parameters
     ----------
-    layout : Layout
+    layout : Layout or JointLayout
     windows : sequence of Windows
     known : mapping of str to float
         Values to start from, by name.
@@ -218,11 +223,36 @@ def fit(layout: Layout, windows: Sequence[Windows], known: Mapping[str, float], 
     return Fitted(layout, point.values, point.loss, point.hessian)
 
 
-def _evaluated(layout: Layout, windows: Sequence[Windows], values: Array) -> _Point:
-    evaluated = Evaluated.of(layout, values)
+class _Evaluations:
+    """A layout at values, evaluated once for each vehicle that flew."""
+
+    def __init__(self, layout: AnyLayout, values: Array) -> None:
+        self.layout, self.values = layout, values
+        self._known: dict[str, tuple[Evaluated, IntArray]] = {}
+
+    def of(self, flight: PlaybackFlight) -> tuple[Evaluated, IntArray]:
+        """Give the evaluation for a flight, and where its numbers stand among all."""
+        if flight.group not in self._known:
+            own, places = self.layout.of_flight(flight)
+            self._known[flight.group] = Evaluated.of(own, self.values[places]), places
+        return self._known[flight.group]
+
+    def sums(self, window: Windows, group: IntArray) -> tuple[float, Array, Array]:
+        """Sum loss, gradient and Hessian over windows of a flight; see `window_sums`."""
+        evaluated, places = self.of(window.flight)
+        loss, own_gradient, own_hessian = window_sums(evaluated, window, group)
+        count = len(self.values)
+        gradient, hessian = np.zeros((len(own_gradient), count)), np.zeros((len(own_gradient), count, count))
+        gradient[:, places] = own_gradient
+        hessian[:, places[:, None], places] = own_hessian
+        return loss, gradient, hessian
+
+
+def _evaluated(layout: AnyLayout, windows: Sequence[Windows], values: Array) -> _Point:
+    evaluations = _Evaluations(layout, values)
     total, gradient, hessian = 0.0, np.zeros(len(values)), np.zeros((len(values), len(values)))
     for window in windows:
-        loss, by_group, curvature = window_sums(evaluated, window, np.zeros(len(window.starts), dtype=np.int64))
+        loss, by_group, curvature = evaluations.sums(window, np.zeros(len(window.starts), dtype=np.int64))
         total, gradient, hessian = total + loss, gradient + by_group[0], hessian + curvature[0]
     count = sum(len(window.starts) for window in windows)
     scale, spread = layout.scales, layout.spreads
@@ -273,7 +303,7 @@ def window_sums(evaluated: Evaluated, window: Windows, group: IntArray) -> tuple
 
 
 def _better(
-    layout: Layout, windows: Sequence[Windows], point: _Point, damping: float, bounds: tuple[Array, Array]
+    layout: AnyLayout, windows: Sequence[Windows], point: _Point, damping: float, bounds: tuple[Array, Array]
 ) -> tuple[_Point | None, float]:
     """Find a point with a smaller objective, with more damping where a step fails; None where none is found."""
     for _ in range(_TRIES):
@@ -347,13 +377,13 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
     Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023 (jackknife by cluster); Ljung, section 9.4.
     """
     layout = fitted.layout
-    evaluated, scale = Evaluated.of(layout, fitted.values), layout.scales
+    evaluations, scale = _Evaluations(layout, fitted.values), layout.scales
     count = sum(len(window.starts) for window in windows)
     sums = []
     for window in windows:
         blocks = max(2, round(_BLOCKS * len(window.starts) / count))
         group = np.arange(len(window.starts), dtype=np.int64) * blocks // len(window.starts)
-        sums.append(window_sums(evaluated, window, group)[1:])
+        sums.append(evaluations.sums(window, group)[1:])
     gradient, hessian = (np.concatenate(each) for each in zip(*sums, strict=True))
     number = len(gradient)
     # The prior stays in the difference, so that it can be inverted whatever a block takes with it.
@@ -369,7 +399,7 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
 def window_errors(fitted: Fitted, window: Windows) -> Array:
     """Weigh the errors of each window as the fit does, shape (window,): about 1.1 for rates that stay."""
     flight = window.flight
-    evaluated = Evaluated.of(fitted.layout, fitted.values)
+    evaluated, _ = _Evaluations(fitted.layout, fitted.values).of(flight)
     errors = np.empty((len(window.starts), window.horizon, 4, 3))
     errors_of_runs(
         window.motion,

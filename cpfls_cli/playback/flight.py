@@ -33,6 +33,8 @@ class PlaybackFlight:
         Whether they were measured. Without attitude or velocity rotation alone is played back.
     wrench : array, shape (time, 6), N m and N, body frame, or None
         Stated torque and force of a flight without rotor speeds, which are then 0.
+    group : str
+        Configuration of the vehicle that flew it, where there are several; empty for the one of the config.
     """
 
     name: str
@@ -44,6 +46,7 @@ class PlaybackFlight:
     has_velocity: bool = True
     has_position: bool = True
     wrench: Array | None = None
+    group: str = ""
 
     def __len__(self) -> int:
         return len(self.speed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -40,6 +41,10 @@ _PRODUCTS_BLOCK = "products"
 _DELAY, _LAG, _SLOW = "delay.delay_s", "lag.time_constant_s", "slow_actuation.log_slow_s"
 _SLOW_SHARES = ("slow_actuation.roll_pitch", "slow_actuation.yaw")
 _THRUST, _DRAG, _LAW = "thrust_factor.scale", "drag_factor.scale", "thrust_law.linear"
+MASS = "mass"
+"""Block of groups of flights alone: one configuration has the stated mass, which gives all else its size."""
+
+_MASS = "mass.log_mass"
 
 _ROOM = 10.0
 """Bounds of a coefficient here, in multiples of those of the catalogue: an effective number may lie beyond them."""
@@ -120,6 +125,7 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
         *(Number(name, "", -0.05, 0.3, -1.5, 3.0, 3.0) for name in _SLOW_SHARES),
         Number(_SLOW, "", float(np.log(0.3)), 0.7, float(np.log(0.03)), float(np.log(5.0)), 2.0),
     ),
+    MASS: (Number(_MASS, "", 0.0, 0.1, -2.0, 2.0, 3.0),),
 }
 """Blocks that are the same for all vehicles."""
 
@@ -144,7 +150,7 @@ def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
     effects = (
         name for name, known in CATALOGUE.items() if not known.shapes and polynomial(known, probe, {}) is not None
     )
-    known = (block for block in _OF_ROTORS if block not in vehicle.unknown)
+    known = (block for block in _OF_ROTORS if block != MASS and block not in vehicle.unknown)
     return (*known, _PRODUCTS_BLOCK, *effects, *LEARNED)
 
 
@@ -179,33 +185,13 @@ class Column:
         return cls(weights, acts / max(acts.sum(), 1) * float(free))
 
 
-@dataclass(frozen=True)
-class Layout:
-    """The numbers that are free, and how they make a model of the vehicle.
+class Numbered(ABC):
+    """Numbers in an order, as arrays."""
 
-    Attributes
-    ----------
-    vehicle : VehicleSettings
-        As stated.
-    chosen : tuple of str
-        Blocks, beside those of what is not known of the vehicle.
-    airflow : Airflow
-        Rules of the remainder, where it is among the blocks.
-    """
-
-    vehicle: VehicleSettings
-    chosen: tuple[str, ...]
-    airflow: Airflow
-
-    @cached_property
-    def blocks(self) -> tuple[str, ...]:
-        """All blocks."""
-        return (*sorted(set(self.vehicle.unknown) - set(self.chosen)), *self.chosen)
-
-    @cached_property
+    @property
+    @abstractmethod
     def numbers(self) -> tuple[Number, ...]:
-        """All numbers, block by block."""
-        return tuple(number for block in self.blocks for number in self._numbers(block))
+        """All numbers."""
 
     @cached_property
     def index(self) -> dict[str, int]:
@@ -237,13 +223,46 @@ class Layout:
         """Standard deviations of what is believed before, in scales, shape (number,)."""
         return np.array([number.spread for number in self.numbers], dtype=float)
 
+    def named(self, values: Array) -> dict[str, float]:
+        """Name values."""
+        return dict(zip(self.index, values.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class Layout(Numbered):
+    """The numbers that are free, and how they make a model of the vehicle.
+
+    Attributes
+    ----------
+    vehicle : VehicleSettings
+        As stated.
+    chosen : tuple of str
+        Blocks, beside those of what is not known of the vehicle.
+    airflow : Airflow
+        Rules of the remainder, where it is among the blocks.
+    """
+
+    vehicle: VehicleSettings
+    chosen: tuple[str, ...]
+    airflow: Airflow
+
+    @cached_property
+    def blocks(self) -> tuple[str, ...]:
+        """All blocks."""
+        return (*sorted(set(self.vehicle.unknown) - set(self.chosen)), *self.chosen)
+
+    @cached_property
+    def numbers(self) -> tuple[Number, ...]:
+        """All numbers, block by block."""
+        return tuple(number for block in self.blocks for number in self._numbers(block))
+
     def values(self, known: Mapping[str, float]) -> Array:
         """Start from known values, and from the stated ones where none is known."""
         return np.array([known.get(number.name, number.start) for number in self.numbers], dtype=float)
 
-    def named(self, values: Array) -> dict[str, float]:
-        """Name values."""
-        return dict(zip(self.index, values.tolist(), strict=True))
+    def of_flight(self, _flight: PlaybackFlight) -> tuple[Layout, IntArray]:
+        """Give the layout of the vehicle of a flight, and where its numbers stand among these."""
+        return self, np.arange(len(self.numbers))
 
     @property
     def used_airflow(self) -> Airflow:
@@ -347,7 +366,7 @@ class Layout:
 
     def physical(self, values: Array) -> dict[str, Physical]:
         """Give all numbers as people know them, in order: moments of inertia, factors of the first rotor, SI."""
-        inertia, coefficients = self.inertia(values), self.coefficients(values)
+        inertia, coefficients = self.inertia(values), self._on_found_vehicle(values)
         rotor, found = self.vehicle.rotors[0], {}
         stated = {block: block not in self.vehicle.unknown for block in self.blocks}
         for number, value in zip(self.numbers, values.tolist(), strict=True):
@@ -365,6 +384,8 @@ class Layout:
             elif name == _DRAG:
                 factor = value * rotor.drag_factor_n_m_s2
                 found["drag_factor"] = Physical(factor, "N m s^2", positive=True, stated=stated[number.block])
+            elif name == _MASS:
+                found["mass"] = Physical(self._mass(values), "kg", positive=True, stated=True)
             elif name == _SLOW:
                 found["slow_actuation.slow_s"] = Physical(float(np.exp(value)), "s", positive=True)
             else:
@@ -379,12 +400,22 @@ class Layout:
         for name, coefficient in self.coefficients(values).items():
             if coefficient:
                 table += coefficient * self._columns[name].weights
-        return table
+        return table * self._forces_by_mass(values)
+
+    def _mass(self, values: Array) -> float:
+        return self.vehicle.mass_kg * float(np.exp(self._get(values, _MASS, 0.0)))
+
+    def _forces_by_mass(self, values: Array) -> Array:
+        """Give what rows of the weights are multiplied with: runs divide forces by the stated mass."""
+        share = self.vehicle.mass_kg / self._mass(values)
+        return np.array([1.0, 1.0, 1.0, share, share, share])[:, None, None]
 
     def table_derivatives(self, values: Array) -> list[Array | None]:
         """Differentiate the weights by each number; None by those of the rotors' response in time."""
         coefficients, log_inertia = self.coefficients(values), self._log_inertia(values)
-        return [self._derivative(number.name, values, coefficients, log_inertia) for number in self.numbers]
+        found = [self._derivative(number.name, values, coefficients, log_inertia) for number in self.numbers]
+        by_mass = self._forces_by_mass(values)
+        return [None if derivative is None else derivative * by_mass for derivative in found]
 
     def _derivative(
         self, name: str, values: Array, coefficients: Mapping[str, float], log_inertia: Array
@@ -399,6 +430,8 @@ class Layout:
             axis = _INERTIA.index(name)
             for each, column in self._columns.items():
                 derivative += coefficients[each] * column.share[axis] * column.weights
+        elif name == _MASS:
+            derivative[3:] = -(self.table(values) / self._forces_by_mass(values))[3:]
         elif name not in _PRODUCTS:
             # The weights of the rotors are linear in each of their numbers.
             moved = values.copy()
@@ -452,8 +485,7 @@ class Layout:
             terms[part] = found.imag / _STEP if by else found.real
         return terms
 
-    def model(self, values: Array) -> VehicleModel:
-        """Build the model, with what was found as numbers of the vehicle."""
+    def _found_vehicle(self, values: Array) -> VehicleSettings:
         thrust, drag = self._get(values, _THRUST, 1.0), self._get(values, _DRAG, 1.0)
         rotors = tuple(
             replace(
@@ -464,7 +496,13 @@ class Layout:
             for rotor in self.vehicle.rotors
         )
         xx, yy, zz, xy, xz, yz = (float(self.inertia(values)[entry]) for entry in INERTIA_ENTRIES)
-        vehicle = replace(self.vehicle, rotors=rotors, inertia_kg_m2=(xx, yy, zz, xy, xz, yz), unknown=())
+        inertia = (xx, yy, zz, xy, xz, yz)
+        return replace(self.vehicle, mass_kg=self._mass(values), rotors=rotors, inertia_kg_m2=inertia, unknown=())
+
+    def model(self, values: Array) -> VehicleModel:
+        """Build the model, with what was found as numbers of the vehicle."""
+        vehicle = self._found_vehicle(values)
+        lighter = self._get(values, _THRUST, 1.0) * self.vehicle.mass_kg / vehicle.mass_kg
         coefficients = self.coefficients(values)
         probe = Probe.of(vehicle)
         effects = tuple(self._effect(name, coefficients, probe) for name in self.blocks if _is_effect(name))
@@ -473,11 +511,20 @@ class Layout:
         return VehicleModel(
             vehicle=vehicle,
             response=self.response(values),
-            # The speed that hovers goes with the root of the thrust factor.
-            thrust_linear=self._get(values, _LAW, 0.0) * float(np.sqrt(thrust)),
+            # The speed that hovers goes with the root of the mass over the thrust factor.
+            thrust_linear=self._get(values, _LAW, 0.0) * float(np.sqrt(lighter)),
             effects=effects,
             remainder=self._remainder(learned, unnamed) if learned else None,
         )
+
+    def _on_found_vehicle(self, values: Array) -> dict[str, float]:
+        """Give the coefficients counted on the vehicle that was found: some effects share its thrust or its inertia."""
+        coefficients, probe = self.coefficients(values), Probe.of(self._found_vehicle(values))
+        for block in filter(_is_effect, self.blocks):
+            names = (number.name for number in self._numbers(block))
+            counted = self._effect(block, coefficients, probe).coefficients.tolist()
+            coefficients |= dict(zip(names, counted, strict=True))
+        return coefficients
 
     def _effect(self, name: str, coefficients: Mapping[str, float], probe: Probe) -> ModelEffect:
         """Count the coefficients of an effect on the vehicle that was found, not on the stated one."""

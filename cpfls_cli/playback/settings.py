@@ -5,10 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, MinLen
 from typing_extensions import Doc
 
 from cpfls_cli.settings import Settings
+
+
+@dataclass(frozen=True, kw_only=True)
+class GroupSettings(Settings):
+    """Flights of the same vehicle in another configuration, such as with a payload or other propellers."""
+
+    name: Annotated[str, MinLen(1), Doc("of the configuration")]
+    flights: Annotated[tuple[str, ...], MinLen(1), Doc("its flights: names of files, * and ? as in a shell")]
+    differs: Annotated[
+        tuple[str, ...],
+        MinLen(1),
+        Doc("blocks of numbers that it has of its own, mass among them; all others are shared"),
+    ] = ("mass", "com_offset", "inertia")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,4 +39,8 @@ class PlaybackSettings(Settings):
     leave_out: Annotated[
         tuple[str, ...],
         Doc("blocks that are not tried, such as inertia, an effect, remainder or remainder_force (docs/playback.md)"),
+    ] = ()
+    groups: Annotated[
+        tuple[GroupSettings, ...],
+        Doc("other configurations of the vehicle, fitted at once; flights of none are those of the section vehicle"),
     ] = ()

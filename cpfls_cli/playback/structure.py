@@ -15,6 +15,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
 from cpfls_cli.playback.fit import Fitted, Windows, fit, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.groups import Group, JointLayout
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import INERTIA, LEARNED, Layout, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -436,8 +437,9 @@ def fitted_to_all(
     flights: Sequence[PlaybackFlight],
     settings: PlaybackSettings,
     start: Fitted,
+    groups: tuple[Group, ...] = (),
 ) -> tuple[Fitted, list[Windows]]:
-    """Fit a structure to all training flights, with windows close together.
+    """Fit a structure to all training flights, those of other configurations as well, with windows close together.
 
     Parameters
     ----------
@@ -448,7 +450,10 @@ def fitted_to_all(
     settings : PlaybackSettings
     start : Fitted
         The same structure on some of them.
+    groups : tuple of Group
+        Other configurations.
     """
+    layout = structure.layout(vehicle)
     windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
     known = start.layout.named(start.values)
-    return fit(structure.layout(vehicle), windows, known, _STEPS, _TOLERANCE), windows
+    return fit(JointLayout(layout, groups) if groups else layout, windows, known, _STEPS, _TOLERANCE), windows

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
@@ -11,10 +11,11 @@ import numpy as np
 from scipy.stats import t as student
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.playback.fit import Fitted, Uncertainty, uncertainty
+from cpfls_cli.playback.fit import AnyLayout, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.groups import Group, JointLayout
 from cpfls_cli.playback.model import VehicleModel, wrench_of
-from cpfls_cli.playback.parameters import Layout, needs_velocity
+from cpfls_cli.playback.parameters import Physical, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Choice, Kept, Progress, choose, fitted_to_all
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -56,6 +57,16 @@ class FoundNumber(NamedTuple):
     stated: float
     determined: bool
     at_bound: bool
+
+
+class Difference(NamedTuple):
+    """What a configuration has that the vehicle of the config has not, in SI, with a 95 % interval."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
 
 
 class Trade(NamedTuple):
@@ -101,6 +112,10 @@ class FoundVehicle:
         Blocks of windows that the intervals come from.
     guessed : tuple of str
         What is not known of the vehicle and no flight tells.
+    others : mapping of str to VehicleModel
+        Other configurations, by name of the group.
+    differences : tuple of Difference
+        What they have that the vehicle of the config has not.
     """
 
     model: VehicleModel
@@ -112,6 +127,8 @@ class FoundVehicle:
     condition_number: float
     blocks: int
     guessed: tuple[str, ...]
+    others: Mapping[str, VehicleModel]
+    differences: tuple[Difference, ...]
 
 
 def find_vehicle(
@@ -135,21 +152,27 @@ def find_vehicle(
     kept : mapping of Structure to sequence of Solution
         Of the same search, stopped before.
     """
-    begun = _begun(vehicle, flights)
-    choice = choose(begun, flights, settings, rng, progress, kept)
+    own = [flight for flight in flights if not flight.group]
+    begun = _begun(vehicle, own)
+    choice = choose(begun, own, settings, rng, progress, kept)
     chosen = choice.chosen
-    fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0])
-    spread = uncertainty(fitted, windows)
-    model = fitted.layout.model(fitted.values)
+    flown = {flight.group for flight in flights}
+    groups = tuple(Group(group.name, group.differs) for group in settings.groups if group.name in flown)
+    fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0], groups)
+    spread, layout = uncertainty(fitted, windows), fitted.layout
+    model = layout.model(fitted.values)
+    joint = layout if isinstance(layout, JointLayout) else None
     return FoundVehicle(
         model,
         tuple(_numbers(fitted, spread)),
-        *_shares(model, flights),
+        *_shares(model, own),
         tuple(_trades(fitted.layout, spread)),
         choice,
         fitted.condition_number,
         spread.blocks,
         tuple(sorted(set(vehicle.unknown) - set(begun.unknown))),
+        {group.name: joint.model(fitted.values, group.name) for group in groups} if joint else {},
+        tuple(_differences(joint, fitted, spread)) if joint else (),
     )
 
 
@@ -200,14 +223,9 @@ def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tup
 def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
     """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that."""
     layout, values = fitted.layout, fitted.values
-    physical, scale = layout.physical(values), layout.scales
+    physical = layout.physical(values)
     stated = layout.physical(layout.starts)
-    slopes = np.empty((len(values), len(values)))
-    for place, step in enumerate(_STEP * scale * np.eye(len(values))):
-        ahead, behind = layout.physical(values + step), layout.physical(values - step)
-        slopes[:, place] = [(ahead[name].value - behind[name].value) / (2 * step[place]) for name in physical]
-    deviation = np.sqrt(np.diag(slopes @ spread.covariance @ slopes.T))
-    half = student.ppf(0.975, spread.blocks - 1) * deviation
+    half = _half_intervals(layout.physical, fitted, spread)
     for place, (number, (name, found)) in enumerate(zip(layout.numbers, physical.items(), strict=True)):
         span = _AT_BOUND * number.scale
         bound = min(values[place] - number.low, number.high - values[place]) <= span
@@ -218,7 +236,25 @@ def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
         yield FoundNumber(name, found.unit, found.value, low, high, known, bool(determined), bool(bound))
 
 
-def _bounds(layout: Layout, values: Array, place: int) -> tuple[float, float]:
+def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
+    """Turn the covariance of a fit into half widths of 95 % intervals of what follows from its numbers."""
+    values = fitted.values
+    slopes = []
+    for place, step in enumerate(_STEP * fitted.layout.scales * np.eye(len(values))):
+        ahead, behind = physical(values + step), physical(values - step)
+        slopes.append([(ahead[name].value - behind[name].value) / (2 * step[place]) for name in ahead])
+    by_number = np.array(slopes).reshape(len(values), -1)
+    deviation = np.sqrt(np.diag(by_number.T @ spread.covariance @ by_number))
+    return np.asarray(student.ppf(0.975, spread.blocks - 1) * deviation)
+
+
+def _differences(joint: JointLayout, fitted: Fitted, spread: Uncertainty) -> Iterator[Difference]:
+    half = _half_intervals(joint.differences, fitted, spread)
+    for (name, found), width in zip(joint.differences(fitted.values).items(), half.tolist(), strict=True):
+        yield Difference(name, found.unit, found.value, found.value - width, found.value + width)
+
+
+def _bounds(layout: AnyLayout, values: Array, place: int) -> tuple[float, float]:
     """Give the bounds of a number as people know it, the others being what they are."""
     number, ends = layout.numbers[place], []
     for bound in (number.low, number.high):
@@ -236,7 +272,7 @@ def _interval(value: float, half: float, *, positive: bool) -> tuple[float, floa
     return value / factor, value * factor
 
 
-def _trades(layout: Layout, spread: Uncertainty) -> Iterator[Trade]:
+def _trades(layout: AnyLayout, spread: Uncertainty) -> Iterator[Trade]:
     names, correlation = list(layout.physical(layout.starts)), spread.correlation
     for first, second in np.argwhere(np.triu(np.abs(correlation) > _TRADED, 1)).tolist():
         yield Trade(names[first], names[second], float(correlation[first, second]))
