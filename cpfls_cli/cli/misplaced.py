@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
-from cpfls_cli.errors import ConfigError
+from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.logs.formats import is_log
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -17,15 +17,38 @@ Kind = Literal["log", "artifact", "config"]
 
 
 def _kind(path: Path) -> Kind | None:
-    """Tell what a file is: by its first bytes, then by its name."""
+    """Tell what a file is: by what it holds, then by its name."""
     if not path.is_file():
         return None
-    with path.open("rb") as stream:
-        if stream.read(len(_HDF5)) == _HDF5:
-            return "artifact"
+    if _format(path) is not None:
+        return "artifact"
     if is_log(path):
         return "log"
     return "config" if path.suffix.lower() in _CONFIGS else None
+
+
+def _format(path: Path) -> str | None:
+    """Tell the format of an artifact; None for any other file, which is not opened as one."""
+    with path.open("rb") as stream:
+        if stream.read(len(_HDF5)) != _HDF5:
+            return None
+    from cpfls_cli.artifacts.store import format_name
+
+    return format_name(path)
+
+
+def refuse_misplaced_log(path: Path) -> None:
+    """Refuse an artifact or a config in the place of a log.
+
+    Raises
+    ------
+    InputError
+    """
+    kind = _kind(path)
+    if kind == "artifact":
+        raise InputError(f"{path}: is a {_format(path)}, not a log: it needs no import; `cpfls info {path}` shows it")
+    if kind == "config":
+        raise InputError(f"{path}: is a config, not a log; first the config, then the log")
 
 
 def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | None) -> None:
@@ -47,7 +70,7 @@ def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | 
     kind = _kind(given[0])
     if kind not in ("log", "artifact"):
         return
-    what = "a log" if kind == "log" else "an artifact"
+    what = "a log" if kind == "log" else f"a {_format(given[0])}"
     config = next((path for path in given if _kind(path) == "config"), None)
     if config is not None:
         exchanged = [config, *(given[0] if path == config else path for path in given[1:])]

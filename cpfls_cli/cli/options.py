@@ -87,8 +87,8 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _check_order(command: str, arguments: Mapping[str, Any], output: Path | None) -> None:
-    """Refuse arguments that do not begin with the config where one is asked for."""
-    from cpfls_cli.cli.misplaced import refuse_misplaced_config
+    """Refuse arguments that do not begin with the config where one is asked for, and a log that is none."""
+    from cpfls_cli.cli.misplaced import refuse_misplaced_config, refuse_misplaced_log
     from cpfls_cli.cli.terminal import messages_for_errors
 
     if arguments.get("config") is None:
@@ -96,6 +96,8 @@ def _check_order(command: str, arguments: Mapping[str, Any], output: Path | None
     given = [path for value in arguments.values() for path in (value if isinstance(value, list) else [value])]
     with messages_for_errors():
         refuse_misplaced_config(command, given, output)
+        if "log" in arguments:
+            refuse_misplaced_log(arguments["log"])
 
 
 def seconds(text: str) -> float:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job, finish
 from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.commands.stopped import not_judged, stopped, without_model
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.errors import ComputationError
@@ -15,6 +17,8 @@ from cpfls_cli.flights.inputs import choosing_source, held_out_parts, input_role
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.flights.training import TrainingData, read_training
 from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.excitation import swings
+from cpfls_cli.identification.findings import short_flight
 from cpfls_cli.identification.identify import Identification, identify
 from cpfls_cli.identification.search import NothingFoundError, SearchRun, SearchStep, require_flights
 from cpfls_cli.inertia import six_parameters
@@ -65,6 +69,7 @@ def run(
     if isinstance(result, NothingFoundError):
         search.end(result.stop_reason)
         raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
+    result = _with_length(result, flights, data)
     with search.kept():
         evidence, interrupt = _evidence(job, result, data, held_out)
         base, vehicle = job.study.identification.base, job.study.vehicle
@@ -104,6 +109,14 @@ def _identify(
         raise
     except ComputationError as error:
         raise _of(flights, error) from None
+
+
+def _with_length(result: Identification, flights: Sequence[Path], data: TrainingData) -> Identification:
+    """Add a warning of short flights, where all were recorded: a planned one may be exact."""
+    if not all("log" in read_header(path).inputs for path in flights):
+        return result
+    short = short_flight(swings(data.training), result.system.parameters)
+    return result if short is None else replace(result, findings=(*result.findings, short))
 
 
 def _of(flights: Sequence[Path], error: ComputationError) -> ComputationError:

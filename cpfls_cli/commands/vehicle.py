@@ -74,11 +74,12 @@ def run(
     if config is not None:
         check_output(config.copy, job.force)
     inputs, checkpoint, kept = begin_vehicle_search(job, roles, resume=resume)
-    _check_left_out(study)
     read = flights_to_play([*flights, *held_out], study)
     for flight in read:
         _require_rotors(flight)
         flight.playback.starts(_horizon(job, flight), 1)
+    # After the rotors are known to be those of a vehicle that flies: blocks of others cannot be scaled.
+    _check_left_out(study)
     training, rest = read[: len(flights)], read[len(flights) :]
     if job.dry_run:
         return nothing_written(job)

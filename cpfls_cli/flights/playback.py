@@ -18,7 +18,7 @@ from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import CpflsError, InputError
+from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import ReadFlight, read_flight, read_import, signals_of, with_voltage
@@ -31,6 +31,7 @@ from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, Player, player_of
 from cpfls_cli.playback.rotors import Hold
+from cpfls_cli.vehicle.rotors import require_control
 
 _STATE = ("body_rate", "attitude", "velocity", "position")
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")
@@ -116,6 +117,8 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
             f"{flight.name}: has no rotor_speed, rotor_command or body_torque, so nothing drives a playback; name "
             "their columns in import.signals"
         )
+    if actuation != "body_torque":
+        _require_control(study)
     stretches = _stretches(flight, actuation)
     made = [signals_of(flight, _known(flight, actuation, part), study) for part in stretches]
     parts = tuple(signals for signals, _ in made)
@@ -128,6 +131,14 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     }
     named = tuple(f"{flight.name}: {warning}" for warning in warnings)
     return LoggedFlight(flight.name, parts, hold or usual, words[actuation], named)
+
+
+def _require_control(study: Study) -> None:
+    """Refuse a vehicle of the config that cannot have flown what its rotors are said to have driven."""
+    try:
+        require_control(study.vehicle)
+    except ComputationError as error:
+        raise ConfigError(str(error)) from None
 
 
 def _stretches(flight: ReadFlight, actuation: str) -> list[slice]:

@@ -25,6 +25,7 @@ CELLS = 72
 
 SILENT_FIRING = 1e-3
 DETERMINED_SHARE = 0.5
+_CLEARLY = 0.5
 
 
 @dataclass(frozen=True)
@@ -181,3 +182,41 @@ def _columns(data: TorqueData) -> Array:
     """Columns of six inertia parameters and three constant body torques, shape (samples, 3, 9)."""
     constant = euler_rate_matrix(data.motion.attitude).swapaxes(1, 2)
     return np.concatenate([rigid_columns(data.motion), constant], axis=2)
+
+
+@dataclass(frozen=True)
+class Swings:
+    """How often a flight turns round.
+
+    Attributes
+    ----------
+    seconds : float, s
+    by_axis : array of int, shape (3,)
+        Changes of direction of the Euler rates.
+    """
+
+    seconds: float
+    by_axis: IntArray
+
+
+def swings(source: TorqueSource) -> Swings:
+    """Count how often each Euler rate goes from clearly above its mean to clearly below, or back.
+
+    Clearly is half a standard deviation, so that noise does not count. A signal of bandwidth B holds about 2 B T
+    independent numbers in the time T, and one of a narrow band crosses its mean as often.
+    """
+    count, total, squares = 0, np.zeros(3), np.zeros(3)
+    for data in source.chunks():
+        rate = data.motion.rate
+        count, total, squares = count + len(data), total + rate.sum(axis=0), squares + np.sum(rate**2, axis=0)
+    mean = total / count
+    clearly = _CLEARLY * np.sqrt(np.maximum(squares / count - mean**2, 0.0))
+    found, side, seconds = np.zeros(3, dtype=np.int64), np.zeros(3), 0.0
+    for data in source.chunks():
+        seconds += float(data.time[-1] - data.time[0]) * len(data) / max(1, len(data) - 1)
+        for axis, rate in enumerate((data.motion.rate - mean).T):
+            sides = np.concatenate([side[axis : axis + 1], np.sign(rate[np.abs(rate) > clearly[axis]])])
+            sides = sides[sides != 0]
+            found[axis] += int((np.diff(sides) != 0).sum())
+            side[axis] = sides[-1] if len(sides) else 0.0
+    return Swings(seconds, found)

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.rigid_body import VERTICAL, why_unphysical
-from cpfls_cli.identification.excitation import AxisEvidence, RuleExcitation
+from cpfls_cli.identification.excitation import AxisEvidence, RuleExcitation, Swings
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.solver import Fit
@@ -198,3 +198,23 @@ def _vertical(diagnostics: FitDiagnostics) -> Iterator[str]:
             f"body torque is judged without the samples nearer than {np.degrees(np.arcsin(VERTICAL)):.0f} degrees to a "
             f"pitch of +-90 degrees, {', '.join(left_out)}: it is divided by cos(pitch), and every error with it"
         )
+
+
+def short_flight(training: Swings, parameters: int) -> str | None:
+    """Warn of recordings that turn round less often than a model has parameters.
+
+    A swing about an axis is about one independent number, whatever the rate of the log: fewer of them than parameters
+    leave some to the noise.
+    """
+    counted = int(training.by_axis.sum())
+    if counted >= parameters:
+        return None
+    needed = "a flight that moves"
+    if counted:
+        needed = f"about {float(f'{training.seconds * parameters / counted:.2g}'):g} s of such flight"
+    return (
+        f"the flights that train are short: in {training.seconds:.3g} s the rates turn round"
+        f" {', '.join(map(str, training.by_axis))} times about {', '.join(AXES)}, {counted} swings for {parameters}"
+        f" parameters, and a swing tells about one number, so noise decides the rest; train on {needed}, or take a"
+        " structure with fewer parameters"
+    )

@@ -81,6 +81,17 @@ def body_wrench(vehicle: VehicleSettings, rotor_speed: Array) -> BodyWrench:
     return BodyWrench(thrust=wrench[:, 0], body_torque=wrench[:, 1:])
 
 
+def require_control(vehicle: VehicleSettings) -> None:
+    """Refuse rotors that no vehicle flies with.
+
+    Raises
+    ------
+    ComputationError
+        If they cannot produce thrust, roll, pitch and yaw independently.
+    """
+    _allocation_inverse(allocation_matrix(vehicle))
+
+
 def rotor_demand(vehicle: VehicleSettings, thrust: Array, body_torque: Array) -> RotorDemand:
     """Compute the rotor speeds that give a wrench, of minimum norm in the squared speeds.
 

@@ -119,11 +119,7 @@ def test_long_values_are_cut(wrong):
         ("", "FILE: the config is empty; `cpfls config` prints a commented default"),
         ("# nothing\n", "FILE: the config is empty; `cpfls config` prints a commented default"),
         ("- seed\n", "FILE: a config is a mapping of sections; this is a list"),
-        (b"\x89PNG\r\n\x1a\n\xff\xfe", "FILE: not a text file; a config is YAML in UTF-8"),
-        (
-            b"\x89HDF\r\n\x1a\n\xff\xfe",
-            "FILE: is an artifact, not a config (YAML); `cpfls config` prints a commented default",
-        ),
+        (b"\x89HDF\r\n\x1a\n\xff\xfe", "FILE: not a text file; a config is YAML in UTF-8"),
         (b"seed: \x00\n", "FILE: not valid YAML: unacceptable character #x0000: special characters are not allowed"),
         ("1: 2\n", "FILE:1:1: not valid YAML: key 1 is not text"),
         ("vehicle: &a [*a]\n", "FILE:1:10: not valid YAML: found unconstructable recursive node"),

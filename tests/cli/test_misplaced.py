@@ -67,3 +67,19 @@ def test_a_log_where_an_artifact_belongs(refuse, log, study, tmp_path, command):
 def test_a_config_where_an_artifact_belongs(refuse, study):
     (line,) = refuse("info", study)
     assert line == f"{study}: is a config, and this takes what cpfls made; `cpfls config {study}` shows it"
+
+
+def test_what_needs_no_import_is_told_so(refuse, pipeline, study, log_study, tmp_path):
+    (line,) = refuse("import", log_study, pipeline.flight, "-o", tmp_path / "out.h5")
+    assert line == (
+        f"{pipeline.flight}: is a cpfls/flight, not a log: it needs no import; `cpfls info {pipeline.flight}` shows it"
+    )
+    (line,) = refuse("import", log_study, study, "-o", tmp_path / "out.h5")
+    assert line == f"{study}: is a config, not a log; first the config, then the log"
+
+
+def test_a_flight_where_no_config_was_given(refuse, pipeline):
+    (line,) = refuse("config", pipeline.flight)
+    assert (
+        line == f"{pipeline.flight}: is a cpfls/flight, not a config (YAML); `cpfls config` prints a commented default"
+    )

@@ -316,6 +316,36 @@ def test_a_flight_of_another_vehicle_is_refused(refused, flights):
     assert message.startswith(f"{flights[0]}: was made with another vehicle")
 
 
+@pytest.mark.parametrize(
+    ("rotors", "axes"),
+    [
+        ([(1, 1, 1), (-1, 1, 1), (-1, -1, 1), (1, -1, 1)], "thrust, yaw"),
+        ([(0, 1, 1), (0, 1, -1)] * 2, "thrust, roll, pitch"),
+    ],
+    ids=["all spin one way", "all on one side"],
+)
+@pytest.mark.parametrize("command", [("vehicle",), ("replay", "vehicle")])
+def test_rotors_that_no_vehicle_flies_with_are_refused(refuse, config, tmp_path, command, rotors, axes):
+    log, time = tmp_path / "log.csv", np.arange(0.0, 4.0, 0.01)
+    waves = np.column_stack([np.sin((1 + i) * time) for i in range(7)])
+    np.savetxt(log, np.column_stack([time, waves + 600]), delimiter=",", header="t,p,q,r,a,b,c,d", comments="")
+    signals = {
+        "body_rate": {"columns": ["p", "q", "r"], "unit": "rad/s"},
+        "rotor_speed": {"columns": ["a", "b", "c", "d"], "unit": "rad/s"},
+    }
+    given = [
+        {"position_m": [0.1 * x, 0.1 * y, 0.0], "spin": spin, "thrust_factor_n_s2": 6e-6, "drag_factor_n_m_s2": 1e-7}
+        for x, y, spin in rotors
+    ]
+    name, *model = command
+    sets = {"import.signals": signals, "import.torque_source": None, "vehicle.rotors": given}
+    words = [word for key, value in sets.items() for word in ("--set", f"{key}={json.dumps(value)}")]
+    (line,) = refuse(name, config, *model, log, "-o", tmp_path / "out.h5", *words)
+    assert line == (
+        f"vehicle.rotors: the rotors cannot produce {axes} independently of the rest; check their positions and spins"
+    )
+
+
 @pytest.mark.parametrize("more", [(), ("--dry-run",)])
 def test_a_flight_shorter_than_the_horizon_is_refused(refused, flights, more):
     message = refused(flights[0], options=("--set", "playback.horizon_s=5.0", *more))
