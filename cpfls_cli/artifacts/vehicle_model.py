@@ -348,6 +348,17 @@ class StructuresTriedGroup:
 
 
 @record
+class DifferencesGroup:
+    """What other configurations have that the vehicle has not, with 95 % intervals."""
+
+    name: tuple[str, ...] = dataset("name", "configuration, and what differs", "difference")
+    unit: tuple[str, ...] = dataset("unit", "of the difference", "difference")
+    value: Array = dataset("value", "estimate", "difference", units="SI")
+    low: Array = dataset("low", "lower end of the 95 % interval", "difference", units="SI")
+    high: Array = dataset("high", "upper end of the 95 % interval", "difference", units="SI")
+
+
+@record
 class VehicleRecord(Record):
     """The artifact `cpfls/vehicle`."""
 
@@ -369,6 +380,7 @@ class VehicleRecord(Record):
     guess: tuple[str, ...] | None = dataset(
         "guess", "numbers of /vehicle that are guesses still: no flight tells them", "guess", default=None
     )
+    difference: DifferencesGroup | None = group("difference", default=None)
     commanded: bool | None = dataset(
         "commanded", "1 where its rotors were driven by commands, 0 by measured speeds", default=None
     )
@@ -400,6 +412,7 @@ class VehicleRecord(Record):
             blocks=found.blocks,
             warning=tuple(warnings),
             guess=found.guessed or None,
+            difference=columns_of(DifferencesGroup, found.differences) if found.differences else None,
             commanded=commanded,
         )
 
@@ -428,6 +441,9 @@ class VehicleRecord(Record):
             "verdict": self.verdict,
             "parameters": {each.key: _but_key(each) for each in parameters_of(self)},
             "numbers": numbers,
+            "differences": {}
+            if self.difference is None
+            else {row.pop("name"): row for row in rows_of(self.difference)},
             "trades": [list(row.values()) for row in rows_of(self.trade)],
             "structures": rows_of(self.structure),
             "held_out": None if self.held_out is None else self.held_out.summary,

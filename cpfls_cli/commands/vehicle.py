@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from difflib import get_close_matches
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,11 +24,12 @@ from cpfls_cli.flights.playback import flights_to_play, whole
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.vehicle_model import answer
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import replay
+from cpfls_cli.playback.settings import GroupSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError
 from cpfls_cli.playback.vehicle import FoundVehicle, find_vehicle
+from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.search.checkpoint import VehicleCheckpoint
 from cpfls_cli.search.resumable import Watch, begin_vehicle_search
@@ -74,12 +77,13 @@ def run(
     if config is not None:
         check_output(config.copy, job.force)
     inputs, checkpoint, kept = begin_vehicle_search(job, roles, resume=resume)
-    read = flights_to_play([*flights, *held_out], study)
+    read = _grouped(flights_to_play([*flights, *held_out], study), [*flights, *held_out], study.playback.groups)
     for flight in read:
         _require_rotors(flight)
         flight.playback.starts(_horizon(job, flight), 1)
     # After the rotors are known to be those of a vehicle that flies: blocks of others cannot be scaled.
-    _check_left_out(study)
+    _check_blocks(study)
+    _check_groups(study.playback.groups, read[: len(flights)])
     training, rest = read[: len(flights)], read[len(flights) :]
     if job.dry_run:
         return nothing_written(job)
@@ -88,7 +92,7 @@ def run(
         checkpoint.remove()
     with checkpoint.kept():
         found, signal = _found(job, training, checkpoint, kept or {})
-        judged = _judged(found.model, rest, job) if rest else None
+        judged = _judged(found, rest, job) if rest else None
         warnings = [warning for flight in read for warning in flight.warnings]
         commanded = any(flight.parts[0].commanded for flight in training)
         record = finish(job, VehicleRecord.of(found, judged, warnings, commanded=commanded), inputs)
@@ -146,25 +150,60 @@ def _found(
     return found, watch.signal
 
 
-def _judged(model: VehicleModel, flights: Sequence[LoggedFlight], job: Job) -> HeldOutGroup:
+def _judged(found: FoundVehicle, flights: Sequence[LoggedFlight], job: Job) -> HeldOutGroup:
     """Play a vehicle back along flights that it was not found in, from every sample."""
-    to_play = whole(model)
-    played = [to_play.played(flight) for flight in flights]
+    to_play = {group: whole(model) for group, model in {"": found.model, **found.others}.items()}
+    played = [to_play[flight.group].played(flight) for flight in flights]
     errors = replay(
         played, _horizon(job, flights[0]), 1, lambda done: job.progress(done, 1, "plays back the flights held out")
     )
     return HeldOutGroup.of([flight.name for flight in flights], errors, flights[0].parts[0].period)
 
 
+def _grouped(
+    flights: Sequence[LoggedFlight], paths: Sequence[Path], groups: Sequence[GroupSettings]
+) -> tuple[LoggedFlight, ...]:
+    """Say of each flight in which configuration the vehicle flew it: the first whose names match."""
+    found = []
+    for flight, path in zip(flights, paths, strict=True):
+        own = (group.name for group in groups if any(fnmatch(path.name, name) for name in group.flights))
+        found.append(replace(flight, group=next(own, "")))
+    return tuple(found)
+
+
+def _check_groups(groups: Sequence[GroupSettings], training: Sequence[LoggedFlight]) -> None:
+    """Refuse groups that no flight tells anything of."""
+    flown = {flight.group for flight in training}
+    for group in groups:
+        if group.name not in flown:
+            names = joined(repr(name) for name in group.flights)
+            raise ConfigError(
+                f"playback.groups: no flight that trains is of {group.name}: none is called like {names}; name its "
+                "files there or leave the group out"
+            )
+    if "" not in flown:
+        raise ConfigError(
+            "playback.groups: every flight is of a group; one at least has to be of the section vehicle, whose mass "
+            "gives all numbers their size"
+        )
+
+
 def _horizon(job: Job, flight: LoggedFlight) -> int:
     return max(1, round(job.study.playback.horizon_s / flight.parts[0].period))
 
 
-def _check_left_out(study: Study) -> None:
-    """Refuse names in `playback.leave_out` that no block has."""
+def _check_blocks(study: Study) -> None:
+    """Refuse names of blocks that no vehicle has."""
     known = blocks_of(study.vehicle)
     for name in study.playback.leave_out:
-        if name not in known:
-            near = get_close_matches(name, known, n=1, cutoff=0.4)
-            hint = f"did you mean {near[0]}?" if near else f"the blocks are {', '.join(known)}"
-            raise ConfigError(f"playback.leave_out = {name}: no such block ({hint})")
+        _check_block("playback.leave_out", name, known)
+    for group in study.playback.groups:
+        for name in group.differs:
+            _check_block(f"playback.groups: {group.name}: differs", name, (MASS, *study.vehicle.unknown, *known))
+
+
+def _check_block(key: str, name: str, known: Sequence[str]) -> None:
+    if name not in known:
+        near = get_close_matches(name, known, n=1, cutoff=0.4)
+        hint = f"did you mean {near[0]}?" if near else f"the blocks are {', '.join(known)}"
+        raise ConfigError(f"{key} = {name}: no such block ({hint})")

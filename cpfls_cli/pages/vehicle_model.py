@@ -79,6 +79,7 @@ def answer(found: Source[VehicleRecord]) -> Iterator[Block]:
     yield found_box(found)
     if found.record.held_out is not None:
         yield errors_table(found.record.held_out, 1)
+    yield from _differences_table(found.record, 1)
     yield from _constants(found.record, 1)
     yield _numbers_table(found, 1)
     yield _section_to_paste(found.record)
@@ -181,6 +182,18 @@ def _constants(record: VehicleRecord, index: int) -> Iterator[Block]:
     yield from (Text(f"To know {each.key}: {_FLIGHTS[each.key]}.", "warning") for each in filter(_wanting, listed))
 
 
+def _differences_table(record: VehicleRecord, index: int) -> Iterator[Table]:
+    """Show what other configurations have of their own; nothing where there is none."""
+    if record.difference is not None:
+        rows = [
+            [row["name"], row["unit"], number(row["value"]), number(row["low"], 3), number(row["high"], 3)]
+            for row in rows_of(record.difference)
+        ]
+        caption = "What other configurations have that the vehicle of the config has not, with 95 % intervals."
+        header = ("Difference", "Unit", "Value", "From", "To")
+        yield Table(f"vehicle-differences-{index}", caption, header, rows, frozenset({0, 1}))
+
+
 def _wanting(parameter: Parameter) -> bool:
     """Tell whether a number was looked for and not found."""
     return parameter.value is None or (parameter.low is not None and not parameter.determined)
@@ -252,6 +265,7 @@ def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
     if record.held_out is not None:
         yield errors_table(record.held_out, index)
         yield horizon_figure(f"vehicle-errors-{index}", record.held_out)
+    yield from _differences_table(record, index)
     yield from _constants(record, index)
     yield _numbers_table(found, index)
     yield _section_to_paste(record)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -94,6 +94,8 @@ class LoggedFlight:
     actuation : str
         What drives the playback, in words.
     warnings : tuple of str
+    group : str
+        See `PlaybackFlight`.
     """
 
     name: str
@@ -101,6 +103,7 @@ class LoggedFlight:
     hold: Hold
     actuation: str
     warnings: tuple[str, ...]
+    group: str = ""
 
     @property
     def time(self) -> Array:
@@ -110,7 +113,7 @@ class LoggedFlight:
     @property
     def playback(self) -> PlaybackFlight:
         """The flight as logged."""
-        return playback_flight(self.name, self.parts, self.hold)
+        return replace(playback_flight(self.name, self.parts, self.hold), group=self.group)
 
 
 def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:

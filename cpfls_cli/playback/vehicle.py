@@ -172,7 +172,7 @@ def find_vehicle(
         spread.blocks,
         tuple(sorted(set(vehicle.unknown) - set(begun.unknown))),
         {group.name: joint.model(fitted.values, group.name) for group in groups} if joint else {},
-        tuple(_differences(joint, fitted, spread)) if joint else (),
+        tuple(differences(joint, fitted, spread)) if joint else (),
     )
 
 
@@ -248,7 +248,16 @@ def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted:
     return np.asarray(student.ppf(0.975, spread.blocks - 1) * deviation)
 
 
-def _differences(joint: JointLayout, fitted: Fitted, spread: Uncertainty) -> Iterator[Difference]:
+def differences(joint: JointLayout, fitted: Fitted, spread: Uncertainty) -> Iterator[Difference]:
+    """Say what differs between configurations, with 95 % intervals.
+
+    Parameters
+    ----------
+    joint : JointLayout
+    fitted : Fitted
+        Of this layout.
+    spread : Uncertainty
+    """
     half = _half_intervals(joint.differences, fitted, spread)
     for (name, found), width in zip(joint.differences(fitted.values).items(), half.tolist(), strict=True):
         yield Difference(name, found.unit, found.value, found.value - width, found.value + width)
