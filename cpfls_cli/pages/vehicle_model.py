@@ -20,7 +20,7 @@ from cpfls_cli.artifacts.parameters import (
     parameters_of,
     vehicle_section,
 )
-from cpfls_cli.artifacts.replay import better_to
+from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
@@ -28,7 +28,7 @@ from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Listing, Plot, Section, Table, Text, Tone
-from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent
+from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent, whole_percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,19 +105,33 @@ def found_box(found: Source[VehicleRecord]) -> Box:
 
 def _verdict(record: VehicleRecord) -> Iterator[str]:
     """Say what the vehicle is good for, to which horizon, and where; by playback alone."""
-    held, fast = record.held_out, number(record.airspeed, 2)
-    where = f"in flight up to {fast} m/s and about as lively as that which it was found in"
+    held = record.held_out
     if held is None:
         yield "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
         return
     turning, moving = better_to(held, "body_rate"), better_to(held, "velocity")
     if record.verdict == "good-for-simulation":
-        yield f"Good for simulation and for control to {number(min(turning, moving), 2)} s, {where}."
+        yield f"Good for simulation and for control to {number(min(turning, moving), 2)} s{_where(held)}."
     elif record.verdict == "good-for-control":
-        yield f"Good for control of the attitude: it predicts body rates to {number(turning, 2)} s, {where}."
+        yield f"Good for control of the attitude: it predicts body rates to {number(turning, 2)} s{_where(held)}."
     else:
         yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
     yield from beside_rivals(held)
+
+
+def _where(held: HeldOutGroup) -> str:
+    """Say at which speeds and rates it is better than what knows no model."""
+    region = held.better
+    if region is None:
+        return ""
+    spans = [("speeds", region.speed, "m/s"), ("rates", region.rate, "rad/s")]
+    known = joined(
+        f"{name} of {number(span[0], 2)} to {number(span[1], 2)} {unit}"
+        for name, span, unit in spans
+        if span is not None
+    )
+    share = whole_percent(region.share)
+    return f", at {known}: there are most of the windows in which its body rates are better ({share} of all)"
 
 
 def _chosen_blocks(record: VehicleRecord) -> list[str]:

@@ -102,6 +102,9 @@ def test_json_tells_verdict_structures_and_what_was_held_out(found):
     assert told["held_out"]["flights"] == ["flight-2.h5"]
     models = told["held_out"]["models"]
     assert models["model"]["body_rate"]["sum"] < 0.2 * models["stated"]["body_rate"]["sum"]
+    better = told["held_out"]["better"]
+    assert better["share"] > 0.9
+    assert 0 <= better["speed_m_s"][0] < better["speed_m_s"][1] < 10
     assert set(told["shares"]) == {"rotors", *told["effects"]}
 
 
