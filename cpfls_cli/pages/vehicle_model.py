@@ -131,7 +131,7 @@ def _where(held: HeldOutGroup) -> str:
         if span is not None
     )
     share = whole_percent(region.share)
-    return f", at {known}: there are most of the windows in which its body rates are better ({share} of all)"
+    return f", at {known}, where most of the windows lie in which its body rates are better ({share} of all)"
 
 
 def _chosen_blocks(record: VehicleRecord) -> list[str]:
