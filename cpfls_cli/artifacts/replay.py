@@ -102,6 +102,23 @@ def _summaries(errors: ErrorsByHorizon, prediction: int) -> dict[str, Any]:
 
 
 @record
+class RegionGroup:
+    """Where a model predicts body rates better than what knows no model."""
+
+    share: float = dataset("share", "of the windows")
+    rate: Array = dataset(
+        "rate", "body rate at the begin of nine tenths of these windows: least, most", "2", units="rad/s"
+    )
+    speed: Array | None = dataset("speed", "the same of the speed of the flight", "2", units="m/s", default=None)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The region for machines."""
+        speed = None if self.speed is None else self.speed.tolist()
+        return {"share": self.share, "rate_rad_s": self.rate.tolist(), "speed_m_s": speed}
+
+
+@record
 class HeldOutGroup:
     """A model played back along flights that it was not found in, beside what it has to beat."""
 
@@ -114,6 +131,7 @@ class HeldOutGroup:
     attitude: SignalErrorGroup | None = group("attitude", default=None)
     velocity: SignalErrorGroup | None = group("velocity", default=None)
     position: SignalErrorGroup | None = group("position", default=None)
+    better: RegionGroup | None = group("better", default=None)
 
     @property
     def played(self) -> str:
@@ -121,21 +139,16 @@ class HeldOutGroup:
         return "the vehicle found"
 
     @classmethod
-    def of(cls, flights: Sequence[str], replay: Replay, period: float) -> Self:
-        """Arrange a replay without its windows.
+    def of(cls, flights: Sequence[Played], replay: Replay) -> Self:
+        """Arrange a replay without its windows."""
+        from cpfls_cli.playback.replay import PREDICTIONS, where_better
 
-        Parameters
-        ----------
-        flights : sequence of str
-            File names.
-        period : float, s
-        """
-        from cpfls_cli.playback.replay import PREDICTIONS
-
+        period, better = flights[0].flight.motion.period, where_better(flights, replay.windows)
         groups = {signal: SignalErrorGroup.of(found) for signal, found in replay.errors.items()}
         assert groups["body_rate"] is not None, "every flight has rates"
         return cls(
-            flown=tuple(flights),
+            flown=tuple(played.flight.name for played in flights),
+            better=None if better is None else RegionGroup(**vars(better)),
             windows=len(replay.windows.start),
             prediction=PREDICTIONS,
             horizon_s=period * np.arange(1, groups["body_rate"].mae.shape[1] + 1),
@@ -160,6 +173,7 @@ class HeldOutGroup:
             "windows": self.windows,
             "horizon_s": self.horizon_s.tolist(),
             "models": models,
+            "better": None if self.better is None else self.better.summary,
         }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,6 +65,10 @@ def answer(replay: Source[ReplayRecord], index: int = 1) -> Iterator[Block]:
 
 def _grounds(record: ReplayRecord, index: int) -> Iterator[Block]:
     yield errors_table(record, index)
+    yield from _worst(record, index)
+
+
+def _worst(record: ReplayRecord, index: int) -> Iterator[Block]:
     yield _worst_table(record, index)
     yield from (Text(words, "warning") for words in (*_diverged(record), *record.warning))
 
@@ -213,16 +218,33 @@ def replay_section(sources: Sources) -> Section | None:
     Section or None
         None where no replay was given.
     """
-    return section_of_each("replay", "Played back along flights", sources.replays, _section)
+    return section_of_each("replay", "Played back along flights", sources.replays, partial(_section, sources))
 
 
-def _section(replay: Source[ReplayRecord], index: int) -> Iterator[Block]:
-    record = replay.record
+def told_at(replay: ReplayRecord, sources: Sources) -> str | None:
+    """Find the vehicle whose errors on the flights held out are those of a replay: they are told once."""
+    for vehicle in sources.vehicles:
+        held = vehicle.record.held_out
+        if held is not None and held.flown == replay.flown and _same_errors(held, replay):
+            return vehicle.label
+    return None
+
+
+def _same_errors(first: ErrorsByHorizon, second: ErrorsByHorizon) -> bool:
+    groups = zip(first.errors.values(), second.errors.values(), strict=True)
+    return all(a is b if a is None or b is None else np.array_equal(a.mae, b.mae) for a, b in groups)
+
+
+def _section(sources: Sources, replay: Source[ReplayRecord], index: int) -> Iterator[Block]:
+    record, told = replay.record, told_at(replay.record, sources)
     yield Heading(replay.label)
     yield Facts(_facts(record))
-    yield from _grounds(record, index)
+    if told is not None:
+        yield Text(f"Its errors by horizon are those of {told} on the flights held out, shown there.", "note")
+    yield from _grounds(record, index) if told is None else _worst(record, index)
     if len(record.horizon_s) > 1:
-        yield horizon_figure(f"replay-errors-{index}", record)
+        if told is None:
+            yield horizon_figure(f"replay-errors-{index}", record)
         yield worst_figure(f"replay-worst-windows-{index}", record)
         yield drawn_figure(f"replay-drawn-{index}", record)
     yield where_figure(f"replay-where-{index}", record)

@@ -30,6 +30,7 @@ R = TypeVar("R", bound=Record, default=Any)
 
 GAP_TITLE = "Where simulation and flight disagree"
 VEHICLE_TITLE = "A vehicle found in flights"
+REPLAY_TITLE = "What a model predicts of flights"
 """Heading of a page about nothing else, unless the config gives one."""
 
 
@@ -157,7 +158,9 @@ class Sources:
         usual = self.settings.title == ReportSettings().title
         if not usual or not self.only_gap:
             return self.settings.title
-        return VEHICLE_TITLE if self.vehicles else GAP_TITLE
+        if self.vehicles:
+            return VEHICLE_TITLE
+        return GAP_TITLE if self.gap else REPLAY_TITLE
 
     def by_hash(self, sha256: str | None) -> Source[Any] | None:
         """Look up an artifact by its hash."""

@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged
 from cpfls_cli.pages.diagnosis import gap_blocks
 from cpfls_cli.pages.model import scores_table, solution, verdict_line
 from cpfls_cli.pages.provenance import missing
-from cpfls_cli.pages.replay import verdict_box
+from cpfls_cli.pages.replay import told_at, verdict_box
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.vehicle_model import found_box
 from cpfls_cli.report.content import Block, Facts, Heading, Section, Text, Tone
@@ -23,7 +23,7 @@ def summary_section(sources: Sources) -> Section:
     blocks += [Text(note, "note") for note in sources.settings.notes]
     blocks += gap_blocks(sources)
     blocks += [found_box(vehicle) for vehicle in sources.vehicles]
-    blocks += [verdict_box(replay) for replay in sources.replays]
+    blocks += [verdict_box(replay) for replay in sources.replays if told_at(replay.record, sources) is None]
     if len(sources.models) == 1:
         blocks += _model(sources.models[0], sources, 1)
     if not sources.models and not sources.only_gap:

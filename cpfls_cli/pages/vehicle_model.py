@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,15 +20,15 @@ from cpfls_cli.artifacts.parameters import (
     parameters_of,
     vehicle_section,
 )
-from cpfls_cli.artifacts.replay import better_to
+from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, stacked, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Listing, Plot, Section, Table, Text, Tone
-from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent
+from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent, whole_percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,6 +54,9 @@ _TONES: dict[str, Tone] = {
 }
 _REMAINDER, _ROTORS = "remainder", "rotors"
 _AXES = ("x", "y", "z")
+_TURNS = ("x (roll to the right)", "y (nose down)", "z (yaw to the left)")
+_PUSHES = ("x (ahead)", "y (left)", "z (up)")
+_KINDS = {"torque": ("N m", {0, 1, 2}), "force": ("N", {3, 4, 5})}
 _FLIGHTS = {
     THRUST: "log velocity (or position), and climb and descend: the known mass then tells thrust",
     DRAG: "turn about yaw with fast steps while rolling and pitching, or state Izz; else only their ratio is known",
@@ -103,19 +106,33 @@ def found_box(found: Source[VehicleRecord]) -> Box:
 
 def _verdict(record: VehicleRecord) -> Iterator[str]:
     """Say what the vehicle is good for, to which horizon, and where; by playback alone."""
-    held, fast = record.held_out, number(record.airspeed, 2)
-    where = f"in flight up to {fast} m/s and about as lively as that which it was found in"
+    held = record.held_out
     if held is None:
         yield "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
         return
     turning, moving = better_to(held, "body_rate"), better_to(held, "velocity")
     if record.verdict == "good-for-simulation":
-        yield f"Good for simulation and for control to {number(min(turning, moving), 2)} s, {where}."
+        yield f"Good for simulation and for control to {number(min(turning, moving), 2)} s{_where(held)}."
     elif record.verdict == "good-for-control":
-        yield f"Good for control of the attitude: it predicts body rates to {number(turning, 2)} s, {where}."
+        yield f"Good for control of the attitude: it predicts body rates to {number(turning, 2)} s{_where(held)}."
     else:
         yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
     yield from beside_rivals(held)
+
+
+def _where(held: HeldOutGroup) -> str:
+    """Say at which speeds and rates it is better than what knows no model."""
+    region = held.better
+    if region is None:
+        return ""
+    spans = [("speeds", region.speed, "m/s"), ("rates", region.rate, "rad/s")]
+    known = joined(
+        f"{name} of {number(span[0], 2)} to {number(span[1], 2)} {unit}"
+        for name, span, unit in spans
+        if span is not None
+    )
+    share = whole_percent(region.share)
+    return f", at {known}, where most of the windows lie in which its body rates are better ({share} of all)"
 
 
 def _chosen_blocks(record: VehicleRecord) -> list[str]:
@@ -127,19 +144,22 @@ def warnings(record: VehicleRecord) -> list[str]:
     """Warn of numbers that the flights do not tell, and of what is known about the flights."""
     found = record.found
     said = list(record.warning)
-    bound = [row["name"] for row in rows_of(found) if row["at_bound"] and row["value"] != 0]
-    none = [row["name"] for row in rows_of(found) if row["at_bound"] and row["value"] == 0]
-    open_ = [name for name, known in zip(found.name, found.determined, strict=True) if not known]
+    named = [row for row in rows_of(found) if not _is_learned(row["name"])]
+    bound = [row["name"] for row in named if row["at_bound"] and row["value"] != 0]
+    none = [row["name"] for row in named if row["at_bound"] and row["value"] == 0]
+    open_ = [row["name"] for row in named if not row["determined"]]
     if bound:
         said.append(f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; not a physical number")
     if none:
         said.append(f"{joined(none)}: 0, the least that it can be; the flights show none of it")
     if open_:
         said.append(f"{joined(open_)}: not determined, the flights say too little of it")
+    # Numbers of the remainder have no meaning of their own, together or apart.
     said.extend(
         f"{row['first']} and {row['second']} trade against each other (correlation {row['correlation']:.3f}): only "
         "together do they mean anything"
         for row in rows_of(record.trade)
+        if not (_is_learned(row["first"]) and _is_learned(row["second"]))
     )
     far = [row["name"] for row in rows_of(found) if _far(row["value"], row["stated"])]
     if far:
@@ -152,12 +172,18 @@ def warnings(record: VehicleRecord) -> list[str]:
     return said
 
 
+def _is_learned(name: str) -> bool:
+    """Tell whether a number belongs to a remainder: to that of the torque, or of the force."""
+    return name.startswith(_REMAINDER)
+
+
 def _far(value: float, stated: float) -> bool:
     return bool(np.isfinite(stated) and stated > 0 and not 1 / _FAR < value / stated < _FAR)
 
 
 def _numbers_table(found: Source[VehicleRecord], index: int) -> Table:
     """Show what was found beside the constants."""
+    numbers = rows_of(found.record.found)
     rows = [
         [
             row["name"],
@@ -166,10 +192,12 @@ def _numbers_table(found: Source[VehicleRecord], index: int) -> Table:
             number(row["low"], 3),
             number(row["high"], 3),
         ]
-        for row in rows_of(found.record.found)
-        if row["name"] not in FOUND_AS.values()
+        for row in numbers
+        if row["name"] not in FOUND_AS.values() and not _is_learned(row["name"])
     ]
-    caption = "Other numbers of the vehicle with 95 % intervals from blocks of the flights."
+    learned = sum(_is_learned(row["name"]) for row in numbers)
+    more = f" {learned} more make the learned remainder; they stand in /found of the file." if learned else ""
+    caption = f"Other numbers of the vehicle with 95 % intervals from blocks of the flights.{more}"
     header = ("Number", "Unit", "Value", "From", "To")
     return Table(f"vehicle-numbers-{index}", caption, header, rows, frozenset({0, 1}))
 
@@ -259,7 +287,8 @@ def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
         [
             ("Structures judged", str(record.evaluated)),
             ("Blocks of windows behind the intervals", str(record.blocks)),
-            ("Named and learned shares of the torque", _share_in_words(record)),
+            ("Named and learned shares of the torque", _share_in_words(record.share.name, record.share.torque)),
+            ("Of the force", _share_in_words(record.share.name, record.share.force)),
         ]
     )
     if record.held_out is not None:
@@ -277,12 +306,12 @@ def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
         yield _remainder_figure(record, index)
 
 
-def _share_in_words(record: VehicleRecord) -> str:
+def _share_in_words(parts: Sequence[str], wrench: Array) -> str:
     """Compare what has a name with what is learned, beside the rotors."""
-    torque = dict(zip(record.share.name, np.linalg.norm(record.share.torque, axis=1).tolist(), strict=True))
-    learned = torque.pop(_REMAINDER, 0.0)
-    torque.pop(_ROTORS)
-    named = float(np.sqrt(sum(value**2 for value in torque.values())))
+    sizes = dict(zip(parts, np.linalg.norm(wrench, axis=1).tolist(), strict=True))
+    learned = sizes.pop(_REMAINDER, 0.0)
+    sizes.pop(_ROTORS)
+    named = float(np.sqrt(sum(value**2 for value in sizes.values())))
     if named + learned == 0:
         return "the rotors alone"
     share = learned**2 / (named**2 + learned**2)
@@ -344,31 +373,39 @@ def _shares_table(record: VehicleRecord, index: int) -> Table:
 
 
 def _remainder_figure(record: VehicleRecord, index: int) -> Plot:
-    direction, wrench = remainder_curves(record)
+    direction, learned, named = remainder_curves(record)
+    remainder = record.vehicle.remainder
+    assert remainder is not None, "drawn only where there is one"
+    kinds = [kind for kind, (_, rows) in _KINDS.items() if rows & set(remainder.rows.tolist())]
 
     def draw(figure: Figure) -> None:
-        torques, forces = stacked(figure, 2)
-        for axis, name in enumerate(_AXES):
-            line(torques, direction, wrench[:, axis], label=f"about or along {name}", **style_of(axis))
-            line(forces, direction, wrench[:, 3 + axis], **style_of(axis))
-        torques.set_ylabel("torque, N m")
-        forces.set_ylabel("force, N")
-        forces.set_xlabel("direction of flight in the rotor plane, ° (0 forward, 90 left)")
-        forces.set_xticks(np.arange(-180, 181, 45))
-        legend_over(figure, torques)
+        panels = figure.subplots(3, len(kinds), sharex=True, sharey="col", squeeze=False)
+        for column, kind in enumerate(kinds):
+            unit, rows = _KINDS[kind]
+            for axes, row in zip(panels[:, column], sorted(rows), strict=True):
+                line(axes, direction, named[:, row], label="all effects that have a name", **BASELINE)
+                line(axes, direction, learned[:, row], label="learned", **{**style_of(0), "linewidth": 2.0})
+                axes.set_title(f"{kind} {_TURNS[row % 3] if kind == 'torque' else _PUSHES[row % 3]}, {unit}")
+            panels[-1, column].set_xticks(np.arange(-180, 181, 90), ["back", "right", "ahead", "left", "back"])
+        figure.supxlabel("direction of flight in the plane of the rotors", fontsize=9.5)
+        legend_over(figure, panels[0, 0])
 
     speed = number(record.airspeed, 2)
-    caption = f"What has no name, over the direction of flight at {speed} m/s and the rotor speed of hover."
-    return plot(f"vehicle-remainder-{index}", caption, caption, 4.2, draw)
+    caption = (
+        f"What has no name, by the direction in which the vehicle flies: level, at {speed} m/s, without turning, with "
+        "the rotors at the speed of hover. Grey: what the effects with a name add there."
+    )
+    return plot(f"vehicle-remainder-{index}", caption, caption, 5.2, draw)
 
 
-def remainder_curves(record: VehicleRecord) -> tuple[Array, Array]:
-    """Evaluate the remainder over the direction of flight.
+def remainder_curves(record: VehicleRecord) -> tuple[Array, Array, Array]:
+    """Evaluate the remainder, and the effects that have a name, over the direction of flight.
 
     Returns
     -------
     direction : array, shape (73,), degrees
-    wrench : array, shape (73, 6), N m and N
+        0 ahead, 90 left.
+    learned, named : array, shape (73, 6), N m and N
     """
     from cpfls_cli.effects.scales import hover_speed
     from cpfls_cli.playback.model import wrench_of
@@ -380,5 +417,7 @@ def remainder_curves(record: VehicleRecord) -> tuple[Array, Array]:
     rotor = np.zeros((len(angle), 1 + 4 * model.rotors))
     rotor[:, 0] = 1.0
     rotor[:, 1 : 1 + model.rotors] = hover_speed(model.vehicle)
-    weights = model.part_weights()[_REMAINDER]
-    return direction, wrench_of(weights, model.terms(velocity, np.zeros_like(velocity)), rotor)
+    parts, terms = model.part_weights(), model.terms(velocity, np.zeros_like(velocity))
+    learned = parts.pop(_REMAINDER)
+    named = np.sum([weights for name, weights in parts.items() if name != _ROTORS], axis=0) + np.zeros_like(learned)
+    return direction, wrench_of(learned, terms, rotor), wrench_of(named, terms, rotor)

@@ -491,6 +491,45 @@ class Replay:
     windows: Windows
 
 
+_OUTER = 0.05
+
+
+@dataclass(frozen=True)
+class Region:
+    """Where a model predicts body rates better than what knows no model.
+
+    Attributes
+    ----------
+    share : float
+        Of the windows.
+    speed : array, shape (2,), m/s, or None
+        Of the flight at the begin of nine tenths of these windows; None where a flight does not know it.
+    rate : array, shape (2,), rad/s
+    """
+
+    share: float
+    speed: Array | None
+    rate: Array
+
+
+def where_better(flights: Sequence[Played], windows: Windows) -> Region | None:
+    """Find the speeds and rates at which a model is better; None where it is nowhere."""
+    model, *rivals = windows.size[:3]
+    better = model < np.min(rivals, axis=0)
+    if not better.any():
+        return None
+    motions = [played.flight.motion for played in flights]
+    places = [windows.start[better & (windows.flight == index)] for index in range(len(flights))]
+
+    def span(signals: Sequence[Array]) -> Array:
+        sizes = [np.linalg.norm(signal[at], axis=1) for signal, at in zip(signals, places, strict=True)]
+        return np.asarray(np.quantile(np.concatenate(sizes), [_OUTER, 1 - _OUTER]))
+
+    known = all(played.knows["velocity"] for played in flights)
+    speed = span([motion.velocity for motion in motions]) if known else None
+    return Region(float(better.mean()), speed, span([motion.rate for motion in motions]))
+
+
 @dataclass
 class _Sums:
     """Sums over the windows so far."""

@@ -102,6 +102,9 @@ def test_json_tells_verdict_structures_and_what_was_held_out(found):
     assert told["held_out"]["flights"] == ["flight-2.h5"]
     models = told["held_out"]["models"]
     assert models["model"]["body_rate"]["sum"] < 0.2 * models["stated"]["body_rate"]["sum"]
+    better = told["held_out"]["better"]
+    assert better["share"] > 0.9
+    assert 0 <= better["speed_m_s"][0] < better["speed_m_s"][1] < 10
     assert set(told["shares"]) == {"rotors", *told["effects"]}
 
 
@@ -152,6 +155,18 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     text = (tmp_path / "page.html").read_text()
     assert "A vehicle found in flights" in text
     assert "Not shown, because" not in text
+
+
+@pytest.mark.parametrize(("along", "tables"), [(1, 1), (0, 2)], ids=["held out", "another flight"])
+def test_errors_on_the_flight_held_out_are_told_once(cpfls, config, flights, found, tmp_path, along, tables):
+    replayed = tmp_path / "replay.h5"
+    cpfls("replay", config, found.output, flights[along], "-o", replayed)
+    with undrawn():
+        assert cpfls("report", config, found.output, replayed, "-o", tmp_path / "page.md").exit_code == 0
+    text = (tmp_path / "page.md").read_text()
+    assert text.count("; sum over all horizons") == text.count("Body rate: better than") == tables
+    assert ("Its errors by horizon are those of vehicle.h5" in text) is (tables == 1)
+    assert "The windows in which the body rate is farthest off" in text
 
 
 def test_dry_run_writes_nothing(cpfls, config, flights, tmp_path):

@@ -233,6 +233,7 @@ def test_the_page_tells_how_to_repeat_it(cpfls, gap_config, of_vehicle, tmp_path
     page = tmp_path / "page.md"
     assert cpfls("report", gap_config, of_vehicle[1], "-o", page).exit_code == 0
     text = page.read_text()
+    assert text.startswith("# What a model predicts of flights\n")
     assert "yaml vehicle flight_4.csv flight_5.csv --horizon 0.5 --every 7 -o replay.h5" in text
 
 

@@ -24,6 +24,7 @@ from cpfls_cli.playback.replay import (
     player_of,
     replay,
     rotation_vectors,
+    where_better,
 )
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.rotations import euler_angles
@@ -214,6 +215,26 @@ def test_batches_do_not_show(monkeypatch):
     parts = replay([played(flight)], 20, 1)
     np.testing.assert_allclose(parts.errors["attitude"].mae, whole.errors["attitude"].mae, rtol=1e-12)
     np.testing.assert_array_equal(parts.windows.start, whole.windows.start)
+
+
+def test_a_model_is_better_where_it_was_played_along_what_it_flies():
+    """The rates of one flight are those of a body at rest, which nothing moves predicts to the end."""
+    moving, still = flight_of(samples=120, seed=1), flight_of(samples=120, seed=2)
+    model = VehicleModel(vehicle=VEHICLE)
+    start = np.array([0])
+    run = free_runs(player_of(model, moving), moving, start, 119).errors[0, :, 3]
+    flown = moving.motion.rate.copy()
+    flown[1:] += run
+    moving = replace(moving, motion=moving.motion._replace(rate=flown))
+    still = replace(still, motion=still.motion._replace(rate=np.zeros((120, 3))))
+    all_played = [played(moving), played(still)]
+    region = where_better(all_played, replay(all_played, 10, 1).windows)
+    assert 0.3 < region.share <= 0.5
+    sizes = np.linalg.norm(flown[:110], axis=1)
+    assert sizes.min() <= region.rate[0] < region.rate[1] <= sizes.max()
+    assert region.speed is not None
+    alone = [played(replace(moving, has_velocity=False))]
+    assert where_better(alone, replay(alone, 10, 1).windows).speed is None
 
 
 def test_a_signal_that_no_flight_knows_has_no_errors():

@@ -1,0 +1,66 @@
+"""The page of a vehicle found in flights: what it says, and draws, of what was learned."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, TradesGroup
+from cpfls_cli.config.study import Study
+from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.pages.source import Sources
+from cpfls_cli.pages.vehicle_model import answer, found_vehicle_section, remainder_curves, warnings
+from cpfls_cli.report.content import Plot, Table
+from tests.builders.forms import source_of_record
+from tests.builders.vehicle_models import record_of, remainder, whole
+
+NAMES = ("inertia.Ixx", "rotor_drag.k_d", "remainder.0_0_0", "remainder_force.3_0_0", "remainder_force.3_0_1")
+
+
+def found(model):
+    """A record that names learned numbers, which the flights hardly tell and which trade."""
+    record, count = record_of(model), len(NAMES)
+    numbers = {name: np.ones(count) for name in ("value", "low", "high", "stated")}
+    known = np.array([True, True, False, False, False])
+    group = FoundNumbersGroup(
+        name=NAMES, unit=("",) * count, determined=known, at_bound=np.zeros(count, dtype=bool), **numbers
+    )
+    pairs = (NAMES[3:5], (NAMES[1], NAMES[3]))
+    first, second = zip(*pairs, strict=True)
+    return replace(
+        record, found=group, trade=TradesGroup(first=first, second=second, correlation=np.array([0.99, -0.97]))
+    )
+
+
+def test_numbers_without_a_meaning_of_their_own_are_counted_and_not_listed():
+    tables = [block for block in answer(source_of_record(found(whole()))) if isinstance(block, Table)]
+    (table,) = [table for table in tables if table.name.startswith("vehicle-numbers")]
+    assert [row[0].text for row in table.cells] == ["rotor_drag.k_d"]
+    assert "3 more make the learned remainder" in table.caption
+
+
+def test_they_are_warned_of_only_where_they_stand_for_a_number_with_a_name():
+    said = " ".join(warnings(found(whole())))
+    assert "rotor_drag.k_d and remainder_force.3_0_0 trade" in said
+    assert "remainder_force.3_0_1" not in said
+    assert "not determined" not in said
+
+
+def test_the_curves_and_the_rotors_make_the_whole_wrench():
+    model, record = whole(), record_of(whole())
+    direction, learned, named = remainder_curves(record)
+    angle = np.radians(direction)
+    velocity = record.airspeed * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    rotor = np.zeros((len(angle), 1 + 4 * model.rotors))
+    rotor[:, 0], rotor[:, 1 : 1 + model.rotors] = 1.0, hover_speed(model.vehicle)
+    rotors = rotor @ model.part_weights()["rotors"][:, 0].T
+    assert learned + named + rotors == pytest.approx(model.wrench(velocity, 0 * velocity, rotor))
+    assert np.abs(learned).max() > 0
+
+
+@pytest.mark.parametrize(("rows", "panels"), [((0, 2), 3), ((5,), 3), ((1, 4), 6)])
+def test_torque_and_force_are_drawn_where_they_were_learned(rows, panels):
+    source = source_of_record(record_of(replace(whole(), remainder=remainder(2, rows=rows))))
+    section = found_vehicle_section(Sources([source], source.vehicle, Study().report))
+    (drawn,) = [block for block in section.blocks if isinstance(block, Plot) and "remainder" in block.name]
+    assert len(drawn.panels) == panels
