@@ -1,6 +1,6 @@
 """Print what models predict of the nano-drone benchmark's test flights, beside the models that are published.
 
-    python benchmarks/nanodrone.py DATA
+    python benchmarks/nanodrone.py DATA [--unknown]
 
 DATA is a clone of idsia-robotics/nanodrone-sysid-benchmark, branch model_export (commit ac439db), which has the raw
 flights; a folder that holds the files of `data/real/raw/parquets`, `data/real/processed/train`, `data/sim` and
@@ -10,7 +10,7 @@ the flat body: 3.2347e-5.
 
 From every sample of the flights melon 1, 4 and 5, models are played back over 50 steps of 10 ms by the measured rotor
 speeds of the sample before each step. Learned is on the flights square, multisine (which the benchmark calls chirp) and
-random alone.
+random alone; with --unknown from mass and geometry, inertia and factors of the rotors being guesses.
 
 "nothing moves" has to give 0.0796, 0.3588 and 0.8777 rad/s at h = 1, 10 and 50. The benchmark says 0.3596 and 0.8837,
 since its script lays the flights end to end and holds the last windows of a flight against the beginning of the next.
@@ -33,7 +33,7 @@ pin_threads()
 
 import numpy as np
 
-from benchmarks.shared.found_vehicles import learned
+from benchmarks.shared.found_vehicles import constants_unknown, learned
 from benchmarks.shared.nanodrone_files import STATED, TEST, TRAINING, VEHICLE, flights
 from benchmarks.shared.playback_scores import (
     SHOWN,
@@ -49,6 +49,7 @@ from benchmarks.shared.playback_scores import (
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 # Of position, velocity, attitude, body rate: h = 1, 10, 50, and the sum over h = 1 to 50. Printed by the notebook
 # results/model_comparison.ipynb of the benchmark's branch main (commit 2d921b5) and in arXiv 2512.14450.
@@ -92,18 +93,20 @@ COLUMNS = (
 )
 
 
-def models(training: Sequence[PlaybackFlight]) -> Mapping[str, VehicleModel]:
+def models(training: Sequence[PlaybackFlight], stated: VehicleSettings) -> Mapping[str, VehicleModel]:
     """Give the models that are played back, by name; those that learn see the training flights alone."""
-    return {"stated rigid body": VehicleModel(vehicle=STATED), **learned(VEHICLE, training)}
+    return {"stated rigid body": VehicleModel(vehicle=STATED), **learned(stated, training)}
 
 
-def our_rows(training: Sequence[PlaybackFlight], test: Sequence[PlaybackFlight]) -> list[list[object]]:
+def our_rows(
+    training: Sequence[PlaybackFlight], test: Sequence[PlaybackFlight], stated: VehicleSettings = VEHICLE
+) -> list[list[object]]:
     """Play the baselines and the models back on the test flights, counted within flights and as published."""
     rows = [
         *rows_of("nothing moves", test, [nothing_moves(flight) for flight in test]),
         *rows_of("rate stays", test, [rate_stays(flight) for flight in test]),
     ]
-    for name, model in models(training).items():
+    for name, model in models(training, stated).items():
         rows += rows_of(name, test, [free_runs(model, flight) for flight in test])
     return rows
 
@@ -125,7 +128,9 @@ def by_signal(mae: np.ndarray) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of the benchmark's files")
-    folder = parser.parse_args().data
+    parser.add_argument("--unknown", action="store_true", help="learn from mass and geometry alone")
+    given = parser.parse_args()
+    folder, stated = given.data, constants_unknown(VEHICLE) if given.unknown else VEHICLE
     start = perf_counter()
     try:
         training, test = flights(folder, TRAINING), flights(folder, TEST)
@@ -135,7 +140,8 @@ def main() -> None:
         )
     print(f"{len(training)} training flights, {len(test)} test flights read in {perf_counter() - start:.1f} s\n")
     published = [[name, *np.ravel(values), 19347, ""] for name, values in PUBLISHED.items()]
-    table("nanodrone", COLUMNS, [*published, *our_rows(training, test)], digits=4)
+    name = "nanodrone_unknown" if given.unknown else "nanodrone"
+    table(name, COLUMNS, [*published, *our_rows(training, test, stated)], digits=4)
 
 
 if __name__ == "__main__":

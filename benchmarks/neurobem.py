@@ -1,6 +1,6 @@
 """Print what models predict of six fast flights of NeuroBEM, each held out once, beside BEM+NN.
 
-    python benchmarks/neurobem.py DATA
+    python benchmarks/neurobem.py DATA [--unknown]
 
 DATA is a clone of RCL-NUS/NeuroMHE (commit 64e184c), or any folder with its files bemnn*.mat in it or below it. They
 hold test segments of NeuroBEM (Bauersfeld et al. 2021) with the torques and forces that its model BEM+NN gives.
@@ -29,13 +29,14 @@ pin_threads()
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.shared.found_vehicles import learned
+from benchmarks.shared.found_vehicles import constants_unknown, learned
 from benchmarks.shared.neurobem_files import INERTIA, MASS, VEHICLE, Segment, segments
 from benchmarks.shared.playback_scores import HORIZON, Runs, free_runs, nothing_moves, rate_stays, score
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 COLUMNS = (
     *("held out", "model", "ω sum", "of rate stays", "R sum", "v sum", "p sum", "windows", "diverged"),
@@ -45,12 +46,14 @@ COLUMNS = (
 UNKNOWN = ("",) * 6
 
 
-def models(training: Sequence[PlaybackFlight]) -> Mapping[str, VehicleModel]:
+def models(training: Sequence[PlaybackFlight], stated: VehicleSettings) -> Mapping[str, VehicleModel]:
     """Give the models that are played back, by name; those that learn see the training segments alone."""
-    return {"stated rigid body": VehicleModel(vehicle=VEHICLE), **learned(VEHICLE, training, baselines=False)}
+    return {"stated rigid body": VehicleModel(vehicle=VEHICLE), **learned(stated, training, baselines=False)}
 
 
-def our_rows(training: Sequence[PlaybackFlight], test: Segment) -> list[list[object]]:
+def our_rows(
+    training: Sequence[PlaybackFlight], test: Segment, stated: VehicleSettings = VEHICLE
+) -> list[list[object]]:
     """Play the baselines, BEM+NN and the models back on the segment that is held out."""
     flight = test.flight
     stays = rate_stays(flight)
@@ -60,7 +63,7 @@ def our_rows(training: Sequence[PlaybackFlight], test: Segment) -> list[list[obj
         row("rate stays", test, stays, reference, None),
         row("BEM+NN along the path", test, along_the_path(test), reference, test.hybrid),
     ]
-    for name, model in models(training).items():
+    for name, model in models(training, stated).items():
         rows.append(row(name, test, free_runs(model, flight), reference, wrench_of(model, flight)))
     return rows
 
@@ -108,14 +111,17 @@ def wrench_of(model: VehicleModel, flight: PlaybackFlight) -> Array:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of the segments")
+    parser.add_argument("--unknown", action="store_true", help="learn from mass and geometry alone")
+    given = parser.parse_args()
+    stated = constants_unknown(VEHICLE) if given.unknown else VEHICLE
     try:
-        found = segments(parser.parse_args().data)
+        found = segments(given.data)
     except InputError as error:
         sys.exit(f"{error}\nget them: git clone https://github.com/RCL-NUS/NeuroMHE")
     rows = []
     for test in found:
-        rows += our_rows([other.flight for other in found if other is not test], test)
-    table("neurobem", COLUMNS, rows)
+        rows += our_rows([other.flight for other in found if other is not test], test, stated)
+    table("neurobem_unknown" if given.unknown else "neurobem", COLUMNS, rows)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
+from cpfls_cli.config.load import validate
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -16,6 +17,19 @@ from cpfls_cli.playback.vehicle import find_vehicle
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 SEED = 1
+
+
+def constants_unknown(vehicle: VehicleSettings) -> VehicleSettings:
+    """Keep mass and geometry, as of a vehicle of which nobody knows the rest."""
+    open_ = {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+    data = {
+        "mass_kg": vehicle.mass_kg,
+        "gravity_m_s2": vehicle.gravity_m_s2,
+        "inertia_kg_m2": None,
+        "rotor_speed_max_rad_s": vehicle.rotor_speed_max_rad_s,
+        "rotors": [{"position_m": list(each.position_m), "spin": each.spin, **open_} for each in vehicle.rotors],
+    }
+    return validate({"vehicle": data}, "a vehicle of mass and geometry").vehicle
 
 
 def learned(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
@@ -157,18 +157,28 @@ class _Bench:
     kept: Kept
     known: dict[Structure, Judged] = field(default_factory=dict)
 
-    def judge(self, structure: Structure) -> Judged:
+    def judge(self, structure: Structure, first: VehicleSettings | None = None) -> Judged:
+        """Fit and judge a structure; fitted to another vehicle first, where one is given."""
         if structure not in self.known:
             kept = self.kept.get(structure)
-            self.known[structure] = self._judged(structure, self._fits(structure) if kept is None else kept)
+            self.known[structure] = self._judged(structure, self._fits(structure, first) if kept is None else kept)
             if kept is None:
                 self.progress(tuple(self.known.values()), max(self.expected, len(self.known)))
         return self.known[structure]
 
-    def _fits(self, structure: Structure) -> list[Solution]:
+    def _fits(self, structure: Structure, first: VehicleSettings | None) -> list[Solution]:
         near = self._nearest(structure)
+
+        def fitted(part: int) -> Solution:
+            known = self._known(structure, part, near)
+            if first is not None:
+                layout = structure.layout(first)
+                known |= layout.named(self._fit(layout, part, known).values)
+            found = self._fit(structure.layout(self.vehicle), part, known)
+            return Solution(found.values, found.loss, found.hessian)
+
         with ThreadPoolExecutor(2) as threads:
-            return list(threads.map(lambda part: self._fit(structure, part, near), range(len(self.parts))))
+            return list(threads.map(fitted, range(len(self.parts))))
 
     def _nearest(self, structure: Structure) -> Judged | None:
         """Find the known structure that differs in the fewest blocks; the better one of two."""
@@ -181,15 +191,18 @@ class _Bench:
 
         return min(self.known.values(), key=away, default=None)
 
-    def _fit(self, structure: Structure, part: int, near: Judged | None) -> Solution:
+    def _known(self, structure: Structure, part: int, near: Judged | None) -> dict[str, float]:
+        """Give the values that a fit starts from."""
+        if near is None:
+            return {}
+        known = near.fits[part].layout.named(near.fits[part].values)
+        if near.structure.rules != structure.rules:
+            known = {name: value for name, value in known.items() if name.split(".")[0] not in LEARNED}
+        return known
+
+    def _fit(self, layout: Layout, part: int, known: Mapping[str, float]) -> Fitted:
         training = [windows for other, kept in enumerate(self.parts) if other != part for windows in kept]
-        known = {}
-        if near is not None:
-            known = near.fits[part].layout.named(near.fits[part].values)
-            if near.structure.rules != structure.rules:
-                known = {name: value for name, value in known.items() if name.split(".")[0] not in LEARNED}
-        fitted = fit(structure.layout(self.vehicle), training, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
-        return Solution(fitted.values, fitted.loss, fitted.hessian)
+        return fit(layout, training, known, _SEARCH_STEPS, _SEARCH_TOLERANCE)
 
     def _judged(self, structure: Structure, solutions: Sequence[Solution]) -> Judged:
         layout = structure.layout(self.vehicle)
@@ -246,10 +259,12 @@ def choose(
     expected = 3 * len(blocks) + settings.population * (1 + settings.generations) // 2
     bench = _Bench(vehicle, parts, progress, expected, kept)
     nothing = bench.judge(Structure(()))
-    # All blocks on the stated body first: a body that is free from the beginning is made so heavy that no torque that
-    # is not explained yet moves it, and then no explanation is worth anything.
-    bench.judge(Structure(tuple(block for block in blocks if block != INERTIA)))
-    everything = bench.judge(Structure(blocks))
+    # All blocks on the stated body first, or on a guessed one: a body that is free from the beginning is made so heavy
+    # that no torque that is not explained yet moves it, and then no explanation is worth anything.
+    if INERTIA in blocks:
+        bench.judge(Structure(tuple(block for block in blocks if block != INERTIA)))
+    guessed = replace(vehicle, unknown=tuple(name for name in vehicle.unknown if name != INERTIA))
+    everything = bench.judge(Structure(blocks), guessed if INERTIA in vehicle.unknown else None)
     path, complete = [nothing], True
     try:
         shrunk = [bench.judge(structure) for structure in _shrinking(everything)]
