@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from difflib import get_close_matches
 from typing import Literal
 
@@ -15,7 +15,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.repair import unwrap_angles
-from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import ColumnMap, ImportSettings, SignalMap
 from cpfls_cli.units import to_si
 
 _SUFFICIENT_SIGNALS = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
@@ -29,6 +29,16 @@ BodyFrame = Literal["FLU", "FRD"]
 WorldFrame = Literal["ENU", "NED"]
 _BODY = {"FLU": np.eye(3), "FRD": np.diag([1.0, -1.0, -1.0])}
 _WORLD = {"ENU": np.eye(3), "NED": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])}
+
+
+def present_choices(columns: Container[str], settings: ImportSettings) -> ImportSettings:
+    """Take for each signal the first of its maps whose columns the log holds; a signal without one stays as it is."""
+    signals = {}
+    for name, signal in settings.signals.items():
+        present = [choice for choice in signal.choices if all(column in columns for column in choice.columns)]
+        values = {each.name: getattr(present[0], each.name) for each in fields(ColumnMap)} if present else {}
+        signals[name] = replace(signal, **values, otherwise=()) if present else signal
+    return replace(settings, signals=signals)
 
 
 def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> ImportSettings:
@@ -96,7 +106,8 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
         and the nearest columns of the log.
     """
     _require_present(columns, settings)
-    time: Array = to_si(np.asarray(columns[settings.time_column], dtype=float), settings.time_unit)
+    stamps = columns[str(settings.time_column)]
+    time: Array = to_si(np.asarray(stamps, dtype=float), settings.time_unit)
     signals: dict[str, Array] = {name: _in_si(columns, signal) for name, signal in settings.signals.items()}
     for name, values in signals.items():
         if len(values) != len(time):
@@ -117,7 +128,7 @@ def _in_si(columns: Mapping[str, Array], signal: SignalMap) -> Array:
 def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> None:
     if not settings.signals:
         raise InputError("import.signals: no signal is mapped to columns of the log")
-    wanted = [("import.time_column", settings.time_column)]
+    wanted = [("import.time_column", str(settings.time_column))]
     wanted += [
         (f"import.signals.{name}.columns", column)
         for name, signal in settings.signals.items()
@@ -126,7 +137,7 @@ def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> 
     hints = [(key, name, _hint(name, columns)) for key, name in wanted if name not in columns]
     missing = [f"{key}: the log has no column {name!r}{hint}" for key, name, hint in hints]
     if not all(hint for _, _, hint in hints):
-        missing.append(f"import.signals: {_columns_in_words(columns)}")
+        missing.append(f"import.signals: {columns_in_words(columns)}")
     if missing:
         raise InputError("\n".join(missing))
 
@@ -146,14 +157,14 @@ def _hint(name: str, columns: Mapping[str, Array]) -> str:
     return f" (nearest: {shown})" if nearest else ""
 
 
-def _columns_in_words(columns: Mapping[str, Array]) -> str:
+def columns_in_words(columns: Mapping[str, Array]) -> str:
     """Say once what the log holds; of a log of topics, which has hundreds of columns, its topics."""
     of_topics = all("." in column for column in columns)
     names = sorted({column.partition(".")[0] for column in columns}) if of_topics else list(columns)
     more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
     what = "topics" if of_topics else "columns"
     return (
-        f"the log has the {what} {', '.join(names[:_MOST_LISTED])}{more}; `cpfls init LOG` proposes what maps to what"
+        f"the log has the {what} {', '.join(names[:_MOST_LISTED]) or 'none'}{more}; `cpfls init LOG` proposes what maps to what"
     )
 
 

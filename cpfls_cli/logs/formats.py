@@ -1,13 +1,14 @@
 """The formats of flight logs: one table, and all that names a format follows from it.
 
-A new format is one reader, a module with a function ``read(path, settings)``, and one row of `LOG_FORMATS`. The
+A new format is one reader, a module with a function ``contents(path, wanted)``, and one row of `LOG_FORMATS`. The
 command line lists the formats in its help, so nothing heavy is imported here: a reader, and the package it needs, is
 loaded when the first file of its format is read.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,18 +24,48 @@ _LONGEST_LINE = 16384
 
 
 @dataclass(frozen=True)
+class LogContents:
+    """What a log holds.
+
+    Attributes
+    ----------
+    topics : dict from topic to dict from field to array, shape (sample,)
+        The fields that were wanted; others may be there by name only, as empty arrays, so that a message can suggest
+        them. A topic has its stamps in the field ``timestamp``, in s from the beginning of the log. A flat log, whose
+        columns share one clock, is one topic with an empty name.
+    units : dict from column to str
+        Units that the log itself states, by ``topic.field``, in a flat log by column. Stamps that have one are in s.
+    parameters : dict from str to float or str
+        What the log knows of the vehicle: parameters of the autopilot, lines of a header.
+    system : str
+        What wrote the log and its version, such as ``PX4 1.14.0``; empty where that is not known.
+    warnings : tuple of str
+        Faults of the file as a whole.
+    """
+
+    topics: dict[str, dict[str, Array]]
+    units: dict[str, str] = field(default_factory=dict)
+    parameters: dict[str, float | str] = field(default_factory=dict)
+    system: str = ""
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class LogColumns:
-    """Columns of a log.
+    """Columns of a log that a config maps, all on one clock.
 
     Attributes
     ----------
     columns : dict from str to array, shape (sample,)
-        Those that the config maps; the others by name only, as empty arrays, so that a message can suggest them.
+        The mapped ones; the others by name only, as empty arrays, so that a message can suggest them.
+    settings : ImportSettings
+        The section `import` as it suits the log: of columns that stand in for each other, those that the log has.
     warnings : tuple of str
         Faults of the file as a whole.
     """
 
     columns: dict[str, Array]
+    settings: ImportSettings
     warnings: tuple[str, ...] = ()
 
 
@@ -53,7 +84,7 @@ class LogFormat:
     magic : bytes
         First bytes of every such file; none for text, which begins with a line of column names.
     reader : str
-        Module with ``read(path, settings)``, which returns `LogColumns`.
+        Module with ``contents(path, wanted)``, which returns `LogContents`.
     packages : tuple of str
         Modules of the optional package that the reader needs.
     extra : str
@@ -120,13 +151,14 @@ def is_log(path: Path) -> bool:
     return _format_of(path) is not None
 
 
-def read_log(path: Path, settings: ImportSettings) -> LogColumns:
-    """Read the columns of a log that a config maps.
+def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
+    """Read a log.
 
     Parameters
     ----------
-    settings : ImportSettings
-        The section `import`.
+    wanted : collection of str, optional
+        Columns of a flat log, or ``topic.field``, that are read as numbers; all without it, where columns that hold no
+        numbers are left out.
 
     Raises
     ------
@@ -140,8 +172,30 @@ def read_log(path: Path, settings: ImportSettings) -> LogColumns:
         raise InputError(f"{path}: not a log: its name must end in one of {suffixes}")
     _refuse_other_content(path, form)
     _require_packages(path, form)
-    columns: LogColumns = import_module(form.reader).read(path, settings)
-    return columns
+    contents: LogContents = import_module(form.reader).contents(path, wanted)
+    return contents
+
+
+def read_log(path: Path, settings: ImportSettings) -> LogColumns:
+    """Read the columns of a log that a config maps, on one clock.
+
+    Parameters
+    ----------
+    settings : ImportSettings
+        The section `import`.
+
+    Raises
+    ------
+    InputError
+        As `log_contents`; or if `time_column` names no stamps, or a topic is too slow.
+    """
+    on_one_clock = import_module("cpfls_cli.flightlog.topics").on_one_clock
+    contents = log_contents(path, settings.mapped_columns)
+    try:
+        columns, chosen, warnings = on_one_clock(contents.topics, contents.units, settings)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return LogColumns(columns, chosen, (*contents.warnings, *warnings))
 
 
 def _format_of(path: Path) -> LogFormat | None:

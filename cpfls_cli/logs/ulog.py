@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Sequence
+from collections.abc import Collection
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -14,82 +14,70 @@ import pyulog
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.settings import ImportSettings
-from cpfls_cli.flightlog.topics import STAMP, on_one_clock, topic_and_field
-from cpfls_cli.logs.formats import ULOG_MAGIC, LogColumns
-from cpfls_cli.units import known_unit
+from cpfls_cli.flightlog.topics import STAMP
+from cpfls_cli.logs.formats import ULOG_MAGIC, LogContents
 
 _MICROSECOND = 1e-6
 
 
-def read(path: Path, settings: ImportSettings) -> LogColumns:
-    """Read the mapped columns, ``topic.field`` or ``topic[instance].field``, on the clock of one topic.
+def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
+    """Read all topics, ``topic`` or ``topic[instance]``.
 
-    Warnings name dropouts of the logger, a broken file and topics that are thinned.
+    Warnings name dropouts of the logger and a broken file.
 
     Parameters
     ----------
-    settings : ImportSettings
-        `time_column` names the stamps that are the clock; stamps are converted to `time_unit`.
+    wanted : collection of str, optional
+        Not needed: the file is read as a whole, and a part of it takes no less time.
 
     Raises
     ------
     InputError
-        If the file is no ULog, or `time_column` names no stamps.
+        If the file is no ULog.
     """
-    log, topics = _read(path, settings)
-    base, stamp = topic_and_field(settings.time_column)
-    if stamp not in topics.get(base, {}):
-        raise InputError(
-            f"{path}: import.time_column = {settings.time_column!r}: in a .ulg every topic has stamps; name those of"
-            " the fastest one that is mapped, such as vehicle_angular_velocity.timestamp (topics:"
-            f" {', '.join(sorted(topics)) or 'none'})"
-        )
-    origin = int(topics[base][stamp][0])
-    try:
-        columns, warnings = on_one_clock(_in_seconds(topics, origin), settings)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    columns[settings.time_column] = columns[settings.time_column] / known_unit(settings.time_unit).factor
-    return LogColumns(columns, (*_warn_of_file(log, origin), *warnings))
+    del wanted
+    log = _parsed(path)
+    origin = int(log.start_timestamp)
+    topics = {
+        f"{data.name}[{data.multi_id}]" if data.multi_id else data.name: {
+            field: _field(field, values, origin) for field, values in data.data.items()
+        }
+        for data in log.data_list
+    }
+    return LogContents(topics, {}, _parameters(log), _system(log), _warn_of_file(log, origin))
 
 
-def _read(path: Path, settings: ImportSettings) -> tuple[Any, dict[str, dict[str, Any]]]:
-    """Read the mapped topics, or all topics where a mapped field is missing, so that a message can list them."""
-    wanted = [topic_and_field(column) for column in settings.mapped_columns]
-    log = _parsed(path, sorted({topic.partition("[")[0] for topic, _ in wanted}))
-    if not all(field in _topics(log).get(topic, {}) for topic, field in wanted):
-        log = _parsed(path, None)
-    return log, _topics(log)
-
-
-def _parsed(path: Path, topics: Sequence[str] | None) -> Any:
+def _parsed(path: Path) -> Any:
     try:
         # The reader prints what it finds wrong, which is asked for below, and leaves a file that it cannot read open.
         with path.open("rb") as stream, redirect_stdout(io.StringIO()):
             if stream.read(len(ULOG_MAGIC)) != ULOG_MAGIC:
                 raise InputError(f"{path}: not a ULog file: it does not begin as one")
             stream.seek(0)
-            return pyulog.ULog(stream, None if topics is None else list(topics))
+            return pyulog.ULog(stream)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
     except (pyulog.core.ULogException, struct.error, ValueError, KeyError, IndexError, TypeError) as error:
         raise InputError(f"{path}: a broken ULog file: {error}") from None
 
 
-def _topics(log: Any) -> dict[str, dict[str, Any]]:
-    return {f"{data.name}[{data.multi_id}]" if data.multi_id else data.name: data.data for data in log.data_list}
+def _parameters(log: Any) -> dict[str, float | str]:
+    """Give the parameters as the log begins."""
+    return {name: float(value) for name, value in log.initial_parameters.items()}
 
 
-def _in_seconds(topics: dict[str, dict[str, Any]], origin: int) -> dict[str, dict[str, Array]]:
-    """Convert stamps to seconds from the origin; the difference of whole numbers is exact."""
-    return {
-        topic: {field: _field(field, values, origin) for field, values in fields.items()}
-        for topic, fields in topics.items()
-    }
+def _system(log: Any) -> str:
+    name = str(log.msg_info_dict.get("sys_name", ""))
+    try:
+        version = str(log.get_version_info_str() or "")
+    except (TypeError, ValueError, IndexError):
+        # What it says of its version is no number.
+        version = ""
+    return " ".join(part for part in (name, version.removeprefix("v")) if part)
 
 
 def _field(field: str, values: Any, origin: int) -> Array:
+    """Convert stamps to seconds from the origin; the difference of whole numbers is exact."""
     if field.startswith(STAMP):
         return np.asarray((values.astype(np.int64) - origin) * _MICROSECOND, dtype=float)
     return np.asarray(values, dtype=float)

@@ -15,17 +15,17 @@ NAMES = ("t", "roll", "pitch", "yaw", "mx", "my", "mz")
 MAGIC = b"FAKE\x00"
 
 
-def read(path, settings):
+def contents(path, wanted):
     """Columns one after the other, eight bytes a number."""
     values = np.frombuffer(path.read_bytes()[len(MAGIC) :]).reshape(len(NAMES), -1)
     columns = dict(zip(NAMES, values, strict=True))
-    assert set(settings.mapped_columns) == set(columns)
-    return formats.LogColumns(columns, ("the logger was tired",))
+    assert set(wanted) == set(columns)
+    return formats.LogContents({"": columns}, warnings=("the logger was tired",))
 
 
 @pytest.fixture
 def fake_format(monkeypatch):
-    monkeypatch.setitem(sys.modules, "fake_reader", SimpleNamespace(read=read))
+    monkeypatch.setitem(sys.modules, "fake_reader", SimpleNamespace(contents=contents))
     row = formats.LogFormat(suffix=".fake", name="Fake", content="fakes", magic=MAGIC, reader="fake_reader")
     monkeypatch.setattr(formats, "LOG_FORMATS", (*formats.LOG_FORMATS, row))
 

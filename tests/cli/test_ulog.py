@@ -1,4 +1,4 @@
-"""Logs in ULog, written here byte by byte from the public description of the format, and files that are none."""
+"""Logs in ULog, and files that are none."""
 
 import json
 import struct
@@ -12,6 +12,8 @@ import pytest
 from cpfls_cli.config.load import load_study
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.rotations import rotation_matrix
+from tests.builders import ulogs
+from tests.builders.ulogs import data, definitions, header, message
 
 EXAMPLE = Path(__file__).parents[2] / "configs" / "px4.yaml"
 
@@ -37,25 +39,7 @@ FIELDS = {
     RATE: "uint64_t timestamp;float[3] xyz",
     TORQUE: "uint64_t timestamp;float[3] xyz",
 }
-BEGIN = 3_600_000_000
 ROLL_RATE, YAW_RATE, NORTH = 0.0, 2.0, 0.3
-
-
-def message(kind, content):
-    return struct.pack("<HB", len(content), ord(kind)) + content
-
-
-def header():
-    return b"ULog\x01\x12\x35\x01" + struct.pack("<Q", BEGIN)
-
-
-def definitions(fields=FIELDS):
-    formats = [message("F", f"{name}:{own};".encode()) for name, own in fields.items()]
-    added = [
-        message("A", struct.pack("<BH", instance, number) + name.encode())
-        for number, (name, instance) in enumerate((name, 0) for name in fields)
-    ]
-    return b"".join([message("B", bytes(40)), *formats, *added])
 
 
 def rows():
@@ -76,12 +60,8 @@ def rows():
     return sorted(sent, key=lambda row: row[:2])
 
 
-def data(stamp, number, values):
-    return message("D", struct.pack("<HQ", number, BEGIN + stamp) + np.asarray(values, "<f4").tobytes())
-
-
 def ulog(sent=None, fields=FIELDS):
-    return header() + definitions(fields) + b"".join(data(*row) for row in (rows() if sent is None else sent))
+    return ulogs.ulog(rows() if sent is None else sent, fields)
 
 
 @pytest.fixture
@@ -151,10 +131,9 @@ def test_dropouts_of_the_logger_are_warned_of(flown):
     cut = next(place for place, row in enumerate(sent) if row[0] > 1_000_000)
     begin, end = (b"".join(data(*row) for row in part) for part in (sent[:cut], sent[cut:]))
     dropouts = message("O", struct.pack("<H", 40)) + message("O", struct.pack("<H", 120))
-    # The clock begins with the first stamp of the body rates, 1 ms after the log.
-    _, _, stderr = flown(header() + definitions() + begin + dropouts + end)
+    _, _, stderr = flown(header() + definitions(FIELDS) + begin + dropouts + end)
     words = " ".join(stderr.split())
-    assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 0.999 s" in words
+    assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 1.000 s" in words
 
 
 def test_a_pause_of_one_topic_is_a_gap(wrong):
@@ -209,9 +188,9 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(wrong, config):
 def test_a_clock_that_is_none_is_told_what_one_is(wrong, column):
     (line,) = wrong(ulog(), "--set", f"import.time_column={column}")
     assert line == (
-        f"LOG: import.time_column = {column!r}: in a .ulg every topic has stamps; name those of the fastest one that is"
-        " mapped, such as vehicle_angular_velocity.timestamp (topics: vehicle_angular_velocity, vehicle_attitude,"
-        " vehicle_torque_setpoint)"
+        f"LOG: import.time_column = {column!r}: in this log every topic has stamps; name those of the fastest one that"
+        " is mapped, such as vehicle_angular_velocity.timestamp, or null for them (topics: vehicle_angular_velocity,"
+        " vehicle_attitude, vehicle_torque_setpoint)"
     )
 
 
@@ -229,8 +208,8 @@ def test_a_slow_topic_is_named(wrong):
         (b"", "LOG: not a ULog file: it does not begin as one"),
         (b"t,roll\n0,1\n", "LOG: seems to hold CSV, not what its name ends in; rename it to end in .csv"),
         (header()[:10], "LOG: a broken ULog file: "),
-        (header(), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in a .ulg"),
-        (header() + definitions(), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in a .ulg"),
+        (header(), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in this log"),
+        (header() + definitions(FIELDS), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in this log"),
         (header() + message("B", bytes(8) + b"\x80" + bytes(31)), "LOG: a broken ULog file: "),
     ],
     ids=["empty", "text", "header-cut", "header-only", "no-data", "unknown-flag"],

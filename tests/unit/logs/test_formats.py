@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[3]
 def test_each_row_has_a_reader_and_an_extra_that_installs_its_package():
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     for form in LOG_FORMATS:
-        assert callable(import_module(form.reader).read)
+        assert callable(import_module(form.reader).contents)
         installed = [requirement.partition(">")[0] for requirement in extras.get(form.extra, ())]
         assert {module.partition(".")[0] for module in form.packages} == set(installed)
 
