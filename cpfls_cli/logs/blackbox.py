@@ -41,13 +41,15 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         raise InputError(f"{path}: not a blackbox log: it does not begin as one")
     try:
         flights = [_flight(content[begin:end]) for begin, end in zip(begins, [*begins[1:], None], strict=True)]
-    except (ValueError, KeyError, struct.error) as error:
+        longest = max(range(len(flights)), key=lambda number: len(flights[number][1]))
+        header, rows, broken = flights[longest]
+        columns, units = _columns(header, rows)
+    except KeyError as error:
+        raise InputError(f"{path}: a broken blackbox log: its header: the line {error} is missing") from None
+    except (ValueError, OverflowError) as error:
         raise InputError(f"{path}: a broken blackbox log: its header: {error}") from None
-    longest = max(range(len(flights)), key=lambda number: len(flights[number][1]))
-    header, rows, broken = flights[longest]
     if len(rows) < 2:
         raise InputError(f"{path}: a blackbox log without frames that can be read")
-    columns, units = _columns(header, rows)
     several = f"holds {len(begins)} flights; the longest, number {longest + 1}, is read: {columns['time'][-1]:.0f} s"
     lost = f"{broken} frames are broken; what follows up to the next whole one is missing"
     warnings = (*((several,) if len(begins) > 1 else ()), *((lost,) if broken else ()))
@@ -111,19 +113,20 @@ def _fields(header: Mapping[str, str]) -> Fields:
 def _columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
     """Name the columns, and give those whose unit the header tells in that unit."""
     names = _names(header)
-    stamps = rows[:, 1] + ROLLOVER * np.concatenate([[0], np.cumsum(np.diff(rows[:, 1]) < 0)])
+    stamps = rows[:, 1] + ROLLOVER * np.cumsum(np.diff(rows[:, 1], prepend=rows[:1, 1]) < 0)
     # The number of a frame follows from which frames are left out, which nothing here needs.
     columns = {name: rows[:, place].astype(float) for place, name in enumerate(names) if name != "loopIteration"}
-    columns["time"] = 1e-6 * (stamps - stamps[0])
+    columns["time"] = 1e-6 * (stamps - stamps[:1])
     units = {"time": "s"}
     for name, (prefix, factor, unit) in ((name, each) for name in names for each in _scales(header)):
         if name.startswith(prefix):
             columns[name] = factor * columns[name]
             units[name] = unit
-    turns = {name: f"rpm{name.removeprefix('eRPM')}" for name in names if name.startswith("eRPM[")}
-    return {turns.get(name, name): values for name, values in columns.items()}, {
-        turns.get(name, name): unit for name, unit in units.items()
-    }
+    for name in [name for name in units if name.startswith("eRPM[")]:
+        # The name would be a lie now.
+        turned = f"rpm{name.removeprefix('eRPM')}"
+        columns[turned], units[turned] = columns.pop(name), units.pop(name)
+    return columns, units
 
 
 def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:

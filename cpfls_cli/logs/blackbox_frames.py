@@ -33,7 +33,7 @@ _LONGEST_STEP_US = 10_000_000
 _END = np.frombuffer(b"End of log", dtype=np.uint8)
 _LOG_END, _RESUMED, _ADJUSTED = 255, 14, 13
 # Numbers of variable length, or bytes, that follow the kind of an event.
-_VARIABLE_EVENTS = ((0, 1), (15, 1), (30, 2), (40, 1))
+_VARIABLE_EVENTS = ((0, 1), (_RESUMED, 2), (15, 1), (30, 2), (40, 1))
 _FIXED_EVENTS = ((10, 5), (11, 4), (12, 8))
 
 
@@ -229,9 +229,6 @@ def _event(data: Bytes, place: int) -> tuple[int, int]:
             if _byte(data, place + number) != _END[number]:
                 return -1, place
         return kind, place + len(_END)
-    if kind == _RESUMED:
-        _, place = _unsigned(data, place)
-        return kind, place
     if kind == _ADJUSTED:
         if _byte(data, place) >= 128:
             return kind, place + 5
@@ -282,7 +279,7 @@ def decode(data: Bytes, place: int, fields: Fields, constants: IntArray, rows: I
     row = np.zeros(fields.encoding.shape[1], dtype=np.int64)
     before = np.zeros((2, len(row)), dtype=np.int64)
     values = np.zeros(8, dtype=np.int64)
-    number, broken, in_step, resumed = 0, 0, False, True
+    number, broken, last, in_step, resumed = 0, 0, np.int64(0), False, True
     while place < len(data):
         kind = _kind(data[place])
         event = -1
@@ -303,7 +300,9 @@ def decode(data: Bytes, place: int, fields: Fields, constants: IntArray, rows: I
         resumed = resumed or event == _RESUMED
         if kind != MAIN and (kind != _BETWEEN or not in_step):
             continue
-        step = (row[_TIME] - before[0, _TIME]) & (ROLLOVER - 1)
+        step = (row[_TIME] - last) & (ROLLOVER - 1)
+        if kind == MAIN or step <= _LONGEST_STEP_US:
+            last = row[_TIME]
         if step > _LONGEST_STEP_US and not resumed:
             broken += 1 if in_step else 0
             in_step = False
