@@ -4,12 +4,14 @@ import json
 import sys
 from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 
 from cpfls_cli.config.load import load_study
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.logs import formats
+from tests.builders.ros_bags import BEGIN_NS, imu, write_bag
 
 NAMES = ("t", "roll", "pitch", "yaw", "mx", "my", "mz")
 MAGIC = b"FAKE\x00"
@@ -78,3 +80,48 @@ def test_a_package_of_a_new_format_that_is_missing_is_named(refuse, log_study, t
     log = write(tmp_path / "log.fake")
     (line,) = refuse("import", log_study, log, "-o", tmp_path / "flight.h5")
     assert line == f'{log}: reading .fake needs the package no_such; pip install "cpfls[fake]"'
+
+
+def test_a_flight_from_hdf5_with_stamps_in_milliseconds(cpfls, tmp_path):
+    time = 0.02 * np.arange(200)
+    waves = np.sin(np.outer(time, [2, 3, 4, 5, 6, 7]))
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["t"] = 1e3 * time
+        file["t"].attrs["units"] = "ms"
+        file["pose"], file["moment"] = 0.2 * waves[:, :3], waves[:, 3:]
+    (tmp_path / "study.yaml").write_text(
+        "import:\n  time_column: t\n  signals:\n"
+        '    attitude: {columns: ["pose[0]", "pose[1]", "pose[2]"], unit: rad}\n'
+        '    body_torque: {columns: ["moment[0]", "moment[1]", "moment[2]"], unit: N m}\n'
+    )
+    result = cpfls("import", tmp_path / "study.yaml", tmp_path / "log.h5", "-o", tmp_path / "flight.h5", "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["log_rate_hz"] == pytest.approx(50)
+    (refused,) = [cpfls("import", tmp_path / "study.yaml", tmp_path / "flight.h5", "-o", tmp_path / "other.h5")]
+    assert refused.exit_code == 2
+    assert "flight.h5: is an artifact of this program (cpfls/flight), not a log" in " ".join(refused.stderr.split())
+
+
+@pytest.mark.parametrize("kind", [".db3", ".mcap"])
+def test_a_bag_is_imported_on_the_clock_of_its_fastest_topic(kind, cpfls, tmp_path):
+    sent = [
+        (
+            f"/{name}",
+            BEGIN_NS + 10_000_000 * number,
+            imu(BEGIN_NS + 10_000_000 * number, (number % 7, 1.0, 2.0), (0, 0, 9.81)),
+        )
+        for number in range(60)
+        for name in (["imu", "slow"] if number % 2 else ["imu"])
+    ]
+    bag = write_bag(tmp_path / "bag", kind, sent)
+    columns = ", ".join(f"/imu.angular_velocity.{axis}" for axis in "xyz")
+    torque = ", ".join(f"/slow.angular_velocity.{axis}" for axis in "xyz")
+    (tmp_path / "study.yaml").write_text(
+        "import:\n  time_column: null\n  signals:\n"
+        f"    body_rate: {{columns: [{columns}], unit: rad/s}}\n    body_torque: {{columns: [{torque}], unit: N m}}\n"
+        '    quaternion: {columns: ["/imu.orientation.w", "/imu.orientation.x", "/imu.orientation.y",'
+        ' "/imu.orientation.z"], unit: "1"}\n'
+    )
+    result = cpfls("import", tmp_path / "study.yaml", bag, "-o", tmp_path / "flight.h5", "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["log_rate_hz"] == pytest.approx(100)
