@@ -25,6 +25,13 @@ _ROTOR_SIGNALS = ("rotor_speed", "rotor_command")
 _SCALAR_SIGNALS = ("thrust", "voltage")
 _MOST_NEAREST, _MOST_LISTED = 3, 20
 _ALIKE, _ALIKE_SHORT, _SHORT_NAME = 0.5, 0.7, 2
+# Names that are far apart, so that the nearest one would mislead: of actuator_motors it is actuator_controls, which is
+# what mixers get and no command of a rotor.
+_SAME_IN_PX4 = (
+    ("actuator_motors.control", "actuator_outputs.output"),
+    ("vehicle_angular_velocity.xyz", "sensor_combined.gyro_rad"),
+    ("vehicle_acceleration.xyz", "sensor_combined.accelerometer_m_s2"),
+)
 BodyFrame = Literal["FLU", "FRD"]
 WorldFrame = Literal["ENU", "NED"]
 _BODY = {"FLU": np.eye(3), "FRD": np.diag([1.0, -1.0, -1.0])}
@@ -134,8 +141,13 @@ def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> 
         for name, signal in settings.signals.items()
         for column in signal.columns
     ]
+    tried = {
+        f"import.signals.{name}.columns": ", nor all columns of an entry of otherwise"
+        for name, signal in settings.signals.items()
+        if signal.otherwise
+    }
     hints = [(key, name, _hint(name, columns)) for key, name in wanted if name not in columns]
-    missing = [f"{key}: the log has no column {name!r}{hint}" for key, name, hint in hints]
+    missing = [f"{key}: the log has no column {name!r}{tried.get(key, '')}{hint}" for key, name, hint in hints]
     if not all(hint for _, _, hint in hints):
         missing.append(f"import.signals: {columns_in_words(columns)}")
     if missing:
@@ -144,6 +156,11 @@ def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> 
 
 def _hint(name: str, columns: Mapping[str, Array]) -> str:
     """Name the nearest columns, by the whole name or by its part after the last dot."""
+    stem, bracket, index = name.partition("[")
+    for versions in _SAME_IN_PX4:
+        others = [f"{other}{bracket}{index}" for other in versions if stem in versions and other != stem]
+        if any(other in columns for other in others):
+            return f" (PX4 of this version has {', '.join(other for other in others if other in columns)})"
     whole = {column.lower(): column for column in columns}
     last = {column.lower().rpartition(".")[2]: column for column in columns}
     # Two letters are alike by chance.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 
 import numpy as np
 
@@ -78,7 +78,17 @@ def on_one_clock(
     chosen = _with_clock(topics, chosen)
     columns, warnings = _resampled(topics, chosen)
     columns[str(chosen.time_column)] /= known_unit(settings.time_unit).factor
-    return columns, chosen, warnings
+    return columns, chosen, (*_tell_of_choices(settings, chosen), *warnings)
+
+
+def _tell_of_choices(settings: ImportSettings, chosen: ImportSettings) -> tuple[str, ...]:
+    """Say which signals are not of the columns that are named first."""
+    first = {name: signal.columns[0] for name, signal in settings.signals.items()}
+    return tuple(
+        f"{name} is that of {', '.join(signal.columns)}: the log has not all of {first[name]} and its kin"
+        for name, signal in chosen.signals.items()
+        if signal.columns[0] != first[name]
+    )
 
 
 def _flat(
@@ -91,7 +101,8 @@ def _flat(
             f" stamps; {columns_in_words(columns)}"
         )
     converted = {time: columns[time] / known_unit(settings.time_unit).factor} if time in units else {}
-    return {**columns, **converted}, present_choices(columns, settings), ()
+    chosen = present_choices(columns, settings)
+    return {**columns, **converted}, chosen, _tell_of_choices(settings, chosen)
 
 
 def _with_clock(topics: Topics, settings: ImportSettings) -> ImportSettings:
@@ -101,7 +112,9 @@ def _with_clock(topics: Topics, settings: ImportSettings) -> ImportSettings:
         if len(topics.get(base, {}).get(stamp, ())) and stamp.startswith(STAMP):
             return settings
     mapped = [topic_and_field(column)[0] for signal in settings.signals.values() for column in signal.columns]
-    steps = {topic: _step(topics[topic][STAMP]) for topic in mapped if len(topics.get(topic, {}).get(STAMP, ())) > 1}
+    steps = {topic: _step(topics[topic][STAMP]) for topic in mapped if STAMP in topics.get(topic, {})}
+    # Some topics have stamps that stand still.
+    steps = {topic: step for topic, step in steps.items() if 0 < step < inf}
     fastest = f"{min(steps, key=steps.__getitem__)}.{STAMP}" if steps else None
     if settings.time_column is None and fastest:
         return replace(settings, time_column=fastest)
@@ -124,8 +137,14 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
     clocks = {topic: fields.get(stamp, fields[STAMP]) for topic, fields in topics.items() if STAMP in fields}
     target = topics[base][stamp]
     columns[str(settings.time_column)] = target.copy()
-    used = {base}
+    used, warnings = {base}, []
     for name, signal in settings.signals.items():
+        unfit = None if signal.required else _unfit(signal, topics, clocks, base, settings)
+        if unfit:
+            warnings.append(f"signal {name} is left out: {unfit}")
+            left = {".".join(topic_and_field(column)) for column in signal.columns} | {*signal.columns}
+            columns = {column: values for column, values in columns.items() if column not in left}
+            continue
         for column, values in _continuous(name, signal, topics).items():
             topic = topic_and_field(column)[0]
             used.add(topic)
@@ -134,7 +153,19 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
                 between = hold_previous if name in _SETPOINTS else interpolate
                 values = between(clocks[topic], values, target, settings.gap_s)
             columns[column] = values
-    return columns, _warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)})
+    return columns, (*warnings, *_warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)}))
+
+
+def _unfit(
+    signal: SignalMap, topics: Topics, clocks: Mapping[str, Array], base: str, settings: ImportSettings
+) -> str | None:
+    """Say why a signal that a log may lack is as good as lacking in it; None if it is not."""
+    parts = [topic_and_field(column) for column in signal.columns]
+    values = [topics[topic][field] for topic, field in parts if field in topics.get(topic, {})]
+    if values and not any(np.any(own[np.isfinite(own)]) for own in values):
+        return "its columns are 0 or absent throughout"
+    slow = [topic for topic, _ in parts if topic != base and topic in clocks and _step(clocks[topic]) > settings.gap_s]
+    return _slowness(slow[0], clocks[slow[0]], settings) if slow else None
 
 
 def _continuous(name: str, signal: SignalMap, topics: Topics) -> dict[str, Array]:
@@ -154,12 +185,17 @@ def _continuous(name: str, signal: SignalMap, topics: Topics) -> dict[str, Array
 
 
 def _require_fast(topic: str, time: Array, settings: ImportSettings) -> None:
-    step = _step(time)
-    if step > settings.gap_s:
+    if _step(time) > settings.gap_s:
         raise InputError(
-            f"topic {topic} has a sample only every {step:.3g} s (median), longer than import.gap_s ="
-            f" {settings.gap_s:g}: raise import.gap_s, or leave its signals out of import.signals"
+            f"{_slowness(topic, time, settings)}: raise import.gap_s, or leave its signals out of import.signals"
         )
+
+
+def _slowness(topic: str, time: Array, settings: ImportSettings) -> str:
+    return (
+        f"topic {topic} has a sample only every {_step(time):.3g} s (median), longer than import.gap_s ="
+        f" {settings.gap_s:g}"
+    )
 
 
 def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cpfls_cli.flightlog.settings import ImportSettings
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
+_ENCRYPTED_MAGIC = b"ULogEnc"
 DATAFLASH_MAGIC = b"\xa3\x95\x80\x80"
 BLACKBOX_MAGIC = b"H Product:Blackbox flight data recorder"
 USD_MAGIC = b"\xbc"
@@ -222,6 +223,8 @@ def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogConten
         that reads it is not installed.
     """
     form = _format_of(path)
+    if _first_line(path).startswith(_ENCRYPTED_MAGIC):
+        raise InputError(f"{path}: is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does")
     if form is None:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
         free = " or ".join(dict.fromkeys(form.content for form in LOG_FORMATS if form.named_freely))

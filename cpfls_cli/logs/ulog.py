@@ -68,12 +68,9 @@ def _parameters(log: Any) -> dict[str, float | str]:
 
 def _system(log: Any) -> str:
     name = str(log.msg_info_dict.get("sys_name", ""))
-    try:
-        version = str(log.get_version_info_str() or "")
-    except (TypeError, ValueError, IndexError):
-        # What it says of its version is no number.
-        version = ""
-    return " ".join(part for part in (name, version.removeprefix("v")) if part)
+    # Of a version that is no release too; old logs do not state it as a number.
+    version = log.get_version_info() if isinstance(log.msg_info_dict.get("ver_sw_release"), int) else None
+    return " ".join([name, ".".join(str(part) for part in version[:3])] if version else [name]).strip()
 
 
 def _field(field: str, values: Any, origin: int) -> Array:

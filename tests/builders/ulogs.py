@@ -26,9 +26,10 @@ def fact(key, value):
     return message(code, bytes([len(f"{kind} {key}")]) + f"{kind} {key}".encode() + content)
 
 
-def definitions(fields, facts=None):
-    """Definitions of topics, by name or ``name[instance]``, numbered in their order."""
-    formats = [message("F", f"{name}:{own};".encode()) for name, own in fields.items() if "[" not in name]
+def definitions(fields, facts=None, nested=None):
+    """Definitions of topics, by name or ``name[instance]``, numbered in their order, and of what is nested in them."""
+    described = fields | (nested or {})
+    formats = [message("F", f"{name}:{own};".encode()) for name, own in described.items() if "[" not in name]
     added = []
     for number, topic in enumerate(fields):
         name, _, instance = topic.partition("[")
@@ -44,5 +45,5 @@ def data(stamp, number, values):
     return message("D", struct.pack("<HQ", number, BEGIN + stamp) + np.asarray(values, "<f4").tobytes())
 
 
-def ulog(sent, fields, facts=None):
-    return header() + definitions(fields, facts) + b"".join(data(*row) for row in sent)
+def ulog(sent, fields, facts=None, nested=None):
+    return header() + definitions(fields, facts, nested) + b"".join(data(*row) for row in sent)

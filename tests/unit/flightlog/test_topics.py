@@ -155,6 +155,36 @@ def test_the_first_map_is_taken_whose_columns_are_all_there():
     assert chosen(gyro=partly) == mapped["body_rate"]
 
 
+def test_it_is_told_which_columns_stand_in():
+    old = ColumnMap(columns=("old.x", "old.y", "old.z"), unit="deg/s")
+    mapped = {"body_rate": SignalMap(columns=RATE, unit="rad/s", otherwise=(old,))}
+    settings = ImportSettings(time_column=None, torque_source=None, signals=mapped)
+    assert on_one_clock({"gyro": gyro(), "old": gyro()}, {}, settings)[2] == ()
+    told = "body_rate is that of old.x, old.y, old.z: the log has not all of gyro.x and its kin"
+    assert on_one_clock({"old": gyro()}, {}, settings)[2] == (told,)
+    flat = {"": {"t": GYRO} | dict.fromkeys(old.columns, GYRO)}
+    assert on_one_clock(flat, {}, replace(settings, time_column="t"))[2] == (told,)
+
+
+def test_signals_that_a_log_may_lack_are_left_out_where_they_say_nothing():
+    slow = {"timestamp": np.arange(3.0), "v": np.array([1.0, 2.0, 3.0])}
+    dead = {"timestamp": GYRO} | dict.fromkeys("abcd", np.where(GYRO > 1, 0.0, np.nan))
+    alive = dead | {"d": GYRO}
+    mapped = signals(body_rate=RATE) | {
+        "voltage": SignalMap(columns=("bat[0].v",), unit="V", required=False),
+        "rotor_speed": SignalMap(columns=("esc.a", "esc.b", "esc.c", "esc.d"), unit="rpm", required=False),
+    }
+    settings = ImportSettings(time_column=None, torque_source=None, signals=mapped)
+    columns, _, warnings = on_one_clock({"gyro": gyro(), "bat": slow, "esc": dead}, {}, settings)
+    assert not {"bat.v", "bat[0].v", "esc.a", "esc.d"} & columns.keys()
+    assert warnings == (
+        "signal voltage is left out: topic bat has a sample only every 1 s (median), longer than import.gap_s = 0.1",
+        "signal rotor_speed is left out: its columns are 0 or absent throughout",
+    )
+    # One that moves is a vehicle with motors that stand.
+    assert on_one_clock({"gyro": gyro(), "esc": alive}, {}, settings)[2] == ()
+
+
 def test_maps_that_stand_in_for_each_other_have_one_number_of_columns_and_one_kind_of_unit():
     def command(unit, *columns):
         other = ColumnMap(columns=columns, unit=unit)
