@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
+from rosbags.interfaces import Connection, MessageDefinitionFormat
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
@@ -54,48 +56,52 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         If the file cannot be read as a bag, or holds no messages with numbers.
     """
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
+        with Reader(path) as reader:
             return _read(path, reader, None if wanted is None else {topic_and_field(column)[0] for column in wanted})
     except InputError:
         raise
     except Exception as error:
-        # SQLite, MCAP, compression and message definitions each break in their own way.
+        # SQLite, MCAP and compression each break in their own way.
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{path}: cannot be read as a ROS 2 bag: {reason}") from None
 
 
-def _read(path: Path, reader: AnyReader, wanted: set[str] | None) -> LogContents:
+def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
     topics: dict[str, dict[str, Array]] = {}
     units: dict[str, str] = {}
     unknown, shifted = [], []
     for topic, about in reader.topics.items():
         kind = about.msgtype or "of several types"
-        if kind not in reader.typestore.fielddefs:
-            unknown.append(f"{topic} ({kind})")
-        elif wanted is not None and topic not in wanted:
+        if wanted is not None and topic not in wanted:
             topics[topic] = {STAMP: np.empty(0)}
         elif about.msgcount and not _WITHOUT_NUMBERS.match(kind):
-            received, columns = _columns(reader, about.connections)
+            try:
+                received, columns = _columns(reader, about.connections)
+            except Exception:
+                # A definition that is missing, of another version or cannot be parsed costs its topic, not the bag.
+                unknown.append(f"{topic} ({kind})")
+                continue
             topics[topic], offset = _on_clock(received, columns, reader.start_time)
             shifted += [f"{topic} ({offset:+.3g} s)"] if offset else []
             units |= {f"{topic}.{name}": unit for name, unit in _units(kind, columns)}
     if not topics:
-        listed = f": {', '.join(unknown)} have no definition in the file" if unknown else ""
+        listed = f": there is no fitting definition of {', '.join(unknown)}" if unknown else ""
         raise InputError(f"{path}: a ROS 2 bag without messages that can be read{listed}")
     warnings = (
-        f"topics left out, whose types have no definition in the file (record as .mcap): {', '.join(unknown)}",
+        f"topics left out, as the file has no fitting definition of their messages: {', '.join(unknown)}",
         f"the clocks of these topics are not the recorder's, and are shifted by the median: {', '.join(shifted)}",
     )
     present = [warning for warning, causes in zip(warnings, (unknown, shifted), strict=True) if causes]
     return LogContents(topics, units, system="ROS 2", warnings=tuple(present))
 
 
-def _columns(reader: AnyReader, connections: Collection[Any]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _columns(reader: Reader, connections: Sequence[Connection]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Read all messages of a topic: when they were received, ns, and their numbers by name."""
+    types = _types(connections[0])
     received, rows = [], []
     paths: dict[str, tuple[_Step, ...]] = {}
     for connection, stamp, data in reader.messages(connections=connections):
-        message = reader.deserialize(data, connection.msgtype)
+        message = types.deserialize_cdr(data, connection.msgtype)
         paths = paths or dict(_numbers(message))
         received.append(stamp)
         rows.append([_at(message, path) for path in paths.values()])
@@ -103,11 +109,27 @@ def _columns(reader: AnyReader, connections: Collection[Any]) -> tuple[np.ndarra
     return np.array(received, dtype=np.int64), {name: np.array(own) for name, own in values}
 
 
+def _types(connection: Connection) -> Typestore:
+    """Give the definition of a topic's messages that the file holds, or those of the standard."""
+    definition = connection.msgdef
+    if definition.format is MessageDefinitionFormat.NONE:
+        return get_typestore(Stores.LATEST)
+    types = get_typestore(Stores.EMPTY)
+    if definition.format is MessageDefinitionFormat.MSG:
+        types.register(get_types_from_msg(definition.data, connection.msgtype))
+        return types
+    # Several files in one, each below a line of its own.
+    for part in re.split(r"^=+\nIDL: .*\n", definition.data, flags=re.MULTILINE):
+        types.register(get_types_from_idl(part) if part.strip() else {})
+    return types
+
+
 def _numbers(value: Any, name: str = "", path: tuple[_Step, ...] = ()) -> Iterator[tuple[str, tuple[_Step, ...]]]:
     """Give the name of each number in a message, and the way to it."""
     if is_dataclass(value):
         for own in fields(value):
-            if own.name != "__msgtype__":
+            # What is in capitals is a constant of the type.
+            if own.name != "__msgtype__" and not own.name.isupper():
                 yield from _numbers(
                     getattr(value, own.name), f"{name}.{own.name}" if name else own.name, (*path, own.name)
                 )

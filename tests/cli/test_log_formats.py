@@ -125,3 +125,9 @@ def test_a_bag_is_imported_on_the_clock_of_its_fastest_topic(kind, cpfls, tmp_pa
     result = cpfls("import", tmp_path / "study.yaml", bag, "-o", tmp_path / "flight.h5", "--json")
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["log_rate_hz"] == pytest.approx(100)
+
+
+def test_of_the_folder_of_a_bag_the_file_is_asked_for(refuse, log_study, tmp_path):
+    write_bag(tmp_path / "bag", ".mcap", [("/imu", BEGIN_NS, imu(BEGIN_NS, (0, 0, 0), (0, 0, 0)))])
+    (line,) = refuse("import", log_study, tmp_path / "bag", "-o", tmp_path / "flight.h5")
+    assert line.endswith("bag: is a folder, not a file; of a ROS 2 bag name the file in it: bag.mcap")

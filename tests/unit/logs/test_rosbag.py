@@ -81,7 +81,7 @@ def test_types_without_definition_are_named(tmp_path):
     assert contents.topics.keys() == {"/imu/data", "/note"}
     (warning,) = contents.warnings
     assert warning == (
-        "topics left out, whose types have no definition in the file (record as .mcap): /fmu/out/rates"
+        "topics left out, as the file has no fitting definition of their messages: /fmu/out/rates"
         " (px4_msgs/msg/VehicleAngularVelocity)"
     )
 
@@ -89,3 +89,25 @@ def test_types_without_definition_are_named(tmp_path):
 def test_a_bag_without_messages(tmp_path):
     with pytest.raises(InputError, match=r"a ROS 2 bag without messages that can be read$"):
         log_contents(write_bag(tmp_path / "bag", ".mcap", []))
+
+
+@pytest.mark.parametrize("change", [("float32[3] xyz", "float32[3) xyz"), ("float32[3] xyz", "float32[] xyz")])
+def test_a_definition_that_does_not_fit_costs_its_topic_only(tmp_path, change):
+    path = write_bag(tmp_path / "bag", ".db3", sent())
+    with sqlite3.connect(path) as database:
+        database.execute(
+            "UPDATE message_definitions SET encoded_message_definition = replace(encoded_message_definition, ?, ?)",
+            change,
+        )
+    database.close()
+    contents = log_contents(path)
+    assert contents.topics.keys() == {"/imu/data", "/note"}
+    assert "no fitting definition of their messages: /fmu/out/rates" in contents.warnings[0]
+
+
+def test_constants_of_a_type_are_no_columns(tmp_path):
+    status = STORE.types["sensor_msgs/msg/NavSatStatus"]
+    path = write_bag(
+        tmp_path / "bag", ".mcap", [("/gps", BEGIN_NS, status(1, 2)), ("/gps", BEGIN_NS + 1, status(0, 2))]
+    )
+    assert log_contents(path).topics["/gps"].keys() == {"status", "service", "timestamp", "timestamp_received"}
