@@ -180,9 +180,8 @@ def columns_in_words(columns: Mapping[str, Array]) -> str:
     names = sorted({column.partition(".")[0] for column in columns}) if of_topics else list(columns)
     more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
     what = "topics" if of_topics else "columns"
-    return (
-        f"the log has the {what} {', '.join(names[:_MOST_LISTED]) or 'none'}{more}; `cpfls init LOG` proposes what maps to what"
-    )
+    shown = ", ".join(names[:_MOST_LISTED]) or "none"
+    return f"the log has the {what} {shown}{more}; `cpfls init LOG` proposes what maps to what"
 
 
 def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:

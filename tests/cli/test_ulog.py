@@ -189,8 +189,9 @@ def test_a_clock_that_is_none_is_told_what_one_is(wrong, column):
     (line,) = wrong(ulog(), "--set", f"import.time_column={column}")
     assert line == (
         f"LOG: import.time_column = {column!r}: in this log every topic has stamps; name those of the fastest one that"
-        " is mapped, such as vehicle_angular_velocity.timestamp, or null for them (topics: vehicle_angular_velocity,"
-        " vehicle_attitude, vehicle_torque_setpoint)"
+        " is mapped, such as vehicle_angular_velocity.timestamp, or null for them; the log has the topics"
+        " vehicle_angular_velocity, vehicle_attitude, vehicle_torque_setpoint; `cpfls init LOG` proposes what maps to"
+        " what"
     )
 
 
