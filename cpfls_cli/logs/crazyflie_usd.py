@@ -13,7 +13,7 @@ import numpy as np
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.formats import LogContents
-from cpfls_cli.logs.records import seconds, table
+from cpfls_cli.logs.records import numbers, seconds, table
 
 _STAMPS = {1: ("<u4", 10**3), 2: ("<u8", 10**6)}
 """Type of the stamps and how many there are in a second, by version of the format."""
@@ -63,7 +63,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     topics = {
         name: {
             STAMP: seconds(samples[STAMP], origin, _STAMPS[version][1]),
-            **{each: samples[each].astype(float) for each in (samples.dtype.names or ())[2:]},
+            **{each: numbers(samples[each]) for each in (samples.dtype.names or ())[2:]},
         }
         for name, samples in tables.items()
     }

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC, LogContents
-from cpfls_cli.logs.records import seconds, table
+from cpfls_cli.logs.records import numbers, seconds, table
 
 _HEAD = b"\xa3\x95"
 _OF_FORMATS = 0x80
@@ -137,7 +137,7 @@ def _topics(kind: _Kind, samples: np.ndarray, units: Mapping[str, str]) -> Itera
             {
                 STAMP: seconds(own[kind.stamp], 0, _STAMPS[kind.stamp]),
                 **{
-                    each: _NUMBERS[letter][1] * own[each].astype(float)
+                    each: _NUMBERS[letter][1] * numbers(own[each])
                     for each, letter in kind.letters.items()
                     if letter in _NUMBERS and each != kind.stamp
                 },

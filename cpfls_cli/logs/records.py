@@ -1,4 +1,4 @@
-"""Binary records of several kinds, mixed in one file, as tables."""
+"""Binary records of several kinds, mixed in one file, as tables of numbers."""
 
 from __future__ import annotations
 
@@ -28,6 +28,12 @@ def table(content: bytes, begins: Sequence[int], kind: np.dtype) -> np.ndarray:
     bytes_of = np.frombuffer(content, dtype=np.uint8)
     places = np.asarray(begins, dtype=np.int64)[:, None] + np.arange(kind.itemsize)
     return np.ascontiguousarray(bytes_of[places]).view(kind)[:, 0]
+
+
+def numbers(values: np.ndarray) -> Array:
+    """Convert numbers of any type; what a broken log takes for one may be no number."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(values, dtype=float)
 
 
 def seconds(stamps: np.ndarray, origin: int, per_second: int) -> Array:

@@ -9,15 +9,15 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyulog
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.logs.formats import ULOG_MAGIC, LogContents
+from cpfls_cli.logs.records import numbers, seconds
 
-_MICROSECOND = 1e-6
+_PER_SECOND = 10**6
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -62,8 +62,9 @@ def _parsed(path: Path) -> Any:
 
 
 def _parameters(log: Any) -> dict[str, float | str]:
-    """Give the parameters as the log begins."""
-    return {name: float(value) for name, value in log.initial_parameters.items()}
+    """Give the parameters as the log begins; in a broken log some are no numbers."""
+    known = log.initial_parameters.items()
+    return {name: float(value) for name, value in known if isinstance(value, int | float)}
 
 
 def _system(log: Any) -> str:
@@ -74,10 +75,9 @@ def _system(log: Any) -> str:
 
 
 def _field(field: str, values: Any, origin: int) -> Array:
-    """Convert stamps to seconds from the origin; the difference of whole numbers is exact."""
-    if field.startswith(STAMP):
-        return np.asarray((values.astype(np.int64) - origin) * _MICROSECOND, dtype=float)
-    return np.asarray(values, dtype=float)
+    if field.startswith(STAMP) and values.dtype.kind in "iu":
+        return seconds(values, origin, _PER_SECOND)
+    return numbers(values)
 
 
 def _warn_of_file(log: Any, origin: int) -> tuple[str, ...]:
@@ -87,7 +87,7 @@ def _warn_of_file(log: Any, origin: int) -> tuple[str, ...]:
     if log.dropouts:
         longest = max(log.dropouts, key=lambda dropout: dropout.duration)
         total_s = 1e-3 * sum(dropout.duration for dropout in log.dropouts)
-        at_s = (longest.timestamp - origin) * _MICROSECOND
+        at_s = (longest.timestamp - origin) / _PER_SECOND
         warnings.append(
             f"{len(log.dropouts)} dropouts of the logger, {total_s:.3g} s in all, the longest"
             f" {1e-3 * longest.duration:.3g} s at {at_s:.3f} s: samples are missing there"
