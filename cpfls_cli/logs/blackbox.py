@@ -15,6 +15,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.logs.blackbox_frames import ENCODINGS, KINDS, MAIN, ROLLOVER, Fields, decode
 from cpfls_cli.logs.formats import BLACKBOX_MAGIC, LogContents
 
+_LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
 
 
@@ -126,6 +127,11 @@ def _columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array
         # The name would be a lie now.
         turned = f"rpm{name.removeprefix('eRPM')}"
         columns[turned], units[turned] = columns.pop(name), units.pop(name)
+    if "imuQuaternion[0]" in units:
+        # Its sign is such that the real part, which is not written, is positive.
+        imaginary = sum(columns[f"imuQuaternion[{axis}]"] ** 2 for axis in range(3))
+        columns["imuQuaternion[w]"] = np.sqrt(np.maximum(1 - imaginary, 0.0))
+        units["imuQuaternion[w]"] = "1"
     return columns, units
 
 
@@ -134,14 +140,17 @@ def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
     (gyro,) = struct.unpack(">f", int(header.get("gyro_scale", "0x0"), 16).to_bytes(4, "big"))
     system = re.match(r"(\w+) (\d+)\.(\d+)", header.get("Firmware revision", ""))
     version = (system[1], (int(system[2]), int(system[3]))) if system else ("", (0, 0))
+    finer = 10 if header.get("blackbox_high_resolution") == "1" else 1
     scales = []
     if gyro > 0:
-        # Betaflight scales to deg/s, others to rad in a microsecond.
-        scales += [("gyro", gyro if gyro > 1e-5 else 1e6 * gyro * _DEGREES, "deg/s")]
+        # Betaflight scales to deg/s, and to tenths of it where asked to, others to rad in a microsecond.
+        scales += [("gyro", gyro / finer if gyro > 1e-5 else 1e6 * gyro * _DEGREES, "deg/s")]
     if int(header.get("acc_1G", "0")) > 0:
         scales += [("accSmooth[", 1 / int(header["acc_1G"]), "g")]
     if version[0] == "Betaflight" and version[1] >= (3, 1):
         scales += [("vbatLatest", 0.01 if version[1] >= (4, 0) else 0.1, "V")]
+        scales += [(f"setpoint[{axis}]", 1 / finer, "deg/s") for axis in range(3)]
+        scales += [("imuQuaternion[", 1 / _LARGEST_SHORT, "1")]
     if version[0] == "INAV":
         scales += [("vbat", 0.01, "V"), ("attitude[", 0.1, "deg")]
     if int(header.get("motor_poles", "0")) > 0:

@@ -190,10 +190,10 @@ LOG_FORMATS = (
 """The formats in the order in which messages list them."""
 
 
-def suffixes_in_words(last: str = "or") -> str:
+def suffixes_in_words() -> str:
     """List the suffixes of logs as a sentence does, ``.csv, .csv.gz or .ulg``; what has none by its format."""
-    *others, end = (form.suffix or form.name for form in LOG_FORMATS)
-    return f"{', '.join(others)} {last} {end}"
+    *others, last = (form.suffix or form.name for form in LOG_FORMATS)
+    return f"{', '.join(others)} or {last}"
 
 
 def formats_in_words() -> str:

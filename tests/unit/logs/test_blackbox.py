@@ -249,6 +249,37 @@ def test_units_parameters_and_program(read):
     assert not {"Product", "Field I name", "I interval"} & contents.parameters.keys()
 
 
+def renamed(content, **names):
+    """A log that has other names for some of its fields."""
+    for old, new in names.items():
+        content = content.replace(f"{old[:-1]}[{old[-1]}]".encode(), new.encode())
+    return content
+
+
+def test_a_log_of_high_resolution_has_tenths(read):
+    rows = flight()
+    content = header(blackbox_high_resolution="1") + b"".join(frames(rows))
+    columns = read(renamed(content, axisI1="setpoint[1]")).topics[""]
+    for name, place in (("gyroADC[0]", "gyroADC[0]"), ("setpoint[1]", "axisI[1]")):
+        np.testing.assert_allclose(columns[name], 0.1 * rows[:, NAMES.index(place)])
+    # What is no angular rate is as it was.
+    np.testing.assert_allclose(columns["accSmooth[2]"], rows[:, NAMES.index("accSmooth[2]")] / 2048)
+
+
+def test_the_real_part_of_an_attitude_is_what_is_left(read):
+    rows = flight()
+    rows[:, NAMES.index("axisI[0]")] = np.linspace(-20_000, 20_000, len(rows))
+    rows[:, NAMES.index("axisI[1]")] = 10_000
+    rows[:, NAMES.index("axisI[2]")] = 0
+    content = header() + b"".join(frames(rows))
+    contents = read(renamed(content, axisI0="imuQuaternion[0]", axisI1="imuQuaternion[1]", axisI2="imuQuaternion[2]"))
+    quaternion = np.column_stack([contents.topics[""][f"imuQuaternion[{part}]"] for part in ("w", 0, 1, 2)])
+    np.testing.assert_allclose(np.linalg.norm(quaternion, axis=1), 1.0)
+    np.testing.assert_allclose(quaternion[0, 1:], [-20_000 / 32_767, 10_000 / 32_767, 0.0])
+    assert quaternion[:, 0].min() > 0
+    assert contents.units["imuQuaternion[w]"] == "1"
+
+
 def test_older_and_other_programs_have_other_units(read):
     def factors(revision, gyro_scale):
         rows = flight()

@@ -47,7 +47,11 @@ def test_a_ulog_holds_topics_and_what_px4_knows_of_the_vehicle(tmp_path):
     fields = {"battery_status": battery, "battery_status[1]": battery}
     sent = [(0, 0, [12.0]), (500_000, 1, [16.0]), (750_000, 0, [11.5])]
     facts = {"sys_name": "PX4", "ver_sw_release": 0x010E00FF, "CA_ROTOR_COUNT": 4, "MPC_THR_HOVER": 0.5}
-    path.write_bytes(ulogs.ulog(sent, fields, facts))
+    # A parameter that is text is none, which broken files have.
+    text = ulogs.message("P", b"\x0bchar[4] ODDtext")
+    path.write_bytes(
+        ulogs.header() + ulogs.definitions(fields, facts) + text + b"".join(ulogs.data(*row) for row in sent)
+    )
     contents = log_contents(path)
     assert listed(contents) == {
         "battery_status": {"timestamp": [0, 0.75], "voltage_v": [12.0, 11.5]},
