@@ -33,7 +33,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     Raises
     ------
     InputError
-        If the file is no ULog.
+        If the file is no ULog, or holds no samples.
     """
     del wanted
     log = _parsed(path)
@@ -44,6 +44,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         }
         for data in log.data_list
     }
+    if not topics:
+        raise InputError(f"{path}: a ULog file without samples: was the logger stopped at once, or the file cut off?")
     return LogContents(topics, {}, _parameters(log), _system(log), _warn_of_file(log, origin))
 
 
