@@ -1,33 +1,21 @@
 """Logs of a Crazyflie's uSD card, written byte by byte, whole and broken."""
 
-import struct
-from zlib import crc32
-
 import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import log_contents
+from tests.builders.usd_logs import text, usd
 
 VARIABLES = {"gyro.x": "f", "motor.m1": "H", "acc.z": "e", "pm.state": "b"}
-SAMPLES = [(1_000_000, 0.5, 40_000, 1.5, -2), (1_002_000, 0.75, 41_000, 1.25, 3)]
+SAMPLES = [
+    ("fixedFrequency", 1_000_000, (0.5, 40_000, 1.5, -2)),
+    ("tick", 1_001_000, ()),
+    ("fixedFrequency", 1_002_000, (0.75, 41_000, 1.25, 3)),
+]
 
 
-def text(name):
-    return name.encode() + b"\0"
-
-
-def event(number, name, variables):
-    own = b"".join(text(f"{variable}({kind})") for variable, kind in variables.items())
-    return struct.pack("<H", number) + text(name) + struct.pack("<H", len(variables)) + own
-
-
-def log(version=2, samples=SAMPLES, whole=True):
-    header = b"\xbc" + struct.pack("<HH", version, 2) + event(7, "fixedFrequency", VARIABLES) + event(9, "tick", {})
-    stamp = {1: "I", 2: "Q"}.get(version, "Q")
-    rows = [struct.pack(f"<H{stamp}" + "".join(VARIABLES.values()), 7, *own) for own in samples]
-    rows.insert(1, struct.pack(f"<H{stamp}", 9, 1_001_000))
-    content = header + b"".join(rows)
-    return content + struct.pack("<I", crc32(content) if whole else 0)
+def log(version=2, whole=True):
+    return usd({"fixedFrequency": VARIABLES, "tick": {}}, SAMPLES, version, whole)
 
 
 @pytest.fixture
