@@ -105,3 +105,11 @@ def test_a_file_without_columns(tmp_path):
         file["name"] = "nothing"
     with pytest.raises(InputError, match=r"log\.h5: holds no vectors or matrices of numbers"):
         log_contents(tmp_path / "log.h5")
+
+
+def test_an_artifact_of_this_program_is_no_log(tmp_path):
+    hdf5(tmp_path / "flight.h5")
+    with h5py.File(tmp_path / "flight.h5", "a") as file:
+        file.attrs["format"] = "cpfls/flight"
+    with pytest.raises(InputError, match=r"flight\.h5: is an artifact of this program \(cpfls/flight\), not a log"):
+        log_contents(tmp_path / "flight.h5")
