@@ -95,7 +95,9 @@ def _check_input(path: Path, output: Path) -> None:
     if not path.exists():
         raise InputError(f"{path}: no such file")
     if not path.is_file():
-        raise InputError(f"{path}: is a {'folder' if path.is_dir() else 'device or a pipe'}, not a file")
+        bags = [own.name for kind in ("*.db3", "*.mcap") for own in sorted(path.glob(kind))] if path.is_dir() else []
+        remedy = f"; of a ROS 2 bag name the file in it: {', '.join(bags)}" if bags else ""
+        raise InputError(f"{path}: is a {'folder' if path.is_dir() else 'device or a pipe'}, not a file{remedy}")
     if output.exists() and path.samefile(output):
         raise InputError(f"{output}: is an input of this command; -o must name another file")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from difflib import get_close_matches
 from typing import Literal
 
@@ -15,7 +15,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.repair import unwrap_angles
-from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import ColumnMap, ImportSettings, SignalMap
 from cpfls_cli.units import to_si
 
 _SUFFICIENT_SIGNALS = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
@@ -25,10 +25,27 @@ _ROTOR_SIGNALS = ("rotor_speed", "rotor_command")
 _SCALAR_SIGNALS = ("thrust", "voltage")
 _MOST_NEAREST, _MOST_LISTED = 3, 20
 _ALIKE, _ALIKE_SHORT, _SHORT_NAME = 0.5, 0.7, 2
+# Names that are far apart, so that the nearest one would mislead: of actuator_motors it is actuator_controls, which is
+# what mixers get and no command of a rotor.
+_SAME_IN_PX4 = (
+    ("actuator_motors.control", "actuator_outputs.output"),
+    ("vehicle_angular_velocity.xyz", "sensor_combined.gyro_rad"),
+    ("vehicle_acceleration.xyz", "sensor_combined.accelerometer_m_s2"),
+)
 BodyFrame = Literal["FLU", "FRD"]
 WorldFrame = Literal["ENU", "NED"]
 _BODY = {"FLU": np.eye(3), "FRD": np.diag([1.0, -1.0, -1.0])}
 _WORLD = {"ENU": np.eye(3), "NED": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])}
+
+
+def present_choices(columns: Container[str], settings: ImportSettings) -> ImportSettings:
+    """Take for each signal the first of its maps whose columns the log holds; a signal without one stays as it is."""
+    signals = {}
+    for name, signal in settings.signals.items():
+        present = [choice for choice in signal.choices if all(column in columns for column in choice.columns)]
+        values = {each.name: getattr(present[0], each.name) for each in fields(ColumnMap)} if present else {}
+        signals[name] = replace(signal, **values, otherwise=()) if present else signal
+    return replace(settings, signals=signals)
 
 
 def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> ImportSettings:
@@ -96,7 +113,8 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
         and the nearest columns of the log.
     """
     _require_present(columns, settings)
-    time: Array = to_si(np.asarray(columns[settings.time_column], dtype=float), settings.time_unit)
+    stamps = columns[str(settings.time_column)]
+    time: Array = to_si(np.asarray(stamps, dtype=float), settings.time_unit)
     signals: dict[str, Array] = {name: _in_si(columns, signal) for name, signal in settings.signals.items()}
     for name, values in signals.items():
         if len(values) != len(time):
@@ -117,22 +135,32 @@ def _in_si(columns: Mapping[str, Array], signal: SignalMap) -> Array:
 def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> None:
     if not settings.signals:
         raise InputError("import.signals: no signal is mapped to columns of the log")
-    wanted = [("import.time_column", settings.time_column)]
+    wanted = [("import.time_column", str(settings.time_column))]
     wanted += [
         (f"import.signals.{name}.columns", column)
         for name, signal in settings.signals.items()
         for column in signal.columns
     ]
+    tried = {
+        f"import.signals.{name}.columns": ", nor all columns of an entry of otherwise"
+        for name, signal in settings.signals.items()
+        if signal.otherwise
+    }
     hints = [(key, name, _hint(name, columns)) for key, name in wanted if name not in columns]
-    missing = [f"{key}: the log has no column {name!r}{hint}" for key, name, hint in hints]
+    missing = [f"{key}: the log has no column {name!r}{tried.get(key, '')}{hint}" for key, name, hint in hints]
     if not all(hint for _, _, hint in hints):
-        missing.append(f"import.signals: {_columns_in_words(columns)}")
+        missing.append(f"import.signals: {columns_in_words(columns)}")
     if missing:
         raise InputError("\n".join(missing))
 
 
 def _hint(name: str, columns: Mapping[str, Array]) -> str:
     """Name the nearest columns, by the whole name or by its part after the last dot."""
+    stem, bracket, index = name.partition("[")
+    for versions in _SAME_IN_PX4:
+        others = [f"{other}{bracket}{index}" for other in versions if stem in versions and other != stem]
+        if any(other in columns for other in others):
+            return f" (PX4 of this version has {', '.join(other for other in others if other in columns)})"
     whole = {column.lower(): column for column in columns}
     last = {column.lower().rpartition(".")[2]: column for column in columns}
     # Two letters are alike by chance.
@@ -146,15 +174,14 @@ def _hint(name: str, columns: Mapping[str, Array]) -> str:
     return f" (nearest: {shown})" if nearest else ""
 
 
-def _columns_in_words(columns: Mapping[str, Array]) -> str:
+def columns_in_words(columns: Mapping[str, Array]) -> str:
     """Say once what the log holds; of a log of topics, which has hundreds of columns, its topics."""
     of_topics = all("." in column for column in columns)
     names = sorted({column.partition(".")[0] for column in columns}) if of_topics else list(columns)
     more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
     what = "topics" if of_topics else "columns"
-    return (
-        f"the log has the {what} {', '.join(names[:_MOST_LISTED])}{more}; `cpfls init LOG` proposes what maps to what"
-    )
+    shown = ", ".join(names[:_MOST_LISTED]) or "none"
+    return f"the log has the {what} {shown}{more}; `cpfls init LOG` proposes what maps to what"
 
 
 def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:

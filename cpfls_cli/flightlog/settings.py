@@ -52,15 +52,14 @@ _COLUMNS_OF_VECTOR = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class SignalMap(Settings):
-    """Columns of one signal in the log: ``signal = sign * (scale * column + offset)`` in `unit`."""
+class ColumnMap(Settings):
+    """Columns of a log and their unit: ``signal = sign * (scale * column + offset)`` in `unit`."""
 
     columns: Annotated[tuple[str, ...], MinLen(1), Doc("names of the columns, in the order of the axes")]
     unit: Annotated[UnitName, Doc("unit of the columns after scale and offset")]
     sign: Annotated[tuple[float, ...] | None, Doc("+1 or -1 for each column; null: all +1")] = None
     scale: Annotated[float, Doc("factor on the logged numbers")] = 1.0
     offset: Annotated[float, Doc("added after the factor, in the unit above")] = 0.0
-    required: Annotated[bool, Doc("false: a log may lack these columns; the flight then lacks the signal")] = True
 
     def __post_init__(self) -> None:
         """Check the signs against the columns."""
@@ -72,6 +71,21 @@ class SignalMap(Settings):
             raise SettingError("sign", f"needs {len(self.columns)} numbers, one for each column, each +1 or -1")
 
 
+@dataclass(frozen=True, kw_only=True)
+class SignalMap(ColumnMap):
+    """One signal in the log: its columns, or those that stand in for them in other logs."""
+
+    required: Annotated[bool, Doc("false: a log may lack these columns; the flight then lacks the signal")] = True
+    otherwise: Annotated[
+        tuple[ColumnMap, ...], Doc("other columns, tried in order where a log lacks one of these; units of one kind")
+    ] = ()
+
+    @property
+    def choices(self) -> tuple[ColumnMap, ...]:
+        """All maps in the order in which they are tried."""
+        return (self, *self.otherwise)
+
+
 def _check_signal(name: SignalName, signal: SignalMap) -> None:
     """Check the number of columns and the unit against the kind of signal.
 
@@ -80,20 +94,29 @@ def _check_signal(name: SignalName, signal: SignalMap) -> None:
     SettingError
         Naming the key below the section `import`.
     """
-    expected = _COLUMNS_OF_SIGNAL.get(name, _COLUMNS_OF_VECTOR)
-    if name not in _ANY_NUMBER and len(signal.columns) != expected:
-        words = f"{expected} columns" if expected > 1 else "1 column"
-        raise SettingError(f"signals.{name}.columns", f"needs {words}, got {len(signal.columns)}")
-    if KNOWN_UNITS[signal.unit].si not in _UNITS_OF_SIGNAL[name]:
-        wanted = [unit for unit, entry in KNOWN_UNITS.items() if entry.si in _UNITS_OF_SIGNAL[name]]
-        raise SettingError(f"signals.{name}.unit", f"{signal.unit!r} does not measure it; one of {', '.join(wanted)}")
+    fixed = None if name in _ANY_NUMBER else _COLUMNS_OF_SIGNAL.get(name, _COLUMNS_OF_VECTOR)
+    expected = fixed or len(signal.columns)
+    # A flight keeps one unit of a signal, whichever columns it came from.
+    kinds = _UNITS_OF_SIGNAL[name]
+    for number, choice in enumerate(signal.choices):
+        key = f"signals.{name}.otherwise.{number - 1}" if number else f"signals.{name}"
+        if len(choice.columns) != expected:
+            words = f"{expected} columns" if expected > 1 else "1 column"
+            raise SettingError(f"{key}.columns", f"needs {words}, got {len(choice.columns)}")
+        if KNOWN_UNITS[choice.unit].si not in kinds:
+            wanted = [unit for unit, entry in KNOWN_UNITS.items() if entry.si in kinds]
+            raise SettingError(f"{key}.unit", f"{choice.unit!r} does not measure it; one of {', '.join(wanted)}")
+        kinds = (KNOWN_UNITS[choice.unit].si,)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImportSettings(Settings):
     """Settings of the import of a flight log."""
 
-    time_column: Annotated[str, Doc("name of the column of time stamps")] = "t"
+    time_column: Annotated[
+        str | None,
+        Doc("name of the column of time stamps; null: those of the fastest mapped topic of a log of topics"),
+    ] = "t"
     time_unit: Annotated[Literal["s", "ms", "us", "ns"], Doc("unit of the time stamps")] = "s"
     signals: Annotated[
         Mapping[SignalName, SignalMap], Doc("for each signal of the log: its columns and their unit")
@@ -159,8 +182,10 @@ class ImportSettings(Settings):
 
     @property
     def mapped_columns(self) -> tuple[str, ...]:
-        """Columns of the log that are used: the time stamps, then those of every signal."""
-        return (self.time_column, *(column for signal in self.signals.values() for column in signal.columns))
+        """Columns of the log that may be used: the time stamps, then those of every signal."""
+        named = () if self.time_column is None else (self.time_column,)
+        choices = (choice for signal in self.signals.values() for choice in signal.choices)
+        return (*named, *(column for choice in choices for column in choice.columns))
 
 
 def _check_attitude(settings: ImportSettings) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from math import pi
+from dataclasses import replace
+from math import inf, pi
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.clock import increasing_rows
+from cpfls_cli.flightlog.conversion import columns_in_words, present_choices
 from cpfls_cli.flightlog.repair import align_quaternion_signs, unwrap_angles
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.units import known_unit
@@ -37,8 +39,10 @@ def topic_and_field(column: str) -> tuple[str, str]:
     return re.sub(r"\[0\]$", "", topic), field
 
 
-def on_one_clock(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Resample the mapped columns of all topics to the clock that `time_column` names.
+def on_one_clock(
+    topics: Topics, units: Mapping[str, str], settings: ImportSettings
+) -> tuple[dict[str, Array], ImportSettings, tuple[str, ...]]:
+    """Put the mapped columns of all topics on the clock that `time_column` names; a flat log is on one already.
 
     Between two samples a setpoint (torque, thrust, rotor command) keeps the previous value, and what is measured is
     interpolated linearly, quaternions with one sign and roll and yaw without full turns. Inside a pause of a topic
@@ -47,29 +51,100 @@ def on_one_clock(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Ar
     Parameters
     ----------
     topics : mapping from topic to mapping from field to array, shape (sample,)
-        Stamps in s from one origin.
+        Stamps in s from one origin; of a flat log, one topic with an empty name.
+    units : mapping from column to str
+        Units that the log states; stamps that have one are in s.
     settings : ImportSettings
-        `time_column`, `signals` and `gap_s`.
+        The section `import`.
 
     Returns
     -------
     columns : dict from str to array, shape (row,)
-        The mapped columns that exist, by the names that the settings use; the others by name only, as empty arrays.
+        The mapped columns that exist, by the names that the settings use, stamps in `time_unit`; the others by name
+        only, as empty arrays.
+    settings : ImportSettings
+        With the columns that the log has, of those that stand in for each other, and the name of the clock.
     warnings : tuple of str
 
     Raises
     ------
     InputError
-        If a topic is always slower than `gap_s`.
+        If `time_column` names no stamps, or a topic is always slower than `gap_s`.
     """
-    columns = {f"{topic}.{field}": np.empty(0) for topic, fields in topics.items() for field in fields}
-    base, stamp = topic_and_field(settings.time_column)
-    if stamp not in topics.get(base, {}):
-        return columns, ()
+    if "" in topics:
+        return _flat(topics[""], units, settings)
+    mapped = [(column, *topic_and_field(column)) for column in settings.mapped_columns]
+    chosen = present_choices({column for column, topic, field in mapped if field in topics.get(topic, {})}, settings)
+    chosen = _with_clock(topics, chosen)
+    columns, warnings = _resampled(topics, chosen)
+    columns[str(chosen.time_column)] /= known_unit(settings.time_unit).factor
+    return columns, chosen, (*_tell_of_choices(settings, chosen), *warnings)
+
+
+def _tell_of_choices(settings: ImportSettings, chosen: ImportSettings) -> tuple[str, ...]:
+    """Say which signals are not of the columns that are named first."""
+    first = {name: signal.columns[0] for name, signal in settings.signals.items()}
+    return tuple(
+        f"{name} is that of {', '.join(signal.columns)}: the log has not all of {first[name]} and its kin"
+        for name, signal in chosen.signals.items()
+        if signal.columns[0] != first[name]
+    )
+
+
+def _flat(
+    columns: Mapping[str, Array], units: Mapping[str, str], settings: ImportSettings
+) -> tuple[dict[str, Array], ImportSettings, tuple[str, ...]]:
+    time = settings.time_column
+    if time is None:
+        raise InputError(
+            "import.time_column = null takes the stamps of a topic, and this log has no topics: name the column of its"
+            f" stamps; {columns_in_words(columns)}"
+        )
+    converted = {time: columns[time] / known_unit(settings.time_unit).factor} if time in units else {}
+    chosen = present_choices(columns, settings)
+    return {**columns, **converted}, chosen, _tell_of_choices(settings, chosen)
+
+
+def _with_clock(topics: Topics, settings: ImportSettings) -> ImportSettings:
+    """Name the stamps that are the clock; those of the fastest mapped topic where the settings leave it open."""
+    if settings.time_column is not None:
+        base, stamp = topic_and_field(settings.time_column)
+        if len(topics.get(base, {}).get(stamp, ())) and stamp.startswith(STAMP):
+            return settings
+    mapped = [topic_and_field(column)[0] for signal in settings.signals.values() for column in signal.columns]
+    steps = {topic: _step(topics[topic][STAMP]) for topic in mapped if STAMP in topics.get(topic, {})}
+    # Some topics have stamps that stand still.
+    steps = {topic: step for topic, step in steps.items() if 0 < step < inf}
+    fastest = f"{min(steps, key=steps.__getitem__)}.{STAMP}" if steps else None
+    if settings.time_column is None and fastest:
+        return replace(settings, time_column=fastest)
+    if settings.time_column is None:
+        raise InputError(f"import.signals: the log has no topic that is mapped; {columns_in_words(_named(topics))}")
+    example = f", such as {fastest}" if fastest else ""
+    raise InputError(
+        f"import.time_column = {settings.time_column!r}: in this log every topic has stamps; name those of the fastest"
+        f" one that is mapped{example}, or null for them; {columns_in_words(_named(topics))}"
+    )
+
+
+def _named(topics: Topics) -> dict[str, Array]:
+    return {f"{topic}.{field}": np.empty(0) for topic, fields in topics.items() for field in fields}
+
+
+def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Array], tuple[str, ...]]:
+    columns = _named(topics)
+    base, stamp = topic_and_field(str(settings.time_column))
     clocks = {topic: fields.get(stamp, fields[STAMP]) for topic, fields in topics.items() if STAMP in fields}
-    columns[settings.time_column] = target = topics[base][stamp]
-    used = {base}
+    target = topics[base][stamp]
+    columns[str(settings.time_column)] = target.copy()
+    used, warnings = {base}, []
     for name, signal in settings.signals.items():
+        unfit = None if signal.required else _unfit(signal, topics, clocks, base, settings)
+        if unfit:
+            warnings.append(f"signal {name} is left out: {unfit}")
+            left = {".".join(topic_and_field(column)) for column in signal.columns} | {*signal.columns}
+            columns = {column: values for column, values in columns.items() if column not in left}
+            continue
         for column, values in _continuous(name, signal, topics).items():
             topic = topic_and_field(column)[0]
             used.add(topic)
@@ -78,7 +153,19 @@ def on_one_clock(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Ar
                 between = hold_previous if name in _SETPOINTS else interpolate
                 values = between(clocks[topic], values, target, settings.gap_s)
             columns[column] = values
-    return columns, _warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)})
+    return columns, (*warnings, *_warn_of_thinning(base, {topic: clocks[topic] for topic in sorted(used)}))
+
+
+def _unfit(
+    signal: SignalMap, topics: Topics, clocks: Mapping[str, Array], base: str, settings: ImportSettings
+) -> str | None:
+    """Say why a signal that a log may lack is as good as lacking in it; None if it is not."""
+    parts = [topic_and_field(column) for column in signal.columns]
+    values = [topics[topic][field] for topic, field in parts if field in topics.get(topic, {})]
+    if values and not any(np.any(own[np.isfinite(own)]) for own in values):
+        return "its columns are 0 or absent throughout"
+    slow = [topic for topic, _ in parts if topic != base and topic in clocks and _step(clocks[topic]) > settings.gap_s]
+    return _slowness(slow[0], clocks[slow[0]], settings) if slow else None
 
 
 def _continuous(name: str, signal: SignalMap, topics: Topics) -> dict[str, Array]:
@@ -98,12 +185,17 @@ def _continuous(name: str, signal: SignalMap, topics: Topics) -> dict[str, Array
 
 
 def _require_fast(topic: str, time: Array, settings: ImportSettings) -> None:
-    step = _step(time)
-    if step > settings.gap_s:
+    if _step(time) > settings.gap_s:
         raise InputError(
-            f"topic {topic} has a sample only every {step:.3g} s (median), longer than import.gap_s ="
-            f" {settings.gap_s:g}: raise import.gap_s, or leave its signals out of import.signals"
+            f"{_slowness(topic, time, settings)}: raise import.gap_s, or leave its signals out of import.signals"
         )
+
+
+def _slowness(topic: str, time: Array, settings: ImportSettings) -> str:
+    return (
+        f"topic {topic} has a sample only every {_step(time):.3g} s (median), longer than import.gap_s ="
+        f" {settings.gap_s:g}"
+    )
 
 
 def _warn_of_thinning(base: str, clocks: Mapping[str, Array]) -> tuple[str, ...]:

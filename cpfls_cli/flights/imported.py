@@ -43,6 +43,7 @@ def imported(log: Path, study: Study) -> ImportedFlight:
         If a key of the section `import` does not suit the log; the message names both.
     """
     read = read_log(log, study.import_)
+    study = study.model_copy(update={"import_": read.settings})
     with _naming(log), settings_of("import", study):
         flight = import_log(
             read.columns,

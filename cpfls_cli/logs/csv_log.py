@@ -6,7 +6,7 @@ import csv
 import gzip
 import io
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
@@ -15,13 +15,19 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.settings import ImportSettings
-from cpfls_cli.logs.formats import LogColumns
+from cpfls_cli.logs.formats import LogContents
 
 
-def read(path: Path, settings: ImportSettings) -> LogColumns:
-    """Read the columns of a log that a config maps."""
-    return LogColumns(read_csv(path, set(settings.mapped_columns)))
+def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
+    """Read columns of a log; without a wish, those whose first value is a number or absent."""
+    if wanted is not None:
+        return LogContents({"": read_csv(path, set(wanted))})
+    names, first = _first_row(path)
+    numeric = [name for name, text in zip(names, first, strict=False) if _is_number(text)]
+    left_out = sorted(set(names) - set(numeric))
+    warnings = (f"columns that hold text are left out: {', '.join(left_out)}",) if left_out else ()
+    columns = read_csv(path, set(numeric))
+    return LogContents({"": {name: columns[name] for name in numeric}}, warnings=warnings)
 
 
 def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
@@ -44,9 +50,21 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
     InputError
         If the file is empty, not text, has rows of unequal length or fields that are not numbers.
     """
+    with _rows(path) as (names, rows):
+        return _columns(path, names, rows, wanted)
+
+
+@contextmanager
+def _rows(path: Path) -> Iterator[tuple[list[str], Iterator[list[str]]]]:
+    """Open a CSV: its column names, and its rows."""
     try:
         with _open(path) as stream:
-            return _columns(path, stream, wanted)
+            first = stream.readline()
+            if not first.strip():
+                raise InputError(f"{path}: is empty; a log starts with a line of column names")
+            delimiter = max(",;\t", key=first.count)
+            names = [name.strip() for name in next(csv.reader([first], delimiter=delimiter))]
+            yield names, csv.reader(stream, delimiter=delimiter)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
@@ -60,18 +78,13 @@ def _open(path: Path) -> Iterator[TextIO]:
         yield text
 
 
-def _columns(path: Path, stream: TextIO, wanted: set[str]) -> dict[str, Array]:
-    first = stream.readline()
-    if not first.strip():
-        raise InputError(f"{path}: is empty; a log starts with a line of column names")
-    delimiter = max(",;\t", key=first.count)
-    names = [name.strip() for name in next(csv.reader([first], delimiter=delimiter))]
+def _columns(path: Path, names: list[str], lines: Iterator[list[str]], wanted: set[str]) -> dict[str, Array]:
     repeated = sorted({name for name in names if names.count(name) > 1 and name in wanted})
     if repeated:
         raise InputError(f"{path}: column '{repeated[0]}' stands twice")
     kept = [index for index, name in enumerate(names) if name in wanted]
     rows = []
-    for number, row in enumerate(csv.reader(stream, delimiter=delimiter), start=2):
+    for number, row in enumerate(lines, start=2):
         if not row:
             continue
         if len(row) != len(names):
@@ -100,6 +113,19 @@ def row_lines(path: Path) -> list[int]:
     with _open(path) as stream:
         lines = [number for number, line in enumerate(stream, start=1) if line.strip()]
     return lines[1:]
+
+
+def _first_row(path: Path) -> tuple[list[str], list[str]]:
+    with _rows(path) as (names, rows):
+        return names, next((row for row in rows if row), [])
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.strip() or "nan")
+    except ValueError:
+        return False
+    return True
 
 
 def _number(field: str, path: Path, row: int, column: str) -> float:

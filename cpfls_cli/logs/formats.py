@@ -1,16 +1,17 @@
 """The formats of flight logs: one table, and all that names a format follows from it.
 
-A new format is one reader, a module with a function ``read(path, settings)``, and one row of `LOG_FORMATS`. The
+A new format is one reader, a module with a function ``contents(path, wanted)``, and one row of `LOG_FORMATS`. The
 command line lists the formats in its help, so nothing heavy is imported here: a reader, and the package it needs, is
 loaded when the first file of its format is read.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cpfls_cli.errors import InputError
 
@@ -19,22 +20,57 @@ if TYPE_CHECKING:
     from cpfls_cli.flightlog.settings import ImportSettings
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
+_ENCRYPTED_MAGIC = b"ULogEnc"
+DATAFLASH_MAGIC = b"\xa3\x95\x80\x80"
+BLACKBOX_MAGIC = b"H Product:Blackbox flight data recorder"
+USD_MAGIC = b"\xbc"
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _LONGEST_LINE = 16384
 
 
 @dataclass(frozen=True)
+class LogContents:
+    """What a log holds.
+
+    Attributes
+    ----------
+    topics : dict from topic to dict from field to array, shape (sample,)
+        The fields that were wanted; others may be there by name only, as empty arrays, so that a message can suggest
+        them. A topic has its stamps in the field ``timestamp``, in s from the beginning of the log. A flat log, whose
+        columns share one clock, is one topic with an empty name.
+    units : dict from column to str
+        Units that the log itself states, by ``topic.field``, in a flat log by column. Stamps that have one are in s.
+    parameters : dict from str to float or str
+        What the log knows of the vehicle: parameters of the autopilot, lines of a header.
+    system : str
+        What wrote the log and its version, such as ``PX4 1.14.0``; empty where that is not known.
+    warnings : tuple of str
+        Faults of the file as a whole.
+    """
+
+    topics: dict[str, dict[str, Array]]
+    units: dict[str, str] = field(default_factory=dict)
+    parameters: dict[str, float | str] = field(default_factory=dict)
+    system: str = ""
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class LogColumns:
-    """Columns of a log.
+    """Columns of a log that a config maps, all on one clock.
 
     Attributes
     ----------
     columns : dict from str to array, shape (sample,)
-        Those that the config maps; the others by name only, as empty arrays, so that a message can suggest them.
+        The mapped ones; the others by name only, as empty arrays, so that a message can suggest them.
+    settings : ImportSettings
+        The section `import` as it suits the log: of columns that stand in for each other, those that the log has.
     warnings : tuple of str
         Faults of the file as a whole.
     """
 
     columns: dict[str, Array]
+    settings: ImportSettings
     warnings: tuple[str, ...] = ()
 
 
@@ -45,15 +81,19 @@ class LogFormat:
     Attributes
     ----------
     suffix : str
-        End of a file's name, in lower case.
+        End of a file's name, in lower case; empty where such files have none.
     name : str
         Of the format, in help texts.
     content : str
         What a file that begins in this way holds, in messages.
     magic : bytes
         First bytes of every such file; none for text, which begins with a line of column names.
+    named_freely : bool
+        Whether a file whose name says nothing is told by its first bytes.
+    shared : bool
+        Whether artifacts of this program end so too; ``is_log(path)`` of the reader tells them apart.
     reader : str
-        Module with ``read(path, settings)``, which returns `LogColumns`.
+        Module with ``contents(path, wanted)``, which returns `LogContents`.
     packages : tuple of str
         Modules of the optional package that the reader needs.
     extra : str
@@ -64,6 +104,8 @@ class LogFormat:
     name: str
     content: str
     magic: bytes = b""
+    named_freely: bool = False
+    shared: bool = False
     reader: str
     packages: tuple[str, ...] = ()
     extra: str = ""
@@ -73,17 +115,15 @@ class LogFormat:
         return line.startswith(self.magic) if self.magic else _is_header(line)
 
 
+def _rows(*suffixes: str, **own: Any) -> tuple[LogFormat, ...]:
+    return tuple(LogFormat(suffix=suffix, **own) for suffix in suffixes)
+
+
 LOG_FORMATS = (
-    LogFormat(suffix=".csv", name="CSV", content="CSV", reader="cpfls_cli.logs.csv_log"),
-    LogFormat(
-        suffix=".csv.gz",
-        name="CSV",
-        content="gzip-compressed data",
-        magic=b"\x1f\x8b",
-        reader="cpfls_cli.logs.csv_log",
-    ),
-    LogFormat(
-        suffix=".parquet",
+    *_rows(".csv", name="CSV", content="CSV", reader="cpfls_cli.logs.csv_log"),
+    *_rows(".csv.gz", name="CSV", content="gzip-compressed data", magic=b"\x1f\x8b", reader="cpfls_cli.logs.csv_log"),
+    *_rows(
+        ".parquet",
         name="Parquet",
         content="Parquet",
         magic=b"PAR1",
@@ -91,8 +131,8 @@ LOG_FORMATS = (
         packages=("pyarrow", "pyarrow.parquet"),
         extra="parquet",
     ),
-    LogFormat(
-        suffix=".ulg",
+    *_rows(
+        ".ulg",
         name="ULog",
         content="ULog",
         magic=ULOG_MAGIC,
@@ -100,13 +140,59 @@ LOG_FORMATS = (
         packages=("pyulog",),
         extra="ulog",
     ),
+    *_rows(
+        ".bin",
+        name="ArduPilot DataFlash",
+        content="a DataFlash log",
+        magic=DATAFLASH_MAGIC,
+        reader="cpfls_cli.logs.dataflash",
+    ),
+    *_rows(
+        ".bbl",
+        ".bfl",
+        name="Betaflight blackbox",
+        content="a blackbox log",
+        magic=BLACKBOX_MAGIC,
+        named_freely=True,
+        reader="cpfls_cli.logs.blackbox",
+    ),
+    *_rows(
+        "",
+        name="Crazyflie uSD",
+        content="a log of a Crazyflie's uSD card",
+        magic=USD_MAGIC,
+        named_freely=True,
+        reader="cpfls_cli.logs.crazyflie_usd",
+    ),
+    *_rows(
+        ".db3",
+        name="ROS 2 bag",
+        content="SQLite",
+        magic=b"SQLite format 3\x00",
+        reader="cpfls_cli.logs.rosbag",
+        packages=("rosbags",),
+        extra="rosbag",
+    ),
+    *_rows(
+        ".mcap",
+        name="ROS 2 bag",
+        content="MCAP",
+        magic=b"\x89MCAP",
+        reader="cpfls_cli.logs.rosbag",
+        packages=("rosbags",),
+        extra="rosbag",
+    ),
+    *_rows(
+        ".h5", ".hdf5", name="HDF5", content="HDF5", magic=HDF5_MAGIC, shared=True, reader="cpfls_cli.logs.matrices"
+    ),
+    *_rows(".mat", name="MATLAB", content="MATLAB", magic=b"MATLAB ", reader="cpfls_cli.logs.matrices"),
 )
 """The formats in the order in which messages list them."""
 
 
 def suffixes_in_words() -> str:
-    """List the suffixes of logs as a sentence does, ``.csv, .csv.gz or .ulg``."""
-    *others, last = (form.suffix for form in LOG_FORMATS)
+    """List the suffixes of logs as a sentence does, ``.csv, .csv.gz or .ulg``; what has none by its format."""
+    *others, last = (form.suffix or form.name for form in LOG_FORMATS)
     return f"{', '.join(others)} or {last}"
 
 
@@ -116,12 +202,41 @@ def formats_in_words() -> str:
 
 
 def is_log(path: Path) -> bool:
-    """Tell by its name whether a file is a log."""
-    return _format_of(path) is not None
+    """Tell whether a file is a log: by its name, and by its first bytes where the name cannot tell."""
+    form = _format_of(path)
+    return form is not None and (not form.shared or bool(import_module(form.reader).is_log(path)))
+
+
+def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
+    """Read a log.
+
+    Parameters
+    ----------
+    wanted : collection of str, optional
+        Columns of a flat log, or ``topic.field``, that are read as numbers; all without it, where columns that hold no
+        numbers are left out.
+
+    Raises
+    ------
+    InputError
+        If the name ends in no suffix of a log or in that of another format, the file cannot be read, or the package
+        that reads it is not installed.
+    """
+    form = _format_of(path)
+    if _first_line(path).startswith(_ENCRYPTED_MAGIC):
+        raise InputError(f"{path}: is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does")
+    if form is None:
+        named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
+        free = " or ".join(dict.fromkeys(form.content for form in LOG_FORMATS if form.named_freely))
+        raise InputError(f"{path}: not a log: its name must end in one of {named}, or it must be {free}")
+    _refuse_other_content(path, form)
+    _require_packages(path, form)
+    contents: LogContents = import_module(form.reader).contents(path, wanted)
+    return contents
 
 
 def read_log(path: Path, settings: ImportSettings) -> LogColumns:
-    """Read the columns of a log that a config maps.
+    """Read the columns of a log that a config maps, on one clock.
 
     Parameters
     ----------
@@ -131,38 +246,40 @@ def read_log(path: Path, settings: ImportSettings) -> LogColumns:
     Raises
     ------
     InputError
-        If the name ends in no suffix of a log or in that of another format, the file cannot be read, or the package
-        that reads it is not installed.
+        As `log_contents`; or if `time_column` names no stamps, or a topic is too slow.
     """
-    form = _format_of(path)
-    if form is None:
-        suffixes = ", ".join(form.suffix for form in LOG_FORMATS)
-        raise InputError(f"{path}: not a log: its name must end in one of {suffixes}")
-    _refuse_other_content(path, form)
-    _require_packages(path, form)
-    columns: LogColumns = import_module(form.reader).read(path, settings)
-    return columns
+    on_one_clock = import_module("cpfls_cli.flightlog.topics").on_one_clock
+    contents = log_contents(path, settings.mapped_columns)
+    try:
+        columns, chosen, warnings = on_one_clock(contents.topics, contents.units, settings)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return LogColumns(columns, chosen, (*contents.warnings, *warnings))
 
 
 def _format_of(path: Path) -> LogFormat | None:
     name = path.name.lower()
-    return next((form for form in LOG_FORMATS if name.endswith(form.suffix)), None)
+    named = next((form for form in LOG_FORMATS if form.suffix and name.endswith(form.suffix)), None)
+    free = (form for form in LOG_FORMATS if form.named_freely and form.begins(_first_line(path)))
+    return named or next(free, None)
+
+
+def _first_line(path: Path) -> bytes:
+    """Read the first bytes of a file, up to the first line; none where the reader will say that it cannot be read."""
+    try:
+        with path.open("rb") as stream:
+            return stream.readline(_LONGEST_LINE)
+    except OSError:
+        return b""
 
 
 def _refuse_other_content(path: Path, form: LogFormat) -> None:
     """Refuse a log that begins as one of another format."""
-    try:
-        with path.open("rb") as stream:
-            first = stream.readline(_LONGEST_LINE)
-    except OSError:
-        # The reader says so.
-        return
+    first = _first_line(path)
     alike = [other for other in LOG_FORMATS if other.begins(first)]
     if alike and form not in alike:
-        raise InputError(
-            f"{path}: seems to hold {alike[0].content}, not what its name ends in; rename it to end in"
-            f" {alike[0].suffix}"
-        )
+        remedy = f"rename it to end in {alike[0].suffix}" if alike[0].suffix else "rename it to have no ending"
+        raise InputError(f"{path}: seems to hold {alike[0].content}, not what its name ends in; {remedy}")
 
 
 def _is_header(line: bytes) -> bool:

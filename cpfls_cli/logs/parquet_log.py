@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -11,42 +12,36 @@ from pyarrow import parquet
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.settings import ImportSettings
-from cpfls_cli.logs.formats import LogColumns
-from cpfls_cli.units import known_unit
+from cpfls_cli.logs.formats import LogContents
 
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
 
-def read(path: Path, settings: ImportSettings) -> LogColumns:
-    """Read the columns of a log that a config maps; nulls are NaN.
-
-    Parameters
-    ----------
-    settings : ImportSettings
-        Stamps whose type states a unit are converted to `time_unit`, from the first one; others are taken as they are.
+def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
+    """Read columns of a log; nulls are NaN, and stamps whose type states a unit count s from the first one.
 
     Raises
     ------
     InputError
-        If the file is no Parquet or broken, has no rows or a name twice, or a mapped column does not hold numbers.
+        If the file is no Parquet or broken, has no rows or a name twice, or a wanted column does not hold numbers.
     """
-    wanted = set(settings.mapped_columns)
     try:
         with parquet.ParquetFile(path) as file:
-            names = file.schema_arrow.names
-            _require_single(path, [name for name in names if name in wanted])
-            table = file.read(columns=[name for name in names if name in wanted])
+            schema = file.schema_arrow
+            kept = schema.names if wanted is None else [name for name in schema.names if name in wanted]
+            _require_single(path, kept)
+            table = file.read(columns=kept)
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
     if file.metadata.num_rows == 0:
         raise InputError(f"{path}: holds column names but no samples")
-    columns: dict[str, Array] = {name: np.empty(0) for name in names}
-    for name in set(table.column_names) & wanted:
+    left_out = [name for name in kept if wanted is None and not _is_numeric(schema.field(name).type)]
+    columns: dict[str, Array] = {name: np.empty(0) for name in schema.names if name not in left_out}
+    for name in set(columns) & set(kept):
         columns[name] = _numbers(path, name, table.column(name))
-        if name == settings.time_column and _states_unit(table.column(name).type):
-            columns[name] /= known_unit(settings.time_unit).factor
-    return LogColumns(columns)
+    warnings = (f"columns that hold no numbers are left out: {', '.join(left_out)}",) if left_out else ()
+    units = {name: "s" for name in set(columns) & set(kept) if _states_unit(schema.field(name).type)}
+    return LogContents({"": columns}, units, warnings=warnings)
 
 
 def _require_single(path: Path, names: list[str]) -> None:
@@ -56,19 +51,26 @@ def _require_single(path: Path, names: list[str]) -> None:
 
 
 def _numbers(path: Path, name: str, column: Any) -> Array:
-    kind = column.type.value_type if pyarrow.types.is_dictionary(column.type) else column.type
-    if _states_unit(kind):
-        return _seconds(column)
-    types = pyarrow.types
-    numeric = (types.is_integer, types.is_floating, types.is_boolean, types.is_decimal, types.is_null)
-    if not any(is_kind(kind) for is_kind in numeric):
+    if not _is_numeric(column.type):
         raise InputError(
-            f"{path}: column '{name}' holds {kind}: not numbers; map another column in import.signals, or write this "
-            "one as numbers"
+            f"{path}: column '{name}' holds {_kind(column.type)}: not numbers; map another column in import.signals, "
+            "or write this one as numbers"
         )
-    if types.is_boolean(kind):
+    if _states_unit(column.type):
+        return _seconds(column)
+    if pyarrow.types.is_boolean(_kind(column.type)):
         column = column.cast(pyarrow.int8())
     return np.asarray(column.cast(pyarrow.float64(), safe=False).to_numpy(), dtype=float)
+
+
+def _kind(kind: Any) -> Any:
+    return kind.value_type if pyarrow.types.is_dictionary(kind) else kind
+
+
+def _is_numeric(kind: Any) -> bool:
+    types = pyarrow.types
+    numeric = (types.is_integer, types.is_floating, types.is_boolean, types.is_decimal, types.is_null)
+    return _states_unit(kind) or any(is_kind(_kind(kind)) for is_kind in numeric)
 
 
 def _states_unit(kind: Any) -> bool:

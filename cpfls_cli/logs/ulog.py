@@ -4,95 +4,82 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Sequence
+from collections.abc import Collection
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyulog
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.settings import ImportSettings
-from cpfls_cli.flightlog.topics import STAMP, on_one_clock, topic_and_field
-from cpfls_cli.logs.formats import ULOG_MAGIC, LogColumns
-from cpfls_cli.units import known_unit
+from cpfls_cli.flightlog.topics import STAMP
+from cpfls_cli.logs.formats import ULOG_MAGIC, LogContents
+from cpfls_cli.logs.records import numbers, seconds
 
-_MICROSECOND = 1e-6
+_PER_SECOND = 10**6
 
 
-def read(path: Path, settings: ImportSettings) -> LogColumns:
-    """Read the mapped columns, ``topic.field`` or ``topic[instance].field``, on the clock of one topic.
+def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
+    """Read all topics, ``topic`` or ``topic[instance]``.
 
-    Warnings name dropouts of the logger, a broken file and topics that are thinned.
+    Warnings name dropouts of the logger and a broken file.
 
     Parameters
     ----------
-    settings : ImportSettings
-        `time_column` names the stamps that are the clock; stamps are converted to `time_unit`.
+    wanted : collection of str, optional
+        Not needed: the file is read as a whole, and a part of it takes no less time.
 
     Raises
     ------
     InputError
-        If the file is no ULog, or `time_column` names no stamps.
+        If the file is no ULog, or holds no samples.
     """
-    log, topics = _read(path, settings)
-    base, stamp = topic_and_field(settings.time_column)
-    if stamp not in topics.get(base, {}):
-        raise InputError(
-            f"{path}: import.time_column = {settings.time_column!r}: in a .ulg every topic has stamps; name those of"
-            " the fastest one that is mapped, such as vehicle_angular_velocity.timestamp (topics:"
-            f" {', '.join(sorted(topics)) or 'none'})"
-        )
-    origin = int(topics[base][stamp][0])
-    try:
-        columns, warnings = on_one_clock(_in_seconds(topics, origin), settings)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    columns[settings.time_column] = columns[settings.time_column] / known_unit(settings.time_unit).factor
-    return LogColumns(columns, (*_warn_of_file(log, origin), *warnings))
+    del wanted
+    log = _parsed(path)
+    origin = int(log.start_timestamp)
+    topics = {
+        f"{data.name}[{data.multi_id}]" if data.multi_id else data.name: {
+            field: _field(field, values, origin) for field, values in data.data.items()
+        }
+        for data in log.data_list
+    }
+    if not topics:
+        raise InputError(f"{path}: a ULog file without samples: was the logger stopped at once, or the file cut off?")
+    return LogContents(topics, {}, _parameters(log), _system(log), _warn_of_file(log, origin))
 
 
-def _read(path: Path, settings: ImportSettings) -> tuple[Any, dict[str, dict[str, Any]]]:
-    """Read the mapped topics, or all topics where a mapped field is missing, so that a message can list them."""
-    wanted = [topic_and_field(column) for column in settings.mapped_columns]
-    log = _parsed(path, sorted({topic.partition("[")[0] for topic, _ in wanted}))
-    if not all(field in _topics(log).get(topic, {}) for topic, field in wanted):
-        log = _parsed(path, None)
-    return log, _topics(log)
-
-
-def _parsed(path: Path, topics: Sequence[str] | None) -> Any:
+def _parsed(path: Path) -> Any:
     try:
         # The reader prints what it finds wrong, which is asked for below, and leaves a file that it cannot read open.
         with path.open("rb") as stream, redirect_stdout(io.StringIO()):
             if stream.read(len(ULOG_MAGIC)) != ULOG_MAGIC:
                 raise InputError(f"{path}: not a ULog file: it does not begin as one")
             stream.seek(0)
-            return pyulog.ULog(stream, None if topics is None else list(topics))
+            return pyulog.ULog(stream)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
     except (pyulog.core.ULogException, struct.error, ValueError, KeyError, IndexError, TypeError) as error:
         raise InputError(f"{path}: a broken ULog file: {error}") from None
 
 
-def _topics(log: Any) -> dict[str, dict[str, Any]]:
-    return {f"{data.name}[{data.multi_id}]" if data.multi_id else data.name: data.data for data in log.data_list}
+def _parameters(log: Any) -> dict[str, float | str]:
+    """Give the parameters as the log begins; in a broken log some are no numbers."""
+    known = log.initial_parameters.items()
+    return {name: float(value) for name, value in known if isinstance(value, int | float)}
 
 
-def _in_seconds(topics: dict[str, dict[str, Any]], origin: int) -> dict[str, dict[str, Array]]:
-    """Convert stamps to seconds from the origin; the difference of whole numbers is exact."""
-    return {
-        topic: {field: _field(field, values, origin) for field, values in fields.items()}
-        for topic, fields in topics.items()
-    }
+def _system(log: Any) -> str:
+    name = str(log.msg_info_dict.get("sys_name", ""))
+    # Of a version that is no release too; old logs do not state it as a number.
+    version = log.get_version_info() if isinstance(log.msg_info_dict.get("ver_sw_release"), int) else None
+    return " ".join([name, ".".join(str(part) for part in version[:3])] if version else [name]).strip()
 
 
 def _field(field: str, values: Any, origin: int) -> Array:
-    if field.startswith(STAMP):
-        return np.asarray((values.astype(np.int64) - origin) * _MICROSECOND, dtype=float)
-    return np.asarray(values, dtype=float)
+    if field.startswith(STAMP) and values.dtype.kind in "iu":
+        return seconds(values, origin, _PER_SECOND)
+    return numbers(values)
 
 
 def _warn_of_file(log: Any, origin: int) -> tuple[str, ...]:
@@ -102,7 +89,7 @@ def _warn_of_file(log: Any, origin: int) -> tuple[str, ...]:
     if log.dropouts:
         longest = max(log.dropouts, key=lambda dropout: dropout.duration)
         total_s = 1e-3 * sum(dropout.duration for dropout in log.dropouts)
-        at_s = (longest.timestamp - origin) * _MICROSECOND
+        at_s = (longest.timestamp - origin) / _PER_SECOND
         warnings.append(
             f"{len(log.dropouts)} dropouts of the logger, {total_s:.3g} s in all, the longest"
             f" {1e-3 * longest.duration:.3g} s at {at_s:.3f} s: samples are missing there"

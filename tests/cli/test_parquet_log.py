@@ -193,7 +193,8 @@ def test_a_broken_page(wrong, write):
 def test_other_endings_are_told_which_there_are(wrong, tmp_path, ending):
     path = tmp_path / f"log{ending}"
     path.write_text("t,roll\n0,1\n")
-    assert wrong(path) == ["LOG: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg"]
+    (line,) = wrong(path)
+    assert line.startswith("LOG: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg, ")
 
 
 def test_without_the_package(wrong, write, monkeypatch):

@@ -1,4 +1,4 @@
-"""Logs in ULog, written here byte by byte from the public description of the format, and files that are none."""
+"""Logs in ULog, and files that are none."""
 
 import json
 import struct
@@ -12,6 +12,8 @@ import pytest
 from cpfls_cli.config.load import load_study
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.rotations import rotation_matrix
+from tests.builders import ulogs
+from tests.builders.ulogs import data, definitions, header, message
 
 EXAMPLE = Path(__file__).parents[2] / "configs" / "px4.yaml"
 
@@ -37,25 +39,7 @@ FIELDS = {
     RATE: "uint64_t timestamp;float[3] xyz",
     TORQUE: "uint64_t timestamp;float[3] xyz",
 }
-BEGIN = 3_600_000_000
 ROLL_RATE, YAW_RATE, NORTH = 0.0, 2.0, 0.3
-
-
-def message(kind, content):
-    return struct.pack("<HB", len(content), ord(kind)) + content
-
-
-def header():
-    return b"ULog\x01\x12\x35\x01" + struct.pack("<Q", BEGIN)
-
-
-def definitions(fields=FIELDS):
-    formats = [message("F", f"{name}:{own};".encode()) for name, own in fields.items()]
-    added = [
-        message("A", struct.pack("<BH", instance, number) + name.encode())
-        for number, (name, instance) in enumerate((name, 0) for name in fields)
-    ]
-    return b"".join([message("B", bytes(40)), *formats, *added])
 
 
 def rows():
@@ -76,12 +60,8 @@ def rows():
     return sorted(sent, key=lambda row: row[:2])
 
 
-def data(stamp, number, values):
-    return message("D", struct.pack("<HQ", number, BEGIN + stamp) + np.asarray(values, "<f4").tobytes())
-
-
 def ulog(sent=None, fields=FIELDS):
-    return header() + definitions(fields) + b"".join(data(*row) for row in (rows() if sent is None else sent))
+    return ulogs.ulog(rows() if sent is None else sent, fields)
 
 
 @pytest.fixture
@@ -151,10 +131,9 @@ def test_dropouts_of_the_logger_are_warned_of(flown):
     cut = next(place for place, row in enumerate(sent) if row[0] > 1_000_000)
     begin, end = (b"".join(data(*row) for row in part) for part in (sent[:cut], sent[cut:]))
     dropouts = message("O", struct.pack("<H", 40)) + message("O", struct.pack("<H", 120))
-    # The clock begins with the first stamp of the body rates, 1 ms after the log.
-    _, _, stderr = flown(header() + definitions() + begin + dropouts + end)
+    _, _, stderr = flown(header() + definitions(FIELDS) + begin + dropouts + end)
     words = " ".join(stderr.split())
-    assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 0.999 s" in words
+    assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 1.000 s" in words
 
 
 def test_a_pause_of_one_topic_is_a_gap(wrong):
@@ -209,9 +188,10 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(wrong, config):
 def test_a_clock_that_is_none_is_told_what_one_is(wrong, column):
     (line,) = wrong(ulog(), "--set", f"import.time_column={column}")
     assert line == (
-        f"LOG: import.time_column = {column!r}: in a .ulg every topic has stamps; name those of the fastest one that is"
-        " mapped, such as vehicle_angular_velocity.timestamp (topics: vehicle_angular_velocity, vehicle_attitude,"
-        " vehicle_torque_setpoint)"
+        f"LOG: import.time_column = {column!r}: in this log every topic has stamps; name those of the fastest one that"
+        " is mapped, such as vehicle_angular_velocity.timestamp, or null for them; the log has the topics"
+        " vehicle_angular_velocity, vehicle_attitude, vehicle_torque_setpoint; `cpfls init LOG` proposes what maps to"
+        " what"
     )
 
 
@@ -229,8 +209,8 @@ def test_a_slow_topic_is_named(wrong):
         (b"", "LOG: not a ULog file: it does not begin as one"),
         (b"t,roll\n0,1\n", "LOG: seems to hold CSV, not what its name ends in; rename it to end in .csv"),
         (header()[:10], "LOG: a broken ULog file: "),
-        (header(), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in a .ulg"),
-        (header() + definitions(), "LOG: import.time_column = 'vehicle_angular_velocity.timestamp': in a .ulg"),
+        (header(), "LOG: a ULog file without samples: was the logger stopped at once, or the file cut off?"),
+        (header() + definitions(FIELDS), "LOG: a ULog file without samples: "),
         (header() + message("B", bytes(8) + b"\x80" + bytes(31)), "LOG: a broken ULog file: "),
     ],
     ids=["empty", "text", "header-cut", "header-only", "no-data", "unknown-flag"],
@@ -277,3 +257,102 @@ def test_the_gap_workflow_takes_it_as_well(config, write):
     flights = read_flights([write(ulog())], load_study(config))
     assert [recording.name for recording in flights.recordings] == ["log.ulg"]
     assert len(flights.recordings[0].signals.time) == pytest.approx(500, abs=10)
+
+
+def of_version(version, removed=()):
+    """A log with the topics of one version of PX4; the vehicle turns about the vertical, and its left motors push."""
+    rate = {
+        "1.9": ("vehicle_attitude", "uint64_t timestamp;float rollspeed;float pitchspeed;float yawspeed;float[4] q")
+    }
+    fields = {
+        "vehicle_attitude": FIELDS[ATTITUDE],
+        "sensor_combined": "uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2",
+        "actuator_controls_0": "uint64_t timestamp;float[8] control",
+        "actuator_outputs": "uint64_t timestamp;uint32_t noutputs;float[16] output",
+    }
+    fields |= {rate[version][0]: rate[version][1]} if version in rate else {RATE: FIELDS[RATE]}
+    if version in ("1.13", "1.17"):
+        fields |= {"actuator_motors": "uint64_t timestamp;float[12] control"}
+    if version == "1.17":
+        fields |= {"vehicle_acceleration": "uint64_t timestamp;float[3] xyz"}
+        fields |= {
+            "esc_status": "uint64_t timestamp;esc_report[4] esc",
+            "battery_status": "uint64_t timestamp;float voltage_v",
+        }
+    fields = {name: own for name, own in fields.items() if name not in removed}
+    turning, pulling = [0.0, 0.0, YAW_RATE], [0.0, 0.0, -9.81]
+    sent = []
+    for number, name in enumerate(fields):
+        for stamp in range(1_000 * number, 2_000_000, 4_000 if name in ("sensor_combined", RATE) else 8_000):
+            yaw = NORTH + YAW_RATE * 1e-6 * stamp
+            attitude = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
+            more = 0.1 if stamp > 1_000_000 else 0.0
+            motors = [0.5, 0.5 + more, 0.5 + more, 0.5]
+            values = {
+                "vehicle_attitude": [*(turning if version == "1.9" else ()), *attitude],
+                "sensor_combined": [*turning, *pulling],
+                "actuator_controls_0": [more, *[0.0] * 7],
+                "actuator_outputs": [0.0, *(1000 + 1000 * np.array(motors)), *[900] * 12],
+                RATE: turning,
+                "actuator_motors": [*motors, *[np.nan] * 8],
+                "vehicle_acceleration": pulling,
+                "esc_status": [*(9000 + 1000 * np.array(motors))],
+                "battery_status": [16.0 - 1e-6 * stamp],
+            }[name]
+            sent.append((stamp, number, values))
+    return ulogs.ulog(sorted(sent, key=lambda row: row[:2]), fields, nested={"esc_report": "float esc_rpm"})
+
+
+VERSIONS = {
+    "1.9": ("vehicle_attitude.rollspeed", "actuator_outputs.output[0]"),
+    "1.10": (None, "actuator_outputs.output[0]"),
+    "1.13": (None, None),
+    "1.17": (None, None),
+}
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_one_example_takes_logs_of_all_versions(cpfls, write, tmp_path, version):
+    flight = tmp_path / "flight.h5"
+    words = ["--set", "import.delay_s=0", "--set", "import.lowpass_hz=null"]
+    result = cpfls("import", EXAMPLE, write(of_version(version)), "-o", flight, *words)
+    assert result.exit_code == 0, result.stderr
+    told = " ".join(result.stderr.split())
+    for signal, column in zip(("body_rate", "rotor_command"), VERSIONS[version], strict=True):
+        assert (f"{signal} is that of {column}" in told) == (column is not None)
+    assert ("acceleration is that of sensor_combined.accelerometer_m_s2[0]" in told) == (version != "1.17")
+    with h5py.File(flight) as file:
+        np.testing.assert_allclose(file["body_rate"][()], [[0.0, 0.0, -YAW_RATE]] * len(file["time"]), atol=1e-6)
+        np.testing.assert_allclose(file["rotor_command"][-20], [0.5, 0.6, 0.6, 0.5], atol=1e-6)
+        # The left motors push more: a roll to the right.
+        assert file["body_torque"][-20, 0] > 0.1
+        assert ("rotor_speed" in file) == ("voltage" in file) == (version == "1.17")
+        np.testing.assert_allclose(file["acceleration"][()], 0.0, atol=0.01)
+        if version == "1.17":
+            speed = (9000 + 1000 * np.array([0.5, 0.6, 0.6, 0.5])) * np.pi / 30
+            np.testing.assert_allclose(file["rotor_speed"][-20], speed, rtol=1e-6)
+
+
+def test_where_motors_are_not_logged_the_pulses_are_offered(refuse, write, tmp_path):
+    study = tmp_path / "study.yaml"
+    text = EXAMPLE.read_text()
+    begin, end = text.index("      # Up to 1.12"), text.index("    # Speeds that")
+    study.write_text(text[:begin] + text[end:])
+    lines = refuse("import", study, write(of_version("1.10")), "-o", tmp_path / "flight.h5")
+    assert [line.partition(": import")[2] for line in lines] == [
+        f".signals.rotor_command.columns: the log has no column 'actuator_motors.control[{motor}]'"
+        f" (PX4 of this version has actuator_outputs.output[{motor}])"
+        for motor in range(4)
+    ]
+
+
+def test_what_no_version_has_is_said_to_have_been_tried(refuse, write, tmp_path):
+    log = write(of_version("1.10", removed=("actuator_outputs",)))
+    lines = refuse("import", EXAMPLE, log, "-o", tmp_path / "flight.h5")
+    begin = ".signals.rotor_command.columns: the log has no column 'actuator_motors.control[0]', nor all columns of an"
+    assert lines[0].partition(": import")[2].startswith(f"{begin} entry of otherwise (")
+
+
+def test_an_encrypted_log_is_said_to_be_one(wrong):
+    remedy = "is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does"
+    assert wrong(b"ULogEnc\x01" + bytes(100)) == [f"LOG: {remedy}"]

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from cpfls_cli.config.load import parse_config, validate
+
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").glob("*.md")])
 
@@ -42,3 +44,11 @@ def prose(page):
 def test_lines_of_prose_have_at_most_120_characters(page):
     # A link in one piece may be longer.
     assert [line for line in prose(page) if len(line) > 120 and " " in line.strip()] == []
+
+
+EXAMPLES = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "import.md").read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=range(len(EXAMPLES)))
+def test_examples_of_the_page_on_import_are_valid(example):
+    assert validate(parse_config(example, "import.md"), "import.md").import_.signals

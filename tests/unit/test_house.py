@@ -183,7 +183,6 @@ SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
     "control/controllers.py": "the laws, beside the loop that they close",
     "excitation/optimise.py": "what the room is for",
-    "flightlog/topics.py": "topics of a log on one clock, which is no matter of its reader",
     "identification/reference.py": "the slow, plain evaluation that tests hold the compiled one against",
     "pages/page.py": "the list of sections",
     "regressor/table.py": "loads without compiled loops",

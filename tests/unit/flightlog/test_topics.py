@@ -1,10 +1,12 @@
 """Topics with clocks of their own, put on the clock of one: what is interpolated, what is held, what is absent."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog import ImportSettings, SignalMap
+from cpfls_cli.errors import InputError, SettingError
+from cpfls_cli.flightlog.settings import ColumnMap, ImportSettings, SignalMap
 from cpfls_cli.flightlog.topics import hold_previous, interpolate, on_one_clock, topic_and_field
 
 GYRO = 0.004 * np.arange(500)
@@ -23,7 +25,8 @@ def signals(**columns):
 
 def put(topics, gap_s=0.1, time_column="gyro.timestamp", **columns):
     settings = ImportSettings(time_column=time_column, torque_source=None, gap_s=gap_s, signals=signals(**columns))
-    return on_one_clock(topics, settings)
+    columns, _, warnings = on_one_clock(topics, {}, settings)
+    return columns, warnings
 
 
 def gyro(**fields):
@@ -108,7 +111,95 @@ def test_what_is_not_there_is_only_named():
     columns, _ = put(topics, body_rate=("gyro.x", "gyro.y", "other.z"))
     assert "other.z" not in columns
     assert columns["gyro.z"].size == 0
-    assert put(topics, time_column="t", body_rate=RATE)[0].keys() == {"gyro.timestamp", *RATE}
+
+
+def test_the_clock_is_named_or_that_of_the_fastest_mapped_topic():
+    slow = {"timestamp": SLOW, "a": SLOW, "b": SLOW, "c": SLOW, "d": SLOW}
+    topics = {"slow": slow, "gyro": gyro(), "other": {"timestamp": np.linspace(0, 2, 9000)}}
+    mapped = signals(quaternion=("slow.a", "slow.b", "slow.c", "slow.d"), body_rate=RATE)
+    settings = ImportSettings(time_column=None, time_unit="ms", torque_source=None, signals=mapped)
+    columns, chosen, _ = on_one_clock(topics, {}, settings)
+    assert chosen.time_column == "gyro.timestamp"
+    np.testing.assert_allclose(columns["gyro.timestamp"], 1e3 * GYRO)
+    with pytest.raises(
+        InputError,
+        match=r"'t': .* such as gyro\.timestamp, or null for them; the log has the topics gyro, other, slow;",
+    ):
+        on_one_clock(topics, {}, replace(settings, time_column="t"))
+    with pytest.raises(
+        InputError, match=r"import\.signals: the log has no topic that is mapped; the log has the topics other;"
+    ):
+        on_one_clock({"other": topics["other"]}, {}, settings)
+
+
+def test_a_flat_log_is_on_one_clock_and_must_be_told_which_column_it_is():
+    flat = {"": {"t": np.array([1.0, 2.0]), "v": np.array([3.0, 4.0])}}
+    settings = ImportSettings(time_unit="ms", torque_source=None, signals=signals(voltage=("v",), body_rate=RATE))
+    assert on_one_clock(flat, {}, settings)[0]["t"].tolist() == [1.0, 2.0]
+    assert on_one_clock(flat, {"t": "s"}, settings)[0]["t"].tolist() == [1e3, 2e3]
+    with pytest.raises(InputError, match=r"name the column of its stamps; the log has the columns t, v; `cpfls"):
+        on_one_clock(flat, {}, replace(settings, time_column=None))
+
+
+def test_the_first_map_is_taken_whose_columns_are_all_there():
+    old = ColumnMap(columns=("old.x", "old.y", "old.z"), unit="deg/s", scale=2.0)
+    older = ColumnMap(columns=("older[0].x", "older.y", "older.z"), unit="rpm")
+    mapped = {"body_rate": SignalMap(columns=RATE, unit="rad/s", required=False, otherwise=(old, older))}
+    settings = ImportSettings(time_column=None, torque_source=None, signals=mapped)
+    partly = {field: values for field, values in gyro().items() if field != "z"}
+
+    def chosen(**topics):
+        return on_one_clock(topics, {}, settings)[1].signals["body_rate"]
+
+    first = SignalMap(columns=RATE, unit="rad/s", required=False)
+    assert chosen(gyro=gyro(), old=gyro(), older=gyro()) == first
+    assert chosen(gyro=partly, old=gyro(), older=gyro()) == replace(first, columns=old.columns, unit="deg/s", scale=2.0)
+    assert chosen(gyro=partly, older=gyro()) == replace(first, columns=older.columns, unit="rpm")
+    assert chosen(gyro=partly) == mapped["body_rate"]
+
+
+def test_it_is_told_which_columns_stand_in():
+    old = ColumnMap(columns=("old.x", "old.y", "old.z"), unit="deg/s")
+    mapped = {"body_rate": SignalMap(columns=RATE, unit="rad/s", otherwise=(old,))}
+    settings = ImportSettings(time_column=None, torque_source=None, signals=mapped)
+    assert on_one_clock({"gyro": gyro(), "old": gyro()}, {}, settings)[2] == ()
+    told = "body_rate is that of old.x, old.y, old.z: the log has not all of gyro.x and its kin"
+    assert on_one_clock({"old": gyro()}, {}, settings)[2] == (told,)
+    flat = {"": {"t": GYRO} | dict.fromkeys(old.columns, GYRO)}
+    assert on_one_clock(flat, {}, replace(settings, time_column="t"))[2] == (told,)
+
+
+def test_signals_that_a_log_may_lack_are_left_out_where_they_say_nothing():
+    slow = {"timestamp": np.arange(3.0), "v": np.array([1.0, 2.0, 3.0])}
+    dead = {"timestamp": GYRO} | dict.fromkeys("abcd", np.where(GYRO > 1, 0.0, np.nan))
+    alive = dead | {"d": GYRO}
+    mapped = signals(body_rate=RATE) | {
+        "voltage": SignalMap(columns=("bat[0].v",), unit="V", required=False),
+        "rotor_speed": SignalMap(columns=("esc.a", "esc.b", "esc.c", "esc.d"), unit="rpm", required=False),
+    }
+    settings = ImportSettings(time_column=None, torque_source=None, signals=mapped)
+    columns, _, warnings = on_one_clock({"gyro": gyro(), "bat": slow, "esc": dead}, {}, settings)
+    assert not {"bat.v", "bat[0].v", "esc.a", "esc.d"} & columns.keys()
+    assert warnings == (
+        "signal voltage is left out: topic bat has a sample only every 1 s (median), longer than import.gap_s = 0.1",
+        "signal rotor_speed is left out: its columns are 0 or absent throughout",
+    )
+    # One that moves is a vehicle with motors that stand.
+    assert on_one_clock({"gyro": gyro(), "esc": alive}, {}, settings)[2] == ()
+
+
+def test_maps_that_stand_in_for_each_other_have_one_number_of_columns_and_one_kind_of_unit():
+    def command(unit, *columns):
+        other = ColumnMap(columns=columns, unit=unit)
+        mapped = SignalMap(columns=("a", "b"), unit="1", otherwise=(other,))
+        return ImportSettings(torque_source=None, signals={"rotor_command": mapped})
+
+    assert command("1", "c", "d").mapped_columns == ("t", "a", "b", "c", "d")
+    with pytest.raises(SettingError, match="needs 2 columns, got 1") as caught:
+        command("1", "c")
+    assert caught.value.key == "signals.rotor_command.otherwise.0.columns"
+    with pytest.raises(SettingError, match=r"'us' does not measure it; one of 1$"):
+        command("us", "c", "d")
 
 
 def test_topic_that_is_too_slow_is_named():

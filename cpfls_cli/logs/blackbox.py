@@ -1,0 +1,165 @@
+"""Reader of blackbox logs, as Betaflight, INAV and their kin write them: a header in text, then packed frames."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Collection, Mapping
+from math import pi
+from pathlib import Path
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.errors import InputError
+from cpfls_cli.logs.blackbox_frames import ENCODINGS, KINDS, MAIN, ROLLOVER, Fields, decode
+from cpfls_cli.logs.formats import BLACKBOX_MAGIC, LogContents
+
+_LARGEST_SHORT = 0x7FFF
+_DEGREES = 180 / pi
+
+
+def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
+    """Read the main fields of the longest flight in a file, on one clock, ``time``.
+
+    Parameters
+    ----------
+    wanted : collection of str, optional
+        Not needed: frames are read as a whole.
+
+    Raises
+    ------
+    InputError
+        If the file is no such log, or holds no frames that can be read.
+    """
+    del wanted
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+    begins = [found.start() for found in re.finditer(re.escape(BLACKBOX_MAGIC), content)]
+    if not begins:
+        raise InputError(f"{path}: not a blackbox log: it does not begin as one")
+    try:
+        flights = [_flight(content[begin:end]) for begin, end in zip(begins, [*begins[1:], None], strict=True)]
+        longest = max(range(len(flights)), key=lambda number: len(flights[number][1]))
+        header, rows, broken = flights[longest]
+        columns, units = _columns(header, rows)
+    except KeyError as error:
+        raise InputError(f"{path}: a broken blackbox log: its header: the line {error} is missing") from None
+    except (ValueError, OverflowError) as error:
+        raise InputError(f"{path}: a broken blackbox log: its header: {error}") from None
+    if len(rows) < 2:
+        raise InputError(f"{path}: a blackbox log without frames that can be read")
+    several = f"holds {len(begins)} flights; the longest, number {longest + 1}, is read: {columns['time'][-1]:.0f} s"
+    lost = f"{broken} frames are broken; what follows up to the next whole one is missing"
+    warnings = (*((several,) if len(begins) > 1 else ()), *((lost,) if broken else ()))
+    return LogContents({"": columns}, units, _parameters(header), header.get("Firmware revision", ""), warnings)
+
+
+def _flight(content: bytes) -> tuple[dict[str, str], IntArray, int]:
+    """Read one flight: the lines of its header, values by frame and main field, and how many frames are broken."""
+    header, begin = {}, 0
+    while content.startswith(b"H ", begin) and (end := content.find(b"\n", begin)) > 0:
+        key, _, value = content[begin + 2 : end].decode("latin-1").partition(":")
+        header[key] = value
+        begin = end + 1
+    if header.get("Data version") != "2":
+        raise ValueError(f"Data version {header.get('Data version', 'missing')}, not 2")
+    fields = _fields(header)
+    constants = np.array(
+        [
+            _numbers(header, "minthrottle", "1150")[0],
+            _numbers(header, "motorOutput", header.get("minthrottle", "1150"))[0],
+            _numbers(header, "vbatref", "4095")[0],
+            _names(header).index("motor[0]") if "motor[0]" in _names(header) else -1,
+        ]
+    )
+    data = np.frombuffer(content, dtype=np.uint8)
+    # How many frames there are is known only once they were read.
+    number, broken = decode(data, begin, fields, constants, np.empty((0, fields.counts[MAIN]), dtype=np.int64))
+    rows = np.empty((number, fields.counts[MAIN]), dtype=np.int64)
+    decode(data, begin, fields, constants, rows)
+    return header, rows, broken
+
+
+def _names(header: Mapping[str, str]) -> list[str]:
+    return header["Field I name"].split(",")
+
+
+def _numbers(header: Mapping[str, str], key: str, otherwise: str = "") -> list[int]:
+    return [int(word) for word in header.get(key, otherwise).split(",")]
+
+
+def _fields(header: Mapping[str, str]) -> Fields:
+    """Read how the fields of each kind of frame are written; frames of kind P have the fields of those of kind I."""
+    if _names(header)[1:2] != ["time"]:
+        raise ValueError("the second field is not time")
+    width = max(len(header.get(f"Field {kind} name", "").split(",")) for kind in KINDS)
+    fields = Fields(np.zeros(len(KINDS), dtype=np.int64), *np.zeros((3, len(KINDS), width), dtype=np.int64))
+    for number, kind in enumerate(KINDS):
+        if f"Field {kind} encoding" not in header:
+            continue
+        named = "I" if kind == "P" else kind
+        count = fields.counts[number] = len(header[f"Field {named} name"].split(","))
+        fields.encoding[number, :count] = _numbers(header, f"Field {kind} encoding")
+        fields.predictor[number, :count] = _numbers(header, f"Field {kind} predictor")
+        fields.is_signed[number, :count] = _numbers(header, f"Field {named} signed")
+        unknown = set(fields.encoding[number, :count].tolist()) - set(ENCODINGS)
+        if unknown:
+            raise ValueError(f"fields of kind {kind} in the encoding {sorted(unknown)[0]}")
+    return fields
+
+
+def _columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
+    """Name the columns, and give those whose unit the header tells in that unit."""
+    names = _names(header)
+    stamps = rows[:, 1] + ROLLOVER * np.cumsum(np.diff(rows[:, 1], prepend=rows[:1, 1]) < 0)
+    # The number of a frame follows from which frames are left out, which nothing here needs.
+    columns = {name: rows[:, place].astype(float) for place, name in enumerate(names) if name != "loopIteration"}
+    columns["time"] = 1e-6 * (stamps - stamps[:1])
+    units = {"time": "s"}
+    for name, (prefix, factor, unit) in ((name, each) for name in names for each in _scales(header)):
+        if name.startswith(prefix):
+            columns[name] = factor * columns[name]
+            units[name] = unit
+    for name in [name for name in units if name.startswith("eRPM[")]:
+        # The name would be a lie now.
+        turned = f"rpm{name.removeprefix('eRPM')}"
+        columns[turned], units[turned] = columns.pop(name), units.pop(name)
+    if "imuQuaternion[0]" in units:
+        # Its sign is such that the real part, which is not written, is positive.
+        imaginary = sum(columns[f"imuQuaternion[{axis}]"] ** 2 for axis in range(3))
+        columns["imuQuaternion[w]"] = np.sqrt(np.maximum(1 - imaginary, 0.0))
+        units["imuQuaternion[w]"] = "1"
+    return columns, units
+
+
+def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
+    """List beginnings of names, factors and units, as far as the header tells them."""
+    (gyro,) = struct.unpack(">f", int(header.get("gyro_scale", "0x0"), 16).to_bytes(4, "big"))
+    system = re.match(r"(\w+) (\d+)\.(\d+)", header.get("Firmware revision", ""))
+    version = (system[1], (int(system[2]), int(system[3]))) if system else ("", (0, 0))
+    finer = 10 if header.get("blackbox_high_resolution") == "1" else 1
+    scales = []
+    if gyro > 0:
+        # Betaflight scales to deg/s, and to tenths of it where asked to, others to rad in a microsecond.
+        scales += [("gyro", gyro / finer if gyro > 1e-5 else 1e6 * gyro * _DEGREES, "deg/s")]
+    if int(header.get("acc_1G", "0")) > 0:
+        scales += [("accSmooth[", 1 / int(header["acc_1G"]), "g")]
+    if version[0] == "Betaflight" and version[1] >= (3, 1):
+        scales += [("vbatLatest", 0.01 if version[1] >= (4, 0) else 0.1, "V")]
+        scales += [(f"setpoint[{axis}]", 1 / finer, "deg/s") for axis in range(3)]
+        scales += [("imuQuaternion[", 1 / _LARGEST_SHORT, "1")]
+    if version[0] == "INAV":
+        scales += [("vbat", 0.01, "V"), ("attitude[", 0.1, "deg")]
+    if int(header.get("motor_poles", "0")) > 0:
+        # Hundreds of electrical turns, of which each pair of poles takes one.
+        scales += [("eRPM[", 200 / int(header["motor_poles"]), "rpm")]
+    return scales
+
+
+def _parameters(header: Mapping[str, str]) -> dict[str, float | str]:
+    """Give the lines of the header that are not about the log itself."""
+    lines = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
+    return {key: float(value) if re.fullmatch(r"-?\d+(\.\d+)?", value) else value for key, value in lines.items()}

@@ -1,0 +1,193 @@
+"""Reader of ArduPilot's DataFlash logs: messages that describe themselves, each kind with stamps of its own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.topics import STAMP
+from cpfls_cli.logs.formats import DATAFLASH_MAGIC, LogContents
+from cpfls_cli.logs.records import numbers, seconds, table
+
+_HEAD = b"\xa3\x95"
+_OF_FORMATS = 0x80
+_FORMAT = np.dtype([("", "V3"), ("kind", "u1"), ("length", "u1"), ("name", "S4"), ("types", "S16"), ("fields", "S64")])
+# Letter of a type to its place in memory and the factor that the letter implies.
+_NUMBERS = {
+    **{own[0]: (own[1:], 1.0) for own in ("bi1", "Bu1", "Mu1", "hi2", "Hu2", "ii4", "Iu4", "qi8", "Qu8")},
+    **{own[0]: (own[1:], 1.0) for own in ("gf2", "ff4", "df8")},
+    **{own[0]: (own[1:], 0.01) for own in ("ci2", "Cu2", "ei4", "Eu4")},
+    "L": ("i4", 1e-7),
+}
+_OTHERS = {"n": "S4", "N": "S16", "Z": "S64", "a": "V64"}
+_STAMPS = {"TimeUS": 10**6, "TimeMS": 10**3}
+_INSTANCE = "#"
+_NO_FACTOR = "-?0"
+_SCALED = "cCeEL"
+# Our names of units that ArduPilot calls otherwise.
+_UNITS = {"m/s/s": "m/s^2", "degheading": "deg", "RPM": "rpm", "PWM": "us"}
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """One kind of message: its name, the letters of its fields' types, and where the messages begin."""
+
+    name: str
+    letters: dict[str, str]
+    record: np.dtype
+    begins: list[int] = field(default_factory=list)
+
+    @property
+    def stamp(self) -> str:
+        """Name of the field of the stamps; empty where there is none."""
+        return next((name for name in _STAMPS if self.letters.get(name) in ("I", "Q")), "")
+
+
+def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
+    """Read all messages, ``MESSAGE.field`` or ``MESSAGE[instance].field``.
+
+    Parameters
+    ----------
+    wanted : collection of str, optional
+        Not needed: the file is read as a whole, and a part of it takes no less time.
+
+    Raises
+    ------
+    InputError
+        If the file is no such log, or holds no messages with stamps.
+    """
+    del wanted
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+    if not content.startswith(DATAFLASH_MAGIC):
+        raise InputError(f"{path}: not a DataFlash log: it does not begin as one (encrypted, or of another program?)")
+    kinds, lost = _find_messages(content)
+    tables = {kind.name: table(content, kind.begins, kind.record) for kind in kinds.values() if kind.begins}
+    stated = _stated_units(tables, kinds)
+    topics = {
+        topic: fields
+        for kind in kinds.values()
+        if kind.begins and kind.stamp
+        for topic, fields in _topics(kind, tables[kind.name], stated.get(kind.name, {}))
+    }
+    if not topics:
+        raise InputError(f"{path}: holds no messages with stamps (TimeUS)")
+    _from_first_stamp(topics)
+    units = {
+        f"{topic}.{each}": unit
+        for topic, fields in topics.items()
+        for each, unit in stated.get(topic.partition("[")[0], {}).items()
+        if each in fields and unit != _INSTANCE
+    }
+    broken = (f"{lost} bytes are no messages: the file is broken in places; what could be read of it is used",)
+    return LogContents(topics, units, _parameters(tables), _system(tables), broken if lost else ())
+
+
+def _find_messages(content: bytes) -> tuple[dict[int, _Kind], int]:
+    """Note where each message begins, by kind, and count the bytes between messages that are none."""
+    kinds = {_OF_FORMATS: _Kind("FMT", {}, _FORMAT)}
+    place, lost = 0, 0
+    while 0 <= place < len(content) - 2:
+        kind = kinds.get(content[place + 2]) if content.startswith(_HEAD, place) else None
+        end = place + (kind.record.itemsize if kind else 0)
+        if kind is None or not (content.startswith(_HEAD, end) or len(content) - end < len(_HEAD)):
+            following = content.find(_HEAD, place + 1)
+            lost += following - place if following >= 0 else 0
+            place = following
+            continue
+        if end > len(content):
+            # The last message is cut off, as the power was.
+            break
+        kind.begins.append(place)
+        if kind.name == "FMT":
+            _describe(content[place:end], kinds)
+        place = end
+    return kinds, lost
+
+
+def _describe(message: bytes, kinds: dict[int, _Kind]) -> None:
+    """Take up the kind that a message describes; one that contradicts itself is left out."""
+    (own,) = np.frombuffer(message, _FORMAT)
+    letters, names = own["types"].decode("latin-1"), own["fields"].decode("latin-1").split(",")
+    if own["kind"] in kinds or len(names) != len(letters) or len(set(names)) != len(names):
+        return
+    if not set(letters) <= {*_NUMBERS, *_OTHERS}:
+        return
+    places = [_NUMBERS[letter][0] if letter in _NUMBERS else _OTHERS[letter] for letter in letters]
+    record = np.dtype([("", "V3"), *((name, f"<{kind}") for name, kind in zip(names, places, strict=True))])
+    if record.itemsize == own["length"]:
+        kinds[int(own["kind"])] = _Kind(own["name"].decode("latin-1"), dict(zip(names, letters, strict=True)), record)
+
+
+def _topics(kind: _Kind, samples: np.ndarray, units: Mapping[str, str]) -> Iterator[tuple[str, dict[str, Array]]]:
+    """Give the numbers of one kind of message, each instance of it a topic."""
+    instance = next((each for each, unit in units.items() if unit == _INSTANCE), None)
+    for number in np.unique(samples[instance]).tolist() if instance else [0]:
+        own = samples[samples[instance] == number] if instance else samples
+        yield (
+            f"{kind.name}[{number}]" if number else kind.name,
+            {
+                STAMP: seconds(own[kind.stamp], 0, _STAMPS[kind.stamp]),
+                **{
+                    each: _NUMBERS[letter][1] * numbers(own[each])
+                    for each, letter in kind.letters.items()
+                    if letter in _NUMBERS and each != kind.stamp
+                },
+            },
+        )
+
+
+def _from_first_stamp(topics: Mapping[str, dict[str, Array]]) -> None:
+    origin = min(fields[STAMP][0] for fields in topics.values())
+    for fields in topics.values():
+        # Whole microseconds again: a difference of two large numbers of seconds is none.
+        fields[STAMP] = np.round(fields[STAMP] - origin, 6)
+
+
+def _stated_units(tables: Mapping[str, np.ndarray], kinds: Mapping[int, _Kind]) -> dict[str, dict[str, str]]:
+    """Look up the units that the log states, by kind and field, of fields that need no further factor to be in them."""
+    try:
+        labels = {chr(int(row["Id"]) % 256): _text(row["Label"]) for row in tables["UNIT"]}
+        stated = {int(row["FmtType"]): (_text(row["UnitIds"]), _text(row["MultIds"])) for row in tables["FMTU"]}
+    except (KeyError, ValueError):
+        # Logs of before 3.6 state none.
+        return {}
+    labels = {letter: _UNITS.get(label, label) for letter, label in labels.items()} | {_INSTANCE: _INSTANCE}
+    return {
+        kind.name: {
+            each: labels[unit]
+            for (each, letter), unit, factor in zip(kind.letters.items(), *stated[number], strict=False)
+            if labels.get(unit) and (factor in _NO_FACTOR or letter in _SCALED)
+        }
+        for number, kind in kinds.items()
+        if number in stated
+    }
+
+
+def _parameters(tables: Mapping[str, np.ndarray]) -> dict[str, float | str]:
+    """Give the parameters as the log begins."""
+    known: dict[str, float | str] = {}
+    for row in tables.get("PARM", ()):
+        known.setdefault(_text(row["Name"]), float(row["Value"]))
+    return known
+
+
+def _system(tables: Mapping[str, np.ndarray]) -> str:
+    for row in tables.get("MSG", ()):
+        program = re.match(r"(?:APM:)?(\w+) V(\d[\w.]*)", _text(row["Message"]))
+        if program:
+            name = program[1] if program[1].startswith("Ardu") else f"Ardu{program[1]}"
+            return f"{name} {program[2]}"
+    return ""
+
+
+def _text(field_of: bytes) -> str:
+    return field_of.decode("latin-1")

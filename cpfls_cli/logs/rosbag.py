@@ -1,0 +1,175 @@
+"""Reader of ROS 2 bags, SQLite or MCAP: topics of messages, flattened to their numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Connection, MessageDefinitionFormat
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.topics import STAMP, topic_and_field
+from cpfls_cli.logs.formats import LogContents
+from cpfls_cli.logs.records import seconds
+
+_NANOSECOND = 10**9
+_MICROSECONDS = 1000
+_SAME_CLOCK_S = 1.0
+_MOST_NUMBERS = 64
+_WITHOUT_NUMBERS = re.compile(r"sensor_msgs/msg/(Image|CompressedImage|PointCloud2?)")
+_STANDARD = re.compile(r"(sensor|geometry|nav)_msgs/msg/")
+# REP 103 sets the units of standard messages.
+_UNITS = (
+    (re.compile(r"orientation\.[xyzw]$"), "1"),
+    (re.compile(r"(angular|angular_velocity)\.[xyz]$"), "rad/s"),
+    (re.compile(r"linear_acceleration\.[xyz]$"), "m/s^2"),
+    (re.compile(r"linear\.[xyz]$"), "m/s"),
+    (re.compile(r"(position|point|translation)\.[xyz]$"), "m"),
+    (re.compile(r"^voltage$"), "V"),
+)
+
+_Step = str | int
+
+
+def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
+    """Read topics, ``/topic.field.of.message`` with the numbers of arrays one by one.
+
+    Stamps are those of the sender, from the header or the field ``timestamp`` (microseconds, as PX4 sends it), and
+    those of the recorder where there are none; ``timestamp_received`` is always the recorder's.
+
+    Parameters
+    ----------
+    wanted : collection of str, optional
+        Only topics of these columns are read; the others are named.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read as a bag, or holds no messages with numbers.
+    """
+    try:
+        with Reader(path) as reader:
+            return _read(path, reader, None if wanted is None else {topic_and_field(column)[0] for column in wanted})
+    except InputError:
+        raise
+    except Exception as error:
+        # SQLite, MCAP and compression each break in their own way.
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{path}: cannot be read as a ROS 2 bag: {reason}") from None
+
+
+def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
+    topics: dict[str, dict[str, Array]] = {}
+    units: dict[str, str] = {}
+    unknown, shifted = [], []
+    for topic, about in reader.topics.items():
+        kind = about.msgtype or "of several types"
+        if wanted is not None and topic not in wanted:
+            topics[topic] = {STAMP: np.empty(0)}
+        elif about.msgcount and not _WITHOUT_NUMBERS.match(kind):
+            try:
+                received, columns = _columns(reader, about.connections)
+            except Exception:
+                # A definition that is missing, of another version or cannot be parsed costs its topic, not the bag.
+                unknown.append(f"{topic} ({kind})")
+                continue
+            topics[topic], offset = _on_clock(received, columns, reader.start_time)
+            shifted += [f"{topic} ({offset:+.3g} s)"] if offset else []
+            units |= {f"{topic}.{name}": unit for name, unit in _units(kind, columns)}
+    if not topics:
+        listed = f": there is no fitting definition of {', '.join(unknown)}" if unknown else ""
+        raise InputError(f"{path}: a ROS 2 bag without messages that can be read{listed}")
+    warnings = (
+        f"topics left out, as the file has no fitting definition of their messages: {', '.join(unknown)}",
+        f"the clocks of these topics are not the recorder's, and are shifted by the median: {', '.join(shifted)}",
+    )
+    present = [warning for warning, causes in zip(warnings, (unknown, shifted), strict=True) if causes]
+    return LogContents(topics, units, system="ROS 2", warnings=tuple(present))
+
+
+def _columns(reader: Reader, connections: Sequence[Connection]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Read all messages of a topic: when they were received, ns, and their numbers by name."""
+    types = _types(connections[0])
+    received, rows = [], []
+    paths: dict[str, tuple[_Step, ...]] = {}
+    for connection, stamp, data in reader.messages(connections=connections):
+        message = types.deserialize_cdr(data, connection.msgtype)
+        paths = paths or dict(_numbers(message))
+        received.append(stamp)
+        rows.append([_at(message, path) for path in paths.values()])
+    values = zip(paths, zip(*rows, strict=True), strict=False)
+    return np.array(received, dtype=np.int64), {name: np.array(own) for name, own in values}
+
+
+def _types(connection: Connection) -> Typestore:
+    """Give the definition of a topic's messages that the file holds, or those of the standard."""
+    definition = connection.msgdef
+    if definition.format is MessageDefinitionFormat.NONE:
+        return get_typestore(Stores.LATEST)
+    types = get_typestore(Stores.EMPTY)
+    if definition.format is MessageDefinitionFormat.MSG:
+        types.register(get_types_from_msg(definition.data, connection.msgtype))
+        return types
+    # Several files in one, each below a line of its own.
+    for part in re.split(r"^=+\nIDL: .*\n", definition.data, flags=re.MULTILINE):
+        types.register(get_types_from_idl(part) if part.strip() else {})
+    return types
+
+
+def _numbers(value: Any, name: str = "", path: tuple[_Step, ...] = ()) -> Iterator[tuple[str, tuple[_Step, ...]]]:
+    """Give the name of each number in a message, and the way to it."""
+    if is_dataclass(value):
+        for own in fields(value):
+            # What is in capitals is a constant of the type.
+            if own.name != "__msgtype__" and not own.name.isupper():
+                yield from _numbers(
+                    getattr(value, own.name), f"{name}.{own.name}" if name else own.name, (*path, own.name)
+                )
+    elif isinstance(value, bool | int | float | np.number):
+        yield name, path
+    elif (
+        isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes) and len(value) <= _MOST_NUMBERS
+    ):
+        for index, own in enumerate(value):
+            yield from _numbers(own, f"{name}[{index}]", (*path, index))
+
+
+def _at(value: Any, path: tuple[_Step, ...]) -> Any:
+    for step in path:
+        if isinstance(step, str):
+            value = getattr(value, step)
+        elif step < len(value):
+            value = value[step]
+        else:
+            # This message has fewer of them than the first one.
+            return np.nan
+    return value
+
+
+def _on_clock(received: np.ndarray, columns: dict[str, np.ndarray], origin: int) -> tuple[dict[str, Array], float]:
+    """Convert stamps to s from an origin; also how far the sender's clock was shifted, s."""
+    sent = {name: _MICROSECONDS * values.astype(np.int64) for name, values in columns.items() if name.startswith(STAMP)}
+    second, part = (columns.get(f"header.stamp.{name}") for name in ("sec", "nanosec"))
+    if second is not None and part is not None and second.all():
+        sent[STAMP] = _NANOSECOND * second.astype(np.int64) + part.astype(np.int64)
+    offset = 0
+    if STAMP in sent:
+        apart = int(np.median(received - sent[STAMP]))
+        offset = apart if abs(apart) > _SAME_CLOCK_S * _NANOSECOND else 0
+    stamps = {STAMP: received} | {name: own + offset for name, own in sent.items()} | {f"{STAMP}_received": received}
+    numbers = {name: own.astype(float) for name, own in columns.items()}
+    return numbers | {name: seconds(own, origin, _NANOSECOND) for name, own in stamps.items()}, offset / _NANOSECOND
+
+
+def _units(kind: str, columns: Collection[str]) -> Iterator[tuple[str, str]]:
+    if _STANDARD.match(kind):
+        for name in columns:
+            yield from ((name, unit) for pattern, unit in _UNITS if pattern.search(name))

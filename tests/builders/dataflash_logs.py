@@ -1,0 +1,60 @@
+"""DataFlash logs of ArduPilot, written byte by byte from the public description of the format."""
+
+import struct
+
+HEAD = b"\xa3\x95"
+_LENGTHS = {"n": "4s", "N": "16s", "Z": "64s", "c": "h", "C": "H", "e": "i", "E": "I", "L": "i", "M": "B", "g": "e"}
+
+
+def packing(letters):
+    return "<" + "".join(_LENGTHS.get(letter, letter) for letter in letters)
+
+
+def message(number, letters, values):
+    return HEAD + bytes([number]) + struct.pack(packing(letters), *values)
+
+
+def definition(number, name, letters, columns):
+    """Describe one kind of message, as such a log does before the first of them."""
+    length = 3 + struct.calcsize(packing(letters))
+    return message(0x80, "BBnNZ", (number, length, name.encode(), letters.encode(), columns.encode()))
+
+
+def dataflash(kinds, rows, parameters=None, said=(), units=None):
+    """Write a log.
+
+    Parameters
+    ----------
+    kinds : dict from name to (letters, columns)
+        Columns as one text, separated by commas.
+    rows : sequence of (name, values)
+    parameters : dict from str to float, optional
+    said : sequence of str
+        Messages to the pilot.
+    units : dict from name to (unit letters, factor letters), optional
+    """
+    kinds = {
+        "PARM": ("QNf", "TimeUS,Name,Value"),
+        "MSG": ("QZ", "TimeUS,Message"),
+        "UNIT": ("QbZ", "TimeUS,Id,Label"),
+        "FMTU": ("QBNN", "TimeUS,FmtType,UnitIds,MultIds"),
+    } | kinds
+    numbers = {name: 129 + place for place, name in enumerate(kinds)}
+    parts = [definition(0x80, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
+    parts += [definition(numbers[name], name, *own) for name, own in kinds.items()]
+
+    def put(name, *values):
+        parts.append(message(numbers[name], kinds[name][0], values))
+
+    for letter, label in (("s", "s"), ("E", "rad/s"), ("o", "m/s/s"), ("d", "deg"), ("Y", "us"), ("#", "instance")):
+        if units is not None:
+            put("UNIT", 1, ord(letter), label.encode())
+    for name, (ids, factors) in (units or {}).items():
+        put("FMTU", 1, numbers[name], ids.encode(), factors.encode())
+    for name, value in (parameters or {}).items():
+        put("PARM", 1, name.encode(), value)
+    for text in said:
+        put("MSG", 1, text.encode())
+    for name, values in rows:
+        put(name, *values)
+    return b"".join(parts)

@@ -1,0 +1,70 @@
+"""Logs of a Crazyflie's uSD card, written byte by byte, whole and broken."""
+
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.logs.formats import log_contents
+from tests.builders.usd_logs import text, usd
+
+VARIABLES = {"gyro.x": "f", "motor.m1": "H", "acc.z": "e", "pm.state": "b"}
+SAMPLES = [
+    ("fixedFrequency", 1_000_000, (0.5, 40_000, 1.5, -2)),
+    ("tick", 1_001_000, ()),
+    ("fixedFrequency", 1_002_000, (0.75, 41_000, 1.25, 3)),
+]
+
+
+def log(version=2, whole=True):
+    return usd({"fixedFrequency": VARIABLES, "tick": {}}, SAMPLES, version, whole)
+
+
+@pytest.fixture
+def read(tmp_path):
+    def call(content):
+        path = tmp_path / "log00"
+        path.write_bytes(content)
+        return log_contents(path)
+
+    return call
+
+
+@pytest.mark.parametrize(("version", "step"), [(1, 2.0), (2, 0.002)])
+def test_events_become_topics_with_stamps_of_milli_or_microseconds(read, version, step):
+    contents = read(log(version))
+    listed = {name: {each: values.tolist() for each, values in own.items()} for name, own in contents.topics.items()}
+    assert listed == {
+        "fixedFrequency": {
+            "timestamp": [0, step],
+            "gyro.x": [0.5, 0.75],
+            "motor.m1": [40_000, 41_000],
+            "acc.z": [1.5, 1.25],
+            "pm.state": [-2, 3],
+        },
+        "tick": {"timestamp": [step / 2]},
+    }
+    assert (contents.system, contents.warnings) == ("Crazyflie uSD", ())
+
+
+@pytest.mark.parametrize("broken", [log()[:-6], log(whole=False), log()[:-4] + b"\xff\xff" + log()[-4:]])
+def test_a_check_sum_that_is_wrong_is_warned_of_and_what_is_whole_is_read(read, broken):
+    contents = read(broken)
+    assert contents.topics["fixedFrequency"]["gyro.x"].tolist()[:1] == [0.5]
+    (warning,) = contents.warnings
+    assert warning.startswith("the check sum is wrong, the file is cut off or broken")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (log(3), "a log of a Crazyflie's uSD card of version 3; read are 1 and 2"),
+        (log()[:40], "a broken log of a Crazyflie's uSD card: its header: "),
+        (log()[:3], "a broken log of a Crazyflie's uSD card: its header: "),
+        (log().replace(b"(f)", b"(x)"), "a broken log of a Crazyflie's uSD card: its header: "),
+        (log()[: log().rindex(text("tick")) + 7], "holds no samples"),
+    ],
+    ids=["version", "names", "short", "type", "none"],
+)
+def test_what_is_no_log(read, content, message):
+    with pytest.raises(InputError) as caught:
+        read(content)
+    assert f"log00: {message}" in str(caught.value)

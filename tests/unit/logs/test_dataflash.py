@@ -1,0 +1,123 @@
+"""Logs of ArduPilot, written byte by byte, whole, broken and cut off."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.logs.formats import log_contents
+from tests.builders.dataflash_logs import HEAD, dataflash
+
+KINDS = {
+    "IMU": ("QBff", "TimeUS,I,GyrX,AccX"),
+    "ATT": ("QccCZ", "TimeUS,DesRoll,Roll,Yaw,Note"),
+    "OLD": ("IhL", "TimeMS,Value,Lat"),
+    "HALF": ("QgdBM", "TimeUS,Half,Double,Count,Mode"),
+    "FILE": ("Nf", "Name,Size"),
+}
+UNITS = {"IMU": ("s#Eo", "F---"), "ATT": ("sddd-", "FBBB-")}
+ROWS = [
+    ("IMU", (5_000_000, 0, 0.5, 9.5)),
+    ("IMU", (5_000_100, 1, 0.25, 9.25)),
+    ("ATT", (5_004_000, -1250, 325, 35999, b"text")),
+    ("OLD", (5_006, -7, -353_632_621)),
+    ("HALF", (5_007_000, 0.5, 1e-300, 200, 5)),
+    ("FILE", (b"a", 1.0)),
+    ("IMU", (5_010_000, 0, 0.75, 9.75)),
+]
+PARAMETERS = {"FRAME_CLASS": 1.0, "MOT_THST_EXPO": 0.5}
+
+
+def log(rows=ROWS, units=UNITS, said=("ArduCopter V4.5.7 (2a3dc4b7)",)):
+    return dataflash(KINDS, rows, PARAMETERS, said, units)
+
+
+@pytest.fixture
+def read(tmp_path):
+    def call(content):
+        path = tmp_path / "log.bin"
+        path.write_bytes(content)
+        return log_contents(path)
+
+    return call
+
+
+def test_messages_become_topics_and_instances_topics_of_their_own(read):
+    contents = read(log())
+    listed = {name: {each: values.tolist() for each, values in own.items()} for name, own in contents.topics.items()}
+    # Seconds from the first stamp of all, those of PARM, MSG, UNIT and FMTU at 1 microsecond among them.
+    assert listed["IMU"] == {"timestamp": [4.999999, 5.009999], "I": [0, 0], "GyrX": [0.5, 0.75], "AccX": [9.5, 9.75]}
+    assert listed["IMU[1]"] == {"timestamp": [5.000099], "I": [1], "GyrX": [0.25], "AccX": [9.25]}
+    assert listed["ATT"] == {"timestamp": [5.003999], "DesRoll": [-12.5], "Roll": [3.25], "Yaw": [359.99]}
+    assert listed["OLD"] == {"timestamp": [5.005999], "Value": [-7], "Lat": [pytest.approx(-35.3632621, abs=1e-12)]}
+    assert listed["HALF"] == {"timestamp": [5.006999], "Half": [0.5], "Double": [1e-300], "Count": [200], "Mode": [5]}
+    assert "FILE" not in listed
+    assert contents.warnings == ()
+
+
+def test_what_the_log_says_of_units_parameters_and_program(read):
+    contents = read(log())
+    units = {"GyrX": "rad/s", "AccX": "m/s^2"}
+    assert {name: unit for name, unit in contents.units.items() if name.startswith(("IMU", "ATT"))} == (
+        {f"IMU.{name}": unit for name, unit in units.items()}
+        | {f"IMU[1].{name}": unit for name, unit in units.items()}
+        | {f"ATT.{name}": "deg" for name in ("DesRoll", "Roll", "Yaw")}
+    )
+    assert contents.parameters == PARAMETERS
+    assert contents.system == "ArduCopter 4.5.7"
+    old = read(log(units=None, said=("PX4: de6b667d", "APM:Copter V3.4.4-rc1 (65ffe9d7)")))
+    assert (old.system, old.units) == ("ArduCopter 3.4.4", {})
+    # What does not say its instances is one topic.
+    assert old.topics["IMU"]["I"].tolist() == [0, 1, 0]
+    assert read(log(said=())).system == ""
+
+
+def test_a_parameter_that_is_changed_in_flight_counts_as_it_was_at_the_beginning(read):
+    rows = [*ROWS, ("PARM", (9_000_000, b"FRAME_CLASS", 7.0))]
+    assert read(log(rows)).parameters == PARAMETERS
+
+
+def test_a_log_that_was_cut_off_is_read_up_to_there(read):
+    contents = read(log()[:-5])
+    assert contents.topics["IMU"]["GyrX"].tolist() == [0.5]
+    assert contents.warnings == ()
+
+
+def test_bytes_that_are_lost_or_strange_are_warned_of_and_cost_the_message_before_at_most(read):
+    whole = log()
+    place = whole.rindex(HEAD, 0, whole.rindex(HEAD))
+    for broken, lost in (
+        (whole[:place] + bytes(40) + HEAD + b"\xee" + whole[place:], 43 + 23),
+        (whole[: place - 9] + whole[place:], 14),
+    ):
+        contents = read(broken)
+        assert contents.topics["IMU"]["GyrX"].tolist() == [0.5, 0.75]
+        (warning,) = contents.warnings
+        assert warning.startswith(f"{lost} bytes are no messages: the file is broken in places")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "not a DataFlash log: it does not begin as one (encrypted, or of another program?)"),
+        (bytes(range(256)), "not a DataFlash log: it does not begin as one (encrypted, or of another program?)"),
+        (b"t,roll\n0,1\n", "seems to hold CSV, not what its name ends in; rename it to end in .csv"),
+        (log()[:60], "holds no messages with stamps (TimeUS)"),
+        (dataflash({}, []), "holds no messages with stamps (TimeUS)"),
+    ],
+    ids=["empty", "noise", "text", "cut", "none"],
+)
+def test_what_is_no_log(read, content, message):
+    with pytest.raises(InputError) as caught:
+        read(content)
+    assert str(caught.value).endswith(f"log.bin: {message}")
+
+
+def test_kinds_that_contradict_themselves_are_left_out(read):
+    kinds = KINDS | {
+        "BAD1": ("Qf", "TimeUS,A,B"),
+        "BAD2": ("QX", "TimeUS,A"),
+        "BAD3": ("Qff", "TimeUS,A,A"),
+    }
+    content = dataflash({name: own for name, own in kinds.items() if name != "BAD2"}, ROWS)
+    assert not {name for name in read(content).topics if name.startswith("BAD")}
+    assert np.isfinite(read(content).topics["IMU"]["GyrX"]).all()
