@@ -80,7 +80,7 @@ def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:
             yield Parameter(key, None, unit, None, None, None, False, reason)
         else:
             held = _held(record, key)
-            stated = held if key in STATED else None
+            stated = held if key in STATED and held else None
             yield Parameter(key, held, unit, None, None, stated, False, _why_not_fitted(key))
 
 
@@ -113,8 +113,8 @@ def _held(record: VehicleRecord, key: str) -> float:
 
 def _why_not_fitted(key: str) -> str:
     if key in (LAG, DELAY, *CENTRE, *INERTIA[3:]):
-        return "none: with it the error on flights kept aside is no lower"
-    return "stated; another value does not lower the error on flights kept aside"
+        return "not needed: no lower error with it"
+    return "as stated: no lower error with another"
 
 
 def vehicle_section(record: VehicleRecord) -> dict[str, Any]:

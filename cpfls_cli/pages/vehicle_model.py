@@ -96,12 +96,19 @@ def found_box(found: Source[VehicleRecord]) -> Box:
     title = f"{found.label}: a vehicle with {len(record.found.name)} numbers found in its flights."
     judged = (
         f"On parts of the flights kept aside in turn its error is {number(errors['chosen'], 3)}; with all blocks "
-        f"{number(errors['everything'], 3)}, with blocks added one by one {number(errors['greedy'], 3)}, with the "
-        f"stated vehicle {number(errors['nothing'], 3)}; rates that stay have about 1.1."
+        f"{number(errors['everything'], 3)}, with blocks added one by one {number(errors['greedy'], 3)}, with "
+        f"{'the constants alone' if _guessed(record) else 'the stated vehicle'} {number(errors['nothing'], 3)}; rates "
+        "that stay have about 1.1."
     )
     blocks = _chosen_blocks(record)
-    holds = f"It holds {joined(blocks)}." if blocks else "It holds nothing but the stated vehicle."
+    alone = "the constants" if _guessed(record) else "the stated vehicle"
+    holds = f"It holds {joined(blocks)}." if blocks else f"It holds nothing but {alone}."
     return Box(_LABELS[record.verdict], title, [*_verdict(record), judged, holds], _TONES[record.verdict])
+
+
+def _guessed(record: VehicleRecord) -> bool:
+    """Tell whether the config leaves constants open: then they are free in every structure."""
+    return bool(record.structure.numbers[record.structure.name.index("nothing")])
 
 
 def _verdict(record: VehicleRecord) -> Iterator[str]:
@@ -167,6 +174,8 @@ def warnings(record: VehicleRecord) -> list[str]:
             f"{joined(far)}: more than {_FAR:g} times off what is stated; an effective number that predicts, not a "
             "property of the part that it is named after"
         )
+    if _guessed(record) and record.held_out is not None:
+        said.append("the stated vehicle has guesses where the config leaves constants open")
     if not record.complete:
         said.append("the search was stopped before its end; other structures may be better")
     return said
@@ -333,7 +342,7 @@ def _structures_table(record: VehicleRecord, index: int) -> Table:
     ]
     caption = (
         "Structures, judged on parts of the flights kept aside in turn. Chosen: the fewest numbers within one standard "
-        "error of the smallest error; one by one: blocks added while they lower the error."
+        "error, or 2 %, of the smallest error; one by one: blocks added while they lower the error."
     )
     header = ("Structure", "Error", "Worse than the best", "Numbers", "Condition", "Blocks")
     return Table(f"vehicle-structures-{index}", caption, header, rows, frozenset({0, 5}), frozenset({0, 5}))
