@@ -76,7 +76,7 @@ def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:
             ends, reason = (row["low"], row["high"]), _reason(record, row)
             yield Parameter(key, row["value"], unit, *ends, stated, not reason, reason or "found in flights")
         elif key in guesses:
-            reason = "not known: no flight has the velocity, which tells thrust from weight"
+            reason = "not known: neither velocity nor accelerometer tells thrust from weight"
             yield Parameter(key, None, unit, None, None, None, False, reason)
         else:
             held = _held(record, key)
@@ -131,13 +131,15 @@ def vehicle_section(record: VehicleRecord) -> dict[str, Any]:
     def factor(key: str, held: float) -> float | None:
         return None if _open(known[key]) else _rounded(held)
 
+    # A product that is not known is none; a moment that is not known is to be found.
     inertia = [
-        None if _open(known[key]) else _rounded(value) for key, value in zip(INERTIA, vehicle.inertia, strict=True)
+        (0.0 if place > 2 else None) if _open(known[key]) else _rounded(vehicle.inertia[place])
+        for place, key in enumerate(INERTIA)
     ]
     section: dict[str, Any] = {
         "gravity_m_s2": vehicle.gravity,
         "mass_kg": _rounded(vehicle.mass),
-        "inertia_kg_m2": inertia if any(inertia[3:]) else inertia[:3],
+        "inertia_kg_m2": inertia if all(inertia[:3]) and any(inertia[3:]) else inertia[:3],
         "rotors": [
             {
                 "position_m": [_rounded(value) for value in rotors.position[place]],

@@ -33,6 +33,8 @@ class PlaybackFlight:
         Whether they were measured. Without attitude or velocity rotation alone is played back.
     wrench : array, shape (time, 6), N m and N, body frame, or None
         Stated torque and force of a flight without rotor speeds, which are then 0.
+    specific_force : array, shape (time, 3), m/s^2, body frame, or None
+        Of an accelerometer.
     group : str
         Configuration of the vehicle that flew it, where there are several; empty for the one of the config.
     """
@@ -46,6 +48,7 @@ class PlaybackFlight:
     has_velocity: bool = True
     has_position: bool = True
     wrench: Array | None = None
+    specific_force: Array | None = None
     group: str = ""
 
     def __len__(self) -> int:
@@ -137,6 +140,7 @@ def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> Playback
         round(float(first.time[-1] - first.time[0]) / (len(first) - 1), 12),
     )
     ends = np.cumsum([0, *(len(part) for part in parts)]).tolist()
+    force = [part.specific_force for part in parts if part.specific_force is not None]
     return PlaybackFlight(
         name=name,
         motion=motion,
@@ -147,6 +151,7 @@ def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> Playback
         has_velocity=first.velocity is not None and thrust_known,
         has_position=first.position is not None,
         wrench=None if first.rotor_speed is not None else _joined([part.wrench for part in parts]),
+        specific_force=_joined(force) if len(force) == len(parts) else None,
     )
 
 

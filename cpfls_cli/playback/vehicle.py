@@ -43,8 +43,8 @@ class FoundNumber(NamedTuple):
     stated : float
         In the config; NaN for what no config states.
     determined : bool
-        Whether the flights say more of it than what was believed before, and to a factor of two where it cannot be
-        negative.
+        Whether the flights say more of it than what was believed before: to a factor of two where it cannot be
+        negative, else to its natural size.
     at_bound : bool
         Whether it lies on a bound, so that the interval says little.
     """
@@ -153,7 +153,7 @@ def find_vehicle(
         Of the same search, stopped before.
     """
     own = [flight for flight in flights if not flight.group]
-    begun = _begun(vehicle, own)
+    begun, sensed = _begun(vehicle, own)
     choice = choose(begun, own, settings, rng, progress, kept)
     chosen = choice.chosen
     flown = {flight.group for flight in flights}
@@ -164,43 +164,68 @@ def find_vehicle(
     joint = layout if isinstance(layout, JointLayout) else None
     return FoundVehicle(
         model,
-        tuple(_numbers(fitted, spread)),
+        (*sensed, *_numbers(fitted, spread)),
         *_shares(model, own),
         tuple(_trades(fitted.layout, spread)),
         choice,
         fitted.condition_number,
         spread.blocks,
-        tuple(sorted(set(vehicle.unknown) - set(begun.unknown))),
+        tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
         {group.name: joint.model(fitted.values, group.name) for group in groups} if joint else {},
         tuple(differences(joint, fitted, spread)) if joint else (),
     )
 
 
-def _begun(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> VehicleSettings:
-    """Replace guesses of the thrust factor by what carries the weight; drag factor and linear terms scale with it.
+def _begun(
+    vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]
+) -> tuple[VehicleSettings, tuple[FoundNumber, ...]]:
+    """Replace the guess of the thrust factor by what carries the weight; a guessed drag factor scales with it.
 
-    Without velocity nothing tells thrust from weight in flight, so that this guess stays as it is.
+    Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found;
+    without one either nothing tells thrust from weight, and the guess stays.
     """
     if "thrust_factor" not in vehicle.unknown:
-        return vehicle
-    squares = np.concatenate([(flight.speed**2).sum(axis=1) for flight in flights])
-    weight = vehicle.mass_kg * vehicle.gravity_m_s2
-    factor = weight / float(np.mean(squares)) / (_thrust_factors(vehicle).mean())
+        return vehicle, ()
+    moves = all(flight.translates for flight in flights)
+    sensed = None if moves else _sensed_thrust_factor(vehicle, flights)
+    if sensed is None:
+        squares = np.concatenate([(flight.speed**2).sum(axis=1) for flight in flights])
+        thrust = vehicle.mass_kg * vehicle.gravity_m_s2 / float(np.mean(squares))
+    else:
+        thrust = sensed.value
+    factor = thrust / float(np.mean([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors]))
     rotors = tuple(
         replace(
             rotor,
-            thrust_factor_n_s2=factor * rotor.thrust_factor_n_s2,
+            thrust_factor_n_s2=thrust,
             drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * (factor if "drag_factor" in vehicle.unknown else 1.0),
         )
         for rotor in vehicle.rotors
     )
-    moves = all(flight.translates for flight in flights)
     unknown = tuple(name for name in vehicle.unknown if moves or not needs_velocity(name))
-    return replace(vehicle, rotors=rotors, unknown=unknown)
+    return replace(vehicle, rotors=rotors, unknown=unknown), () if sensed is None else (sensed,)
 
 
-def _thrust_factors(vehicle: VehicleSettings) -> Array:
-    return np.array([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
+_FORCE_BLOCKS = 30
+
+
+def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> FoundNumber | None:
+    """Regress mass times specific force along z on the squared speeds, with an interval from blocks left out."""
+    products, squares = [], []
+    for flight in flights:
+        if flight.specific_force is None:
+            return None
+        lift = (flight.speed**2).sum(axis=1)
+        force = vehicle.mass_kg * flight.specific_force[:, 2]
+        count = max(2, _FORCE_BLOCKS // len(flights))
+        products += [part.sum() for part in np.array_split(lift * force, count)]
+        squares += [part.sum() for part in np.array_split(lift**2, count)]
+    above, below, number = np.array(products), np.array(squares), len(products)
+    value = float(above.sum() / below.sum())
+    without = (above.sum() - above) / (below.sum() - below)
+    deviation = float(np.sqrt((number - 1) / number * np.sum((without - without.mean()) ** 2)))
+    low, high = _interval(value, float(student.ppf(0.975, number - 1)) * deviation, positive=True)
+    return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < _KNOWN * low, False)
 
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
@@ -226,13 +251,15 @@ def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
     physical = layout.physical(values)
     stated = layout.physical(layout.starts)
     half = _half_intervals(layout.physical, fitted, spread)
+    own = student.ppf(0.975, spread.blocks - 1) * np.sqrt(np.diag(spread.covariance))
     for place, (number, (name, found)) in enumerate(zip(layout.numbers, physical.items(), strict=True)):
         span = _AT_BOUND * number.scale
         bound = min(values[place] - number.low, number.high - values[place]) <= span
         ends = _interval(found.value, float(half[place]), positive=found.positive)
         low, high = np.clip(ends, *_bounds(layout, values, place)).tolist()
         known = stated[name].value if found.stated else np.nan
-        determined = spread.determined[place] and not (found.positive and high > _KNOWN * low)
+        wide = high > _KNOWN * low if found.positive else own[place] > number.scale
+        determined = spread.determined[place] and not wide
         yield FoundNumber(name, found.unit, found.value, low, high, known, bool(determined), bool(bound))
 
 

@@ -1,0 +1,87 @@
+"""Constants that no config states: where their fit begins, and what tells the scale."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.config.load import validate
+from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.vehicle import find_vehicle
+from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
+
+TRUE = truth()
+OPEN = validate(
+    {
+        "vehicle": {
+            "mass_kg": STATED.mass_kg,
+            "inertia_kg_m2": None,
+            "rotor_speed_max_rad_s": 1500.0,
+            "rotors": [
+                {"position_m": list(each.position_m), "spin": each.spin}
+                | dict.fromkeys(("thrust_factor_n_s2", "drag_factor_n_m_s2"))
+                for each in STATED.rotors
+            ],
+        }
+    },
+    "here",
+).vehicle
+SETTINGS = PlaybackSettings(
+    search_windows=60,
+    population=2,
+    generations=0,
+    leave_out=tuple(block for block in blocks_of(STATED) if block not in TRUE_BLOCKS),
+)
+
+
+def found(flights):
+    vehicle = find_vehicle(OPEN, flights, SETTINGS, np.random.default_rng(1), lambda *_: None)
+    return vehicle, {number.name: number for number in vehicle.numbers}
+
+
+def test_guesses_are_of_the_right_size():
+    assert set(OPEN.unknown) == {"thrust_factor", "drag_factor", "inertia"}
+    guess, true = np.array(OPEN.inertia_kg_m2), np.array(TRUE.vehicle.inertia_kg_m2)
+    assert ((guess / true < 3) & (guess / true > 1 / 3)).all()
+
+
+def test_mass_and_geometry_are_enough_where_velocity_is_known():
+    vehicle, by_name = found(flown(TRUE, noise=MIDDLING, seed=2, hold="linear"))
+    rotor = TRUE.vehicle.rotors[0]
+    assert by_name["thrust_factor"].value == pytest.approx(rotor.thrust_factor_n_s2, rel=0.01)
+    assert by_name["drag_factor"].value == pytest.approx(rotor.drag_factor_n_m_s2, rel=0.05)
+    for axis, name in enumerate(("Ixx", "Iyy", "Izz")):
+        assert by_name[f"inertia.{name}"].value == pytest.approx(TRUE.vehicle.inertia_kg_m2[axis], rel=0.05)
+    assert (vehicle.guessed, vehicle.model.vehicle.unknown) == ((), ())
+
+
+def without_velocity(flights, accelerometer):
+    """The same flights as a log without position and velocity has them."""
+    gravity = np.array([0.0, 0.0, STATED.gravity_m_s2])
+    changed = []
+    for flight in flights:
+        motion = flight.motion
+        acceleration = np.gradient(motion.velocity, motion.period, axis=0)
+        sensed = np.einsum("tji,tj->ti", motion.rotation, acceleration + gravity)
+        force = sensed if accelerometer else None
+        changed.append(replace(flight, has_velocity=False, has_position=False, specific_force=force))
+    return changed
+
+
+def test_an_accelerometer_tells_thrust_where_velocity_is_not_known():
+    # Without velocity nothing tells what the air does to a moving rotor, so this vehicle knows damping alone.
+    flights = flown(replace(TRUE, effects=TRUE.effects[:1]), noise=MIDDLING, seed=2, hold="linear")
+    vehicle, by_name = found(without_velocity(flights, accelerometer=True))
+    factor = by_name["thrust_factor"]
+    true = TRUE.vehicle.rotors[0].thrust_factor_n_s2
+    assert factor.determined
+    assert factor.value == pytest.approx(true, rel=0.03)
+    assert by_name["inertia.Ixx"].value == pytest.approx(TRUE.vehicle.inertia_kg_m2[0], rel=0.1)
+    assert vehicle.guessed == ()
+
+
+def test_without_velocity_and_accelerometer_the_thrust_factor_stays_open():
+    vehicle, by_name = found(without_velocity(flown(TRUE, noise=MIDDLING, seed=2, hold="linear"), accelerometer=False))
+    assert vehicle.guessed == ("thrust_factor",)
+    assert "thrust_factor" not in by_name
