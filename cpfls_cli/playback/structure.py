@@ -24,6 +24,9 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 _SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
 _STEPS, _TOLERANCE = 60, 3e-5
 _FEWEST_BLOCKS = 8
+_UNSEEN = 3.0
+"""How many times as fast about an axis a part turns, at least, that is nothing like the others."""
+
 _VISIBLE = 0.02
 """Share of the error that is worth a name: on long flights less is significant, and is the step of the integrator."""
 
@@ -270,7 +273,7 @@ def choose(
         shrunk = [bench.judge(structure) for structure in _shrinking(everything)]
         path.extend(_greedy(bench, blocks, nothing))
         first = min(bench.known.values(), key=lambda each: each.error)
-        _evolve(bench, blocks, [*path, *shrunk, *_neighbours(bench, first, blocks)], settings, rng)
+        _evolve(bench, blocks, [*path, *shrunk, *_neighbours(bench, first)], settings, rng)
         _refine(bench, blocks)
     except SearchStoppedError:
         complete = False
@@ -279,24 +282,38 @@ def choose(
 
 
 def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> list[list[Windows]]:
-    """Split flights into parts that are kept aside in turn: neighbours in their order, or pieces of a single one.
+    """Split flights into parts that are kept aside in turn: neighbours in their order, or pieces of each.
 
     Neighbours are kept aside together because flights of one kind usually stand side by side: what a model has to
-    predict is a kind of flight that it has not seen.
+    predict is a kind of flight that it has not seen. Pieces are taken of a single flight, and where a part turns about
+    an axis about which hardly anything turns in the others: no model can be asked for what nothing tells.
     """
     flown = sum(len(flight) * flight.motion.period for flight in flights)
     interval = max(settings.window_interval_s, flown / settings.search_windows)
     windows = windows_of(flights, settings.horizon_s, interval)
-    if len(windows) > 1:
-        count = min(settings.folds, len(windows))
-        ends = np.linspace(0, len(windows), count + 1).round().astype(int).tolist()
-        return [windows[start:end] for start, end in pairwise(ends)]
-    only, horizon = windows[0], windows[0].horizon
-    pieces = np.array_split(only.starts, settings.folds)
-    # Windows that reach into the next piece are left out, so that no sample is in two pieces.
-    ends = [*(piece[0] for piece in pieces[1:]), np.inf]
-    kept = [piece[piece + horizon < end] for piece, end in zip(pieces, ends, strict=True)]
-    return [[Windows(only.flight, piece, only.loss)] for piece in kept if len(piece)]
+    count = min(settings.folds, len(windows))
+    ends = np.linspace(0, len(windows), count + 1).round().astype(int).tolist()
+    together = [windows[start:end] for start, end in pairwise(ends)]
+    if count > 1 and not _lacks_an_axis(together):
+        return together
+    cut = [_pieces(each, settings.folds) for each in windows]
+    return [part for pieces in zip(*cut, strict=True) if (part := [piece for piece in pieces if len(piece.starts)])]
+
+
+def _pieces(windows: Windows, count: int) -> list[Windows]:
+    """Cut the windows of a flight; those that reach into the next piece are left out, so that none shares a sample."""
+    pieces = np.array_split(windows.starts, count)
+    ends = [*(piece[0] if len(piece) else np.inf for piece in pieces[1:]), np.inf]
+    kept = [piece[piece + windows.horizon < end] for piece, end in zip(pieces, ends, strict=True)]
+    return [Windows(windows.flight, piece, windows.loss) for piece in kept]
+
+
+def _lacks_an_axis(parts: Sequence[Sequence[Windows]]) -> bool:
+    """Tell whether a part turns about an axis about which hardly anything turns in the others."""
+    squares = np.array([sum((each.motion.rate**2).sum(axis=0) for each in part) for part in parts])
+    samples = np.array([sum(len(each.motion.rate) for each in part) for part in parts])[:, None]
+    others = np.sqrt((squares.sum(axis=0) - squares) / (samples.sum() - samples))
+    return bool(np.any(np.sqrt(squares / samples) > _UNSEEN * others))
 
 
 def _greedy(bench: _Bench, blocks: tuple[str, ...], start: Judged) -> Iterator[Judged]:
@@ -361,16 +378,25 @@ def _with(structure: Structure, block: str, order: Sequence[str]) -> Structure:
     return Structure(tuple(name for name in order if name in kept), structure.rules)
 
 
-def _neighbours(bench: _Bench, judged: Judged, blocks: tuple[str, ...]) -> list[Judged]:
-    """Judge the structures with one block less, an effect in the place of what is learned, or other rules of that."""
+def _neighbours(bench: _Bench, judged: Judged) -> list[Judged]:
+    """Judge the structures with one block less, or with other rules of what is learned."""
     structure = judged.structure
     fewer = [_with(structure, block, structure.blocks) for block in structure.blocks]
-    learned = [block for block in structure.blocks if block in LEARNED]
-    # What is learned can stand for several effects; none of them alone may then gain anything beside it.
-    absent = [block for block in blocks if needs_velocity(block) and block not in (*structure.blocks, *LEARNED)]
-    named = [_with(_with(structure, block, blocks), effect, blocks) for block in learned for effect in absent]
+    learned = any(block in LEARNED for block in structure.blocks)
     other = [structure._replace(rules=rules) for rules in REMAINDERS] if learned else []
-    return [bench.judge(each) for each in (*fewer, *named, *other)]
+    return [bench.judge(each) for each in (*fewer, *other)]
+
+
+def _named_instead(bench: _Bench, judged: Judged, blocks: tuple[str, ...]) -> None:
+    """Judge the structures with an effect in the place of what is learned.
+
+    What is learned can stand for several effects; none of them alone may then gain anything beside it.
+    """
+    structure = judged.structure
+    absent = [block for block in blocks if needs_velocity(block) and block not in (*structure.blocks, *LEARNED)]
+    for learned in (block for block in structure.blocks if block in LEARNED):
+        for effect in absent:
+            bench.judge(_with(_with(structure, learned, blocks), effect, blocks))
 
 
 def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
@@ -381,12 +407,24 @@ def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
 
 
 def _refine(bench: _Bench, blocks: tuple[str, ...]) -> None:
-    """Judge the neighbours of the best and of the choice, until no block is left that nothing speaks for."""
+    """Judge the neighbours of the best and of the choice, until no block is left that nothing speaks for.
+
+    What is learned is then held against names, which takes many fits, for the choice alone.
+    """
     asked: set[Structure] = set()
-    while new := [each for each in _preferred(bench)[1:] if each.structure not in asked]:
+    held: set[Structure] = set()
+    while True:
+        new = [each for each in _preferred(bench)[1:] if each.structure not in asked]
+        if not new:
+            choice = _preferred(bench)[2]
+            if choice.structure in held:
+                return
+            held.add(choice.structure)
+            _named_instead(bench, choice, blocks)
+            continue
         asked |= {each.structure for each in new}
         for each in new:
-            _neighbours(bench, each, blocks)
+            _neighbours(bench, each)
 
 
 def _evolve(
