@@ -1,0 +1,885 @@
+"""What the columns of an unknown log are: signals, units, axes and frames, each with the reason for the guess."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+import numpy as np
+from scipy.constants import g as standard_gravity
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.agreement import (
+    AxisFit,
+    TiltFit,
+    first_derivative,
+    fit_axes,
+    fit_rates,
+    fit_tilt,
+    on_clock,
+    rotations_of,
+    second_derivative,
+    slow,
+)
+from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
+from cpfls_cli.flightlog.flown import Flown, find_flown
+from cpfls_cli.flightlog.names import Named, column_groups, named_signals
+from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_rotors
+from cpfls_cli.flightlog.settings import SignalMap, SignalName
+from cpfls_cli.flightlog.topics import STAMP, Topics
+from cpfls_cli.units import UnitName, known_unit
+
+Sure = Literal["data", "named", "guess"]
+"""Whether the data decided, a name or the kind of log says so, or neither does."""
+
+_GRID_HZ = 100.0
+_FEWEST_SAMPLES = 20
+_SLOWEST_HZ = 0.5
+_DEGREES = 180 / np.pi
+_CLEAR, _GOOD = 0.3, 0.6
+"""Shares of a signal that another has to explain to say something about it, and to overrule a name."""
+
+_TOLERANCE = 1.4
+_TEN = 10.0
+"""Wind and clocks change a size, but not from one unit of length to the next."""
+
+_RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
+"""Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s."""
+
+_LARGEST_ANGLE = 6.6
+_LARGEST_TILT = 1.7
+_SENSED: Final[tuple[tuple[float, UnitName, float], ...]] = (
+    (standard_gravity, "m/s^2", 1.0),
+    (1.0, "g", 1.0),
+    (1000.0, "g", 1e-3),
+    (2048.0, "g", 1 / 2048),
+    (4096.0, "g", 1 / 4096),
+)
+_NEAR_GRAVITY = 1.3
+_TIME_NAMES = ("t", "time", "time_s", "timestamp", "time_us", "timeus", "time_ms", "stamp", "tick", "seconds", "sec")
+_TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_STEPS_S = (2e-4, 0.5)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another guess that the data cannot part from the one that is taken.
+
+    Attributes
+    ----------
+    text : str
+        As it would stand in the config, such as ``unit: deg``.
+    reason : str
+        Why it is not ruled out.
+    """
+
+    text: str
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Guess:
+    """A signal of the log.
+
+    Attributes
+    ----------
+    sure : {"data", "named", "guess"}
+    """
+
+    signal: SignalName
+    columns: SignalMap
+    reason: str
+    sure: Sure
+    rivals: tuple[Rival, ...] = ()
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A key of the section `import` that holds for the whole log.
+
+    Attributes
+    ----------
+    sure : {"data", "named", "guess"}
+    """
+
+    key: str
+    value: str
+    reason: str
+    sure: Sure
+    rivals: tuple[Rival, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recognition:
+    """What a log is taken for.
+
+    Attributes
+    ----------
+    time_column, time_unit : str
+        As the section `import` takes them.
+    signals : tuple of Guess
+    choices : tuple of Choice
+        Frames, the order of a quaternion, what a command is.
+    left_out : tuple of str
+        Sentences on columns that look like a signal and are not mapped.
+    flown : Flown
+    rate_hz : float
+        Of the clock.
+    slowest_s : float
+        Longest median step of a topic that is mapped, s.
+    moved : MovedBy or None
+        The rotors as the motion tells them.
+    speeds : array, shape (time, rotor), or None
+        Rotor speeds in flight in rad/s, or commands as shares of the largest speed.
+    warnings : tuple of str
+    """
+
+    time_column: str
+    time_unit: str
+    signals: tuple[Guess, ...]
+    choices: tuple[Choice, ...]
+    left_out: tuple[str, ...]
+    flown: Flown
+    rate_hz: float
+    slowest_s: float
+    moved: MovedBy | None
+    speeds: Array | None = field(repr=False)
+    warnings: tuple[str, ...] = ()
+
+    def signal(self, name: SignalName) -> Guess | None:
+        """Give the guess for a signal; None where it is not recognised."""
+        return next((guess for guess in self.signals if guess.signal == name), None)
+
+    def choice(self, key: str) -> str | None:
+        """Give the value of a choice; None where there was none to make."""
+        return next((choice.value for choice in self.choices if choice.key == key), None)
+
+    @property
+    def rotors(self) -> int:
+        """Number of rotors that the columns name; 0 where none do."""
+        names: tuple[SignalName, ...] = ("rotor_speed", "rotor_command")
+        return max((len(guess.columns.columns) for name in names if (guess := self.signal(name))), default=0)
+
+
+class _Log:
+    """Columns of a log by name, each on its own clock, and all of them on one."""
+
+    def __init__(self, topics: Topics, units: Mapping[str, str]) -> None:
+        self.topics, self.units = topics, units
+        self.flat = set(topics) == {""}
+        self.names = tuple(
+            f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields
+        )
+        self.time_column, self.time_unit = _flat_time(topics[""], units) if self.flat else ("", "s")
+        self.grid = np.empty(0)
+
+    def parts(self, column: str) -> tuple[str, str]:
+        """Split a column into topic and field."""
+        if self.flat:
+            return "", column
+        topic, _, name = column.partition(".")
+        return topic, name
+
+    def clock(self, topic: str) -> Array:
+        """Stamps of a topic, s."""
+        if self.flat:
+            factor = 1.0 if self.time_column in self.units else _TIME_UNITS[self.time_unit]
+            return np.asarray(self.topics[""][self.time_column] * factor, dtype=float)
+        return np.asarray(self.topics[topic].get(STAMP, np.empty(0)), dtype=float)
+
+    def values(self, columns: Sequence[str]) -> tuple[Array, Array]:
+        """Stamps and values of columns of one topic, rows without a value left out."""
+        topic = self.parts(columns[0])[0]
+        time = self.clock(topic)
+        rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
+        if len(rows) != len(time):
+            return np.empty(0), np.empty((0, len(columns)))
+        known = np.isfinite(rows).all(axis=1) & np.isfinite(time)
+        known[1:] &= np.diff(np.maximum.accumulate(np.where(np.isfinite(time), time, -np.inf))) > 0
+        return time[known], rows[known]
+
+    def on_grid(self, columns: Sequence[str]) -> Array:
+        """Columns on the one clock; at its ends the nearest value."""
+        time, values = self.values(columns)
+        return np.column_stack([np.interp(self.grid, time, column) for column in values.T])
+
+    def rate_hz(self, columns: Sequence[str]) -> float:
+        """Median rate of the topic of a column."""
+        time, _ = self.values(columns[:1])
+        return 1 / float(np.median(np.diff(time))) if len(time) > 2 else 0.0
+
+
+def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str]:
+    """Find the column of stamps: it never falls, and its name or its steps say what it counts.
+
+    Raises
+    ------
+    InputError
+        If no column can be one.
+    """
+    rising = [name for name, values in fields.items() if _rises(np.asarray(values, dtype=float))]
+    rising.sort(key=lambda name: (_time_rank(name), list(fields).index(name)))
+    for name in rising:
+        if _time_rank(name) > 2:
+            break
+        step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
+        if name in units:
+            return name, "s"
+        stated = [unit for unit in ("ns", "us", "ms") if name.lower().endswith(unit)]
+        fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
+        if stated or fitting:
+            return name, (stated or fitting)[0]
+    raise InputError(
+        "no column of time stamps is recognised: one that rises from row to row and is called t, time or timestamp;"
+        " rename it, or write the config by hand (`cpfls config` prints every key)"
+    )
+
+
+def _time_rank(name: str) -> int:
+    lower = name.lower().strip()
+    if lower in _TIME_NAMES:
+        return _TIME_NAMES.index(lower) > 1
+    return 2 if "time" in lower or "stamp" in lower else 3
+
+
+def _rises(values: Array) -> bool:
+    known = values[np.isfinite(values)]
+    return len(known) > 2 and len(known) > 0.5 * len(values) and bool((np.diff(known) >= 0).all()) and np.ptp(known) > 0
+
+
+def recognise(
+    topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str
+) -> Recognition:
+    """Propose what the columns of a log are.
+
+    Parameters
+    ----------
+    topics : mapping from topic to mapping from field to array, shape (sample,)
+        As a reader gives them: stamps of topics in s, a flat log as one topic without a name.
+    units : mapping from column to str
+        That the log states.
+    parameters : mapping
+        Of the autopilot, or of a header.
+    system : str
+        What wrote the log; empty where that is not known.
+
+    Raises
+    ------
+    InputError
+        If nothing in the log is recognised, or nothing in it flies.
+    """
+    log = _Log(topics, units)
+    candidates = _holding_values(log, named_signals(column_groups(log.names), system))
+    if not candidates:
+        shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
+        raise InputError(f"no column is recognised as a signal of a flight (columns: {shown})")
+    _make_grid(log, candidates)
+    return _Recogniser(log, candidates, parameters, system).result()
+
+
+def _holding_values(log: _Log, candidates: Sequence[Named]) -> dict[SignalName, list[Named]]:
+    """Keep what has enough values that change, by signal."""
+    kept: dict[SignalName, list[Named]] = {}
+    for named in candidates:
+        time, values = log.values(named.group.columns)
+        rotors = named.signal in ("rotor_speed", "rotor_command")
+        if rotors and len(time) < _FEWEST_SAMPLES:
+            # Outputs that are not there hold no numbers.
+            named = _with_values(log, named)
+            time, values = log.values(named.group.columns)
+        if len(time) < _FEWEST_SAMPLES or log.rate_hz(named.group.columns) < _SLOWEST_HZ:
+            continue
+        if float(np.ptp(values, axis=0).max()) > 0:
+            kept.setdefault(named.signal, []).append(named)
+    return kept
+
+
+def _with_values(log: _Log, named: Named) -> Named:
+    columns = tuple(c for c in named.group.columns if len(log.values((c,))[0]) >= _FEWEST_SAMPLES)
+    return replace(named, group=replace(named.group, columns=columns or named.group.columns))
+
+
+def _make_grid(log: _Log, candidates: Mapping[SignalName, Sequence[Named]]) -> None:
+    """Lay one uniform clock over all signals of motion and rotors."""
+    chosen = [found[0] for name, found in candidates.items() if name != "voltage"] or [
+        found[0] for found in candidates.values()
+    ]
+    clocks = [log.values(named.group.columns[:1])[0] for named in chosen]
+    rate = min(_GRID_HZ, max(1 / float(np.median(np.diff(clock))) for clock in clocks))
+    begin, end = min(float(clock[0]) for clock in clocks), max(float(clock[-1]) for clock in clocks)
+    if end - begin < 2.0:
+        raise InputError(f"holds only {end - begin:.2g} s; a flight to learn from has ten or more")
+    log.grid = np.arange(begin, end, 1 / rate)
+
+
+@dataclass
+class _Attitude:
+    """An attitude that is taken, as rotations on the grid."""
+
+    rotation: Rotation
+    rates: AxisFit | None
+
+
+class _Recogniser:
+    """Goes through the signals in the order in which each helps with the next."""
+
+    def __init__(
+        self, log: _Log, candidates: Mapping[SignalName, list[Named]], parameters: Parameters, system: str
+    ) -> None:
+        self.log, self.candidates, self.parameters, self.system = log, candidates, parameters, system
+        self.rate_hz = 1 / float(log.grid[1] - log.grid[0])
+        self.guesses: dict[SignalName, Guess] = {}
+        self.choices: dict[str, Choice] = {}
+        self.left_out: list[str] = []
+        self.warnings: list[str] = []
+        self.part = slice(None)
+
+    def first(self, name: SignalName) -> Named | None:
+        """The best candidate for a signal."""
+        return next(iter(self.candidates.get(name, ())), None)
+
+    def grid(self, named: Named) -> Array:
+        """A candidate's columns in the part that is flown."""
+        return self.log.on_grid(named.group.columns)[self.part]
+
+    def result(self) -> Recognition:
+        """Recognise everything."""
+        rotors = find_rotors(
+            {
+                name: [(named, *self.log.values(named.group.columns)) for named in self.candidates.get(name, ())]
+                for name in ("rotor_speed", "rotor_command")
+            },
+            self.parameters,
+            self.system,
+        )
+        flown = self._find_flown(rotors)
+        if not flown.flies:
+            raise InputError(f"nothing flies in it: {flown.reasons[0]}")
+        begin, end = flown.span_s or (0.0, np.inf)
+        inside = np.flatnonzero((self.log.grid - self.log.grid[0] >= begin) & (self.log.grid - self.log.grid[0] <= end))
+        self.part = slice(int(inside[0]), int(inside[-1]) + 1)
+        attitude = self._attitude()
+        tilt = self._position(attitude)
+        if tilt is not None and self._angles_by_tilt(tilt) == "deg":
+            attitude = self._attitude("deg")
+            tilt = self._position(attitude)
+        self._body_rate(attitude)
+        self._acceleration(attitude, tilt)
+        self._frames(tilt)
+        self._beside()
+        speeds, moved = self._rotors(rotors)
+        return self._gathered(flown, speeds, moved)
+
+    def _find_flown(self, rotors: RotorColumns) -> Flown:
+        level = None
+        found = rotors.command or rotors.speed
+        if found is not None:
+            values = self.log.on_grid(found.columns.columns)
+            level = (found.columns.scale * values + found.columns.offset).mean(axis=1)
+            level = level / max(1.0, float(np.quantile(level, 0.98))) if rotors.command is None else level
+        position, gyro = self.first("position"), self.first("body_rate")
+        height = None if position is None else self.log.on_grid(position.group.columns)[:, 2]
+        if height is not None and position is not None and position.unit == "mm":
+            height = height / 1000
+        rate = None
+        if gyro is not None:
+            values = slow_free(self.log.on_grid(gyro.group.columns))
+            rate = np.linalg.norm(values, axis=1) / (_DEGREES if gyro.unit == "deg/s" else 1.0)
+        return find_flown(self.log.grid - self.log.grid[0], level, height, rate)
+
+    # Attitude and body rate.
+
+    def _attitude(self, unit: UnitName | None = None) -> _Attitude | None:
+        gyro = self.first("body_rate")
+        measured = None if gyro is None else self.grid(gyro)
+        for named in self.candidates.get("quaternion", ()):
+            values = self.log.values(named.group.columns)[1]
+            if float(np.median(np.abs(np.linalg.norm(values, axis=1) - 1))) < 0.05:
+                return self._quaternion(named, measured)
+        euler = self.first("attitude")
+        return None if euler is None else self._euler(euler, measured, unit)
+
+    def _angles_by_tilt(self, tilt: TiltFit) -> UnitName | None:
+        """Let the tilt decide the unit of angles that could be either: gravity and the lean make the acceleration."""
+        guess = self.guesses.get("attitude")
+        if guess is None or not guess.rivals:
+            return None
+        options: tuple[tuple[float, UnitName], ...] = (
+            (1.0, "rad"),
+            (1000.0, "rad"),
+            (1 / _DEGREES, "deg"),
+            (1000.0 / _DEGREES, "deg"),
+        )
+        unit = min(options, key=lambda option: abs(np.log(tilt.gain / option[0])))[1]
+        reason = f"{guess.reason}; in {unit} the lean explains the acceleration"
+        self.guesses["attitude"] = replace(guess, reason=reason, sure="data", rivals=())
+        return unit
+
+    def _quaternion(self, named: Named, measured: Array | None) -> _Attitude:
+        time, values = self.log.values(named.group.columns)
+        orders = ("wxyz",) if named.group.kind == "wxyz" else ("wxyz", "xyzw")
+        tried: dict[tuple[str, bool], tuple[Rotation, AxisFit | None]] = {}
+        for order in orders:
+            for inverse in (False, True):
+                rotation = on_clock(rotations_of(values, order, inverse), time, self.log.grid[self.part])
+                tried[(order, inverse)] = (
+                    rotation,
+                    None if measured is None else fit_rates(rotation, measured, self.rate_hz),
+                )
+        shares = {key: fit.explained if fit is not None else 0.0 for key, (_, fit) in tried.items()}
+        best = max(shares, key=lambda key: shares[key])
+        plain = (orders[0] if measured is not None and shares[best] > _CLEAR else _order_at_rest(values, orders), False)
+        if shares[best] < _CLEAR or shares[plain] > shares[best] - 0.02:
+            best = plain
+        self._tell_quaternion(named, best, shares)
+        rotation, fit = tried[best]
+        return _Attitude(rotation, fit)
+
+    def _tell_quaternion(
+        self, named: Named, best: tuple[str, bool], shares: Mapping[tuple[str, bool], float]
+    ) -> None:
+        order, inverse = best
+        sign = None
+        if inverse:
+            sign = (1.0, -1.0, -1.0, -1.0) if order == "wxyz" else (-1.0, -1.0, -1.0, 1.0)
+        told = shares[best] > _CLEAR
+        others = max((share for key, share in shares.items() if key != best), default=0.0)
+        data = f"its derivative explains {100 * shares[best]:.0f} % of the gyroscope"
+        turned = " when turned from world-to-body, as logged, to body-to-world" if inverse else ""
+        reason = f"of length 1; {_called(named)}" + (f"; {data}{turned}" if told else "")
+        self.guesses["quaternion"] = Guess(
+            signal="quaternion",
+            columns=SignalMap(columns=named.group.columns, unit="1", sign=sign),
+            reason=reason,
+            sure="data" if told else "named",
+        )
+        if named.group.kind == "wxyz":
+            choice = Choice("quaternion_order", order, "the columns are named by w, x, y, z", "named")
+        elif told and others < shares[best] - 0.05:
+            next_best = f"{data}, in the other order {100 * others:.0f} %"
+            choice = Choice("quaternion_order", order, next_best, "data")
+        else:
+            other = "xyzw" if order == "wxyz" else "wxyz"
+            rival = Rival(f"quaternion_order: {other}", "no gyroscope that turns speaks against it")
+            known = named.known or "level flight leaves two middle components small"
+            choice = Choice("quaternion_order", order, known, "named" if named.known else "guess", (rival,))
+        self.choices["quaternion_order"] = choice
+
+    def _euler(self, named: Named, measured: Array | None, decided: UnitName | None) -> _Attitude:
+        time, values = self.log.values(named.group.columns)
+        unit, reason, sure, rivals = self._angle_unit(named, values)
+        if decided is not None:
+            unit, sure, rivals = decided, "data", ()
+            reason = f"{_called(named)}; in {unit} the lean explains the acceleration"
+        signs = ((1.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, -1.0), (1.0, -1.0, -1.0))
+        tried = {}
+        for sign in signs:
+            angles = np.asarray(sign) * values * known_unit(unit).factor
+            rotation = on_clock(Rotation.from_euler("ZYX", angles[:, ::-1]), time, self.log.grid[self.part])
+            fit = None if measured is None else fit_rates(rotation, measured, self.rate_hz)
+            tried[sign] = (rotation, fit)
+        shares = {sign: fit.as_named if fit is not None else 0.0 for sign, (_, fit) in tried.items()}
+        best = max(shares, key=lambda sign: shares[sign])
+        if shares[best] < _CLEAR or shares[signs[0]] > shares[best] - 0.02:
+            best = signs[0]
+        told = shares[best] > _CLEAR
+        if told:
+            flipped = [name for name, sign in zip(("roll", "pitch", "yaw"), best, strict=True) if sign < 0]
+            turned = f" with {' and '.join(flipped)} reversed" if flipped else ""
+            reason += f"; {'their' if flipped else 'the'} derivative explains {100 * shares[best]:.0f} % of the gyroscope{turned}"
+            sure = "data" if not rivals else sure
+        self.guesses["attitude"] = Guess(
+            signal="attitude",
+            columns=SignalMap(columns=named.group.columns, unit=unit, sign=None if best == signs[0] else best),
+            reason=reason,
+            sure=sure,
+            rivals=rivals,
+        )
+        rotation, fit = tried[best]
+        return _Attitude(rotation, fit)
+
+    def _angle_unit(self, named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple[Rival, ...]]:
+        stated = _stated_unit(self.log, named)
+        if stated is not None:
+            return stated, f"{_called(named)}, which is in {stated}", "named", ()
+        largest = np.quantile(np.abs(values), 0.999, axis=0)
+        tilt, turn = float(largest[:2].max()), float(largest[2])
+        if tilt > _LARGEST_TILT or turn > 20 * _LARGEST_ANGLE:
+            return "deg", f"{_called(named)}; reaches {max(tilt, turn):.3g}, so these are degrees", "data", ()
+        rival = Rival("unit: deg", f"a flight that never leans by more than {tilt:.2g} degrees would read the same")
+        rivals = () if turn > 1.0 and turn <= _LARGEST_ANGLE and tilt > 0.1 else (rival,)
+        return "rad", f"{_called(named)}; leans by {tilt:.2g} at most", "data" if not rivals else "guess", rivals
+
+    def _body_rate(self, attitude: _Attitude | None) -> None:
+        named = self.first("body_rate")
+        if named is None:
+            return
+        fit = None if attitude is None else attitude.rates
+        stated = _stated_unit(self.log, named)
+        if fit is not None and fit.explained > _CLEAR:
+            unit, scale, agrees = _rate_unit(fit.gain)
+            if agrees or stated is None:
+                if stated is not None and known_unit(stated).factor != known_unit(unit).factor * scale:
+                    self.warnings.append(f"{named.group.pattern} is said to be in {stated}; its size says {unit}")
+                self.guesses["body_rate"] = _rates_by_data(named, fit, unit, scale, agrees)
+                return
+        values = self.grid(named)
+        spread = float(np.sqrt(values.var(axis=0).sum()))
+        if stated is not None:
+            guess: tuple[UnitName, Sure, tuple[Rival, ...]] = (stated, "named", ())
+        elif spread < _RADIANS_UP_TO:
+            guess = ("rad/s", "data", ())
+        elif spread > _DEGREES_FROM:
+            guess = ("deg/s", "data", ())
+        else:
+            rival = Rival("unit: deg/s", f"a spread of {spread:.2g} is possible in both")
+            guess = ("rad/s", "guess", (rival,))
+        unit, sure, rivals = guess
+        size = f"a spread of {spread:.2g} in flight" if stated is None else f"which is in {stated}"
+        none = "; no attitude that turns is there to hold it against"
+        self.guesses["body_rate"] = Guess(
+            signal="body_rate",
+            columns=SignalMap(columns=named.group.columns, unit=unit, scale=named.scale),
+            reason=f"{_called(named)}, {size}{none}",
+            sure=sure,
+            rivals=rivals,
+        )
+
+    # Position, velocity and what they say of frames.
+
+    def _position(self, attitude: _Attitude | None) -> TiltFit | None:
+        position, velocity = self.first("position"), self.first("velocity")
+        moving = None
+        if velocity is not None:
+            velocity = self._velocity(velocity, position, attitude)
+        if position is not None:
+            moving = second_derivative(self.grid(position), self.rate_hz)
+        elif velocity is not None:
+            moving = first_derivative(self.grid(velocity), self.rate_hz)
+        tilt = None if moving is None or attitude is None else fit_tilt(attitude.rotation, moving, self.rate_hz)
+        if tilt is not None and tilt.explained < _CLEAR:
+            tilt = None
+        if position is not None:
+            self._tell_place("position", position, ("m", "mm"), tilt)
+        if velocity is not None:
+            self._tell_place("velocity", velocity, ("m/s", "mm/s"), tilt)
+        return tilt
+
+    def _velocity(self, velocity: Named, position: Named | None, attitude: _Attitude | None) -> Named | None:
+        """Give the velocity back where it is that of the world."""
+        if position is None:
+            return velocity
+        derived = first_derivative(self.grid(position), self.rate_hz)
+        measured = slow(self.grid(velocity), self.rate_hz)
+        world = fit_axes(slow(derived, self.rate_hz), measured)
+        if attitude is not None:
+            in_body = attitude.rotation.inv().apply(derived)
+            body = fit_axes(slow(in_body, self.rate_hz), measured)
+            if body.explained > max(_GOOD, world.explained + 0.1):
+                self.left_out.append(
+                    f"{velocity.group.pattern}: a velocity in body axes (the position's derivative explains"
+                    f" {100 * body.explained:.0f} % there, {100 * world.explained:.0f} % in the world); import.signals"
+                    " takes velocities of the world"
+                )
+                return None
+        self.velocity_share = world.explained
+        return velocity
+
+    def _tell_place(
+        self, name: Literal["position", "velocity"], named: Named, units: tuple[UnitName, UnitName], tilt: TiltFit | None
+    ) -> None:
+        stated = _stated_unit(self.log, named)
+        unit: UnitName = stated or units[0]
+        sure: Sure = "named"
+        reason = f"{_called(named)}"
+        rivals: tuple[Rival, ...] = ()
+        if tilt is not None and stated is None:
+            unit = units[1] if tilt.gain > 100 else units[0]
+            sure = "data" if 1 / _TEN < tilt.gain / (1000 if unit == units[1] else 1) < _TEN else "guess"
+            reason += f"; tilt and gravity explain {100 * tilt.explained:.0f} % of the acceleration in {unit.split('/')[0]}"
+        elif stated is None:
+            spread = float(np.ptp(self.grid(named), axis=0).max())
+            sure = "data" if spread < 50 else "guess"
+            reason += f"; ranges over {spread:.3g}"
+            rivals = () if sure == "data" else (Rival(f"unit: {units[1]}", "no attitude that leans speaks against it"),)
+        else:
+            reason += f", which is in {stated}"
+        if name == "velocity" and getattr(self, "velocity_share", 0.0) > _CLEAR:
+            reason += f"; the position's derivative explains {100 * self.velocity_share:.0f} % of it"
+        columns, sign = _in_world_of_attitude(named.group.columns, tilt)
+        if columns != named.group.columns or sign is not None:
+            reason += "; turned into the axes of the attitude, as the tilt asks for"
+        self.guesses[name] = Guess(
+            signal=name,
+            columns=SignalMap(columns=columns, unit=unit, scale=named.scale, sign=sign),
+            reason=reason,
+            sure=sure,
+            rivals=rivals,
+        )
+
+    # The accelerometer.
+
+    def _acceleration(self, attitude: _Attitude | None, tilt: TiltFit | None) -> None:
+        for named in self.candidates.get("acceleration", ()):
+            if self._take_acceleration(named, attitude, tilt):
+                return
+
+    def _take_acceleration(self, named: Named, attitude: _Attitude | None, tilt: TiltFit | None) -> bool:
+        values = self.grid(named)
+        vertical = float(np.median(values[:, 2]))
+        stated = _stated_unit(self.log, named)
+        sensed = [
+            (level, unit, scale)
+            for level, unit, scale in _SENSED
+            if 1 / _NEAR_GRAVITY < abs(vertical) / level < _NEAR_GRAVITY and unit == (stated or unit)
+        ]
+        world = self._world_acceleration()
+        along_world = None if world is None else fit_axes(slow(world, self.rate_hz, 1.0), slow(values, self.rate_hz, 1.0))
+        if sensed:
+            if along_world is not None and along_world.as_named > _GOOD:
+                self.left_out.append(
+                    f"{named.group.pattern}: an acceleration of the world with gravity in it (the motion explains"
+                    f" {100 * along_world.as_named:.0f} %), which import.signals has no word for"
+                )
+                return False
+            self._tell_sensed(named, vertical, sensed[0], tilt)
+            return True
+        if along_world is None or along_world.explained < _CLEAR:
+            self.left_out.append(
+                f"{named.group.pattern}: neither gravity is in it (z has a median of {vertical:.3g}) nor does the motion"
+                " over ground explain it"
+            )
+            return False
+        unit: UnitName = "g" if abs(np.log(along_world.gain * standard_gravity)) < np.log(2) else "m/s^2"
+        self.guesses["acceleration"] = Guess(
+            signal="acceleration",
+            columns=SignalMap(columns=named.group.columns, unit=stated or unit, scale=named.scale),
+            reason=f"{_called(named)}; the motion over ground explains {100 * along_world.explained:.0f} %, in {stated or unit},"
+            " and no gravity is in it",
+            sure="data",
+        )
+        self.choices["acceleration_frame"] = Choice(
+            "acceleration_frame", "world", "the acceleration has no gravity in it and follows the motion", "data"
+        )
+        return True
+
+    def _world_acceleration(self) -> Array | None:
+        position, velocity = self.first("position"), self.guesses.get("velocity")
+        if velocity is not None:
+            return first_derivative(self.log.on_grid(velocity.columns.columns)[self.part], self.rate_hz)
+        return None if position is None else second_derivative(self.grid(position), self.rate_hz)
+
+    def _tell_sensed(
+        self, named: Named, vertical: float, sensed: tuple[float, UnitName, float], tilt: TiltFit | None
+    ) -> None:
+        level, unit, scale = sensed
+        up = "FLU" if vertical > 0 else "FRD"
+        body = tilt.body if tilt is not None else named.frame if named.frame in ("FLU", "FRD") else None
+        sign = None
+        reason = f"{_called(named)}; z has a median of {vertical:.3g} in flight: gravity, in {unit}"
+        if body is not None and body != up:
+            sign = (-1.0, -1.0, -1.0)
+            reason += f", and points the wrong way for {body}, so it is gravity that is logged, not what carries it"
+        self.guesses["acceleration"] = Guess(
+            signal="acceleration",
+            columns=SignalMap(columns=named.group.columns, unit=unit, scale=scale, sign=sign),
+            reason=reason,
+            sure="data",
+        )
+        self.choices["acceleration_frame"] = Choice(
+            "acceleration_frame", "body-specific-force", f"gravity stays in z (median {vertical:.3g}) in flight", "data"
+        )
+        if body is None:
+            points = "up" if up == "FLU" else "down"
+            self.choices["body_frame"] = Choice(
+                "body_frame", up, f"the accelerometer reads {vertical:.3g} along z, so z points {points}", "data"
+            )
+
+    def _frames(self, tilt: TiltFit | None) -> None:
+        """Choose the frames: from the tilt, from the accelerometer, from the kind of log, or as usual."""
+        bodies = {named.frame for found in self.candidates.values() for named in found[:1]} & {"FLU", "FRD"}
+        known = next((named.known for found in self.candidates.values() for named in found[:1] if named.frame), "")
+        if tilt is not None:
+            reason = f"leaning explains {100 * tilt.explained:.0f} % of the acceleration with body z {_UP[tilt.body]}"
+            self.choices["body_frame"] = Choice("body_frame", tilt.body, reason, "data")
+            if bodies and tilt.body not in bodies:
+                self.warnings.append(f"a log of {known} is in {', '.join(sorted(bodies))}, and its motion says {tilt.body}")
+        elif bodies:
+            frame = sorted(bodies)[0]
+            self.choices["body_frame"] = Choice("body_frame", frame, f"a log of {known}", "named")
+        elif "body_frame" not in self.choices and self.guesses.keys() & _WITH_BODY:
+            rival = Rival("body_frame: FRD", "nothing in the log tells y left, z up from y right, z down")
+            self.choices["body_frame"] = Choice("body_frame", "FLU", "taken as the usual one", "guess", (rival,))
+        if not self.guesses.keys() & {"position", "velocity", "attitude", "quaternion"}:
+            return
+        body = self.choices["body_frame"].value if "body_frame" in self.choices else "FLU"
+        world = {"FLU": "ENU", "FRD": "NED"}[body]
+        sure = self.choices["body_frame"].sure if "body_frame" in self.choices else "guess"
+        reason = "z of the world points where z of the level body does; x and y of it matter to no model"
+        self.choices["world_frame"] = Choice("world_frame", world, reason, sure)
+
+    # The rest.
+
+    def _beside(self) -> None:
+        torque = self.first("body_torque")
+        if torque is not None:
+            self.left_out.append(
+                f"{torque.group.pattern}: looks like a torque; if it is one, in N m, map it as body_torque (a commanded"
+                " one is what the controller wanted, not what acted)"
+            )
+        voltage = self.first("voltage")
+        if voltage is None:
+            return
+        level = float(np.median(self.grid(voltage)))
+        scale = voltage.scale if voltage.known else 1e-3 if level > 1000 else 1.0
+        self.guesses["voltage"] = Guess(
+            signal="voltage",
+            columns=SignalMap(columns=voltage.group.columns, unit="V", scale=scale, required=False),
+            reason=f"{_called(voltage)}; {level * scale:.3g} V in flight",
+            sure="named",
+        )
+
+    def _rotors(self, rotors: RotorColumns) -> tuple[Array | None, MovedBy | None]:
+        self.left_out += rotors.left_out
+        self.warnings += rotors.warnings
+        speeds = None
+        for name, found in (("rotor_command", rotors.command), ("rotor_speed", rotors.speed)):
+            if found is not None:
+                self.guesses[found.signal] = Guess(
+                    signal=found.signal,
+                    columns=found.columns,
+                    reason=found.reason,
+                    sure=found.sure,
+                    rivals=tuple(Rival(*rival) for rival in found.rivals),
+                )
+                values = self.log.on_grid(found.columns.columns)[self.part]
+                signed = np.asarray(found.columns.sign or np.ones(values.shape[1]))
+                factor = known_unit(found.columns.unit).factor
+                speeds = factor * signed * (found.columns.scale * values + found.columns.offset)
+                if name == "rotor_command" and rotors.command_is == "thrust":
+                    speeds = np.sqrt(np.maximum(speeds, 0.0))
+        if rotors.command is not None and rotors.command.columns.unit == "1":
+            choice = Choice(
+                "rotor_command_is",
+                rotors.command_is,
+                rotors.command_reason,
+                rotors.command_sure,
+                tuple(Rival(*rival) for rival in rotors.command_rivals),
+            )
+            self.choices["rotor_command_is"] = choice
+        rate = self.guesses.get("body_rate")
+        if speeds is None or rate is None:
+            return speeds, None
+        values = self.log.on_grid(rate.columns.columns)[self.part]
+        signed = np.asarray(rate.columns.sign or (1.0, 1.0, 1.0))
+        body = known_unit(rate.columns.unit).factor * rate.columns.scale * signed * values
+        if self.choices["body_frame"].value == "FRD":
+            body = body * np.array([1.0, -1.0, -1.0])
+        return speeds, airframe_from_motion(body, speeds, self.rate_hz, rotors.speed is None)
+
+    def _gathered(self, flown: Flown, speeds: Array | None, moved: MovedBy | None) -> Recognition:
+        order: tuple[SignalName, ...] = (
+            "quaternion",
+            "attitude",
+            "body_rate",
+            "acceleration",
+            "position",
+            "velocity",
+            "rotor_speed",
+            "rotor_command",
+            "voltage",
+        )
+        signals = tuple(self.guesses[name] for name in order if name in self.guesses)
+        rates = {guess.signal: self.log.rate_hz(guess.columns.columns) for guess in signals}
+        base = max((g for g in signals if g.signal != "voltage"), key=lambda g: rates[g.signal])
+        time_column, unit = self.log.time_column, self.log.time_unit
+        begin = self.log.clock("")[0] if self.log.flat else 0.0
+        if not self.log.flat:
+            topic = self.log.parts(base.columns.columns[0])[0]
+            time_column, unit = f"{topic}.{STAMP}", "us"
+            begin = float(self.log.clock(topic)[0])
+        if flown.span_s is not None:
+            # import.crop_s counts from the first stamp of the clock.
+            off = float(self.log.grid[0]) - float(begin)
+            flown = replace(flown, span_s=(max(0.0, flown.span_s[0] + off), flown.span_s[1] + off))
+        return Recognition(
+            time_column=time_column,
+            time_unit=unit,
+            signals=signals,
+            choices=tuple(self.choices.values()),
+            left_out=tuple(self.left_out),
+            flown=flown,
+            rate_hz=rates[base.signal],
+            slowest_s=max(1 / rates[g.signal] for g in signals),
+            moved=moved,
+            speeds=speeds,
+            warnings=tuple(self.warnings),
+        )
+
+
+_WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
+_UP: Final = {"FLU": "up", "FRD": "down"}
+
+
+def slow_free(values: Array) -> Array:
+    """Take the median of each column away."""
+    return np.asarray(values - np.median(values, axis=0))
+
+
+def _called(named: Named) -> str:
+    pattern = named.group.pattern
+    if any(letter.isalnum() for letter in pattern):
+        return f"a log of {named.known} calls it {pattern}" if named.known else f"called {pattern}"
+    return f"called {', '.join(named.group.columns)}"
+
+
+def _stated_unit(log: _Log, named: Named) -> UnitName | None:
+    """Give the unit that the log, the kind of log or the name states."""
+    words = {"deg/s": "deg/s", "rad/s": "rad/s", "m/s/s": "m/s^2", "m/s^2": "m/s^2", "m": "m", "m/s": "m/s", "deg": "deg"}
+    stated = words.get(log.units.get(named.group.columns[0], ""))
+    return stated or named.unit  # type: ignore[return-value]
+
+
+def _rate_unit(gain: float) -> tuple[UnitName, float, bool]:
+    """Tell the unit of a gyroscope from its size beside the attitude's derivative, and whether the size fits."""
+    options: tuple[tuple[float, UnitName, float], ...] = (
+        (1.0, "rad/s", 1.0),
+        (_DEGREES, "deg/s", 1.0),
+        (1000.0, "rad/s", 1e-3),
+    )
+    size, unit, scale = min(options, key=lambda option: abs(np.log(gain / option[0])))
+    return unit, scale, bool(abs(np.log(gain / size)) < np.log(_TOLERANCE))
+
+
+def _rates_by_data(named: Named, fit: AxisFit, unit: UnitName, scale: float, agrees: bool) -> Guess:
+    columns = tuple(named.group.columns[index] for index in fit.order)
+    sign = None if fit.sign == (1.0, 1.0, 1.0) else fit.sign
+    axes = "" if fit.is_as_named else ", with its axes in this order and with these signs"
+    better = f"{fit.times_better:.1f} times better than in any other order or with other signs"
+    size = f" and is {fit.gain:.3g} times as large, so it is in {unit}" if scale == 1.0 else f", in thousandths of {unit}"
+    return Guess(
+        signal="body_rate",
+        columns=SignalMap(columns=columns, unit=unit, scale=scale, sign=sign),
+        reason=f"{_called(named)}; follows the attitude's derivative{axes} ({100 * fit.explained:.0f} %, {better}){size}",
+        sure="data" if agrees else "guess",
+    )
+
+
+def _order_at_rest(values: Array, orders: Sequence[str]) -> str:
+    """Tell the order of a quaternion of level flight, whose x and y are small."""
+    if len(orders) == 1:
+        return orders[0]
+    size = np.abs(values).mean(axis=0)
+    return "wxyz" if size[1] + size[2] < size[0] + size[1] else "xyzw"
+
+
+def _in_world_of_attitude(
+    columns: tuple[str, ...], tilt: TiltFit | None
+) -> tuple[tuple[str, ...], tuple[float, ...] | None]:
+    if tilt is None:
+        return columns, None
+    ordered = (columns[tilt.order[0]], columns[tilt.order[1]], columns[2])
+    return ordered, None if tilt.sign == (1.0, 1.0, 1.0) else tilt.sign
