@@ -264,9 +264,7 @@ def _shares(acceleration: Array, rate: Array, squared: Array) -> list[tuple[_Lay
     inner = slice(edge, len(rate) - edge)
     # What turning itself does to the acceleration, and a constant torque, are no work of the rotors.
     basis = np.linalg.qr(np.column_stack([np.ones(len(rate[inner])), rate[inner]]))[0]
-    wanted, rotors = (
-        values[inner] - basis @ (basis.T @ values[inner]) for values in (acceleration, squared)
-    )
+    wanted, rotors = (values[inner] - basis @ (basis.T @ values[inner]) for values in (acceleration, squared))
     together, own, total = rotors.T @ wanted, rotors.T @ rotors, (wanted**2).sum(axis=0)
     results = []
     for layout in _layouts():

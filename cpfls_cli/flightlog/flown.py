@@ -20,7 +20,9 @@ _OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05
 _MARGIN_S = 0.5
 """Left out after take-off and before landing, where the ground pushes."""
 
-_STILL_RAD_S, _STILL_M = 0.01, 0.02
+_STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
+"""Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move."""
+
 _ALIVE = 0.02
 _MOST_CLOCK_HZ = 50.0
 
@@ -60,8 +62,8 @@ def find_flown(time: Array, level: Array | None, height: Array | None, rate: Arr
     """
     clock_hz = 1 / float(time[1] - time[0])
     every = max(1, int(clock_hz / _MOST_CLOCK_HZ))
-    time, level, height, rate = (None if v is None else v[::every] for v in (time, level, height, rate))
-    assert time is not None
+    time = time[::every]
+    level, height, rate = (None if values is None else values[::every] for values in (level, height, rate))
     period = float(time[1] - time[0])
     active, told = _active(level, height, rate, period)
     if active is None or not active.any():
@@ -120,14 +122,16 @@ def _smoothed(marked: BoolArray, period: float) -> BoolArray:
     """Fill short pauses, then drop short stretches."""
     width = max(1, round(_SHORT_S / period))
     around = np.pad(marked, width, mode="edge")
-    closed = binary_closing(around, np.ones(width))
-    return np.asarray(binary_opening(closed, np.ones(width))[width:-width], dtype=bool)
+    window = np.ones(width, dtype=np.bool_)
+    return np.asarray(binary_opening(binary_closing(around, window), window)[width:-width], dtype=np.bool_)
 
 
 def _still(active: BoolArray, height: Array | None, rate: Array | None) -> bool:
-    moves = [float(np.ptp(height[active])) > _STILL_M] if height is not None else []
-    moves += [float(np.sqrt(np.mean(rate[active] ** 2))) > _STILL_RAD_S] if rate is not None else []
-    return bool(moves) and not any(moves)
+    moves = height is not None and float(np.ptp(height[active])) > _STILL_M
+    if rate is None:
+        return height is not None and not moves
+    turning = float(np.sqrt(np.mean(rate[active] ** 2)))
+    return turning < _STILL_RAD_S or (turning < _SOFT_RAD_S and height is not None and not moves)
 
 
 def _longest(time: Array, active: BoolArray, told: str, level: Array | None) -> Flown:

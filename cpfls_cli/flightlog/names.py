@@ -84,7 +84,7 @@ _SHORTEST_NUMBERED, _LONGEST_NUMBERED = 3, 16
 def column_groups(names: Mapping[str, object] | tuple[str, ...]) -> tuple[ColumnGroup, ...]:
     """Find columns whose names differ in an axis or a number alone, and leave every other one as its own group."""
     known = dict.fromkeys(names)
-    found = {}
+    found: dict[tuple[str, Kind], ColumnGroup] = {}
     for group in (*_of_axes(known), *_numbered(known)):
         found.setdefault((group.pattern, group.kind), group)
     single = tuple(ColumnGroup(name, "one", (name,)) for name in known)
@@ -199,7 +199,20 @@ _FEWEST_ROTORS = 3
 _BY_WORDS = 100.0
 _OF_OTHER_INSTANCE = 50.0
 _WORDS: Final = {
-    "position": {"pos", "position", "p", "translation", "point", "poses", "pose", "mocap", "local", "state", "estimate", "v"},
+    "position": {
+        "pos",
+        "position",
+        "p",
+        "translation",
+        "point",
+        "poses",
+        "pose",
+        "mocap",
+        "local",
+        "state",
+        "estimate",
+        "v",
+    },
     "velocity": {"vel", "velocity", "v", "linear", "twist"},
     "acceleration": {"acc", "accel", "accelerometer", "acceleration", "a", "sf", "f", "imu"},
     "body_rate": {"gyro", "gyr", "gyroscope", "gyros", "omega", "om", "w", "rate", "rates", "angular", "angvel", "pqr"},
@@ -215,9 +228,56 @@ _STRONG: Final = {
     "rotor_command": {"cmd", "command", "pwm", "u", "control", "output", "throttle", "omcmd", "motor"},
 }
 _NOT_MEASURED: Final = frozenset(
-    "des desired d sp setpoint ref reference target goal r cmd command ctrltarget cov covariance var variance bias"
-    " noise std err error integral reset delta innov innovation offset mag magnetometer rc gps status temperature"
-    " current thrust thrusts jerk snap stamp timestamp counter padding derivative test ratio ratios clip".split()
+    [
+        "des",
+        "desired",
+        "d",
+        "sp",
+        "setpoint",
+        "ref",
+        "reference",
+        "target",
+        "goal",
+        "r",
+        "cmd",
+        "command",
+        "ctrltarget",
+        "cov",
+        "covariance",
+        "var",
+        "variance",
+        "bias",
+        "noise",
+        "std",
+        "err",
+        "error",
+        "integral",
+        "reset",
+        "delta",
+        "innov",
+        "innovation",
+        "offset",
+        "mag",
+        "magnetometer",
+        "rc",
+        "gps",
+        "status",
+        "temperature",
+        "current",
+        "thrust",
+        "thrusts",
+        "jerk",
+        "snap",
+        "stamp",
+        "timestamp",
+        "counter",
+        "padding",
+        "derivative",
+        "test",
+        "ratio",
+        "ratios",
+        "clip",
+    ]
 )
 _SECOND_HAND: Final = frozenset(
     {"raw", "groundtruth", "mocap", "poses", "estimator", "filtered", "filt", "unfilt", "backup"}

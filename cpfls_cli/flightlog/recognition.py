@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -26,18 +26,20 @@ from cpfls_cli.flightlog.agreement import (
 )
 from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
 from cpfls_cli.flightlog.flown import Flown, find_flown
+from cpfls_cli.flightlog.log_table import (
+    LogTable,
+    holding_values,
+    make_grid,
+    refuse_dead_rotors,
+    stated_unit,
+)
 from cpfls_cli.flightlog.names import Named, column_groups, named_signals
+from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival, Sure
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_rotors
 from cpfls_cli.flightlog.settings import SignalMap, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.units import UnitName, known_unit
 
-Sure = Literal["data", "named", "guess"]
-"""Whether the data decided, a name or the kind of log says so, or neither does."""
-
-_GRID_HZ = 100.0
-_FEWEST_SAMPLES = 20
-_SLOWEST_HZ = 0.5
 _DEGREES = 180 / np.pi
 _CLEAR, _GOOD = 0.3, 0.6
 """Shares of a signal that another has to explain to say something about it, and to overrule a name."""
@@ -59,200 +61,9 @@ _SENSED: Final[tuple[tuple[float, UnitName, float], ...]] = (
     (4096.0, "g", 1 / 4096),
 )
 _NEAR_GRAVITY = 1.3
-_TIME_NAMES = ("t", "time", "time_s", "timestamp", "time_us", "timeus", "time_ms", "stamp", "tick", "seconds", "sec")
-_TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_STEPS_S = (2e-4, 0.5)
 
 
-@dataclass(frozen=True)
-class Rival:
-    """Another guess that the data cannot part from the one that is taken.
-
-    Attributes
-    ----------
-    text : str
-        As it would stand in the config, such as ``unit: deg``.
-    reason : str
-        Why it is not ruled out.
-    """
-
-    text: str
-    reason: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Guess:
-    """A signal of the log.
-
-    Attributes
-    ----------
-    sure : {"data", "named", "guess"}
-    """
-
-    signal: SignalName
-    columns: SignalMap
-    reason: str
-    sure: Sure
-    rivals: tuple[Rival, ...] = ()
-
-
-@dataclass(frozen=True)
-class Choice:
-    """A key of the section `import` that holds for the whole log.
-
-    Attributes
-    ----------
-    sure : {"data", "named", "guess"}
-    """
-
-    key: str
-    value: str
-    reason: str
-    sure: Sure
-    rivals: tuple[Rival, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Recognition:
-    """What a log is taken for.
-
-    Attributes
-    ----------
-    time_column, time_unit : str
-        As the section `import` takes them.
-    signals : tuple of Guess
-    choices : tuple of Choice
-        Frames, the order of a quaternion, what a command is.
-    left_out : tuple of str
-        Sentences on columns that look like a signal and are not mapped.
-    flown : Flown
-    rate_hz : float
-        Of the clock.
-    slowest_s : float
-        Longest median step of a topic that is mapped, s.
-    moved : MovedBy or None
-        The rotors as the motion tells them.
-    speeds : array, shape (time, rotor), or None
-        Rotor speeds in flight in rad/s, or commands as shares of the largest speed.
-    warnings : tuple of str
-    """
-
-    time_column: str
-    time_unit: str
-    signals: tuple[Guess, ...]
-    choices: tuple[Choice, ...]
-    left_out: tuple[str, ...]
-    flown: Flown
-    rate_hz: float
-    slowest_s: float
-    moved: MovedBy | None
-    speeds: Array | None = field(repr=False)
-    warnings: tuple[str, ...] = ()
-
-    def signal(self, name: SignalName) -> Guess | None:
-        """Give the guess for a signal; None where it is not recognised."""
-        return next((guess for guess in self.signals if guess.signal == name), None)
-
-    def choice(self, key: str) -> str | None:
-        """Give the value of a choice; None where there was none to make."""
-        return next((choice.value for choice in self.choices if choice.key == key), None)
-
-    @property
-    def rotors(self) -> int:
-        """Number of rotors that the columns name; 0 where none do."""
-        names: tuple[SignalName, ...] = ("rotor_speed", "rotor_command")
-        return max((len(guess.columns.columns) for name in names if (guess := self.signal(name))), default=0)
-
-
-class _Log:
-    """Columns of a log by name, each on its own clock, and all of them on one."""
-
-    def __init__(self, topics: Topics, units: Mapping[str, str]) -> None:
-        self.topics, self.units = topics, units
-        self.flat = set(topics) == {""}
-        self.names = tuple(
-            f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields
-        )
-        self.time_column, self.time_unit = _flat_time(topics[""], units) if self.flat else ("", "s")
-        self.grid = np.empty(0)
-
-    def parts(self, column: str) -> tuple[str, str]:
-        """Split a column into topic and field."""
-        if self.flat:
-            return "", column
-        topic, _, name = column.partition(".")
-        return topic, name
-
-    def clock(self, topic: str) -> Array:
-        """Stamps of a topic, s."""
-        if self.flat:
-            factor = 1.0 if self.time_column in self.units else _TIME_UNITS[self.time_unit]
-            return np.asarray(self.topics[""][self.time_column] * factor, dtype=float)
-        return np.asarray(self.topics[topic].get(STAMP, np.empty(0)), dtype=float)
-
-    def values(self, columns: Sequence[str]) -> tuple[Array, Array]:
-        """Stamps and values of columns of one topic, rows without a value left out."""
-        topic = self.parts(columns[0])[0]
-        time = self.clock(topic)
-        rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
-        if len(rows) != len(time):
-            return np.empty(0), np.empty((0, len(columns)))
-        known = np.isfinite(rows).all(axis=1) & np.isfinite(time)
-        known[1:] &= np.diff(np.maximum.accumulate(np.where(np.isfinite(time), time, -np.inf))) > 0
-        return time[known], rows[known]
-
-    def on_grid(self, columns: Sequence[str]) -> Array:
-        """Columns on the one clock; at its ends the nearest value."""
-        time, values = self.values(columns)
-        return np.column_stack([np.interp(self.grid, time, column) for column in values.T])
-
-    def rate_hz(self, columns: Sequence[str]) -> float:
-        """Median rate of the topic of a column."""
-        time, _ = self.values(columns[:1])
-        return 1 / float(np.median(np.diff(time))) if len(time) > 2 else 0.0
-
-
-def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str]:
-    """Find the column of stamps: it never falls, and its name or its steps say what it counts.
-
-    Raises
-    ------
-    InputError
-        If no column can be one.
-    """
-    rising = [name for name, values in fields.items() if _rises(np.asarray(values, dtype=float))]
-    rising.sort(key=lambda name: (_time_rank(name), list(fields).index(name)))
-    for name in rising:
-        if _time_rank(name) > 2:
-            break
-        step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
-        if name in units:
-            return name, "s"
-        stated = [unit for unit in ("ns", "us", "ms") if name.lower().endswith(unit)]
-        fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
-        if stated or fitting:
-            return name, (stated or fitting)[0]
-    raise InputError(
-        "no column of time stamps is recognised: one that rises from row to row and is called t, time or timestamp;"
-        " rename it, or write the config by hand (`cpfls config` prints every key)"
-    )
-
-
-def _time_rank(name: str) -> int:
-    lower = name.lower().strip()
-    if lower in _TIME_NAMES:
-        return _TIME_NAMES.index(lower) > 1
-    return 2 if "time" in lower or "stamp" in lower else 3
-
-
-def _rises(values: Array) -> bool:
-    known = values[np.isfinite(values)]
-    return len(known) > 2 and len(known) > 0.5 * len(values) and bool((np.diff(known) >= 0).all()) and np.ptp(known) > 0
-
-
-def recognise(
-    topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str
-) -> Recognition:
+def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> Recognition:
     """Propose what the columns of a log are.
 
     Parameters
@@ -271,48 +82,15 @@ def recognise(
     InputError
         If nothing in the log is recognised, or nothing in it flies.
     """
-    log = _Log(topics, units)
-    candidates = _holding_values(log, named_signals(column_groups(log.names), system))
+    log = LogTable(topics, units)
+    named = named_signals(column_groups(log.names), system)
+    candidates = holding_values(log, named)
     if not candidates:
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
         raise InputError(f"no column is recognised as a signal of a flight (columns: {shown})")
-    _make_grid(log, candidates)
+    refuse_dead_rotors(log, named, candidates)
+    make_grid(log, candidates)
     return _Recogniser(log, candidates, parameters, system).result()
-
-
-def _holding_values(log: _Log, candidates: Sequence[Named]) -> dict[SignalName, list[Named]]:
-    """Keep what has enough values that change, by signal."""
-    kept: dict[SignalName, list[Named]] = {}
-    for named in candidates:
-        time, values = log.values(named.group.columns)
-        rotors = named.signal in ("rotor_speed", "rotor_command")
-        if rotors and len(time) < _FEWEST_SAMPLES:
-            # Outputs that are not there hold no numbers.
-            named = _with_values(log, named)
-            time, values = log.values(named.group.columns)
-        if len(time) < _FEWEST_SAMPLES or log.rate_hz(named.group.columns) < _SLOWEST_HZ:
-            continue
-        if float(np.ptp(values, axis=0).max()) > 0:
-            kept.setdefault(named.signal, []).append(named)
-    return kept
-
-
-def _with_values(log: _Log, named: Named) -> Named:
-    columns = tuple(c for c in named.group.columns if len(log.values((c,))[0]) >= _FEWEST_SAMPLES)
-    return replace(named, group=replace(named.group, columns=columns or named.group.columns))
-
-
-def _make_grid(log: _Log, candidates: Mapping[SignalName, Sequence[Named]]) -> None:
-    """Lay one uniform clock over all signals of motion and rotors."""
-    chosen = [found[0] for name, found in candidates.items() if name != "voltage"] or [
-        found[0] for found in candidates.values()
-    ]
-    clocks = [log.values(named.group.columns[:1])[0] for named in chosen]
-    rate = min(_GRID_HZ, max(1 / float(np.median(np.diff(clock))) for clock in clocks))
-    begin, end = min(float(clock[0]) for clock in clocks), max(float(clock[-1]) for clock in clocks)
-    if end - begin < 2.0:
-        raise InputError(f"holds only {end - begin:.2g} s; a flight to learn from has ten or more")
-    log.grid = np.arange(begin, end, 1 / rate)
 
 
 @dataclass
@@ -327,7 +105,7 @@ class _Recogniser:
     """Goes through the signals in the order in which each helps with the next."""
 
     def __init__(
-        self, log: _Log, candidates: Mapping[SignalName, list[Named]], parameters: Parameters, system: str
+        self, log: LogTable, candidates: Mapping[SignalName, list[Named]], parameters: Parameters, system: str
     ) -> None:
         self.log, self.candidates, self.parameters, self.system = log, candidates, parameters, system
         self.rate_hz = 1 / float(log.grid[1] - log.grid[0])
@@ -336,13 +114,14 @@ class _Recogniser:
         self.left_out: list[str] = []
         self.warnings: list[str] = []
         self.part = slice(None)
+        self.velocity_share = 0.0
 
     def first(self, name: SignalName) -> Named | None:
-        """The best candidate for a signal."""
+        """Give the best candidate for a signal."""
         return next(iter(self.candidates.get(name, ())), None)
 
     def grid(self, named: Named) -> Array:
-        """A candidate's columns in the part that is flown."""
+        """Give a candidate's columns in the part that is flown."""
         return self.log.on_grid(named.group.columns)[self.part]
 
     def result(self) -> Recognition:
@@ -367,7 +146,7 @@ class _Recogniser:
             attitude = self._attitude("deg")
             tilt = self._position(attitude)
         self._body_rate(attitude)
-        self._acceleration(attitude, tilt)
+        self._acceleration(tilt)
         self._frames(tilt)
         self._beside()
         speeds, moved = self._rotors(rotors)
@@ -438,9 +217,7 @@ class _Recogniser:
         rotation, fit = tried[best]
         return _Attitude(rotation, fit)
 
-    def _tell_quaternion(
-        self, named: Named, best: tuple[str, bool], shares: Mapping[tuple[str, bool], float]
-    ) -> None:
+    def _tell_quaternion(self, named: Named, best: tuple[str, bool], shares: Mapping[tuple[str, bool], float]) -> None:
         order, inverse = best
         sign = None
         if inverse:
@@ -464,8 +241,11 @@ class _Recogniser:
         else:
             other = "xyzw" if order == "wxyz" else "wxyz"
             rival = Rival(f"quaternion_order: {other}", "no gyroscope that turns speaks against it")
-            known = named.known or "level flight leaves two middle components small"
-            choice = Choice("quaternion_order", order, known, "named" if named.known else "guess", (rival,))
+            choice = Choice(
+                "quaternion_order", order, "level flight leaves the second and third small", "guess", (rival,)
+            )
+            if named.known:
+                choice = Choice("quaternion_order", order, f"a log of {named.known}", "named")
         self.choices["quaternion_order"] = choice
 
     def _euler(self, named: Named, measured: Array | None, decided: UnitName | None) -> _Attitude:
@@ -489,7 +269,7 @@ class _Recogniser:
         if told:
             flipped = [name for name, sign in zip(("roll", "pitch", "yaw"), best, strict=True) if sign < 0]
             turned = f" with {' and '.join(flipped)} reversed" if flipped else ""
-            reason += f"; {'their' if flipped else 'the'} derivative explains {100 * shares[best]:.0f} % of the gyroscope{turned}"
+            reason += f"; the derivative explains {100 * shares[best]:.0f} % of the gyroscope{turned}"
             sure = "data" if not rivals else sure
         self.guesses["attitude"] = Guess(
             signal="attitude",
@@ -502,7 +282,7 @@ class _Recogniser:
         return _Attitude(rotation, fit)
 
     def _angle_unit(self, named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple[Rival, ...]]:
-        stated = _stated_unit(self.log, named)
+        stated = stated_unit(self.log, named)
         if stated is not None:
             return stated, f"{_called(named)}, which is in {stated}", "named", ()
         largest = np.quantile(np.abs(values), 0.999, axis=0)
@@ -518,7 +298,7 @@ class _Recogniser:
         if named is None:
             return
         fit = None if attitude is None else attitude.rates
-        stated = _stated_unit(self.log, named)
+        stated = stated_unit(self.log, named)
         if fit is not None and fit.explained > _CLEAR:
             unit, scale, agrees = _rate_unit(fit.gain)
             if agrees or stated is None:
@@ -589,9 +369,13 @@ class _Recogniser:
         return velocity
 
     def _tell_place(
-        self, name: Literal["position", "velocity"], named: Named, units: tuple[UnitName, UnitName], tilt: TiltFit | None
+        self,
+        name: Literal["position", "velocity"],
+        named: Named,
+        units: tuple[UnitName, UnitName],
+        tilt: TiltFit | None,
     ) -> None:
-        stated = _stated_unit(self.log, named)
+        stated = stated_unit(self.log, named)
         unit: UnitName = stated or units[0]
         sure: Sure = "named"
         reason = f"{_called(named)}"
@@ -599,7 +383,9 @@ class _Recogniser:
         if tilt is not None and stated is None:
             unit = units[1] if tilt.gain > 100 else units[0]
             sure = "data" if 1 / _TEN < tilt.gain / (1000 if unit == units[1] else 1) < _TEN else "guess"
-            reason += f"; tilt and gravity explain {100 * tilt.explained:.0f} % of the acceleration in {unit.split('/')[0]}"
+            reason += (
+                f"; tilt and gravity explain {100 * tilt.explained:.0f} % of the acceleration in {unit.split('/')[0]}"
+            )
         elif stated is None:
             spread = float(np.ptp(self.grid(named), axis=0).max())
             sure = "data" if spread < 50 else "guess"
@@ -607,7 +393,7 @@ class _Recogniser:
             rivals = () if sure == "data" else (Rival(f"unit: {units[1]}", "no attitude that leans speaks against it"),)
         else:
             reason += f", which is in {stated}"
-        if name == "velocity" and getattr(self, "velocity_share", 0.0) > _CLEAR:
+        if name == "velocity" and self.velocity_share > _CLEAR:
             reason += f"; the position's derivative explains {100 * self.velocity_share:.0f} % of it"
         columns, sign = _in_world_of_attitude(named.group.columns, tilt)
         if columns != named.group.columns or sign is not None:
@@ -622,24 +408,31 @@ class _Recogniser:
 
     # The accelerometer.
 
-    def _acceleration(self, attitude: _Attitude | None, tilt: TiltFit | None) -> None:
+    def _acceleration(self, tilt: TiltFit | None) -> None:
         for named in self.candidates.get("acceleration", ()):
-            if self._take_acceleration(named, attitude, tilt):
+            if self._take_acceleration(named, tilt):
                 return
 
-    def _take_acceleration(self, named: Named, attitude: _Attitude | None, tilt: TiltFit | None) -> bool:
+    def _take_acceleration(self, named: Named, tilt: TiltFit | None) -> bool:
         values = self.grid(named)
         vertical = float(np.median(values[:, 2]))
-        stated = _stated_unit(self.log, named)
+        stated = stated_unit(self.log, named)
         sensed = [
             (level, unit, scale)
             for level, unit, scale in _SENSED
             if 1 / _NEAR_GRAVITY < abs(vertical) / level < _NEAR_GRAVITY and unit == (stated or unit)
         ]
         world = self._world_acceleration()
-        along_world = None if world is None else fit_axes(slow(world, self.rate_hz, 1.0), slow(values, self.rate_hz, 1.0))
+        ground = np.array([1.0, 1.0, 0.0 if sensed else 1.0])
+        along_world = (
+            None
+            if world is None
+            else fit_axes(slow(ground * world, self.rate_hz, 1.0), slow(ground * values, self.rate_hz, 1.0))
+        )
         if sensed:
-            if along_world is not None and along_world.as_named > _GOOD:
+            # In body axes next to nothing is sensed along x and y in flight; over ground the world's axes have it all.
+            of_body = named.frame in ("FLU", "FRD")
+            if along_world is not None and along_world.as_named > _GOOD and along_world.gain > 0.5 and not of_body:
                 self.left_out.append(
                     f"{named.group.pattern}: an acceleration of the world with gravity in it (the motion explains"
                     f" {100 * along_world.as_named:.0f} %), which import.signals has no word for"
@@ -649,16 +442,16 @@ class _Recogniser:
             return True
         if along_world is None or along_world.explained < _CLEAR:
             self.left_out.append(
-                f"{named.group.pattern}: neither gravity is in it (z has a median of {vertical:.3g}) nor does the motion"
-                " over ground explain it"
+                f"{named.group.pattern}: no gravity is in it (z has a median of {vertical:.3g}), and the motion over ground"
+                " does not explain it"
             )
             return False
         unit: UnitName = "g" if abs(np.log(along_world.gain * standard_gravity)) < np.log(2) else "m/s^2"
         self.guesses["acceleration"] = Guess(
             signal="acceleration",
             columns=SignalMap(columns=named.group.columns, unit=stated or unit, scale=named.scale),
-            reason=f"{_called(named)}; the motion over ground explains {100 * along_world.explained:.0f} %, in {stated or unit},"
-            " and no gravity is in it",
+            reason=f"{_called(named)}; the motion over ground explains {100 * along_world.explained:.0f} %, in"
+            f" {stated or unit}, and no gravity is in it",
             sure="data",
         )
         self.choices["acceleration_frame"] = Choice(
@@ -675,7 +468,7 @@ class _Recogniser:
     def _tell_sensed(
         self, named: Named, vertical: float, sensed: tuple[float, UnitName, float], tilt: TiltFit | None
     ) -> None:
-        level, unit, scale = sensed
+        _, unit, scale = sensed
         up = "FLU" if vertical > 0 else "FRD"
         body = tilt.body if tilt is not None else named.frame if named.frame in ("FLU", "FRD") else None
         sign = None
@@ -700,16 +493,18 @@ class _Recogniser:
 
     def _frames(self, tilt: TiltFit | None) -> None:
         """Choose the frames: from the tilt, from the accelerometer, from the kind of log, or as usual."""
-        bodies = {named.frame for found in self.candidates.values() for named in found[:1]} & {"FLU", "FRD"}
+        bodies = {_BODY_OF.get(str(named.frame)) for found in self.candidates.values() for named in found[:1]} - {None}
         known = next((named.known for found in self.candidates.values() for named in found[:1] if named.frame), "")
         if tilt is not None:
             reason = f"leaning explains {100 * tilt.explained:.0f} % of the acceleration with body z {_UP[tilt.body]}"
             self.choices["body_frame"] = Choice("body_frame", tilt.body, reason, "data")
             if bodies and tilt.body not in bodies:
-                self.warnings.append(f"a log of {known} is in {', '.join(sorted(bodies))}, and its motion says {tilt.body}")
+                self.warnings.append(
+                    f"a log of {known} is in {', '.join(map(str, bodies))}, and its motion says {tilt.body}"
+                )
         elif bodies:
-            frame = sorted(bodies)[0]
-            self.choices["body_frame"] = Choice("body_frame", frame, f"a log of {known}", "named")
+            frame = min(map(str, bodies))
+            self.choices["body_frame"] = Choice("body_frame", str(frame), f"a log of {known}", "named")
         elif "body_frame" not in self.choices and self.guesses.keys() & _WITH_BODY:
             rival = Rival("body_frame: FRD", "nothing in the log tells y left, z up from y right, z down")
             self.choices["body_frame"] = Choice("body_frame", "FLU", "taken as the usual one", "guess", (rival,))
@@ -794,7 +589,9 @@ class _Recogniser:
         )
         signals = tuple(self.guesses[name] for name in order if name in self.guesses)
         rates = {guess.signal: self.log.rate_hz(guess.columns.columns) for guess in signals}
-        base = max((g for g in signals if g.signal != "voltage"), key=lambda g: rates[g.signal])
+        # An accelerometer is often logged faster than all that matters more.
+        clocked = [g for g in signals if g.signal not in ("voltage", "acceleration")] or list(signals)
+        base = max(clocked, key=lambda g: rates[g.signal])
         time_column, unit = self.log.time_column, self.log.time_unit
         begin = self.log.clock("")[0] if self.log.flat else 0.0
         if not self.log.flat:
@@ -804,7 +601,7 @@ class _Recogniser:
         if flown.span_s is not None:
             # import.crop_s counts from the first stamp of the clock.
             off = float(self.log.grid[0]) - float(begin)
-            flown = replace(flown, span_s=(max(0.0, flown.span_s[0] + off), flown.span_s[1] + off))
+            flown = replace(flown, span_s=(max(0.0, round(flown.span_s[0] + off, 2)), round(flown.span_s[1] + off, 2)))
         return Recognition(
             time_column=time_column,
             time_unit=unit,
@@ -814,6 +611,7 @@ class _Recogniser:
             flown=flown,
             rate_hz=rates[base.signal],
             slowest_s=max(1 / rates[g.signal] for g in signals),
+            slowest_but_voltage_s=max(1 / rates[g.signal] for g in signals if g.signal != "voltage"),
             moved=moved,
             speeds=speeds,
             warnings=tuple(self.warnings),
@@ -821,6 +619,7 @@ class _Recogniser:
 
 
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
+_BODY_OF: Final = {"FLU": "FLU", "ENU": "FLU", "FRD": "FRD", "NED": "FRD"}
 _UP: Final = {"FLU": "up", "FRD": "down"}
 
 
@@ -834,13 +633,6 @@ def _called(named: Named) -> str:
     if any(letter.isalnum() for letter in pattern):
         return f"a log of {named.known} calls it {pattern}" if named.known else f"called {pattern}"
     return f"called {', '.join(named.group.columns)}"
-
-
-def _stated_unit(log: _Log, named: Named) -> UnitName | None:
-    """Give the unit that the log, the kind of log or the name states."""
-    words = {"deg/s": "deg/s", "rad/s": "rad/s", "m/s/s": "m/s^2", "m/s^2": "m/s^2", "m": "m", "m/s": "m/s", "deg": "deg"}
-    stated = words.get(log.units.get(named.group.columns[0], ""))
-    return stated or named.unit  # type: ignore[return-value]
 
 
 def _rate_unit(gain: float) -> tuple[UnitName, float, bool]:
@@ -859,11 +651,14 @@ def _rates_by_data(named: Named, fit: AxisFit, unit: UnitName, scale: float, agr
     sign = None if fit.sign == (1.0, 1.0, 1.0) else fit.sign
     axes = "" if fit.is_as_named else ", with its axes in this order and with these signs"
     better = f"{fit.times_better:.1f} times better than in any other order or with other signs"
-    size = f" and is {fit.gain:.3g} times as large, so it is in {unit}" if scale == 1.0 else f", in thousandths of {unit}"
+    share = f"{100 * fit.explained:.0f} %"
+    size = (
+        f" and is {fit.gain:.3g} times as large, so it is in {unit}" if scale == 1.0 else f", in thousandths of {unit}"
+    )
     return Guess(
         signal="body_rate",
         columns=SignalMap(columns=columns, unit=unit, scale=scale, sign=sign),
-        reason=f"{_called(named)}; follows the attitude's derivative{axes} ({100 * fit.explained:.0f} %, {better}){size}",
+        reason=f"{_called(named)}; follows the attitude's derivative{axes} ({share}, {better}){size}",
         sure="data" if agrees else "guess",
     )
 

@@ -11,10 +11,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.airframe import Parameters
 from cpfls_cli.flightlog.names import Named
+from cpfls_cli.flightlog.recognised import Sure
 from cpfls_cli.flightlog.settings import SignalMap
 from cpfls_cli.units import UnitName
 
-Sure = Literal["data", "named", "guess"]
 _FEWEST = 3
 _MUCH_FASTER = 2.0
 _SLOW_HZ = 25.0
@@ -80,7 +80,7 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
     """
     speed = next((g for f in _in_preference(found["rotor_speed"]) if (g := _speed(f, parameters)) is not None), None)
     command = next((g for f in found["rotor_command"] if (g := _command(f, parameters)) is not None), None)
-    left_out, warnings = [], []
+    left_out = []
     if speed is not None and command is not None:
         counts = [len(guess.columns.columns) for guess in (speed, command)]
         if speed.rate_hz * _MUCH_FASTER < command.rate_hz:
@@ -90,14 +90,16 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
             )
             speed = None
         elif counts[0] != counts[1]:
-            left_out.append(f"{command.columns.columns[0]} and those beside it: {counts[1]} commands, {counts[0]} rotors")
-            command = None
-    for guess in (speed, command):
-        if guess is not None and guess.rate_hz < _SLOW_HZ:
-            warnings.append(
-                f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that"
-                " follow within some 50 ms; log them at 100 Hz or more"
+            left_out.append(
+                f"{command.columns.columns[0]} and those beside it: {counts[1]} commands, {counts[0]} rotors"
             )
+            command = None
+    warnings = [
+        f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that follow"
+        " within some 50 ms; log them at 100 Hz or more"
+        for guess in (speed, command)
+        if guess is not None and guess.rate_hz < _SLOW_HZ
+    ]
     meaning, reason, sure, rivals = _meaning(command, parameters, system)
     return RotorColumns(
         speed=speed,
@@ -163,9 +165,21 @@ def _speed_unit(named: Named, level: float, parameters: Parameters) -> Unit:
         poles = float(parameters.get("motor_poles", 0) or 0)
         if poles:
             pairs = poles / 2
-            return "rpm", factor / pairs, f"{called}: electric, over motor_poles {poles:.0f} / 2 of the header", "named", ()
+            return (
+                "rpm",
+                factor / pairs,
+                f"{called}: electric, over motor_poles {poles:.0f} / 2 of the header",
+                "named",
+                (),
+            )
         rivals = ((f"scale: {factor / 6:.6g}", "six pole pairs; the log does not say how many the motors have"),)
-        return "rpm", factor / _USUAL_POLE_PAIRS, f"{called}: electric, over 7 pole pairs, a usual number", "guess", rivals
+        return (
+            "rpm",
+            factor / _USUAL_POLE_PAIRS,
+            f"{called}: electric, over 7 pole pairs, a usual number",
+            "guess",
+            rivals,
+        )
     if named.unit is not None:
         return named.unit, named.scale, f"{called}: {named.unit} by its name", "named", ()
     if level > _RPM_FROM:
@@ -229,7 +243,11 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
     if named.known == "Betaflight" and "motorOutput" in parameters:
         low, high = (float(part) for part in str(parameters["motorOutput"]).split(",")[:2])
         return low, high, "motorOutput of the header"
-    for low_name, high_name in (("MOT_PWM_MIN", "MOT_PWM_MAX"), ("PWM_MIN", "PWM_MAX"), ("PWM_MAIN_MIN", "PWM_MAIN_MAX")):
+    for low_name, high_name in (
+        ("MOT_PWM_MIN", "MOT_PWM_MAX"),
+        ("PWM_MIN", "PWM_MAX"),
+        ("PWM_MAIN_MIN", "PWM_MAIN_MAX"),
+    ):
         low, high = (float(parameters.get(name, 0) or 0) for name in (low_name, high_name))
         if 500 < low < high and ("output" in named.group.pattern or named.known == "ArduPilot"):
             return low, high, f"{low_name} and {high_name} of the log"
