@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.settings import SignalName
+from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
-from cpfls_cli.units import UnitName
+from cpfls_cli.units import KNOWN_UNITS, UnitName
 
 _TIME_NAMES = ("t", "time", "time_s", "timestamp", "time_us", "timeus", "time_ms", "stamp", "tick", "seconds", "sec")
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -52,14 +52,24 @@ class LogTable:
         return np.asarray(self.topics[topic].get(STAMP, np.empty(0)), dtype=float)
 
     def values(self, columns: Sequence[str]) -> tuple[Array, Array]:
-        """Stamps and values of columns of one topic, rows without a value left out."""
+        """Stamps and values of columns, rows without a value left out; all on the clock of the first one's topic."""
         topic = self.parts(columns[0])[0]
+        if all(self.parts(column)[0] == topic for column in columns):
+            return self._of_topic(topic, columns)
+        clocks = [self.values((column,)) for column in columns]
+        time = clocks[0][0]
+        if not all(len(own) for own, _ in clocks):
+            return np.empty(0), np.empty((0, len(columns)))
+        return time, np.column_stack([np.interp(time, own, values[:, 0]) for own, values in clocks])
+
+    def _of_topic(self, topic: str, columns: Sequence[str]) -> tuple[Array, Array]:
         time = self.clock(topic)
         rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
         if len(rows) != len(time):
             return np.empty(0), np.empty((0, len(columns)))
         known = np.isfinite(rows).all(axis=1) & np.isfinite(time)
-        known[1:] &= np.diff(np.maximum.accumulate(np.where(np.isfinite(time), time, -np.inf))) > 0
+        highest = np.maximum.accumulate(np.where(known, time, -np.inf))
+        known[1:] &= time[1:] > highest[:-1]
         return time[known], rows[known]
 
     def on_grid(self, columns: Sequence[str]) -> Array:
@@ -115,7 +125,8 @@ def _rises(values: Array) -> bool:
 def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalName, list[Named]]:
     """Keep what has enough values that change, by signal."""
     kept: dict[SignalName, list[Named]] = {}
-    for named in candidates:
+    for candidate in candidates:
+        named = _in_stated_unit(log, candidate)
         time, values = log.values(named.group.columns)
         if named.signal in ROTORS and len(time) < _FEWEST_SAMPLES:
             # Outputs that are not there hold no numbers.
@@ -163,16 +174,12 @@ def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -
     log.grid = np.arange(begin, end, 1 / rate)
 
 
-def stated_unit(log: LogTable, named: Named) -> UnitName | None:
-    """Give the unit that the log, the kind of log or the name states."""
-    words = {
-        "deg/s": "deg/s",
-        "rad/s": "rad/s",
-        "m/s/s": "m/s^2",
-        "m/s^2": "m/s^2",
-        "m": "m",
-        "m/s": "m/s",
-        "deg": "deg",
-    }
-    stated = words.get(log.units.get(named.group.columns[0], ""))
-    return stated or named.unit  # type: ignore[return-value]
+def _in_stated_unit(log: LogTable, named: Named) -> Named:
+    """Let the unit that a log states win over the one that its kind is known for."""
+    stated = log.units.get(named.group.columns[0], "")
+    kinds = UNITS_OF_SIGNAL[named.signal]
+    # Pulses in us are no time: their range makes them shares.
+    unit = next((known for known in get_args(UnitName) if known == stated and known != "us"), None)
+    if unit is None or KNOWN_UNITS[unit].si not in kinds:
+        return named
+    return replace(named, unit=unit, scale=1.0)

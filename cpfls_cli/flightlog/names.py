@@ -122,6 +122,10 @@ def _from_first(name: str, names: Mapping[str, None], kind: Kind, axes: tuple[st
 def _numbered(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
     groups: dict[str, dict[int, str]] = {}
     for name in names:
+        topic, dot, rest = name.partition(".")
+        if dot and f"{topic}[1].{rest}" in names:
+            # The first instance of a topic bears no number.
+            groups.setdefault(f"{topic}[*].{rest}", {})[0] = name
         for found in re.finditer(r"\d+", name):
             groups.setdefault(f"{name[: found.start()]}*{name[found.end() :]}", {})[int(found.group())] = name
     for pattern, columns in groups.items():
@@ -149,6 +153,7 @@ class _Known:
 
 
 _PX4, _ARDUPILOT, _BETAFLIGHT, _CRAZYFLIE = "PX4", "ArduPilot", "Betaflight", "Crazyflie"
+_KIN: Final = {_ARDUPILOT: ("Ardu",), _BETAFLIGHT: ("INAV", "Cleanflight", "EmuFlight")}
 _KNOWN: Final = (
     _Known(_PX4, "quaternion", "vehicle_attitude.q[*]", "1", "FRD"),
     _Known(_PX4, "body_rate", "vehicle_angular_velocity.xyz[*]", "rad/s", "FRD"),
@@ -176,7 +181,9 @@ _KNOWN: Final = (
     _Known(_BETAFLIGHT, "body_rate", "gyroADC[*]", "deg/s", "FLU"),
     _Known(_BETAFLIGHT, "acceleration", "accSmooth[*]", None, "FLU"),
     _Known(_BETAFLIGHT, "rotor_command", "motor[*]", None),
+    _Known(_BETAFLIGHT, "rotor_speed", "rpm[*]", "rpm"),
     _Known(_BETAFLIGHT, "rotor_speed", "eRPM[*]", None),
+    _Known(_BETAFLIGHT, "voltage", "vbatLatest", "V"),
     _Known(_CRAZYFLIE, "quaternion", "stateEstimate.q*", "1", "FLU"),
     _Known(_CRAZYFLIE, "attitude", "stabilizer.*", "deg", "FLU"),
     _Known(_CRAZYFLIE, "attitude", "stateEstimate.*", "deg", "FLU"),
@@ -294,7 +301,7 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
         Kind of log, as its reader names it; empty where any may be meant.
     """
     found = [named for group in groups for named in (*_known(group, system), *_by_words(group))]
-    if any(system.lower().startswith(known.lower()) for known in (_PX4, _ARDUPILOT, _BETAFLIGHT)):
+    if any(_is_of(system, known) for known in (_PX4, _ARDUPILOT, _BETAFLIGHT)):
         # Of these logs all that drives rotors is in the list; words would find parameters and allocations.
         found = [named for named in found if named.known or named.signal not in (*_ROTOR_SIGNALS, "voltage")]
     best: dict[tuple[SignalName, tuple[str, ...]], Named] = {}
@@ -303,11 +310,18 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     return tuple(best.values())
 
 
+def _is_of(system: str, known: str) -> bool:
+    """Tell whether a log was written by a program or its kin."""
+    return system.startswith((known, *_KIN.get(known, ())))
+
+
 def _known(group: ColumnGroup, system: str) -> Iterator[Named]:
     for rank, known in enumerate(_KNOWN):
-        of_other = system and not system.lower().startswith(known.system.lower())
+        of_other = system and not _is_of(system, known.system)
         angles = known.signal != "attitude" or group.kind == "angles"
-        if not of_other and angles and group.pattern == known.pattern and _suits(known.signal, group):
+        # On its card a Crazyflie puts the name of an event before that of a variable.
+        patterns = (group.pattern, group.pattern.partition(".")[2] if system.startswith(_CRAZYFLIE) else "")
+        if not of_other and angles and known.pattern in patterns and _suits(known.signal, group):
             yield Named(known.signal, group, float(rank), known.unit, known.scale, known.frame, known.system)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -31,7 +31,6 @@ from cpfls_cli.flightlog.log_table import (
     holding_values,
     make_grid,
     refuse_dead_rotors,
-    stated_unit,
 )
 from cpfls_cli.flightlog.names import Named, column_groups, named_signals
 from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival, Sure
@@ -61,6 +60,8 @@ _SENSED: Final[tuple[tuple[float, UnitName, float], ...]] = (
     (4096.0, "g", 1 / 4096),
 )
 _NEAR_GRAVITY = 1.3
+_AS_LEVEL = 0.2
+_AS_GOOD = 0.02
 
 
 def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> Recognition:
@@ -93,12 +94,22 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     return _Recogniser(log, candidates, parameters, system).result()
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Attitude:
-    """An attitude that is taken, as rotations on the grid."""
+    """An attitude that may be the right one, as rotations on the grid."""
 
     rotation: Rotation
     rates: AxisFit | None
+
+    @property
+    def explained(self) -> float:
+        """Share of the gyroscope that its derivative explains; 0 where there is nothing to explain."""
+        return 0.0 if self.rates is None else self.rates.explained
+
+    @property
+    def upright(self) -> float:
+        """Mean size of the vertical part of the body's third axis: near 1 for what flies level."""
+        return float(np.abs(self.rotation.as_matrix()[:, 2, 2]).mean())
 
 
 class _Recogniser:
@@ -200,30 +211,43 @@ class _Recogniser:
     def _quaternion(self, named: Named, measured: Array | None) -> _Attitude:
         time, values = self.log.values(named.group.columns)
         orders = ("wxyz",) if named.group.kind == "wxyz" else ("wxyz", "xyzw")
-        tried: dict[tuple[str, bool], tuple[Rotation, AxisFit | None]] = {}
-        for order in orders:
-            for inverse in (False, True):
-                rotation = on_clock(rotations_of(values, order, inverse), time, self.log.grid[self.part])
-                tried[(order, inverse)] = (
-                    rotation,
-                    None if measured is None else fit_rates(rotation, measured, self.rate_hz),
-                )
-        shares = {key: fit.explained if fit is not None else 0.0 for key, (_, fit) in tried.items()}
-        best = max(shares, key=lambda key: shares[key])
-        plain = (orders[0] if measured is not None and shares[best] > _CLEAR else _order_at_rest(values, orders), False)
-        if shares[best] < _CLEAR or shares[plain] > shares[best] - 0.02:
-            best = plain
-        self._tell_quaternion(named, best, shares)
-        rotation, fit = tried[best]
-        return _Attitude(rotation, fit)
+        tried: dict[tuple[str, bool], _Attitude] = {}
+        for key in ((order, inverse) for inverse in (False, True) for order in orders):
+            rotation = on_clock(rotations_of(values, *key), time, self.log.grid[self.part])
+            tried[key] = _Attitude(rotation, None if measured is None else fit_rates(rotation, measured, self.rate_hz))
+        # In another order a quaternion turns about other axes, which a gyroscope whose axes are free cannot tell;
+        # but it does not stay level, as what flies does.
+        upright = {key: attitude.upright for key, attitude in tried.items()}
+        level = [key for key in tried if upright[key] > max(upright.values()) - _AS_LEVEL]
+        shares = {key: tried[key].explained for key in level}
+        most = max(shares.values())
+        equal = [key for key in level if most < _CLEAR or shares[key] > most - _AS_GOOD]
+        leaning = {key: self._leaning(tried[key]) for key in equal} if len(equal) > 1 else {}
+        as_named = {key: (fit.as_named if (fit := tried[key].rates) is not None else 0.0) for key in equal}
+        best = max(equal, key=lambda key: (round(leaning.get(key, 0.0), 1), round(as_named[key], 1)))
+        parted = {leaning[key] for key in equal if key[0] != best[0] and leaning[best] > leaning[key] + _AS_LEVEL}
+        self._tell_quaternion(named, best, shares, leaning[best] if parted else None)
+        return tried[best]
 
-    def _tell_quaternion(self, named: Named, best: tuple[str, bool], shares: Mapping[tuple[str, bool], float]) -> None:
+    def _leaning(self, attitude: _Attitude) -> float:
+        """Give the share of the acceleration over ground that the lean of an attitude explains."""
+        position, velocity = self.first("position"), self.first("velocity")
+        if position is not None:
+            moving = second_derivative(self.grid(position), self.rate_hz)
+        elif velocity is not None:
+            moving = first_derivative(self.grid(velocity), self.rate_hz)
+        else:
+            return 0.0
+        return fit_tilt(attitude.rotation, moving, self.rate_hz).explained
+
+    def _tell_quaternion(
+        self, named: Named, best: tuple[str, bool], shares: Mapping[tuple[str, bool], float], leaning: float | None
+    ) -> None:
         order, inverse = best
         sign = None
         if inverse:
             sign = (1.0, -1.0, -1.0, -1.0) if order == "wxyz" else (-1.0, -1.0, -1.0, 1.0)
         told = shares[best] > _CLEAR
-        others = max((share for key, share in shares.items() if key != best), default=0.0)
         data = f"its derivative explains {100 * shares[best]:.0f} % of the gyroscope"
         turned = " when turned from world-to-body, as logged, to body-to-world" if inverse else ""
         reason = f"of length 1; {_called(named)}" + (f"; {data}{turned}" if told else "")
@@ -233,19 +257,23 @@ class _Recogniser:
             reason=reason,
             sure="data" if told else "named",
         )
+        others = max((share for (own, _), share in shares.items() if own != order), default=None)
         if named.group.kind == "wxyz":
             choice = Choice("quaternion_order", order, "the columns are named by w, x, y, z", "named")
+        elif others is None:
+            choice = Choice("quaternion_order", order, "in the other order the vehicle would not stay level", "data")
         elif told and others < shares[best] - 0.05:
             next_best = f"{data}, in the other order {100 * others:.0f} %"
             choice = Choice("quaternion_order", order, next_best, "data")
+        elif leaning is not None:
+            reason = f"in this order alone the lean explains the acceleration ({100 * leaning:.0f} %)"
+            choice = Choice("quaternion_order", order, reason, "data")
+        elif named.known:
+            choice = Choice("quaternion_order", order, f"a log of {named.known}", "named")
         else:
             other = "xyzw" if order == "wxyz" else "wxyz"
-            rival = Rival(f"quaternion_order: {other}", "no gyroscope that turns speaks against it")
-            choice = Choice(
-                "quaternion_order", order, "level flight leaves the second and third small", "guess", (rival,)
-            )
-            if named.known:
-                choice = Choice("quaternion_order", order, f"a log of {named.known}", "named")
+            rival = Rival(f"quaternion_order: {other}", "in both the vehicle stays level, and no gyroscope parts them")
+            choice = Choice("quaternion_order", order, "the more usual one", "guess", (rival,))
         self.choices["quaternion_order"] = choice
 
     def _euler(self, named: Named, measured: Array | None, decided: UnitName | None) -> _Attitude:
@@ -282,7 +310,7 @@ class _Recogniser:
         return _Attitude(rotation, fit)
 
     def _angle_unit(self, named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple[Rival, ...]]:
-        stated = stated_unit(self.log, named)
+        stated = named.unit
         if stated is not None:
             return stated, f"{_called(named)}, which is in {stated}", "named", ()
         largest = np.quantile(np.abs(values), 0.999, axis=0)
@@ -298,7 +326,7 @@ class _Recogniser:
         if named is None:
             return
         fit = None if attitude is None else attitude.rates
-        stated = stated_unit(self.log, named)
+        stated = named.unit
         if fit is not None and fit.explained > _CLEAR:
             unit, scale, agrees = _rate_unit(fit.gain)
             if agrees or stated is None:
@@ -375,7 +403,7 @@ class _Recogniser:
         units: tuple[UnitName, UnitName],
         tilt: TiltFit | None,
     ) -> None:
-        stated = stated_unit(self.log, named)
+        stated = named.unit
         unit: UnitName = stated or units[0]
         sure: Sure = "named"
         reason = f"{_called(named)}"
@@ -416,7 +444,7 @@ class _Recogniser:
     def _take_acceleration(self, named: Named, tilt: TiltFit | None) -> bool:
         values = self.grid(named)
         vertical = float(np.median(values[:, 2]))
-        stated = stated_unit(self.log, named)
+        stated = named.unit
         sensed = [
             (level, unit, scale)
             for level, unit, scale in _SENSED
@@ -442,8 +470,8 @@ class _Recogniser:
             return True
         if along_world is None or along_world.explained < _CLEAR:
             self.left_out.append(
-                f"{named.group.pattern}: no gravity is in it (z has a median of {vertical:.3g}), and the motion over ground"
-                " does not explain it"
+                f"{named.group.pattern}: no gravity is in it (z has a median of {vertical:.3g}), and the motion over"
+                " ground does not explain it"
             )
             return False
         unit: UnitName = "g" if abs(np.log(along_world.gain * standard_gravity)) < np.log(2) else "m/s^2"
@@ -661,14 +689,6 @@ def _rates_by_data(named: Named, fit: AxisFit, unit: UnitName, scale: float, agr
         reason=f"{_called(named)}; follows the attitude's derivative{axes} ({share}, {better}){size}",
         sure="data" if agrees else "guess",
     )
-
-
-def _order_at_rest(values: Array, orders: Sequence[str]) -> str:
-    """Tell the order of a quaternion of level flight, whose x and y are small."""
-    if len(orders) == 1:
-        return orders[0]
-    size = np.abs(values).mean(axis=0)
-    return "wxyz" if size[1] + size[2] < size[0] + size[1] else "xyzw"
 
 
 def _in_world_of_attitude(
