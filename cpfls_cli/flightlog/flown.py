@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_closing, binary_opening, label
+from scipy.ndimage import binary_closing, binary_opening, find_objects, label
 
 from cpfls_cli.arrays import Array, BoolArray
 
@@ -109,7 +109,14 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
     if highest < 2 * _LEAST_HEIGHT:
         return turning
     risen = np.abs(height - ground) > max(_LEAST_HEIGHT, _OF_HEIGHT * highest)
-    return _smoothed(turning & risen, period)
+    numbers, _ = label(turning)
+    off = np.zeros_like(turning)
+    # Between the first and the last moment above it a flight may well come down to the height of its ground.
+    for (stretch,) in find_objects(numbers):
+        high = np.flatnonzero(risen[stretch])
+        if len(high):
+            off[stretch.start + high[0] : stretch.start + high[-1] + 1] = True
+    return _smoothed(off, period)
 
 
 def _quiet(rate: Array, period: float) -> BoolArray:

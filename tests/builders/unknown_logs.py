@@ -98,3 +98,28 @@ def flat_log(own, **changed):
     if speed is not None and "rpm1" in speed and "speed" not in changed:
         columns["speed"] = {name: values * 60 / (2 * np.pi) for name, values in speed.items()}
     return LogContents({"": {name: v for part in columns.values() if part for name, v in part.items()}})
+
+
+def write_csv(path, contents):
+    """Write a flat log as CSV."""
+    columns = contents.topics[""]
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
+    return path
+
+
+def with_ground(own, before_s=5.0, after_s=4.0, idle=0.25):
+    """The same flight with time on the ground: the rotors stand, then idle, then fly, then stand."""
+    step = own.time[1] - own.time[0]
+    before, after = (round(seconds / step) for seconds in (before_s, after_s))
+    longer = SimpleNamespace(**vars(own))
+    longer.time = np.arange(len(own.time) + before + after) * step
+    for name in ("angles", "rate", "position", "velocity", "acceleration", "specific_force", "speed"):
+        values = getattr(own, name)
+        still = np.zeros_like(values[:1]) if name not in ("position", "angles", "specific_force") else values[:1]
+        if name == "position":
+            values = values + np.array([0.0, 0.0, 2.0])
+        longer.__dict__[name] = np.vstack([np.repeat(still, before, 0), values, np.repeat(still, after, 0)])
+    longer.speed[before // 2 : before] = idle * own.speed.mean()
+    longer.rotation = Rotation.from_euler("ZYX", longer.angles[:, ::-1])
+    return longer
