@@ -38,7 +38,7 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
     for number, log in enumerate(logs):
         job.progress(number, len(logs), log.name)
         known.append(_known(log))
-    proposal = propose(known, stated.arm_m)
+    proposal = propose(known, stated.mass_kg, stated.arm_m)
     if not job.dry_run:
         write_text(job.output, config_text(proposal, stated))
     return Outcome(summary(proposal, stated, str(job.output)), tuple(answer(proposal, stated, str(job.output))))

@@ -20,9 +20,10 @@ SLOW_HZ = 3.0
 """Below which rates are compared: between two sensors with clocks of their own a few ten ms do not matter there."""
 
 _TILT_HZ = 1.0
+_RISES = 0.3
 _AS_NAMED_IS_GOOD_ENOUGH = 0.02
+_CLEARLY, _TIMES_BETTER = 0.6, 2.0
 _MOVES_RAD_S = 0.03
-_LEAST_LIFT = 3.0
 
 
 @dataclass(frozen=True)
@@ -94,9 +95,12 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
     explained = {axes: max(value, 0.0) ** 2 / (power * total) for axes, value in together.items()}
     named = ((0, 1, 2), (1.0, 1.0, 1.0))
     best = max(explained, key=lambda axes: explained[axes])
-    if explained[named] >= explained[best] - _AS_NAMED_IS_GOOD_ENOUGH:
-        best = named
     runner_up = max(value for axes, value in explained.items() if axes != best)
+    # Other axes than the names say have to be clearly better.
+    clearly = explained[best] > _CLEARLY and 1 - explained[best] < (1 - explained[named]) / _TIMES_BETTER
+    if not clearly or explained[named] >= explained[best] - _AS_NAMED_IS_GOOD_ENOUGH:
+        best = named
+        runner_up = max(value for axes, value in explained.items() if axes != best)
     # Noise in the reference makes the regression's gain small, that of the spreads does not.
     gain = float(np.sqrt(total / power)) if explained[best] > 0.2 else together[best] / power
     order, sign = best
@@ -184,7 +188,7 @@ class TiltFit:
     runner_up: float
 
 
-def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float) -> TiltFit:
+def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Array | None = None) -> TiltFit:
     """Find out from tilt and acceleration whether body z points up or down, and how the world's axes lie.
 
     A multirotor accelerates where its thrust leans: over the ground by ``g b_xy / b_z`` with the direction b of thrust
@@ -194,6 +198,9 @@ def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float) -> TiltFit
     ----------
     acceleration : array, shape (time, 3)
         Second derivative of the position, in any unit.
+    lift : array, shape (time,), or None
+        What grows with the thrust: with it the position's third axis is known to point up or down, and a body that
+        looks like another one in a world that is turned round is told from that.
     """
     axis = rotation.as_matrix()[:, :, 2]
     upright = np.where(np.abs(axis[:, 2:]) < 0.2, 0.2, axis[:, 2:])
@@ -209,6 +216,10 @@ def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float) -> TiltFit
                 handed = sign[0] * sign[1] * (1.0 if order == (0, 1) else -1.0)
                 together = up * sum(sign[i] * cross[order[i], i] for i in range(2))
                 results[(body, order, (*sign, handed))] = together
+    rises = 0.0 if lift is None else _rises(axis[:, 2], acceleration[:, 2], lift, rate_hz)
+    if rises:
+        # The attitude's third axis of the world points up where that of the body does, as the vehicle is level.
+        results = {key: own for key, own in results.items() if rises * key[2][2] == (1.0 if key[0] == "FLU" else -1.0)}
     scale = power * total
     explained = {key: (max(value, 0.0) ** 2 / scale if scale else 0.0) for key, value in results.items()}
     # A turn of the world by half a turn looks like the other body frame: of the two the one as named is taken.
@@ -223,6 +234,15 @@ def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float) -> TiltFit
         float(explained[best]),
         float(max(others, default=0.0)),
     )
+
+
+def _rises(upright: Array, vertical: Array, lift: Array, rate_hz: float) -> float:
+    """Tell whether what the position's third axis shows grows (1) or falls (-1) with the lift; 0 if neither."""
+    own, other = (slow(values[:, None], rate_hz)[:, 0] for values in (vertical, lift))
+    if own.std() == 0 or other.std() == 0:
+        return 0.0
+    together = float(np.corrcoef(own, other)[0, 1])
+    return float(np.sign(together) * np.sign(np.median(upright))) if abs(together) > _RISES else 0.0
 
 
 def second_derivative(values: Array, rate_hz: float) -> Array:

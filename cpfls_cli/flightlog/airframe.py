@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import permutations
-from math import cos, hypot, radians, sin
+from math import cos, hypot, pi, radians, sin
 from typing import Final
 
 import numpy as np
+from scipy.constants import g as standard_gravity
 from scipy.signal import lfilter
 
 from cpfls_cli.arrays import Array
@@ -26,6 +27,7 @@ _CORNERS: Final = {
 }
 _ENDS: Final = {"front": (1.0, 0.0), "right": (0.0, -1.0), "rear": (-1.0, 0.0), "left": (0.0, 1.0)}
 _FACTOR = 1e-9
+_AIR_KG_M3 = 1.2
 _TURNS = ("roll", "pitch", "yaw")
 _LEAST_EXPLAINED = 0.05
 _LEAST_OF_BOTH = 0.2
@@ -115,7 +117,7 @@ def _of_px4(parameters: Parameters) -> Airframe | None:
         # Of PX4: y to the right, z down, and a positive moment for a rotor that turns counter-clockwise.
         rotors.append(RotorPlace(_name(x, -y), (x, 0.0 - y), int(np.sign(ratio)), 0.0 - z))
         ratios.append(abs(ratio))
-    reason = "CA_ROTOR*_PX, _PY and the sign of _KM in the log's parameters"
+    reason = "CA_ROTOR*_PX, _PY and the signs of _KM in the log"
     return Airframe(tuple(rotors), True, reason, "stated", float(np.mean(ratios)))
 
 
@@ -150,11 +152,31 @@ def _of_ardupilot(parameters: Parameters) -> Airframe | None:
         RotorPlace(_name(round(cos(radians(a)), 9), round(-sin(radians(a)), 9)), _direction(a), spin)
         for a, spin in motors
     )
-    return Airframe(rotors, False, f"FRAME_CLASS and FRAME_TYPE in the log's parameters: {kind} {form}", "stated")
+    return Airframe(rotors, False, f"FRAME_CLASS and FRAME_TYPE in the log: {kind} {form}", "stated")
 
 
 def _direction(degrees: float) -> tuple[float, float]:
     return round(cos(radians(degrees)), 9) + 0.0, round(-sin(radians(degrees)), 9) + 0.0
+
+
+_PX4_ORDER = (("front right", 1), ("rear left", 1), ("front left", -1), ("rear right", -1))
+_USUAL: Final = {
+    "PX4": _PX4_ORDER,
+    "ArduPilot": _PX4_ORDER,
+    "Betaflight": (("rear right", -1), ("front right", 1), ("rear left", 1), ("front left", -1)),
+    "Crazyflie": (("front right", 1), ("rear right", -1), ("rear left", 1), ("front left", -1)),
+}
+
+
+def usual_airframe(kind: str) -> Airframe | None:
+    """Give the four rotors in an X as a kind of log numbers them if nothing is changed; None for an unknown kind."""
+    if kind not in _USUAL:
+        return None
+    corner = 1 / hypot(1.0, 1.0)
+    rotors = tuple(
+        RotorPlace(name, (corner * _CORNERS[name][0], corner * _CORNERS[name][1]), spin) for name, spin in _USUAL[kind]
+    )
+    return Airframe(rotors, False, f"the numbers that {kind} gives the motors of an X, if nobody changed them", "named")
 
 
 def _require_control(airframe: Airframe) -> None:
@@ -278,6 +300,21 @@ def _shares(acceleration: Array, rate: Array, squared: Array) -> list[tuple[_Lay
     return results
 
 
-def hover_factor(mass_kg: float, gravity: float, speeds: Array) -> float:
-    """Give the thrust factor with which rotors carry a mass, ``m g = sum k w^2``, at the mean of their squares."""
-    return mass_kg * gravity / float((speeds**2).mean(axis=0).sum())
+def thrust_number(mass_kg: float, arm_m: float, speed: Array) -> float:
+    """Give the thrust number ``T / (rho n^2 D^4)`` of rotors that carry a mass, were they as large as they can be.
+
+    Parameters
+    ----------
+    arm_m : float
+        From the middle to a rotor, m; neighbours nearly touch.
+    speed : array, shape (time, rotor), rad/s
+
+    Returns
+    -------
+    float
+        Of real propellers 0.003 to 0.2: their own number is 0.05 to 0.2, their diameter half of the room or more.
+    """
+    rotors = speed.shape[1]
+    diameter = 2 * arm_m * sin(pi / rotors)
+    turns = (speed / (2 * pi)) ** 2
+    return float(mass_kg * standard_gravity / (_AIR_KG_M3 * turns.mean(axis=0).sum() * diameter**4))

@@ -24,6 +24,7 @@ _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
 """Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move."""
 
 _ALIVE = 0.02
+_TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
 _MOST_CLOCK_HZ = 50.0
 
 
@@ -83,8 +84,16 @@ def _active(
         if largest < _ALIVE:
             return None, "the rotors stand all the time"
         hover = float(np.median(level[level > _OF_LARGEST * largest]))
-        turning = _smoothed(level > _OF_HOVER * hover, period)
+        carrying = level > _OF_HOVER * hover
         told = f"the rotors below {100 * _OF_HOVER:.0f} % of their level at hover"
+        if rate is not None and carrying.any():
+            # In free fall and in flips rotors idle too, but then the vehicle turns.
+            window = max(1, round(_SHORT_S / period))
+            turns = np.sqrt(np.convolve(rate**2, np.ones(window) / window, mode="same"))
+            lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
+            carrying |= (level > _ALIVE) & lively
+            told += ", and hardly any turning"
+        turning = _smoothed(carrying, period)
         if height is None or not turning.any() or turning.all():
             return turning, told
         return _off_the_ground(turning, height, period), told + ", or no height"

@@ -34,6 +34,10 @@ class LogTable:
         self.names = tuple(
             f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields
         )
+        if self.flat and max(map(len, topics[""].values()), default=0) < _FEWEST_SAMPLES:
+            raise InputError(
+                f"holds only {max(map(len, topics[''].values()), default=0)} samples, too few for a flight"
+            )
         self.time_column, self.time_unit = _flat_time(topics[""], units) if self.flat else ("", "s")
         self.grid = np.empty(0)
 

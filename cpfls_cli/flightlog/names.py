@@ -249,6 +249,7 @@ _NOT_MEASURED: Final = frozenset(
         "cmd",
         "command",
         "ctrltarget",
+        "controller",
         "cov",
         "covariance",
         "var",

@@ -9,10 +9,12 @@ from typing import Final
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe
+from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, thrust_number, usual_airframe
 from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition
 from cpfls_cli.flightlog.settings import ColumnMap, SignalMap, SignalName
+from cpfls_cli.units import UnitName, known_unit
 
 _SURENESS: Final = ("data", "named", "guess")
 _SAME_PLACE_M = 0.005
@@ -20,8 +22,10 @@ _WORTH_IT = 0.8
 """Share of every flight that a stretch common to all logs has to keep."""
 
 _STEPS_BRIDGED = 2.5
+_WAY: Final = {1: "counter-clockwise", -1: "clockwise", 0: "?"}
 _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 _ROOM = 1.2
+_PROPELLERS = (0.003, 0.2)
 _MULTIROTORS: Final = (2, 13, 14, 15, 29)
 """MAV_TYPE: quadrotor, hexarotor, octorotor, tricopter, dodecarotor."""
 
@@ -104,13 +108,15 @@ class Proposal:
         )
 
 
-def propose(logs: Sequence[KnownLog], arm_m: float | None) -> Proposal:
+def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None) -> Proposal:
     """Make one proposal of what each of several logs is taken for.
 
     Parameters
     ----------
     logs : sequence of KnownLog
         One at least.
+    mass_kg : float or None
+        None: not known.
     arm_m : float or None
         From the middle of the vehicle to a rotor, m; None: not known.
 
@@ -125,6 +131,8 @@ def propose(logs: Sequence[KnownLog], arm_m: float | None) -> Proposal:
     for other in logs[1:]:
         _require_same_vehicle(logs[0], other)
     signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))
+    if mass_kg is not None and arm_m is not None:
+        signals = tuple(_by_weight(guess, logs[0].recognition.speeds, mass_kg, arm_m) for guess in signals)
     airframe, doubts = _airframe(logs)
     if airframe is not None and arm_m is not None:
         airframe = airframe.with_arm(arm_m)
@@ -139,7 +147,7 @@ def propose(logs: Sequence[KnownLog], arm_m: float | None) -> Proposal:
         gap_s=max(_LEAST_GAP_S, _rounded_up(_STEPS_BRIDGED * slowest)),
         airframe=airframe,
         rotors=len(airframe.rotors) if airframe else max(one.recognition.rotors for one in logs),
-        speed_max=_speed_max(logs),
+        speed_max=_speed_max(logs, signals),
         facts=tuple(_facts(logs[0])),
         warnings=tuple(dict.fromkeys((*warnings, *doubts))),
     )
@@ -168,7 +176,7 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
         ):
             values = first.parameters[key], other.parameters[key]
             if values[0] != values[1]:
-                differing.append(f"{key} {values[0]} and {values[1]}")
+                differing.append(f"{key} {_plain(values[0])} and {_plain(values[1])}")
     counts = first.recognition.rotors, other.recognition.rotors
     if counts[0] != counts[1] and 0 not in counts:
         differing.append(f"{counts[0]} and {counts[1]} rotors")
@@ -176,7 +184,7 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
     if all(found is not None and found.clear for found in moved):
         orders = [[(r.name, r.spin) for r in found.airframe.rotors] for found in moved if found is not None]
         if orders[0] != orders[1]:
-            differing.append("their motion says that the rotors are numbered or turn differently")
+            differing.append("by their motion the rotors are numbered or turn differently")
     if differing:
         shown = "; ".join(differing[:3])
         raise InputError(
@@ -251,6 +259,20 @@ def _without_slow_voltage(logs: Sequence[KnownLog], signals: tuple[Guess, ...]) 
     return signals, slow
 
 
+def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float) -> Guess:
+    """Let the mass that rotors carry tell rad/s from rpm, where the size of their speeds does not."""
+    if guess.signal != "rotor_speed" or speeds is None or [rival.text for rival in guess.rivals] != ["unit: rpm"]:
+        return guess
+    units: tuple[UnitName, UnitName] = ("rad/s", "rpm")
+    numbers = {unit: thrust_number(mass_kg, arm_m, known_unit(unit).factor * speeds) for unit in units}
+    fitting = [unit for unit, own in numbers.items() if _PROPELLERS[0] < own < _PROPELLERS[1]]
+    if len(fitting) != 1:
+        return guess
+    columns = replace(guess.columns, unit=fitting[0])
+    reason = f"{guess.reason}; in {fitting[0]} propellers that fit the arms carry the mass at hover"
+    return replace(guess, columns=columns, reason=reason, sure="data", rivals=())
+
+
 def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     """Take the rotors that parameters state, else those that the motion tells, and hold the one against the other."""
     try:
@@ -259,15 +281,18 @@ def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
         raise InputError(f"{logs[0].name}: {error}") from None
     moved = [one.recognition.moved for one in logs if one.recognition.moved is not None]
     best = max(moved, key=lambda found: (found.clear, sum(found.explained)), default=None)
-    if stated is None:
-        return (best.airframe if best is not None else None), []
-    doubts = []
-    if best is not None and best.clear and len(stated.rotors) == len(best.airframe.rotors):
-        orders = [[(rotor.name, rotor.spin) for rotor in found.rotors] for found in (stated, best.airframe)]
-        if orders[0] != orders[1] and all(rotor.name for rotor in stated.rotors):
-            says = ", ".join(f"{rotor.name} {'ccw' if rotor.spin > 0 else 'cw'}" for rotor in best.airframe.rotors)
-            doubts.append(f"the parameters state other rotors than {best.airframe.reason}: {says}")
-    return stated, doubts
+    if best is not None and best.clear and stated is None:
+        return best.airframe, []
+    four = logs[0].recognition.rotors == 4
+    taken = stated or (usual_airframe(logs[0].recognition.kind) if four else None)
+    if best is None:
+        return taken, []
+    says = f"{best.airframe.reason}: {', '.join(f'{r.name} {_WAY[r.spin]}' for r in best.airframe.rotors)}"
+    if taken is None:
+        return best.airframe, [f"where the rotors are and how they turn is a guess from {says}"]
+    orders = [[(rotor.name, rotor.spin) for rotor in found.rotors] for found in (taken, best.airframe)]
+    differ = best.clear and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
+    return taken, [f"the rotors are taken as in {taken.reason}, and others are told by {says}"] if differ else []
 
 
 def _crops(
@@ -285,14 +310,17 @@ def _crops(
     return ((begin, end) if keeps and len(known) == len(logs) else None), crops
 
 
-def _speed_max(logs: Sequence[KnownLog]) -> float:
+def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:
     """Round up what is somewhat above the largest speed; for commands any number will do, and 1000 is taken."""
     largest = 0.0
+    units = {guess.signal: guess.columns.unit for guess in signals}
+    unit = units.get("rotor_speed", units.get("rotor_command", "1"))
     for one in logs:
-        guesses = [one.recognition.signal(name) for name in ("rotor_speed", "rotor_command")]
-        units = [guess.columns.unit for guess in guesses if guess is not None]
-        if one.recognition.speeds is not None and units and units[0] != "1":
-            largest = max(largest, float(np.quantile(np.abs(one.recognition.speeds), 0.999)))
+        if one.recognition.speeds is not None and unit != "1":
+            own = float(np.quantile(np.abs(one.recognition.speeds), 0.999))
+            guessed = one.recognition.signal("rotor_speed")
+            changed = guessed is not None and guessed.columns.unit == "rad/s" and unit == "rpm"
+            largest = max(largest, own * (known_unit("rpm").factor if changed else 1.0))
     return _rounded_up(_ROOM * largest) if largest else 1000.0
 
 

@@ -80,6 +80,8 @@ class Recognition:
         Of the clock.
     slowest_s, slowest_but_voltage_s : float
         Longest median step of a topic that is mapped, s; and without that of the voltage.
+    kind : str
+        Kind of log that is known for such columns of rotors; empty where none is.
     moved : MovedBy or None
         The rotors as the motion tells them.
     speeds : array, shape (time, rotor), or None
@@ -96,6 +98,7 @@ class Recognition:
     rate_hz: float
     slowest_s: float
     slowest_but_voltage_s: float
+    kind: str
     moved: MovedBy | None
     speeds: Array | None = field(repr=False)
     warnings: tuple[str, ...] = ()

@@ -126,6 +126,7 @@ class _Recogniser:
         self.warnings: list[str] = []
         self.part = slice(None)
         self.velocity_share = 0.0
+        self.level: Array | None = None
 
     def first(self, name: SignalName) -> Named | None:
         """Give the best candidate for a signal."""
@@ -161,7 +162,8 @@ class _Recogniser:
         self._frames(tilt)
         self._beside()
         speeds, moved = self._rotors(rotors)
-        return self._gathered(flown, speeds, moved)
+        driving = rotors.speed or rotors.command
+        return self._gathered(flown, speeds, moved, "" if driving is None else driving.kind)
 
     def _find_flown(self, rotors: RotorColumns) -> Flown:
         level = None
@@ -170,6 +172,7 @@ class _Recogniser:
             values = self.log.on_grid(found.columns.columns)
             level = (found.columns.scale * values + found.columns.offset).mean(axis=1)
             level = level / max(1.0, float(np.quantile(level, 0.98))) if rotors.command is None else level
+        self.level = level
         position, gyro = self.first("position"), self.first("body_rate")
         height = None if position is None else self.log.on_grid(position.group.columns)[:, 2]
         if height is not None and position is not None and position.unit == "mm":
@@ -185,11 +188,13 @@ class _Recogniser:
     def _attitude(self, unit: UnitName | None = None) -> _Attitude | None:
         gyro = self.first("body_rate")
         measured = None if gyro is None else self.grid(gyro)
+        euler = self.first("attitude")
         for named in self.candidates.get("quaternion", ()):
+            if euler is not None and euler.known and not named.known:
+                break
             values = self.log.values(named.group.columns)[1]
             if float(np.median(np.abs(np.linalg.norm(values, axis=1) - 1))) < 0.05:
                 return self._quaternion(named, measured)
-        euler = self.first("attitude")
         return None if euler is None else self._euler(euler, measured, unit)
 
     def _angles_by_tilt(self, tilt: TiltFit) -> UnitName | None:
@@ -238,7 +243,7 @@ class _Recogniser:
             moving = first_derivative(self.grid(velocity), self.rate_hz)
         else:
             return 0.0
-        return fit_tilt(attitude.rotation, moving, self.rate_hz).explained
+        return fit_tilt(attitude.rotation, moving, self.rate_hz, self._lift()).explained
 
     def _tell_quaternion(
         self, named: Named, best: tuple[str, bool], shares: Mapping[tuple[str, bool], float], leaning: float | None
@@ -367,7 +372,11 @@ class _Recogniser:
             moving = second_derivative(self.grid(position), self.rate_hz)
         elif velocity is not None:
             moving = first_derivative(self.grid(velocity), self.rate_hz)
-        tilt = None if moving is None or attitude is None else fit_tilt(attitude.rotation, moving, self.rate_hz)
+        tilt = (
+            None
+            if moving is None or attitude is None
+            else fit_tilt(attitude.rotation, moving, self.rate_hz, self._lift())
+        )
         if tilt is not None and tilt.explained < _CLEAR:
             tilt = None
         if position is not None:
@@ -375,6 +384,16 @@ class _Recogniser:
         if velocity is not None:
             self._tell_place("velocity", velocity, ("m/s", "mm/s"), tilt)
         return tilt
+
+    def _lift(self) -> Array | None:
+        """Give what grows with the thrust: the rotors' level squared, or the size of what an accelerometer senses."""
+        if self.level is not None:
+            return np.asarray(self.level[self.part] ** 2)
+        for named in self.candidates.get("acceleration", ()):
+            size = np.linalg.norm(self.grid(named), axis=1)
+            if any(1 / _NEAR_GRAVITY < float(np.median(size)) / level < _NEAR_GRAVITY for level, _, _ in _SENSED):
+                return np.asarray(size)
+        return None
 
     def _velocity(self, velocity: Named, position: Named | None, attitude: _Attitude | None) -> Named | None:
         """Give the velocity back where it is that of the world."""
@@ -603,7 +622,7 @@ class _Recogniser:
             body = body * np.array([1.0, -1.0, -1.0])
         return speeds, airframe_from_motion(body, speeds, self.rate_hz, rotors.speed is None)
 
-    def _gathered(self, flown: Flown, speeds: Array | None, moved: MovedBy | None) -> Recognition:
+    def _gathered(self, flown: Flown, speeds: Array | None, moved: MovedBy | None, kind: str) -> Recognition:
         order: tuple[SignalName, ...] = (
             "quaternion",
             "attitude",
@@ -640,6 +659,7 @@ class _Recogniser:
             rate_hz=rates[base.signal],
             slowest_s=max(1 / rates[g.signal] for g in signals),
             slowest_but_voltage_s=max(1 / rates[g.signal] for g in signals if g.signal != "voltage"),
+            kind=kind,
             moved=moved,
             speeds=speeds,
             warnings=tuple(self.warnings),

@@ -30,6 +30,8 @@ class RotorGuess:
 
     Attributes
     ----------
+    kind : str
+        Kind of log that is known for such columns; empty where none is.
     rivals : tuple of (str, str)
         What would stand in the config, and why it is not ruled out.
     """
@@ -39,6 +41,7 @@ class RotorGuess:
     reason: str
     sure: Sure
     rate_hz: float
+    kind: str
     rivals: tuple[tuple[str, str], ...] = ()
 
 
@@ -151,6 +154,7 @@ def _speed(found: Found, parameters: Parameters) -> RotorGuess | None:
         reason=reason,
         sure=sure,
         rate_hz=1 / float(np.median(np.diff(time))),
+        kind=named.known,
         rivals=rivals,
     )
 
@@ -203,6 +207,7 @@ def _command(found: Found, parameters: Parameters) -> RotorGuess | None:
         reason=reason,
         sure=sure,
         rate_hz=1 / float(np.median(np.diff(time))),
+        kind=named.known,
         rivals=rivals,
     )
 
@@ -273,5 +278,7 @@ def _meaning(
             return "speed", f"THR_MDL_FAC is {value:g}: the autopilot hands commands on as they are", "named", ()
         rival = (("rotor_command_is: thrust", f"THR_MDL_FAC is {value:g}, which lies between the two"),)
         return "speed", f"THR_MDL_FAC is {value:g}, between speed (0) and thrust (1)", "guess", rival
+    if "MOT_THST_EXPO" in parameters or system.startswith("Ardu"):
+        return "speed", "RCOU is what the motors get, behind the autopilot's own thrust curve", "named", ()
     rival = (("rotor_command_is: thrust", "the log does not say which"),)
     return "speed", f"taken as most motor controllers have it{f' ({system})' if system else ''}", "guess", rival

@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.logs.formats import LogContents
+from tests.builders import ulogs
 
 GRAVITY, MASS, INERTIA = 9.80665, 0.8, np.array([0.004, 0.0044, 0.0075])
 ARM, THRUST_FACTOR, DRAG_FACTOR = 0.16, 6e-6, 1.4e-7
@@ -123,3 +124,36 @@ def with_ground(own, before_s=5.0, after_s=4.0, idle=0.25):
     longer.speed[before // 2 : before] = idle * own.speed.mean()
     longer.rotation = Rotation.from_euler("ZYX", longer.angles[:, ::-1])
     return longer
+
+
+def ulog_of_flight(own, **parameters):
+    """The flight as PX4 writes it: FRD in NED, topics at rates of their own, thrust linearised, parameters."""
+    turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
+    share = (own.speed / 1000.0) ** 2
+    motors = np.hstack([share, np.full((len(share), 8), np.nan)])
+    topics = {
+        "vehicle_attitude": ("float[4] q", 2, quaternion(turned)),
+        "vehicle_angular_velocity": ("float[3] xyz", 1, own.rate @ FLIP),
+        "sensor_combined": (
+            "float[3] gyro_rad;float[3] accelerometer_m_s2",
+            1,
+            np.hstack([own.rate @ FLIP, own.specific_force @ FLIP]),
+        ),
+        "vehicle_local_position": (
+            "float x;float y;float z;float vx;float vy;float vz",
+            5,
+            np.hstack([own.position @ NED.T, own.velocity @ NED.T]),
+        ),
+        "actuator_motors": ("float[12] control", 1, motors),
+    }
+    rows = [
+        (round(1e6 * own.time[row]), number, values[row])
+        for number, (_, every, values) in enumerate(topics.values())
+        for row in range(0, len(own.time), every)
+    ]
+    facts = {"sys_name": "PX4", "MAV_TYPE": 2, "SYS_AUTOSTART": 4001, "THR_MDL_FAC": 1, "CA_ROTOR_COUNT": len(HUBS)}
+    for index, (x, y, spin) in enumerate(HUBS):
+        hub = {"PX": 0.11 * x, "PY": -0.12 * y, "PZ": 0.0, "KM": 0.05 * spin}
+        facts |= {f"CA_ROTOR{index}_{name}": value for name, value in hub.items()}
+    fields = {name: f"uint64_t timestamp;{own}" for name, (own, _, _) in topics.items()}
+    return ulogs.ulog(sorted(rows, key=lambda row: row[:2]), fields, facts | parameters)
