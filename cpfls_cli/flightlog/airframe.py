@@ -261,7 +261,7 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     tried = [_shares(acceleration, rate, low_pass(_lagged(squared, lag, rate_hz), rate_hz, cutoff, 2)) for lag in lags]
     shares = max(tried, key=lambda found: max(sum(share) for _, share in found))
     layout, explained = max(shares, key=lambda found: sum(found[1]) * (_PREFER_X if found[0].form == "X" else 1.0))
-    if max(explained[:2]) < _LEAST_EXPLAINED:
+    if sum(explained[:2]) < 2 * _LEAST_EXPLAINED:
         return None
     places = [rotor.name for rotor in layout.rotors]
     others = max(sum(share[:2]) for other, share in shares if [rotor.name for rotor in other.rotors] != places)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Final, get_args
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
@@ -76,9 +77,14 @@ class LogTable:
         known[1:] &= time[1:] > highest[:-1]
         return time[known], rows[known]
 
-    def on_grid(self, columns: Sequence[str]) -> Array:
+    def without_spikes(self, columns: Sequence[str]) -> Array:
+        """Values of columns, each the median of five neighbours: what rotors do takes longer."""
+        return np.asarray(median_filter(self.values(columns)[1], size=(5, 1)), dtype=float)
+
+    def on_grid(self, columns: Sequence[str], *, spikes: bool = True) -> Array:
         """Columns on the one clock; at its ends the nearest value."""
         time, values = self.values(columns)
+        values = values if spikes else self.without_spikes(columns)
         return np.column_stack([np.interp(self.grid, time, column) for column in values.T])
 
     def rate_hz(self, columns: Sequence[str]) -> float:

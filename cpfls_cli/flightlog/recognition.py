@@ -140,7 +140,10 @@ class _Recogniser:
         """Recognise everything."""
         rotors = find_rotors(
             {
-                name: [(named, *self.log.values(named.group.columns)) for named in self.candidates.get(name, ())]
+                name: [
+                    (named, self.log.values(named.group.columns)[0], self.log.without_spikes(named.group.columns))
+                    for named in self.candidates.get(name, ())
+                ]
                 for name in ("rotor_speed", "rotor_command")
             },
             self.parameters,
@@ -169,7 +172,7 @@ class _Recogniser:
         level = None
         found = rotors.command or rotors.speed
         if found is not None:
-            values = self.log.on_grid(found.columns.columns)
+            values = self.log.on_grid(found.columns.columns, spikes=False)
             level = (found.columns.scale * values + found.columns.offset).mean(axis=1)
             level = level / max(1.0, float(np.quantile(level, 0.98))) if rotors.command is None else level
         self.level = level
@@ -597,7 +600,7 @@ class _Recogniser:
                     sure=found.sure,
                     rivals=tuple(Rival(*rival) for rival in found.rivals),
                 )
-                values = self.log.on_grid(found.columns.columns)[self.part]
+                values = self.log.on_grid(found.columns.columns, spikes=False)[self.part]
                 signed = np.asarray(found.columns.sign or np.ones(values.shape[1]))
                 factor = known_unit(found.columns.unit).factor
                 speeds = factor * signed * (found.columns.scale * values + found.columns.offset)
