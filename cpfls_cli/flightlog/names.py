@@ -228,6 +228,7 @@ _WORDS: Final = {
     "quaternion": {"q", "quat", "quaternion", "orientation", "att", "attitude", "pose"},
     "rotor_speed": {"rpm", "erpm", "rads", "rotor", "om", "omega", "speed", "w"},
     "rotor_command": {"motor", "m", "cmd", "command", "pwm", "u", "control", "output", "throttle", "omcmd", "esc"},
+    "thrust": {"thrust", "lift"},
     "voltage": {"voltage", "vbat", "volt", "vbatt", "battery", "batt"},
 }
 _STRONG: Final = {
@@ -348,7 +349,8 @@ def _by_words(group: ColumnGroup) -> Iterator[Named]:
         if re.search(r"[a-z]2($|_)", group.pattern.replace("*", "")) and signal in _ROTOR_SIGNALS:
             # A square.
             continue
-        excluded = _NOT_MEASURED - (_ALLOWED_OF_ROTORS if signal in _ROTOR_SIGNALS else frozenset())
+        allowed = frozenset({"thrust"}) if signal == "thrust" else frozenset()
+        excluded = _NOT_MEASURED - allowed - (_ALLOWED_OF_ROTORS if signal in _ROTOR_SIGNALS else frozenset())
         if not _suits(name, group) or excluded & set(words):
             continue
         if _means(name, group, words, meant):

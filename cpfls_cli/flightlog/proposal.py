@@ -100,12 +100,16 @@ class Proposal:
         return self.logs[0].recognition
 
     @property
+    def states_torque(self) -> bool:
+        """Whether a torque of the log takes the place of rotors."""
+        return any(guess.signal == "body_torque" for guess in self.signals)
+
+    @property
     def share_of_speed(self) -> bool:
         """Whether the rotors are told by commands that are shares alone."""
         names = {guess.signal: guess for guess in self.signals}
-        return "rotor_speed" not in names and (
-            "rotor_command" not in names or names["rotor_command"].columns.unit == "1"
-        )
+        command = names.get("rotor_command")
+        return "rotor_speed" not in names and command is not None and command.columns.unit == "1"
 
 
 def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None) -> Proposal:

@@ -27,6 +27,7 @@ from cpfls_cli.flightlog.agreement import (
 from cpfls_cli.flightlog.airframe import MovedBy, Parameters, airframe_from_motion
 from cpfls_cli.flightlog.flown import Flown, find_flown
 from cpfls_cli.flightlog.log_table import (
+    ROTORS,
     LogTable,
     holding_values,
     make_grid,
@@ -62,6 +63,7 @@ _SENSED: Final[tuple[tuple[float, UnitName, float], ...]] = (
 _NEAR_GRAVITY = 1.3
 _AS_LEVEL = 0.2
 _AS_GOOD = 0.02
+_TORQUE_HZ, _FOLLOWS = 4.0, 0.3
 
 
 def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> Recognition:
@@ -165,6 +167,7 @@ class _Recogniser:
         self._frames(tilt)
         self._beside()
         speeds, moved = self._rotors(rotors)
+        self._wrench()
         driving = rotors.speed or rotors.command
         return self._gathered(flown, speeds, moved, "" if driving is None else driving.kind)
 
@@ -568,13 +571,39 @@ class _Recogniser:
 
     # The rest.
 
-    def _beside(self) -> None:
-        torque = self.first("body_torque")
-        if torque is not None:
-            self.left_out.append(
-                f"{torque.group.pattern}: looks like a torque; if it is one, in N m, map it as body_torque (a commanded"
-                " one is what the controller wanted, not what acted)"
+    def _wrench(self) -> None:
+        """Take torque and thrust where the log has no rotors; beside rotors they are what a controller asked for."""
+        torque, thrust, rate = self.first("body_torque"), self.first("thrust"), self.guesses.get("body_rate")
+        if torque is None:
+            return
+        if self.guesses.keys() & set(ROTORS) or rate is None:
+            self.left_out.append(f"{torque.group.pattern}: looks like a torque that is asked for; the rotors say more")
+            return
+        turning = first_derivative(self.log.on_grid(rate.columns.columns)[self.part], self.rate_hz)
+        own = [slow(values, self.rate_hz, _TORQUE_HZ)[:, :2] for values in (turning, self.grid(torque))]
+        share = [float(np.corrcoef(own[0][:, axis], own[1][:, axis])[0, 1]) for axis in range(2)]
+        if not min(share) > _FOLLOWS:
+            self.left_out.append(f"{torque.group.pattern}: looks like a torque, and the motion does not follow it")
+            return
+        scale = (Rival("unit: N mm", "inertia, which no log states, makes the scale"),)
+        self.guesses["body_torque"] = Guess(
+            signal="body_torque",
+            columns=SignalMap(columns=torque.group.columns, unit=torque.unit or "N m"),
+            reason=f"{_called(torque)}; the angular acceleration follows it (correlation {share[0]:.2f} about roll,"
+            f" {share[1]:.2f} about pitch); a commanded one is what a controller asked for",
+            sure="guess" if torque.unit is None else "named",
+            rivals=scale if torque.unit is None else (),
+        )
+        if thrust is not None:
+            self.guesses["thrust"] = Guess(
+                signal="thrust",
+                columns=SignalMap(columns=thrust.group.columns, unit="N"),
+                reason=f"{_called(thrust)}; {float(np.median(self.grid(thrust))):.3g} in flight, which has to be the"
+                " weight in N",
+                sure="guess",
             )
+
+    def _beside(self) -> None:
         voltage = self.first("voltage")
         if voltage is None:
             return
@@ -635,6 +664,8 @@ class _Recogniser:
             "velocity",
             "rotor_speed",
             "rotor_command",
+            "body_torque",
+            "thrust",
             "voltage",
         )
         signals = tuple(self.guesses[name] for name in order if name in self.guesses)

@@ -44,7 +44,7 @@ def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
     """List the keys of the config that only a person can fill in."""
     keys = [] if stated.mass_kg is not None else ["vehicle.mass_kg"]
     if not proposal.rotors:
-        return (*keys, "vehicle.rotors")
+        return tuple(keys) if proposal.states_torque else (*keys, "vehicle.rotors")
     airframe = proposal.airframe
     for index in range(proposal.rotors):
         if airframe is None or not airframe.in_metres:
@@ -101,6 +101,8 @@ def _rivals(proposal: Proposal) -> Iterator[tuple[str, Rival]]:
 
 
 def _rotors_in_words(proposal: Proposal) -> str:
+    if proposal.states_torque:
+        return "the log states a torque and no rotors"
     if not proposal.rotors:
         return "no column is recognised as a rotor's, so nothing here drives a model of the vehicle"
     if proposal.airframe is None:
@@ -204,6 +206,13 @@ def _vehicle(proposal: Proposal, stated: Stated) -> Iterator[str]:
 
 
 def _rotors(proposal: Proposal) -> Iterator[str]:
+    if proposal.states_torque:
+        yield from _comment(
+            "The log states a torque and no rotors, so none are described here; commands that ask for rotors would take"
+            " those of the default.",
+            2,
+        )
+        return
     if not proposal.rotors:
         yield from _comment(
             "No column of the log is recognised as a rotor's. A list with position_m, spin, thrust_factor_n_s2 and"
@@ -265,12 +274,15 @@ def _import(proposal: Proposal) -> Iterator[str]:
     yield "  signals:"
     for guess in proposal.signals:
         yield from _entry(guess.reason, guess.rivals, list(_signal(guess)), 4)
-    yield from _comment(
-        "No torque is computed: `cpfls vehicle` works with the rotors. For `cpfls identify`, name rotor-speed or"
-        " rotor-command here when the factors above are numbers.",
-        2,
-    )
-    yield "  torque_source: null"
+    if proposal.states_torque:
+        yield "  torque_source: column"
+    else:
+        yield from _comment(
+            "No torque is computed: `cpfls vehicle` works with the rotors. For `cpfls identify`, name rotor-speed or"
+            " rotor-command here when the factors above are numbers.",
+            2,
+        )
+        yield "  torque_source: null"
     yield from _crop(proposal)
     yield f"  gap_s: {_flow(proposal.gap_s)}"
     yield "  gap_rule: longest-part"
