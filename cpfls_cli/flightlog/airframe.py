@@ -19,6 +19,7 @@ from cpfls_cli.flightlog.smoothing import derivative, low_pass
 Parameters = Mapping[str, float | str]
 _ACCELERATION_HZ = 12.0
 _LAGS_S = (0.0, 0.02, 0.04, 0.07, 0.1)
+_SHIFTS_S = (-0.06, -0.04, -0.02, 0.02, 0.04, 0.06)
 _CORNERS: Final = {
     "front left": (1.0, 1.0),
     "front right": (1.0, -1.0),
@@ -257,19 +258,38 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     rate = low_pass(body_rate, rate_hz, cutoff, 2)
     acceleration = derivative(np.arange(len(rate)) / rate_hz, rate)
     squared = (speed / np.mean(speed)) ** 2
-    lags = _LAGS_S if is_command else (0.0, 0.02, 0.04)
-    tried = [_shares(acceleration, rate, low_pass(_lagged(squared, lag, rate_hz), rate_hz, cutoff, 2)) for lag in lags]
+    # Motors follow a command late; stamps of a measured speed may be late or early.
+    moved = [_lagged(squared, lag, rate_hz) for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
+    moved += [] if is_command else [_shifted(squared, rate_hz, seconds) for seconds in _SHIFTS_S]
+    tried = [_shares(acceleration, rate, low_pass(own, rate_hz, cutoff, 2)) for own in moved]
     shares = max(tried, key=lambda found: max(sum(share) for _, share in found))
-    layout, explained = max(shares, key=lambda found: sum(found[1]) * (_PREFER_X if found[0].form == "X" else 1.0))
+    layout, explained, clear = _chosen(shares, ("X", "plus"))
+    if not clear:
+        layout, explained, clear = _chosen(shares, ("X",))
     if sum(explained[:2]) < 2 * _LEAST_EXPLAINED:
         return None
-    places = [rotor.name for rotor in layout.rotors]
-    others = max(sum(share[:2]) for other, share in shares if [rotor.name for rotor in other.rotors] != places)
-    clear = sum(explained[:2]) > max(_LEAST_OF_BOTH, _LEAST_TIMES * others) and explained[2] > _LEAST_EXPLAINED
     words = ", ".join(f"{100 * share:.0f} % of {axis}" for share, axis in zip(explained, _TURNS, strict=True))
     form = "an X" if layout.form == "X" else "a plus"
     reason = f"the motion: as {form} in this order the rotors explain {words} acceleration"
     return MovedBy(Airframe(layout.rotors, False, reason, "data" if clear else "guess"), explained, clear)
+
+
+def _chosen(
+    shares: list[tuple[_Layout, tuple[float, float, float]]], forms: tuple[str, ...]
+) -> tuple[_Layout, tuple[float, float, float], bool]:
+    """Choose the layout that explains most, and tell whether another numbering comes near."""
+    own = [found for found in shares if found[0].form in forms]
+    layout, explained = max(own, key=lambda found: sum(found[1]) * (_PREFER_X if found[0].form == "X" else 1.0))
+    places = [rotor.name for rotor in layout.rotors]
+    others = max(sum(share[:2]) for other, share in own if [rotor.name for rotor in other.rotors] != places)
+    clear = sum(explained[:2]) > max(_LEAST_OF_BOTH, _LEAST_TIMES * others) and explained[2] > _LEAST_EXPLAINED
+    return layout, explained, clear
+
+
+def _shifted(values: Array, rate_hz: float, seconds: float) -> Array:
+    """Move values in time, later where the seconds are positive; at the end left open the nearest one stays."""
+    places = np.arange(len(values)) - round(rate_hz * seconds)
+    return values[np.clip(places, 0, len(values) - 1)]
 
 
 def _lagged(values: Array, lag_s: float, rate_hz: float) -> Array:
