@@ -96,7 +96,7 @@ def test_what_is_written_imports_the_flight(tmp_path):
     assert done.exit_code == 0, done.stderr
     rotors = yaml.safe_load(study.read_text())["vehicle"]["rotors"]
     # The source states 28 mm along both axes, M1 front right.
-    np.testing.assert_allclose([rotor["position_m"][:2] for rotor in rotors][0], [0.028, -0.028], atol=1e-4)
+    np.testing.assert_allclose(rotors[0]["position_m"][:2], [0.028, -0.028], atol=1e-4)
     imported = command_line.run("import", study, log, "-o", flight, "--json")
     assert imported.exit_code == 0, imported.stderr
     summary = json.loads(imported.stdout)
