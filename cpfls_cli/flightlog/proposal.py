@@ -63,6 +63,8 @@ class Proposal:
     ----------
     logs : tuple of KnownLog
         The first one leads.
+    time_column, time_unit : str or None, str
+        The clock of all of them; None for that of each log's fastest topic.
     signals, choices : tuple
         That hold for all of them.
     crop_s : tuple of float or None
@@ -83,6 +85,8 @@ class Proposal:
     """
 
     logs: tuple[KnownLog, ...]
+    time_column: str | None
+    time_unit: str
     signals: tuple[Guess, ...]
     choices: tuple[Choice, ...]
     crop_s: tuple[float, float] | None
@@ -144,6 +148,8 @@ def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None
     warnings = [f"{one.name}: {warning}" for one in logs for warning in one.recognition.warnings]
     return Proposal(
         logs=tuple(logs),
+        time_column=_time_column(logs),
+        time_unit=logs[0].recognition.time_unit,
         signals=signals,
         choices=_merged_choices(logs),
         crop_s=crop,
@@ -194,6 +200,31 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
         raise InputError(
             f"{first.name} and {other.name} are of two vehicles ({shown}): run cpfls init for each of them"
         )
+
+
+def _time_column(logs: Sequence[KnownLog]) -> str | None:
+    """Give the clock that suits all logs.
+
+    Raises
+    ------
+    InputError
+        If flat logs have stamps of other names or units.
+    """
+    first = logs[0]
+    if all(first.recognition.time_column in one.columns for one in logs):
+        wrong = [one for one in logs if one.recognition.time_unit != first.recognition.time_unit]
+    else:
+        # Every topic has stamps of its own.
+        wrong = [one for one in logs if "." not in one.recognition.time_column]
+        if not wrong:
+            return None
+    if wrong:
+        clocks = [f"{one.recognition.time_column} in {one.recognition.time_unit}" for one in (first, wrong[-1])]
+        raise InputError(
+            f"{first.name} and {wrong[-1].name}: the stamps are {clocks[0]} and {clocks[1]}, so one config cannot suit"
+            " both: run cpfls init for each of them"
+        )
+    return first.recognition.time_column
 
 
 def _merged_signals(logs: Sequence[KnownLog]) -> tuple[Guess, ...]:

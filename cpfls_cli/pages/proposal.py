@@ -134,8 +134,8 @@ def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
         "output": output,
         "logs": [one.name for one in proposal.logs],
         "systems": [one.system for one in proposal.logs],
-        "time_column": proposal.first.time_column,
-        "time_unit": proposal.first.time_unit,
+        "time_column": proposal.time_column,
+        "time_unit": proposal.time_unit,
         "signals": {guess.signal: {**_map(guess.columns), **_grounds(guess)} for guess in proposal.signals},
         "choices": {choice.key: {"value": choice.value, **_grounds(choice)} for choice in proposal.choices},
         "crop_s": proposal.crop_s,
@@ -265,8 +265,8 @@ def _rotor(rotor: RotorPlace | None, airframe: Airframe | None) -> str:
 
 def _import(proposal: Proposal) -> Iterator[str]:
     first = proposal.first
-    yield f"  time_column: {_flow(first.time_column)}"
-    yield f"  time_unit: {first.time_unit}"
+    yield f"  time_column: {_flow(proposal.time_column)}"
+    yield f"  time_unit: {proposal.time_unit}"
     choices = {choice.key: choice for choice in proposal.choices}
     for key in _ORDER:
         if key in choices:

@@ -126,7 +126,7 @@ def with_ground(own, before_s=5.0, after_s=4.0, idle=0.25):
     return longer
 
 
-def ulog_of_flight(own, **parameters):
+def ulog_of_flight(own, without=None, **parameters):
     """The flight as PX4 writes it: FRD in NED, topics at rates of their own, thrust linearised, parameters."""
     turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
     share = (own.speed / 1000.0) ** 2
@@ -146,6 +146,7 @@ def ulog_of_flight(own, **parameters):
         ),
         "actuator_motors": ("float[12] control", 1, motors),
     }
+    topics.pop(without, None)
     rows = [
         (round(1e6 * own.time[row]), number, values[row])
         for number, (_, every, values) in enumerate(topics.values())

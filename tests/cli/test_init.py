@@ -156,6 +156,28 @@ def test_several_logs_share_one_mapping(proposed, tmp_path, own):
     assert f"{second} lacks these columns" in " ".join(text.replace("#", "").split())
 
 
+def test_logs_of_two_versions_share_a_config_by_columns_that_stand_in(cpfls, proposed, tmp_path, own):
+    first, second = tmp_path / "new.ulg", tmp_path / "old.ulg"
+    first.write_bytes(ulog_of_flight(own))
+    second.write_bytes(ulog_of_flight(flight(seconds=20.0, seed=7), without="vehicle_angular_velocity"))
+    _, _, data = proposed(first, second, "--mass", MASS)
+    assert data["import"]["time_column"] is None
+    stand_in = data["import"]["signals"]["body_rate"]["otherwise"]
+    assert stand_in == [{"columns": [f"sensor_combined.gyro_rad[{axis}]" for axis in range(3)], "unit": "rad/s"}]
+    for log in (first, second):
+        result = cpfls("import", tmp_path / "study.yaml", log, "-o", tmp_path / f"{log.stem}.h5")
+        assert result.exit_code == 0, result.stderr
+
+
+def test_logs_with_clocks_of_other_names_are_refused(refuse, tmp_path, own):
+    first = write_csv(tmp_path / "one.csv", flat_log(own))
+    second = write_csv(tmp_path / "two.csv", flat_log(own, t={"time_us": 1e6 * own.time}))
+    assert refuse("init", first, second, "-o", tmp_path / "study.yaml") == [
+        f"{first} and {second}: the stamps are t in s and time_us in us, so one config cannot suit both: run cpfls init"
+        " for each of them"
+    ]
+
+
 def test_logs_that_are_cut_differently_each_get_their_own_cut(proposed, tmp_path, own):
     first = write_csv(tmp_path / "one.csv", flat_log(with_ground(own)))
     second = write_csv(tmp_path / "two.csv", flat_log(with_ground(own, before_s=15.0)))
