@@ -109,10 +109,11 @@ def _refuse_asked(data: dict[str, Any], source: str) -> None:
     """Refuse a config in which something is still asked, naming every such key in one sentence."""
     keys = list(_asked(data, ""))
     if keys:
+        one = len(keys) == 1
         raise ConfigError(
-            f"{source}: {', '.join(keys)} = {ASK}: no log says {'it' if len(keys) == 1 else 'them'}; write"
-            f" {'the number' if len(keys) == 1 else 'numbers'} in place of {ASK}, or make the config again with"
-            " cpfls init --mass KG --arm M --force"
+            f"{source}: {', '.join(keys)} = {ASK}: no log says {'it' if one else 'them'}; write"
+            f" {'the number' if one else 'numbers'} in place of {ASK} (cpfls init --mass KG --arm M fills in mass and"
+            " arm length)"
         )
 
 

@@ -43,8 +43,6 @@ class Stated:
 def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
     """List the keys of the config that only a person can fill in."""
     keys = [] if stated.mass_kg is not None else ["vehicle.mass_kg"]
-    if not proposal.rotors:
-        return tuple(keys) if proposal.states_torque else (*keys, "vehicle.rotors")
     airframe = proposal.airframe
     for index in range(proposal.rotors):
         if airframe is None or not airframe.in_metres:
@@ -106,7 +104,8 @@ def _rotors_in_words(proposal: Proposal) -> str:
     if not proposal.rotors:
         return "no column is recognised as a rotor's, so nothing here drives a model of the vehicle"
     if proposal.airframe is None:
-        return f"{proposal.rotors} rotors; neither parameters nor the motion say where they are"
+        unknown = "neither parameters nor the motion say where they are; a livelier log beside this one may"
+        return f"{proposal.rotors} rotors; {unknown}"
     places = ", ".join(
         f"{index} {rotor.name or 'at its place'} {_turning(rotor)}".replace("  ", " ")
         for index, rotor in enumerate(proposal.airframe.rotors, start=1)
@@ -206,20 +205,9 @@ def _vehicle(proposal: Proposal, stated: Stated) -> Iterator[str]:
 
 
 def _rotors(proposal: Proposal) -> Iterator[str]:
-    if proposal.states_torque:
-        yield from _comment(
-            "The log states a torque and no rotors, so none are described here; commands that ask for rotors would take"
-            " those of the default.",
-            2,
-        )
-        return
     if not proposal.rotors:
-        yield from _comment(
-            "No column of the log is recognised as a rotor's. A list with position_m, spin, thrust_factor_n_s2 and"
-            " drag_factor_n_m_s2 of each.",
-            2,
-        )
-        yield f"  rotors: {ASK}"
+        states = "states a torque and no rotors" if proposal.states_torque else "has no columns of rotors"
+        yield from _comment(f"The log {states}: none are described here, and those of the default are of no use.", 2)
         return
     airframe = proposal.airframe
     if airframe is None:

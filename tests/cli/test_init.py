@@ -74,8 +74,8 @@ def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls
     assert f"to be filled in by hand, marked ASK in {tmp_path / 'study.yaml'}: {asked}" in result.stderr
     study = tmp_path / "study.yaml"
     sentence = (
-        f"{study}: {asked} = ASK: no log says them; write numbers in place of ASK, or make the config again with cpfls"
-        " init --mass KG --arm M --force"
+        f"{study}: {asked} = ASK: no log says them; write numbers in place of ASK (cpfls init --mass KG --arm M fills"
+        " in mass and arm length)"
     )
     for words in (
         ("import", study, log, "-o", tmp_path / "flight.h5"),
@@ -89,8 +89,8 @@ def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls
     assert cpfls("config", study).exit_code == 0
     study.write_text(filled.replace("mass_kg: 0.8", "mass_kg: ASK"))
     assert refuse("config", study) == [
-        f"{study}: vehicle.mass_kg = ASK: no log says it; write the number in place of ASK, or make the config again"
-        " with cpfls init --mass KG --arm M --force"
+        f"{study}: vehicle.mass_kg = ASK: no log says it; write the number in place of ASK (cpfls init --mass KG"
+        " --arm M fills in mass and arm length)"
     ]
     assert cpfls("config", study, "--set", "vehicle.mass_kg=0.8").exit_code == 0
 
@@ -203,6 +203,26 @@ def test_two_vehicles_in_one_call_are_refused(refuse, tmp_path, own):
         f"{first} and {second} are of two vehicles (by their motion the rotors are numbered or turn differently):"
         " run cpfls init for each of them"
     ]
+
+
+def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tmp_path, own):
+    path = write_csv(tmp_path / "log.csv", flat_log(own, speed=None))
+    result, text, data = proposed(path, "--mass", MASS)
+    assert "no column is recognised as a rotor's, so nothing here drives a model of the vehicle" in result.stdout
+    assert "then: cpfls vehicle" not in result.stdout
+    assert "rotors" not in data["vehicle"]
+    assert cpfls("import", tmp_path / "study.yaml", path, "-o", tmp_path / "flight.h5").exit_code == 0
+    assert "The log has no columns of rotors" in text
+
+
+def test_rotors_that_nothing_tells_are_asked_for(proposed, tmp_path, own):
+    noise = np.random.default_rng(2).normal(500, 3, own.speed.shape)
+    speed = named(noise, "rotor1", "rotor2", "rotor3", "rotor4")
+    result, _, data = proposed(
+        write_csv(tmp_path / "log.csv", flat_log(own, speed=speed)), "--mass", MASS, "--arm", ARM
+    )
+    assert {(rotor["position_m"], rotor["spin"]) for rotor in data["vehicle"]["rotors"]} == {("ASK", "ASK")}
+    assert "4 rotors; neither parameters nor the motion say where they are" in result.stdout
 
 
 def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
