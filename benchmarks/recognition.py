@@ -24,9 +24,8 @@ from benchmarks.shared.measure import pin_threads, table
 pin_threads()
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.proposal import KnownLog, propose
+from cpfls_cli.flightlog.proposal import KnownLog, known_log, propose
 from cpfls_cli.flightlog.recognised import Guess
-from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.units import known_unit
 
@@ -47,6 +46,7 @@ FRD = {"body_frame": "FRD", "world_frame": "NED"}
 CRAZYFLIE = ("front right", 1), ("rear right", -1), ("rear left", 1), ("front left", -1)
 PX4 = ("front right", 1), ("rear left", 1), ("front left", -1), ("rear right", -1)
 BETAFLIGHT = ("rear right", -1), ("front right", 1), ("rear left", 1), ("front left", -1)
+NEUROBEM = ("rear right", -1), ("front right", 1), ("rear left", 1), ("front left", -1)
 HUMMINGBIRD = ("front left", -1), ("front right", 1), ("rear right", -1), ("rear left", 1)
 
 
@@ -59,7 +59,7 @@ class LogSet:
     names : tuple of str
         Patterns of the files' names.
     signals : mapping from signal to (columns, unit, factor) or columns
-        Columns with spaces between them; alone they are in SI.
+        Columns with spaces between them, the name of the file as ``@``; alone they are in SI.
     rotors : tuple
         Corner and way to turn of each; empty where the set does not say.
     """
@@ -173,6 +173,18 @@ SETS = {
         FLU | {"quaternion_order": "wxyz"},
         CRAZYFLIE,
     ),
+    "NeuroBEM, without names (.mat)": LogSet(
+        ("bemnn*.mat",),
+        {
+            "quaternion": columns("@[*]", range(7, 11)),
+            "body_rate": columns("@[*]", range(4, 7)),
+            "acceleration": columns("@[*]", range(11, 14)),
+            "position": columns("@[*]", range(17, 20)),
+            "rotor_speed": columns("@[*]", range(20, 24)),
+        },
+        FLU | {"quaternion_order": "xyzw", "acceleration_frame": "body-specific-force"},
+        NEUROBEM,
+    ),
     "PX4 1.15, simulated (ULog)": LogSet(
         ("sample_px4_events.ulg",),
         PX4_SIGNALS,
@@ -262,9 +274,8 @@ def row(name: str, count: Count) -> tuple[str, ...]:
 
 
 def known(path: Path) -> KnownLog:
-    contents = log_contents(path)
-    recognition = recognise(contents.topics, contents.units, contents.parameters, contents.system)
-    return KnownLog(path.name, recognition, contents.parameters, contents.system, frozenset())
+    own = log_contents(path)
+    return known_log(path.name, own.topics, own.units, own.parameters, own.system)
 
 
 def refusal(path: Path) -> str:
@@ -287,7 +298,7 @@ def judge(path: Path, own: LogSet, count: Count) -> None:
         return
     guesses = {guess.signal: guess for guess in proposal.signals}
     for signal, truth in own.signals.items():
-        judge_signal(path.name, signal, truth, guesses.get(signal), count)  # type: ignore[call-overload]
+        judge_signal(path, signal, truth, guesses.get(signal), count)  # type: ignore[call-overload]
     for key, value in own.keys.items():
         choice = next((choice for choice in proposal.choices if choice.key == key), None)
         right = choice is not None and choice.value == value
@@ -301,8 +312,9 @@ def judge(path: Path, own: LogSet, count: Count) -> None:
     count.wrong += [f"{path.name}: {signal} is mapped, and the set has none" for signal in extra]
 
 
-def judge_signal(log: str, signal: str, truth: str | Truth, guess: Guess | None, count: Count) -> None:
+def judge_signal(path: Path, signal: str, truth: str | Truth, guess: Guess | None, count: Count) -> None:
     names, unit, factor = (truth, SI[signal], 1.0) if isinstance(truth, str) else truth
+    log, names = path.name, names.replace("@", path.stem)
     if guess is None:
         count.wrong.append(f"{log}: {signal} is missing")
         return

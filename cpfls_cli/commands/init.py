@@ -8,8 +8,7 @@ from pathlib import Path
 from cpfls_cli.artifacts.job import Job, take_inputs
 from cpfls_cli.artifacts.output import check_output, write_text
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.proposal import KnownLog, propose
-from cpfls_cli.flightlog.recognition import recognise
+from cpfls_cli.flightlog.proposal import KnownLog, known_log, propose
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.pages.proposal import Stated, answer, config_text, summary
 from cpfls_cli.report.outcome import Outcome
@@ -45,12 +44,8 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
 
 
 def _known(log: Path) -> KnownLog:
-    contents = log_contents(log)
-    columns = frozenset(
-        f"{topic}.{field}" if topic else field for topic, fields in contents.topics.items() for field in fields
-    )
+    own = log_contents(log)
     try:
-        recognition = recognise(contents.topics, contents.units, contents.parameters, contents.system)
+        return known_log(str(log), own.topics, own.units, own.parameters, own.system)
     except InputError as error:
         raise InputError(f"{log}: {error}") from None
-    return KnownLog(str(log), recognition, contents.parameters, contents.system, columns)

@@ -20,7 +20,7 @@ SLOW_HZ = 3.0
 """Below which rates are compared: between two sensors with clocks of their own a few ten ms do not matter there."""
 
 _TILT_HZ = 1.0
-_RISES = 0.3
+_RISES = 0.4
 _AS_NAMED_IS_GOOD_ENOUGH = 0.02
 _CLEARLY, _TIMES_BETTER = 0.6, 2.0
 _MOVES_RAD_S = 0.03
@@ -216,7 +216,7 @@ def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Arra
                 handed = sign[0] * sign[1] * (1.0 if order == (0, 1) else -1.0)
                 together = up * sum(sign[i] * cross[order[i], i] for i in range(2))
                 results[(body, order, (*sign, handed))] = together
-    rises = 0.0 if lift is None else _rises(axis[:, 2], acceleration[:, 2], lift, rate_hz)
+    rises = 0.0 if lift is None else _rises(axis[:, 2], acceleration[:, 2], lift * np.abs(axis[:, 2]), rate_hz)
     if rises:
         # The attitude's third axis of the world points up where that of the body does, as the vehicle is level.
         results = {key: own for key, own in results.items() if rises * key[2][2] == (1.0 if key[0] == "FLU" else -1.0)}

@@ -11,6 +11,7 @@ from scipy.ndimage import median_filter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.nameless import nameless_clock
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
@@ -113,6 +114,9 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
         fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
         if stated or fitting:
             return name, (stated or fitting)[0]
+    clock = nameless_clock(fields)
+    if clock is not None:
+        return clock, "s"
     raise InputError(
         "no column of time stamps is recognised: one that rises from row to row and is called t, time or timestamp;"
         " rename it, or write the config by hand (`cpfls config` prints every key)"

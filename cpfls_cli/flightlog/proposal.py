@@ -13,7 +13,9 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, thrust_number, usual_airframe
 from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition
+from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import ColumnMap, SignalMap, SignalName
+from cpfls_cli.flightlog.topics import Topics
 from cpfls_cli.units import UnitName, known_unit
 
 _SURENESS: Final = ("data", "named", "guess")
@@ -53,6 +55,19 @@ class KnownLog:
     parameters: Parameters
     system: str
     columns: frozenset[str]
+
+
+def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> KnownLog:
+    """Recognise a log, as its reader gives it.
+
+    Raises
+    ------
+    InputError
+        See `recognise`.
+    """
+    columns = (f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields)
+    recognition = recognise(topics, units, parameters, system)
+    return KnownLog(name, recognition, parameters, system, frozenset(columns))
 
 
 @dataclass(frozen=True, kw_only=True)

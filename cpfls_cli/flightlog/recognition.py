@@ -33,6 +33,7 @@ from cpfls_cli.flightlog.log_table import (
     make_grid,
     refuse_dead_rotors,
 )
+from cpfls_cli.flightlog.nameless import OF_A_MATRIX, nameless_signals
 from cpfls_cli.flightlog.names import Named, column_groups, named_signals
 from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival, Sure
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_rotors
@@ -60,9 +61,12 @@ _SENSED: Final[tuple[tuple[float, UnitName, float], ...]] = (
     (2048.0, "g", 1 / 2048),
     (4096.0, "g", 1 / 4096),
 )
-_NEAR_GRAVITY = 1.3
+_NEAR_GRAVITY, _WEIGHT = 1.3, 1.15
 _AS_LEVEL = 0.2
 _AS_GOOD = 0.02
+_CLOSER = 0.4
+"""What is left of a velocity in body axes, as a share of what is left in those of the world, that tells the former."""
+
 _TORQUE_HZ, _FOLLOWS = 4.0, 0.3
 
 
@@ -88,6 +92,8 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     log = LogTable(topics, units)
     named = named_signals(column_groups(log.names), system)
     candidates = holding_values(log, named)
+    if not candidates and log.flat:
+        candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
         raise InputError(f"no column is recognised as a signal of a flight (columns: {shown})")
@@ -411,7 +417,7 @@ class _Recogniser:
         if attitude is not None:
             in_body = attitude.rotation.inv().apply(derived)
             body = fit_axes(slow(in_body, self.rate_hz), measured)
-            if body.explained > max(_GOOD, world.explained + 0.1):
+            if body.explained > _GOOD and 1 - body.explained < _CLOSER * (1 - world.explained):
                 self.left_out.append(
                     f"{velocity.group.pattern}: a velocity in body axes (the position's derivative explains"
                     f" {100 * body.explained:.0f} % there, {100 * world.explained:.0f} % in the world); import.signals"
@@ -470,10 +476,11 @@ class _Recogniser:
         values = self.grid(named)
         vertical = float(np.median(values[:, 2]))
         stated = named.unit
+        carried = self._carried(tilt)
         sensed = [
             (level, unit, scale)
             for level, unit, scale in _SENSED
-            if 1 / _NEAR_GRAVITY < abs(vertical) / level < _NEAR_GRAVITY and unit == (stated or unit)
+            if 1 / _NEAR_GRAVITY < abs(vertical) / (carried * level) < _NEAR_GRAVITY and unit == (stated or unit)
         ]
         world = self._world_acceleration()
         ground = np.array([1.0, 1.0, 0.0 if sensed else 1.0])
@@ -491,7 +498,7 @@ class _Recogniser:
                     f" {100 * along_world.as_named:.0f} %), which import.signals has no word for"
                 )
                 return False
-            self._tell_sensed(named, vertical, sensed[0], tilt)
+            self._tell_sensed(named, vertical, carried, sensed[0], tilt)
             return True
         if along_world is None or along_world.explained < _CLEAR:
             self.left_out.append(
@@ -512,6 +519,16 @@ class _Recogniser:
         )
         return True
 
+    def _carried(self, tilt: TiltFit | None) -> float:
+        """Give how many times its weight the rotors carry, by the motion; 1 where that says nothing."""
+        position = self.first("position")
+        if position is None or tilt is None:
+            return 1.0
+        moving = second_derivative(self.grid(position), self.rate_hz) / (1000.0 if tilt.gain > 100 else 1.0)
+        up = tilt.sign[2] * (1.0 if tilt.body == "FLU" else -1.0)
+        size = np.linalg.norm(moving + np.array([0.0, 0.0, up * standard_gravity]), axis=1)
+        return float(np.median(size)) / standard_gravity
+
     def _world_acceleration(self) -> Array | None:
         position, velocity = self.first("position"), self.guesses.get("velocity")
         if velocity is not None:
@@ -519,13 +536,14 @@ class _Recogniser:
         return None if position is None else second_derivative(self.grid(position), self.rate_hz)
 
     def _tell_sensed(
-        self, named: Named, vertical: float, sensed: tuple[float, UnitName, float], tilt: TiltFit | None
+        self, named: Named, vertical: float, carried: float, sensed: tuple[float, UnitName, float], tilt: TiltFit | None
     ) -> None:
         _, unit, scale = sensed
         up = "FLU" if vertical > 0 else "FRD"
         body = tilt.body if tilt is not None else named.frame if named.frame in ("FLU", "FRD") else None
         sign = None
-        reason = f"{_called(named)}; z has a median of {vertical:.3g} in flight: gravity, in {unit}"
+        weight = "gravity" if 1 / _WEIGHT < carried < _WEIGHT else f"{carried:.2g} times gravity, as it moves"
+        reason = f"{_called(named)}; z has a median of {vertical:.3g} in flight: {weight}, in {unit}"
         if body is not None and body != up:
             sign = (-1.0, -1.0, -1.0)
             reason += f", and points the wrong way for {body}, so it is gravity that is logged, not what carries it"
@@ -712,6 +730,8 @@ def slow_free(values: Array) -> Array:
 
 def _called(named: Named) -> str:
     pattern = named.group.pattern
+    if named.known == OF_A_MATRIX:
+        return f"{pattern} of {OF_A_MATRIX}"
     if any(letter.isalnum() for letter in pattern):
         return f"a log of {named.known} calls it {pattern}" if named.known else f"called {pattern}"
     return f"called {', '.join(named.group.columns)}"

@@ -18,8 +18,11 @@ FLIP = np.diag([1.0, -1.0, -1.0])
 NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
 
-def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0):
-    """A flight in FLU and ENU with all that a log can hold, SI units; noise as multiples of a usual one."""
+def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0):
+    """A flight in FLU and ENU with all that a log can hold, SI units; noise as multiples of a usual one.
+
+    With `push`, m/s^2, it flies a circle that takes as much.
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1 / rate_hz)
 
@@ -29,6 +32,12 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0):
 
     angles = np.column_stack([wave(0.25, 0.2, 1.5), wave(0.25, 0.2, 1.5), wave(0.8, 0.05, 0.6)])
     rotation = Rotation.from_euler("ZYX", angles[:, ::-1])
+    if push:
+        # Leaning to the middle of a circle, heading ahead.
+        turn = 1.5 * time
+        lean = np.column_stack([turn, 0 * time, np.full_like(time, -np.arctan(push / GRAVITY))])
+        rotation = Rotation.from_euler("ZYX", lean) * rotation
+        angles = rotation.as_euler("ZYX")[:, ::-1]
     steps = CubicSpline(time, rotation.as_quat()).derivative()(time)
     turning = 2 * (Rotation.from_quat(rotation.as_quat()).inv().as_quat())
     rate = _product(turning, steps)

@@ -227,6 +227,34 @@ def test_a_stand_with_idling_rotors_is_no_flight(own):
         seen(flat_log(still))
 
 
+def test_a_matrix_without_names_is_recognised_by_how_its_columns_move_together(own):
+    body_velocity = own.rotation.inv().apply(own.velocity)
+    noise = np.random.default_rng(4).normal(0, 300, (len(own.time), 3))
+    table = np.column_stack(
+        [own.time, noise, own.rate, quaternion(own.rotation, "xyzw"), own.specific_force, body_velocity, own.position]
+    )
+    table = np.column_stack([table, own.speed])
+    log = {"": {f"data[{column}]": values for column, values in enumerate(table.T)}}
+    recognition = recognise(log, {}, {}, "")
+    assert (recognition.time_column, recognition.time_unit) == ("data[0]", "s")
+    found = {guess.signal: [int(name[5:-1]) for name in guess.columns.columns] for guess in recognition.signals}
+    assert found == {
+        "body_rate": [4, 5, 6],
+        "quaternion": [7, 8, 9, 10],
+        "acceleration": [11, 12, 13],
+        "position": [17, 18, 19],
+        "rotor_speed": [20, 21, 22, 23],
+    }
+    assert recognition.choice("quaternion_order") == "xyzw"
+    assert "columns data[14] to data[16]: a velocity in body axes" in recognition.left_out[0]
+
+
+def test_a_flight_that_is_never_near_hover_shows_what_carries_it():
+    columns = seen(flat_log(flight(seconds=20.0, push=15.0))).signal("acceleration")
+    assert (columns.columns.unit, columns.columns.sign) == ("m/s^2", None)
+    assert "times gravity, as it moves" in columns.reason
+
+
 def test_columns_of_something_else_are_refused_by_name():
     log = {"": {"t": np.arange(100.0), "price": np.arange(100.0) ** 2}}
     with pytest.raises(InputError, match=r"no column is recognised as a signal of a flight \(columns: t, price\)"):
