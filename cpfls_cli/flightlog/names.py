@@ -193,6 +193,9 @@ _KNOWN: Final = (
     _Known(_CRAZYFLIE, "acceleration", "stateEstimate.a*", "g", "ENU"),
     _Known(_CRAZYFLIE, "position", "stateEstimate.*", "m", "ENU"),
     _Known(_CRAZYFLIE, "velocity", "stateEstimate.v*", "m/s", "ENU"),
+    # The compressed state counts in thousandths.
+    _Known(_CRAZYFLIE, "position", "stateEstimateZ.*", "mm", "ENU"),
+    _Known(_CRAZYFLIE, "velocity", "stateEstimateZ.v*", "mm/s", "ENU"),
     _Known(_CRAZYFLIE, "rotor_speed", "rpm.m*", "rpm"),
     # The pwm columns are these after the firmware's compensation of the battery.
     _Known(_CRAZYFLIE, "rotor_command", "motor.m*", "1", scale=1 / 65536),

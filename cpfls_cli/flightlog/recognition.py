@@ -67,7 +67,8 @@ _AS_GOOD = 0.02
 _CLOSER = 0.4
 """What is left of a velocity in body axes, as a share of what is left in those of the world, that tells the former."""
 
-_TORQUE_HZ, _FOLLOWS = 4.0, 0.3
+_TORQUE_HZ, _FOLLOWS = 6.0, 0.3
+_LATE_S = (0.0, 0.03, 0.06, 0.09)
 
 
 def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> Recognition:
@@ -133,7 +134,7 @@ class _Recogniser:
         self.left_out: list[str] = []
         self.warnings: list[str] = []
         self.part = slice(None)
-        self.velocity_share = 0.0
+        self.velocity_share, self.velocity_gain = 0.0, 1.0
         self.level: Array | None = None
 
     def first(self, name: SignalName) -> Named | None:
@@ -424,7 +425,7 @@ class _Recogniser:
                     " takes velocities of the world"
                 )
                 return None
-        self.velocity_share = world.explained
+        self.velocity_share, self.velocity_gain = world.explained, world.gain
         return velocity
 
     def _tell_place(
@@ -439,7 +440,12 @@ class _Recogniser:
         sure: Sure = "named"
         reason = f"{_called(named)}"
         rivals: tuple[Rival, ...] = ()
-        if tilt is not None and stated is None:
+        place = self.guesses.get("position")
+        if name == "velocity" and stated is None and place is not None and self.velocity_share > _CLEAR:
+            # What it is in follows from the position, whatever else is logged in other units.
+            small = known_unit(place.columns.unit).factor / self.velocity_gain < 0.03
+            unit, sure = units[1] if small else units[0], place.sure
+        elif tilt is not None and stated is None:
             unit = units[1] if tilt.gain > 100 else units[0]
             sure = "data" if 1 / _TEN < tilt.gain / (1000 if unit == units[1] else 1) < _TEN else "guess"
             reason += (
@@ -598,8 +604,8 @@ class _Recogniser:
             self.left_out.append(f"{torque.group.pattern}: looks like a torque that is asked for; the rotors say more")
             return
         turning = first_derivative(self.log.on_grid(rate.columns.columns)[self.part], self.rate_hz)
-        own = [slow(values, self.rate_hz, _TORQUE_HZ)[:, :2] for values in (turning, self.grid(torque))]
-        share = [float(np.corrcoef(own[0][:, axis], own[1][:, axis])[0, 1]) for axis in range(2)]
+        shares = [self._follows(turning, self.grid(torque), late) for late in _LATE_S]
+        share = max(shares, key=min)
         if not min(share) > _FOLLOWS:
             self.left_out.append(f"{torque.group.pattern}: looks like a torque, and the motion does not follow it")
             return
@@ -620,6 +626,13 @@ class _Recogniser:
                 " weight in N",
                 sure="guess",
             )
+
+    def _follows(self, turning: Array, torque: Array, late_s: float) -> list[float]:
+        """Correlate angular acceleration with a torque some time before, about roll and pitch."""
+        steps = round(late_s * self.rate_hz)
+        own = slow(turning[steps:], self.rate_hz, _TORQUE_HZ)
+        other = slow(torque[: len(torque) - steps], self.rate_hz, _TORQUE_HZ)
+        return [float(np.corrcoef(own[:, axis], other[:, axis])[0, 1]) for axis in range(2)]
 
     def _beside(self) -> None:
         voltage = self.first("voltage")

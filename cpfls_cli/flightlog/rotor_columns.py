@@ -267,8 +267,11 @@ def _meaning(
     """Tell whether a command is a share of thrust or of speed."""
     if command is None:
         return "speed", "", "guess", ()
-    if command.columns.columns[0].startswith(("motor.m", "motor[")) and "Crazyflie" in command.reason:
-        return "thrust", "motor.m* of a Crazyflie are thrusts, before the battery is compensated", "named", ()
+    if command.kind == "Crazyflie":
+        if "motor.m" in command.columns.columns[0]:
+            older = (("rotor_command_is: speed", "before 2022 the firmware logged what the motors got"),)
+            return "thrust", "motor.m* of a Crazyflie are thrusts, before the battery is compensated", "named", older
+        return "speed", "pwm.* of a Crazyflie is what the motors get", "named", ()
     factor = parameters.get("THR_MDL_FAC")
     if factor is not None:
         value = float(factor)
