@@ -67,10 +67,12 @@ def find_flown(time: Array, level: Array | None, height: Array | None, rate: Arr
     level, height, rate = (None if values is None else values[::every] for values in (level, height, rate))
     period = float(time[1] - time[0])
     active, told = _active(level, height, rate, period)
-    if active is None or not active.any():
+    if active is None:
         return Flown(None, (told,), flies=False)
+    if not active.any():
+        return Flown(None, (f"nothing flies in it: {told} all the time",), flies=False)
     if _still(active, height, rate):
-        return Flown(None, ("the vehicle neither turns nor moves",), flies=False)
+        return Flown(None, ("nothing flies in it: the vehicle neither turns nor moves",), flies=False)
     return _longest(time, active, told, level)
 
 
@@ -82,7 +84,7 @@ def _active(
         level = np.nan_to_num(level)
         largest = float(np.quantile(level, 0.98))
         if largest < _ALIVE:
-            return None, "the rotors stand all the time"
+            return None, "nothing flies in it: the rotors stand all the time"
         hover = float(np.median(level[level > _OF_LARGEST * largest]))
         carrying = level > _OF_HOVER * hover
         told = f"the rotors below {100 * _OF_HOVER:.0f} % of their level at hover"
@@ -91,7 +93,8 @@ def _active(
             window = max(1, round(_SHORT_S / period))
             turns = np.sqrt(np.convolve(rate**2, np.ones(window) / window, mode="same"))
             lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
-            carrying |= (level > _ALIVE) & lively
+            first, last = np.flatnonzero(carrying)[[0, -1]]
+            carrying[first:last] |= ((level > _ALIVE) & lively)[first:last]
             told += ", and hardly any turning"
         turning = _smoothed(carrying, period)
         if height is None or not turning.any() or turning.all():

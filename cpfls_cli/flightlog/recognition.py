@@ -160,7 +160,7 @@ class _Recogniser:
         )
         flown = self._find_flown(rotors)
         if not flown.flies:
-            raise InputError(f"nothing flies in it: {flown.reasons[0]}")
+            raise InputError(flown.reasons[0])
         begin, end = flown.span_s or (0.0, np.inf)
         inside = np.flatnonzero((self.log.grid - self.log.grid[0] >= begin) & (self.log.grid - self.log.grid[0] <= end))
         self.part = slice(int(inside[0]), int(inside[-1]) + 1)
@@ -632,7 +632,7 @@ class _Recogniser:
         steps = round(late_s * self.rate_hz)
         own = slow(turning[steps:], self.rate_hz, _TORQUE_HZ)
         other = slow(torque[: len(torque) - steps], self.rate_hz, _TORQUE_HZ)
-        return [float(np.corrcoef(own[:, axis], other[:, axis])[0, 1]) for axis in range(2)]
+        return [_together(own[:, axis], other[:, axis]) for axis in range(2)]
 
     def _beside(self) -> None:
         voltage = self.first("voltage")
@@ -739,6 +739,11 @@ _UP: Final = {"FLU": "up", "FRD": "down"}
 def slow_free(values: Array) -> Array:
     """Take the median of each column away."""
     return np.asarray(values - np.median(values, axis=0))
+
+
+def _together(first: Array, second: Array) -> float:
+    """Correlate two signals; 0 where one of them stands still."""
+    return float(np.corrcoef(first, second)[0, 1]) if first.std() > 0 and second.std() > 0 else 0.0
 
 
 def _called(named: Named) -> str:
