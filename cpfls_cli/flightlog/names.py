@@ -234,10 +234,10 @@ _WORDS: Final = {
     "thrust": {"thrust", "lift"},
     "voltage": {"voltage", "vbat", "volt", "vbatt", "battery", "batt"},
 }
-_STRONG: Final = {
-    "rotor_speed": {"rpm", "erpm", "rads", "rotor", "om", "omega", "speed"},
-    "rotor_command": {"cmd", "command", "pwm", "u", "control", "output", "throttle", "omcmd", "motor"},
-}
+_FAST: Final = frozenset({"rpm", "erpm", "rads", "rotor", "om", "omega", "speed", "speeds", "velocities", "angular"})
+_ASKED: Final = frozenset(
+    {"cmd", "command", "commands", "pwm", "u", "control", "output", "throttle", "omcmd", "ref", "des", "d", "r"}
+)
 _NOT_MEASURED: Final = frozenset(
     [
         "des",
@@ -386,14 +386,15 @@ def _means_position(group: ColumnGroup, words: list[str], meant: set[str]) -> bo
 
 
 def _means_rotors(signal: SignalName, words: list[str]) -> bool:
-    if "squared" in words or "sq" in words:
+    """Tell speeds from commands: what is asked for is none that was measured, and a motor alone is driven."""
+    if {"squared", "sq"} & set(words):
         return False
-    command, speed = (bool(set(words) & _STRONG[name]) for name in ("rotor_command", "rotor_speed"))
-    if {"rads", "rpm", "erpm"} & set(words) and not {"cmd", "command", "ref", "des", "d", "r"} & set(words):
-        return signal == "rotor_speed"
+    asked = bool(set(words) & _ASKED)
+    fast = bool(set(words) & _FAST)
     if signal == "rotor_speed":
-        return speed and not command and not set(words) & {"r", "ref", "des", "d"}
-    return command or words in (["m"], ["motors"], ["motor", "m"])
+        return fast and not asked
+    motors = words == ["m"] or bool({"motor", "motors"} & set(words))
+    return asked or (motors and not fast)
 
 
 _UNITS_BY_WORD: Final = {
