@@ -37,6 +37,9 @@ TrainingArgument = Annotated[
     list[Path], typer.Argument(metavar="FLIGHT...", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
 ]
 LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help=f"Flight log: {suffixes_in_words()}.")]
+LogsArgument = Annotated[
+    list[Path], typer.Argument(metavar="LOG...", help=f"Flight logs of one vehicle: {suffixes_in_words()}.")
+]
 ModelArgument = Annotated[
     Path, typer.Argument(metavar="MODEL", help="Made by `cpfls identify`, `extend` or `vehicle`.")
 ]
@@ -254,6 +257,28 @@ def simulate(
         return command.run(job, trajectory, model, mode)
 
     _run("simulate", config, output, common, call)
+
+
+@app.command()
+@with_common
+def init(
+    logs: LogsArgument,
+    output: OutputOption,
+    mass: Annotated[
+        float | None, typer.Option("--mass", metavar="KG", min=1e-6, help="Mass as it flew, with battery, kg.")
+    ] = None,
+    arm: Annotated[
+        float | None, typer.Option("--arm", metavar="M", min=1e-6, help="From the middle to a rotor's axis, m.")
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Look into logs of one vehicle and write a config for them, with the reason of every guess."""
+    with messages_for_errors():
+        from cpfls_cli.commands import init as command
+        from cpfls_cli.pages.proposal import Stated
+
+        _run_without_config("init", output, common, lambda job: command.run(job, logs, Stated(mass, arm)))
 
 
 @app.command("import")
@@ -530,17 +555,9 @@ def export(
 ) -> None:
     """Write a model as JSON, C or Python that computes torque, and of a whole vehicle its motion, on its own."""
     with messages_for_errors():
-        from cpfls_cli.artifacts.job import Job
         from cpfls_cli.commands import export as command
-        from cpfls_cli.config.load import validate
 
-        narration = Narration("export", common.verbose and not common.quiet)
-        with progress_bar("export", common) as progress:
-            job = Job(validate({}, "default"), output, common.force, common.dry_run, progress, narration.reads)
-            outcome = command.run(job, model, form and form.value, name)
-        if not common.dry_run:
-            narration.wrote(output)
-        tell(outcome, common)
+        _run_without_config("export", output, common, lambda job: command.run(job, model, form and form.value, name))
 
 
 @app.command()
@@ -612,3 +629,17 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
         if not common.dry_run:
             narration.wrote(output)
         tell(outcome, common)
+
+
+def _run_without_config(title: str, output: Path, common: Common, call: Callable[[Job], Outcome]) -> None:
+    """Run one command that needs no study, with a progress bar, and print what it says."""
+    from cpfls_cli.artifacts.job import Job
+    from cpfls_cli.config.load import validate
+
+    narration = Narration(title, common.verbose and not common.quiet)
+    with progress_bar(title, common) as progress:
+        job = Job(validate({}, "default"), output, common.force, common.dry_run, progress, narration.reads)
+        outcome = call(job)
+    if not common.dry_run:
+        narration.wrote(output)
+    tell(outcome, common)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,9 @@ from cpfls_cli.config.overrides import apply_override, setting_errors
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.errors import ConfigError
+
+ASK = "ASK"
+"""Stands in a config for what only a person knows; `cpfls init` writes it."""
 
 
 def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = None, *, sweep: bool = False) -> Study:
@@ -93,9 +96,30 @@ def validate(data: dict[str, Any], source: str, *, sweep: bool = False) -> Study
     ConfigError
         Listing every wrong key with its value, what is wrong, and the nearest valid key.
     """
+    _refuse_asked(data, source)
     study, errors = check_data(data, source)
     if sweep:
         errors += setting_errors(data, source, errors)
     if study is None or errors:
         raise ConfigError("\n".join(errors))
     return study
+
+
+def _refuse_asked(data: dict[str, Any], source: str) -> None:
+    """Refuse a config in which something is still asked, naming every such key in one sentence."""
+    keys = list(_asked(data, ""))
+    if keys:
+        one = len(keys) == 1
+        raise ConfigError(
+            f"{source}: {', '.join(keys)} = {ASK}: no log says {'it' if one else 'them'}; write"
+            f" {'the number' if one else 'numbers'} in place of {ASK} (cpfls init --mass KG --arm M fills in mass and"
+            " arm length)"
+        )
+
+
+def _asked(node: Any, path: str) -> Iterator[str]:
+    if node == ASK:
+        yield path
+    entries = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, value in entries:
+        yield from _asked(value, f"{path}.{key}" if path else str(key))

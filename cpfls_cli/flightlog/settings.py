@@ -29,7 +29,7 @@ SignalName = Literal[
     "rotor_command",
     "voltage",
 ]
-_UNITS_OF_SIGNAL: Final = MappingProxyType(
+UNITS_OF_SIGNAL: Final = MappingProxyType(
     {
         "attitude": ("rad",),
         "quaternion": ("1",),
@@ -97,7 +97,7 @@ def _check_signal(name: SignalName, signal: SignalMap) -> None:
     fixed = None if name in _ANY_NUMBER else _COLUMNS_OF_SIGNAL.get(name, _COLUMNS_OF_VECTOR)
     expected = fixed or len(signal.columns)
     # A flight keeps one unit of a signal, whichever columns it came from.
-    kinds = _UNITS_OF_SIGNAL[name]
+    kinds = UNITS_OF_SIGNAL[name]
     for number, choice in enumerate(signal.choices):
         key = f"signals.{name}.otherwise.{number - 1}" if number else f"signals.{name}"
         if len(choice.columns) != expected:

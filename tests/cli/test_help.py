@@ -12,6 +12,7 @@ from cpfls_cli.cli.app import app
 COMMANDS = (
     "trajectory",
     "simulate",
+    "init",
     "import",
     "reduce",
     "identify",

@@ -1,0 +1,340 @@
+"""Where the rotors of a vehicle are and how they turn: from the parameters in a log, or from its motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import permutations
+from math import cos, hypot, pi, radians, sin
+from typing import Final
+
+import numpy as np
+from scipy.constants import g as standard_gravity
+from scipy.signal import lfilter
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.smoothing import derivative, low_pass
+
+Parameters = Mapping[str, float | str]
+_ACCELERATION_HZ = 12.0
+_LAGS_S = (0.0, 0.02, 0.04, 0.07, 0.1)
+_SHIFTS_S = (-0.06, -0.04, -0.02, 0.02, 0.04, 0.06)
+_CORNERS: Final = {
+    "front left": (1.0, 1.0),
+    "front right": (1.0, -1.0),
+    "rear right": (-1.0, -1.0),
+    "rear left": (-1.0, 1.0),
+}
+_ENDS: Final = {"front": (1.0, 0.0), "right": (0.0, -1.0), "rear": (-1.0, 0.0), "left": (0.0, 1.0)}
+_FACTOR = 1e-9
+_AIR_KG_M3 = 1.2
+_TURNS = ("roll", "pitch", "yaw")
+_LEAST_EXPLAINED = 0.05
+_LEAST_OF_BOTH = 0.2
+_LEAST_TIMES = 1.3
+_PREFER_X = 1.3
+"""Few vehicles are a plus: one has to explain that much more than an X."""
+
+
+@dataclass(frozen=True)
+class RotorPlace:
+    """Where a rotor is and how it turns.
+
+    Attributes
+    ----------
+    name : str
+        Such as ``front left``; empty where it is told by its numbers alone.
+    direction : tuple of float
+        x forward and y left, of length 1 where only the direction is known.
+    height_m : float
+        Of the hub above the point that the parameters count from.
+    spin : int
+        1 counter-clockwise seen from above, -1 clockwise; 0 where that is not known.
+    """
+
+    name: str
+    direction: tuple[float, float]
+    spin: int
+    height_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Airframe:
+    """The rotors of a vehicle, in the order of the log.
+
+    Attributes
+    ----------
+    rotors : tuple of RotorPlace
+    in_metres : bool
+        Whether the places are lengths; False where they are directions.
+    reason : str
+        Where that is known from.
+    sure : {"stated", "data", "guess"}
+    moment_ratio_m : float or None
+        Drag factor over thrust factor that the parameters state.
+    """
+
+    rotors: tuple[RotorPlace, ...]
+    in_metres: bool
+    reason: str
+    sure: str
+    moment_ratio_m: float | None = None
+
+    def with_arm(self, arm_m: float) -> Airframe:
+        """Give the same rotors at a distance from the middle; the mean distance where they differ."""
+        mean = float(np.mean([hypot(*rotor.direction) for rotor in self.rotors]))
+        factor = arm_m / mean
+        rotors = tuple(
+            RotorPlace(
+                r.name, (factor * r.direction[0], factor * r.direction[1]), r.spin, factor * r.height_m * self.in_metres
+            )
+            for r in self.rotors
+        )
+        return Airframe(rotors, True, self.reason, self.sure, self.moment_ratio_m)
+
+
+def stated_airframe(parameters: Parameters) -> Airframe | None:
+    """Read the rotors that the parameters of an autopilot state; None where they state none.
+
+    Raises
+    ------
+    InputError
+        If the rotors that are stated cannot turn the vehicle about all of its axes.
+    """
+    found = _of_px4(parameters) or _of_ardupilot(parameters)
+    if found is not None:
+        _require_control(found)
+    return found
+
+
+def _of_px4(parameters: Parameters) -> Airframe | None:
+    count = int(float(parameters.get("CA_ROTOR_COUNT", 0) or 0))
+    if count < 1 or "CA_ROTOR0_PX" not in parameters:
+        return None
+    rotors, ratios = [], []
+    for index in range(count):
+        x, y, z, ratio = (float(parameters.get(f"CA_ROTOR{index}_{name}", 0.0)) for name in ("PX", "PY", "PZ", "KM"))
+        # Of PX4: y to the right, z down, and a positive moment for a rotor that turns counter-clockwise.
+        rotors.append(RotorPlace(_name(x, -y), (x, 0.0 - y), int(np.sign(ratio)), 0.0 - z))
+        ratios.append(abs(ratio))
+    reason = "CA_ROTOR*_PX, _PY and the signs of _KM in the log"
+    return Airframe(tuple(rotors), True, reason, "stated", float(np.mean(ratios)))
+
+
+def _name(x: float, y: float) -> str:
+    along = "front" if x > _FACTOR else "rear" if x < -_FACTOR else ""
+    across = "left" if y > _FACTOR else "right" if y < -_FACTOR else ""
+    return f"{along} {across}".strip()
+
+
+_CLASSES: Final = {1: "quad", 2: "hexa", 3: "octa"}
+_TYPES: Final = {0: "plus", 1: "X", 3: "H"}
+# Angle clockwise from the front in degrees and spin, motor by motor, as ArduPilot's motor library has them.
+_ARDUPILOT_FRAMES: Final = {
+    ("quad", "plus"): ((90, 1), (-90, 1), (0, -1), (180, -1)),
+    ("quad", "X"): ((45, 1), (-135, 1), (-45, -1), (135, -1)),
+    # Of an H the same motors turn the other way.
+    ("quad", "H"): ((45, -1), (-135, -1), (-45, 1), (135, 1)),
+    ("hexa", "plus"): ((0, -1), (180, 1), (-120, -1), (60, 1), (-60, 1), (120, -1)),
+    ("hexa", "X"): ((90, -1), (-90, 1), (-30, -1), (150, 1), (30, 1), (-150, -1)),
+    ("octa", "plus"): ((0, -1), (180, -1), (45, 1), (135, 1), (-45, 1), (-135, 1), (-90, -1), (90, -1)),
+    ("octa", "X"): ((22.5, -1), (-157.5, -1), (67.5, 1), (157.5, 1), (-22.5, 1), (-112.5, 1), (-67.5, -1), (112.5, -1)),
+}
+
+
+def _of_ardupilot(parameters: Parameters) -> Airframe | None:
+    kind = _CLASSES.get(int(float(parameters.get("FRAME_CLASS", -1))))
+    form = _TYPES.get(int(float(parameters.get("FRAME_TYPE", -1))))
+    motors = _ARDUPILOT_FRAMES.get((kind or "", form or ""))
+    if motors is None:
+        return None
+    rotors = tuple(
+        RotorPlace(_name(round(cos(radians(a)), 9), round(-sin(radians(a)), 9)), _direction(a), spin)
+        for a, spin in motors
+    )
+    return Airframe(rotors, False, f"FRAME_CLASS and FRAME_TYPE in the log: {kind} {form}", "stated")
+
+
+def _direction(degrees: float) -> tuple[float, float]:
+    return round(cos(radians(degrees)), 9) + 0.0, round(-sin(radians(degrees)), 9) + 0.0
+
+
+_PX4_ORDER = (("front right", 1), ("rear left", 1), ("front left", -1), ("rear right", -1))
+_USUAL: Final = {
+    "PX4": _PX4_ORDER,
+    "ArduPilot": _PX4_ORDER,
+    "Betaflight": (("rear right", -1), ("front right", 1), ("rear left", 1), ("front left", -1)),
+    "Crazyflie": (("front right", 1), ("rear right", -1), ("rear left", 1), ("front left", -1)),
+}
+
+
+def usual_airframe(kind: str) -> Airframe | None:
+    """Give the four rotors in an X as a kind of log numbers them if nothing is changed; None for an unknown kind."""
+    if kind not in _USUAL:
+        return None
+    corner = 1 / hypot(1.0, 1.0)
+    rotors = tuple(
+        RotorPlace(name, (corner * _CORNERS[name][0], corner * _CORNERS[name][1]), spin) for name, spin in _USUAL[kind]
+    )
+    return Airframe(rotors, False, f"the numbers that {kind} gives the motors of an X, if nobody changed them", "named")
+
+
+def _require_control(airframe: Airframe) -> None:
+    """Refuse rotors that leave thrust and the torques about the three axes dependent on each other."""
+    rows = np.array([[1.0, r.direction[1], -r.direction[0], -float(r.spin)] for r in airframe.rotors]).T
+    scale = np.abs(rows).max(axis=1, keepdims=True)
+    for row, axis in ((1, "roll"), (2, "pitch"), (3, "yaw")):
+        others = np.delete(rows, row, axis=0) / np.maximum(np.delete(scale, row, axis=0), _FACTOR)
+        own = rows[row] / max(float(scale[row, 0]), _FACTOR)
+        left = own - others.T @ np.linalg.lstsq(others.T, own, rcond=None)[0]
+        if float(np.linalg.norm(left)) < 1e-6:
+            raise InputError(
+                f"{airframe.reason}: these {len(airframe.rotors)} rotors cannot turn the vehicle about {axis} by"
+                " themselves; correct the parameters in the autopilot, or state vehicle.rotors by hand"
+            )
+
+
+@dataclass(frozen=True)
+class _Layout:
+    rotors: tuple[RotorPlace, ...]
+    form: str
+
+
+def _layouts() -> Iterator[_Layout]:
+    """List how four rotors can be numbered, in an X and in a plus, and which pair turns which way."""
+    for form, places in (("X", _CORNERS), ("plus", _ENDS)):
+        for order in permutations(places):
+            for first in (1, -1):
+                turning = {name: first if index % 2 == 0 else -first for index, name in enumerate(places)}
+                length = hypot(*next(iter(places.values())))
+                rotors = tuple(
+                    RotorPlace(name, (places[name][0] / length, places[name][1] / length), turning[name])
+                    for name in order
+                )
+                yield _Layout(rotors, form)
+
+
+@dataclass(frozen=True)
+class MovedBy:
+    """Four rotors told by the motion, and how clearly.
+
+    Attributes
+    ----------
+    airframe : Airframe
+    explained : tuple of float
+        Share of the angular acceleration about roll, pitch and yaw that they explain.
+    clear : bool
+        Whether every axis says it.
+    """
+
+    airframe: Airframe
+    explained: tuple[float, float, float]
+    clear: bool
+
+
+def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_command: bool) -> MovedBy | None:
+    """Find out which of four rotors is where and which way it turns, from what the vehicle does.
+
+    The angular acceleration about each axis is regressed on the rotors' torque in every numbering of an X and of a
+    plus; the one that explains most is taken.
+
+    Parameters
+    ----------
+    body_rate : array, shape (time, 3), rad/s, body frame FLU
+    speed : array, shape (time, 4)
+        In any unit that is a share of the speed.
+    is_command : bool
+        Whether the motors follow later.
+
+    Returns
+    -------
+    MovedBy or None
+        None for another number of rotors, or where nothing is explained.
+    """
+    if speed.shape[1] != 4 or len(speed) < 5 * rate_hz:
+        return None
+    cutoff = min(_ACCELERATION_HZ, rate_hz / 5)
+    rate = low_pass(body_rate, rate_hz, cutoff, 2)
+    acceleration = derivative(np.arange(len(rate)) / rate_hz, rate)
+    squared = (speed / np.mean(speed)) ** 2
+    # Motors follow a command late; stamps of a measured speed may be late or early.
+    moved = [_lagged(squared, lag, rate_hz) for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
+    moved += [] if is_command else [_shifted(squared, rate_hz, seconds) for seconds in _SHIFTS_S]
+    tried = [_shares(acceleration, rate, low_pass(own, rate_hz, cutoff, 2)) for own in moved]
+    shares = max(tried, key=lambda found: max(sum(share) for _, share in found))
+    layout, explained, clear = _chosen(shares, ("X", "plus"))
+    if not clear:
+        layout, explained, clear = _chosen(shares, ("X",))
+    if sum(explained[:2]) < 2 * _LEAST_EXPLAINED:
+        return None
+    words = ", ".join(f"{100 * share:.0f} % of {axis}" for share, axis in zip(explained, _TURNS, strict=True))
+    form = "an X" if layout.form == "X" else "a plus"
+    reason = f"the motion: as {form} in this order the rotors explain {words} acceleration"
+    return MovedBy(Airframe(layout.rotors, False, reason, "data" if clear else "guess"), explained, clear)
+
+
+def _chosen(
+    shares: list[tuple[_Layout, tuple[float, float, float]]], forms: tuple[str, ...]
+) -> tuple[_Layout, tuple[float, float, float], bool]:
+    """Choose the layout that explains most, and tell whether another numbering comes near."""
+    own = [found for found in shares if found[0].form in forms]
+    layout, explained = max(own, key=lambda found: sum(found[1]) * (_PREFER_X if found[0].form == "X" else 1.0))
+    places = [rotor.name for rotor in layout.rotors]
+    others = max(sum(share[:2]) for other, share in own if [rotor.name for rotor in other.rotors] != places)
+    clear = sum(explained[:2]) > max(_LEAST_OF_BOTH, _LEAST_TIMES * others) and explained[2] > _LEAST_EXPLAINED
+    return layout, explained, clear
+
+
+def _shifted(values: Array, rate_hz: float, seconds: float) -> Array:
+    """Move values in time, later where the seconds are positive; at the end left open the nearest one stays."""
+    places = np.arange(len(values)) - round(rate_hz * seconds)
+    return values[np.clip(places, 0, len(values) - 1)]
+
+
+def _lagged(values: Array, lag_s: float, rate_hz: float) -> Array:
+    if lag_s == 0.0:
+        return values
+    keep = float(np.exp(-1 / (rate_hz * lag_s)))
+    first = values[:1] * keep
+    return np.asarray(lfilter([1 - keep], [1.0, -keep], values, axis=0, zi=first)[0])
+
+
+def _shares(acceleration: Array, rate: Array, squared: Array) -> list[tuple[_Layout, tuple[float, float, float]]]:
+    """Tell of every layout which share of the angular acceleration about each axis it explains."""
+    edge = max(1, len(rate) // 50)
+    inner = slice(edge, len(rate) - edge)
+    # What turning itself does to the acceleration, and a constant torque, are no work of the rotors.
+    basis = np.linalg.qr(np.column_stack([np.ones(len(rate[inner])), rate[inner]]))[0]
+    wanted, rotors = (values[inner] - basis @ (basis.T @ values[inner]) for values in (acceleration, squared))
+    together, own, total = rotors.T @ wanted, rotors.T @ rotors, (wanted**2).sum(axis=0)
+    results = []
+    for layout in _layouts():
+        places = np.array([rotor.direction for rotor in layout.rotors])
+        weights = (places[:, 1], -places[:, 0], -np.array([float(rotor.spin) for rotor in layout.rotors]))
+        shares = []
+        for axis, weight in enumerate(weights):
+            along, power = float(weight @ together[:, axis]), float(weight @ own @ weight) * float(total[axis])
+            shares.append(along**2 / power if along > 0 and power > 0 else 0.0)
+        results.append((layout, (shares[0], shares[1], shares[2])))
+    return results
+
+
+def thrust_number(mass_kg: float, arm_m: float, speed: Array) -> float:
+    """Give the thrust number ``T / (rho n^2 D^4)`` of rotors that carry a mass, were they as large as they can be.
+
+    Parameters
+    ----------
+    arm_m : float
+        From the middle to a rotor, m; neighbours nearly touch.
+    speed : array, shape (time, rotor), rad/s
+
+    Returns
+    -------
+    float
+        Of real propellers 0.003 to 0.2: their own number is 0.05 to 0.2, their diameter half of the room or more.
+    """
+    rotors = speed.shape[1]
+    diameter = 2 * arm_m * sin(pi / rotors)
+    turns = (speed / (2 * pi)) ** 2
+    return float(mass_kg * standard_gravity / (_AIR_KG_M3 * turns.mean(axis=0).sum() * diameter**4))

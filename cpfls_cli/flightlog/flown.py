@@ -1,0 +1,181 @@
+"""The part of a log in which the vehicle flies: not on the ground, not idling, not disarmed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_closing, binary_opening, find_objects, label
+
+from cpfls_cli.arrays import Array, BoolArray
+
+_OF_HOVER = 0.6
+"""Share of the level at hover below which rotors idle."""
+
+_OF_LARGEST = 0.5
+_SHORT_S = 1.0
+"""Shorter pauses are part of a flight, and shorter flights none."""
+
+_OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05
+_MARGIN_S = 0.5
+"""Left out after take-off and before landing, where the ground pushes."""
+
+_STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
+"""Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move."""
+
+_ALIVE = 0.02
+_TURNS_RAD_S, _OF_TURNING = 0.2, 0.3
+_MOST_CLOCK_HZ = 50.0
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What of a log is a flight.
+
+    Attributes
+    ----------
+    span_s : tuple of float or None
+        Begin and end, s from the log's first stamp; None where all of it flies.
+    reasons : tuple of str
+        What was cut, where, and how that was told; what else flies and is left out.
+    flies : bool
+        False where nothing in it flies.
+    """
+
+    span_s: tuple[float, float] | None
+    reasons: tuple[str, ...]
+    flies: bool = True
+
+
+def find_flown(time: Array, level: Array | None, height: Array | None, rate: Array | None) -> Flown:
+    """Find the longest stretch of a log that is flown.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+        Uniform, from 0.
+    level : array, shape (time,), or None
+        Mean of the rotors' commands or speeds, 0 where they stand.
+    height : array, shape (time,), m, or None
+        Upward.
+    rate : array, shape (time,), rad/s, or None
+        Size of the body rate.
+    """
+    clock_hz = 1 / float(time[1] - time[0])
+    every = max(1, int(clock_hz / _MOST_CLOCK_HZ))
+    time = time[::every]
+    level, height, rate = (None if values is None else values[::every] for values in (level, height, rate))
+    period = float(time[1] - time[0])
+    active, told = _active(level, height, rate, period)
+    if active is None:
+        return Flown(None, (told,), flies=False)
+    if not active.any():
+        return Flown(None, (f"nothing flies in it: {told} all the time",), flies=False)
+    if _still(active, height, rate):
+        return Flown(None, ("nothing flies in it: the vehicle neither turns nor moves",), flies=False)
+    return _longest(time, active, told, level)
+
+
+def _active(
+    level: Array | None, height: Array | None, rate: Array | None, period: float
+) -> tuple[BoolArray | None, str]:
+    """Mark the samples in which the vehicle flies, and say how that is told."""
+    if level is not None:
+        level = np.nan_to_num(level)
+        largest = float(np.quantile(level, 0.98))
+        if largest < _ALIVE:
+            return None, "nothing flies in it: the rotors stand all the time"
+        hover = float(np.median(level[level > _OF_LARGEST * largest]))
+        carrying = level > _OF_HOVER * hover
+        told = f"the rotors below {100 * _OF_HOVER:.0f} % of their level at hover"
+        if rate is not None and carrying.any():
+            # In free fall and in flips rotors idle too, but then the vehicle turns.
+            window = max(1, round(_SHORT_S / period))
+            turns = np.sqrt(np.convolve(rate**2, np.ones(window) / window, mode="same"))
+            lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
+            first, last = np.flatnonzero(carrying)[[0, -1]]
+            carrying[first:last] |= ((level > _ALIVE) & lively)[first:last]
+            told += ", and hardly any turning"
+        turning = _smoothed(carrying, period)
+        if height is None or not turning.any() or turning.all():
+            return turning, told
+        return _off_the_ground(turning, height, period), told + ", or no height"
+    if height is not None and float(np.ptp(height)) > 2 * _LEAST_HEIGHT:
+        ground = float(np.quantile(height, 0.02))
+        above = height - ground > max(_LEAST_HEIGHT, _OF_HEIGHT * float(np.ptp(height)))
+        starts_there = abs(float(np.median(height[: max(1, round(_SHORT_S / period))])) - ground) < _LEAST_HEIGHT
+        return (_smoothed(above, period) if starts_there else np.ones(len(height), dtype=bool)), "no height"
+    if rate is None:
+        return None, "no rotors, no height and no rates are recognised, so a flight cannot be told from a stand"
+    quiet = _quiet(rate, period)
+    return ~quiet, "no turning at all"
+
+
+def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArray:
+    """Take away what turns its rotors on the ground that it stands on before."""
+    first = int(np.argmax(turning))
+    if first < _SHORT_S / period:
+        return turning
+    ground = float(np.median(height[max(0, first - round(1 / period)) : first]))
+    highest = float(np.quantile(np.abs(height - ground)[turning], 0.95))
+    if highest < 2 * _LEAST_HEIGHT:
+        return turning
+    risen = np.abs(height - ground) > max(_LEAST_HEIGHT, _OF_HEIGHT * highest)
+    numbers, _ = label(turning)
+    off = np.zeros_like(turning)
+    # Between the first and the last moment above it a flight may well come down to the height of its ground.
+    for (stretch,) in find_objects(numbers):
+        high = np.flatnonzero(risen[stretch])
+        if len(high):
+            off[stretch.start + high[0] : stretch.start + high[-1] + 1] = True
+    return _smoothed(off, period)
+
+
+def _quiet(rate: Array, period: float) -> BoolArray:
+    window = max(1, round(_SHORT_S / period))
+    level = np.sqrt(np.convolve(rate**2, np.ones(window) / window, mode="same"))
+    return np.asarray(level < max(_STILL_RAD_S, 0.05 * float(np.quantile(level, 0.9))), dtype=bool)
+
+
+def _smoothed(marked: BoolArray, period: float) -> BoolArray:
+    """Fill short pauses, then drop short stretches."""
+    width = max(1, round(_SHORT_S / period))
+    around = np.pad(marked, width, mode="edge")
+    window = np.ones(width, dtype=np.bool_)
+    return np.asarray(binary_opening(binary_closing(around, window), window)[width:-width], dtype=np.bool_)
+
+
+def _still(active: BoolArray, height: Array | None, rate: Array | None) -> bool:
+    moves = height is not None and float(np.ptp(height[active])) > _STILL_M
+    if rate is None:
+        return height is not None and not moves
+    turning = float(np.sqrt(np.mean(rate[active] ** 2)))
+    return turning < _STILL_RAD_S or (turning < _SOFT_RAD_S and height is not None and not moves)
+
+
+def _longest(time: Array, active: BoolArray, told: str, level: Array | None) -> Flown:
+    numbers, count = label(active)
+    stretches = [np.flatnonzero(numbers == number) for number in range(1, count + 1)]
+    longest = max(stretches, key=len)
+    begin, end = float(time[longest[0]]), float(time[longest[-1]])
+    margin = min(_MARGIN_S, (end - begin) / 10)
+    reasons = []
+    if longest[0] > 0:
+        begin += margin
+        reasons.append(f"the first {begin:.1f} s are cut: {_how(level, slice(0, longest[0]), told)}")
+    if longest[-1] < len(time) - 1:
+        end -= margin
+        last = float(time[-1]) - end
+        reasons.append(f"the last {last:.1f} s are cut: {_how(level, slice(longest[-1] + 1, None), told)}")
+    others = [(float(time[part[0]]), float(time[part[-1]])) for part in stretches if part is not longest]
+    if others:
+        words = ", ".join(f"{a:.1f} to {b:.1f} s" for a, b in others)
+        reasons.append(f"it flies again at {words}; import.crop_s takes one stretch, the longest")
+    whole = not reasons or (longest[0] == 0 and longest[-1] == len(time) - 1)
+    return Flown(None if whole else (round(begin, 2), round(end, 2)), tuple(reasons))
+
+
+def _how(level: Array | None, part: slice, told: str) -> str:
+    if level is None:
+        return told
+    return "the rotors stand" if float(np.quantile(np.nan_to_num(level)[part], 0.9)) < _ALIVE else told

@@ -1,0 +1,199 @@
+"""Columns of a log of any kind by name, each on its own clock and all on one, and the column that is its clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final, get_args
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.nameless import nameless_clock
+from cpfls_cli.flightlog.names import Named
+from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL, SignalName
+from cpfls_cli.flightlog.topics import STAMP, Topics
+from cpfls_cli.units import KNOWN_UNITS, UnitName
+
+_TIME_NAMES = ("t", "time", "time_s", "timestamp", "time_us", "timeus", "time_ms", "stamp", "tick", "seconds", "sec")
+_TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")
+_STEPS_S = (2e-4, 0.5)
+_SEVERAL = 3.0
+_SLOWEST_HZ = 0.5
+_FEWEST_SAMPLES = 20
+_GRID_HZ = 100.0
+
+
+class LogTable:
+    """Columns of a log by name, each on its own clock, and all of them on one."""
+
+    def __init__(self, topics: Topics, units: Mapping[str, str]) -> None:
+        self.topics, self.units = topics, units
+        self.flat = set(topics) == {""}
+        self.names = tuple(
+            f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields
+        )
+        if self.flat and max(map(len, topics[""].values()), default=0) < _FEWEST_SAMPLES:
+            raise InputError(
+                f"holds only {max(map(len, topics[''].values()), default=0)} samples, too few for a flight"
+            )
+        self.time_column, self.time_unit = _flat_time(topics[""], units) if self.flat else ("", "s")
+        self.grid = np.empty(0)
+
+    def parts(self, column: str) -> tuple[str, str]:
+        """Split a column into topic and field."""
+        if self.flat:
+            return "", column
+        topic, _, name = column.partition(".")
+        return topic, name
+
+    def clock(self, topic: str) -> Array:
+        """Stamps of a topic, s."""
+        if self.flat:
+            factor = 1.0 if self.time_column in self.units else _TIME_UNITS[self.time_unit]
+            return np.asarray(self.topics[""][self.time_column] * factor, dtype=float)
+        return np.asarray(self.topics[topic].get(STAMP, np.empty(0)), dtype=float)
+
+    def values(self, columns: Sequence[str]) -> tuple[Array, Array]:
+        """Stamps and values of columns, rows without a value left out; all on the clock of the first one's topic."""
+        topic = self.parts(columns[0])[0]
+        if all(self.parts(column)[0] == topic for column in columns):
+            return self._of_topic(topic, columns)
+        clocks = [self.values((column,)) for column in columns]
+        time = clocks[0][0]
+        if not all(len(own) for own, _ in clocks):
+            return np.empty(0), np.empty((0, len(columns)))
+        return time, np.column_stack([np.interp(time, own, values[:, 0]) for own, values in clocks])
+
+    def _of_topic(self, topic: str, columns: Sequence[str]) -> tuple[Array, Array]:
+        time = self.clock(topic)
+        rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
+        if len(rows) != len(time):
+            return np.empty(0), np.empty((0, len(columns)))
+        known = np.isfinite(rows).all(axis=1) & np.isfinite(time)
+        highest = np.maximum.accumulate(np.where(known, time, -np.inf))
+        known[1:] &= time[1:] > highest[:-1]
+        return time[known], rows[known]
+
+    def without_spikes(self, columns: Sequence[str]) -> Array:
+        """Values of columns, each the median of five neighbours: what rotors do takes longer."""
+        return np.asarray(median_filter(self.values(columns)[1], size=(5, 1)), dtype=float)
+
+    def on_grid(self, columns: Sequence[str], *, spikes: bool = True) -> Array:
+        """Columns on the one clock; at its ends the nearest value."""
+        time, values = self.values(columns)
+        values = values if spikes else self.without_spikes(columns)
+        return np.column_stack([np.interp(self.grid, time, column) for column in values.T])
+
+    def rate_hz(self, columns: Sequence[str]) -> float:
+        """Median rate of the topic of a column."""
+        time, _ = self.values(columns[:1])
+        return 1 / float(np.median(np.diff(time))) if len(time) > 2 else 0.0
+
+
+def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str]:
+    """Find the column of stamps: it never falls, and its name or its steps say what it counts.
+
+    Raises
+    ------
+    InputError
+        If no column can be one.
+    """
+    rising = [name for name, values in fields.items() if _rises(np.asarray(values, dtype=float))]
+    rising.sort(key=lambda name: (_time_rank(name), list(fields).index(name)))
+    for name in rising:
+        if _time_rank(name) > 2:
+            break
+        step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
+        if name in units:
+            return name, "s"
+        stated = [unit for unit in ("ns", "us", "ms") if name.lower().endswith(unit)]
+        fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
+        if stated or fitting:
+            return name, (stated or fitting)[0]
+    clock = nameless_clock(fields)
+    if clock is not None:
+        return clock, "s"
+    raise InputError(
+        "no column of time stamps is recognised: one that rises from row to row and is called t, time or timestamp;"
+        " rename it, or write the config by hand (`cpfls config` prints every key)"
+    )
+
+
+def _time_rank(name: str) -> int:
+    lower = name.lower().strip()
+    if lower in _TIME_NAMES:
+        return _TIME_NAMES.index(lower) > 1
+    return 2 if "time" in lower or "stamp" in lower else 3
+
+
+def _rises(values: Array) -> bool:
+    known = values[np.isfinite(values)]
+    enough = len(known) > 2 and len(known) > 0.5 * len(values)
+    return enough and bool((np.diff(known) >= 0).all() and np.ptp(known) > 0)
+
+
+def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalName, list[Named]]:
+    """Keep what has enough values that change, by signal."""
+    kept: dict[SignalName, list[Named]] = {}
+    for candidate in candidates:
+        named = _in_stated_unit(log, candidate)
+        time, values = log.values(named.group.columns)
+        if named.signal in ROTORS and len(time) < _FEWEST_SAMPLES:
+            # Outputs that are not there hold no numbers.
+            named = _with_values(log, named)
+            time, values = log.values(named.group.columns)
+        if len(time) < _FEWEST_SAMPLES or log.rate_hz(named.group.columns) < _SLOWEST_HZ:
+            continue
+        if float(np.ptp(values, axis=0).max()) > 0:
+            kept.setdefault(named.signal, []).append(named)
+    for found in kept.values():
+        found.sort(key=lambda named: _too_slow(log, named, found))
+    return kept
+
+
+def _too_slow(log: LogTable, named: Named, others: Sequence[Named]) -> bool:
+    """Tell whether columns that the same kind of log is known for come several times as often."""
+    rates = [log.rate_hz(other.group.columns) for other in others if other.known and named.known]
+    return bool(rates) and log.rate_hz(named.group.columns) * _SEVERAL < max(rates)
+
+
+def refuse_dead_rotors(log: LogTable, named: Sequence[Named], candidates: Mapping[SignalName, Sequence[Named]]) -> None:
+    """Refuse a log whose rotors are all logged and never change: it is of a vehicle on the ground."""
+    if any(name in candidates for name in ROTORS):
+        return
+    dead = next((n for n in named if n.signal in ROTORS and len(log.values(n.group.columns[:1])[0])), None)
+    if dead is not None:
+        raise InputError(f"nothing flies in it: the rotors ({dead.group.pattern}) never change")
+
+
+def _with_values(log: LogTable, named: Named) -> Named:
+    columns = tuple(c for c in named.group.columns if len(log.values((c,))[0]) >= _FEWEST_SAMPLES)
+    return replace(named, group=replace(named.group, columns=columns or named.group.columns))
+
+
+def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -> None:
+    """Lay one uniform clock over all signals of motion and rotors."""
+    chosen = [found[0] for name, found in candidates.items() if name != "voltage"] or [
+        found[0] for found in candidates.values()
+    ]
+    clocks = [log.values(named.group.columns[:1])[0] for named in chosen]
+    rate = min(_GRID_HZ, max(1 / float(np.median(np.diff(clock))) for clock in clocks))
+    begin, end = min(float(clock[0]) for clock in clocks), max(float(clock[-1]) for clock in clocks)
+    if end - begin < 2.0:
+        raise InputError(f"holds only {end - begin:.2g} s; a flight to learn from has ten or more")
+    log.grid = np.arange(begin, end, 1 / rate)
+
+
+def _in_stated_unit(log: LogTable, named: Named) -> Named:
+    """Let the unit that a log states win over the one that its kind is known for."""
+    stated = log.units.get(named.group.columns[0], "")
+    kinds = UNITS_OF_SIGNAL[named.signal]
+    # Pulses in us are no time: their range makes them shares.
+    unit = next((known for known in get_args(UnitName) if known == stated and known != "us"), None)
+    if unit is None or KNOWN_UNITS[unit].si not in kinds:
+        return named
+    return replace(named, unit=unit, scale=1.0)

@@ -1,0 +1,176 @@
+"""Columns of a matrix that bear numbers and no names, recognised by how they move together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from scipy.constants import g as standard_gravity
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.flightlog.agreement import (
+    SLOW_HZ,
+    first_derivative,
+    fit_axes,
+    fit_rates,
+    on_clock,
+    rotations_of,
+    second_derivative,
+    slow,
+)
+from cpfls_cli.flightlog.names import ColumnGroup, Named
+from cpfls_cli.flightlog.settings import SignalName
+
+_FEWEST_COLUMNS = 12
+_STEPS_S = (2e-4, 0.2)
+_EVEN = 0.05
+_UNIT_LENGTH = 0.02
+_FOLLOWS = 0.8
+_NEAR = 1.3
+_SLOWEST_ROTOR, _ALIKE = 50.0, 1.3
+_SIZE = 0.1
+_RATE_HZ = 100.0
+OF_A_MATRIX: Final = "a matrix without names"
+
+
+def nameless_clock(columns: Mapping[str, Array]) -> str | None:
+    """Find the column of a matrix without names that counts seconds in even steps."""
+    for name in _of_matrix(columns):
+        values = np.asarray(columns[name], dtype=float)
+        steps = np.diff(values[np.isfinite(values)])
+        if len(steps) < 2 or steps.min() <= 0:
+            continue
+        step = float(np.median(steps))
+        if _STEPS_S[0] <= step <= _STEPS_S[1] and float(np.abs(steps - step).mean()) < _EVEN * step:
+            return name
+    return None
+
+
+def _of_matrix(columns: Mapping[str, Array]) -> list[str]:
+    """List the columns of the widest matrix, ``name[0]`` and on, in their order; none where it is narrow."""
+    wide: dict[str, list[str]] = {}
+    for name in columns:
+        if name.endswith("]"):
+            wide.setdefault(name.rpartition("[")[0], []).append(name)
+    longest = max(wide.values(), key=len, default=[])
+    return longest if len(longest) >= _FEWEST_COLUMNS else []
+
+
+def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, ...]:
+    """Find attitude, rates, accelerometer, position, velocity and rotors among columns without names.
+
+    An attitude is four neighbours of length 1, and what its derivative explains are the rates; gravity tells the
+    accelerometer, a derivative the velocity, in the axes of the world or of the body, and four large and like numbers
+    are rotors. Without an attitude nothing is found.
+
+    Parameters
+    ----------
+    time : array, shape (sample,), s
+    """
+    names = _of_matrix(columns)
+    every = max(1, round(1 / (_RATE_HZ * float(np.median(np.diff(time)))))) if len(time) > 2 else 1
+    table = np.column_stack([np.asarray(columns[name], dtype=float)[::every] for name in names]) if names else None
+    if table is None or not np.isfinite(table).all():
+        return ()
+    grid = np.arange(time[0], time[-1], every * float(np.median(np.diff(time))))[: len(table)]
+    table = table[: len(grid)]
+    return tuple(_Matrix(names, table, time[::every][: len(grid)], grid).signals())
+
+
+class _Matrix:
+    """The table, and which of its columns are taken."""
+
+    def __init__(self, names: Sequence[str], table: Array, time: Array, grid: Array) -> None:
+        self.names, self.table, self.grid, self.time = names, table, grid, time
+        self.rate_hz = 1 / float(grid[1] - grid[0])
+        self.taken: set[int] = set()
+        self.carried: tuple[float, ...] = (standard_gravity,)
+
+    def runs(self, length: int) -> Iterator[tuple[int, Array]]:
+        """Go through the runs of neighbours of which none is taken."""
+        for first in range(self.table.shape[1] - length + 1):
+            if not self.taken & set(range(first, first + length)):
+                values = self.table[:, first : first + length]
+                if float(np.ptp(values, axis=0).min()) > 0:
+                    yield first, values
+
+    def take(self, signal: SignalName, first: int, length: int) -> Named:
+        """Take neighbours for a signal."""
+        self.taken |= set(range(first, first + length))
+        columns = tuple(self.names[first : first + length])
+        pattern = f"columns {columns[0]} to {columns[-1]}"
+        return Named(signal, ColumnGroup(pattern, "numbers", columns), 0.0, known=OF_A_MATRIX)
+
+    def signals(self) -> Iterator[Named]:
+        attitude = self._attitude()
+        if attitude is None:
+            return
+        first, rotation, rates = attitude
+        yield self.take("quaternion", first, 4)
+        yield self.take("body_rate", rates, 3)
+        yield from self._places(rotation)
+        sensed = self._accelerometer()
+        if sensed is not None:
+            yield self.take("acceleration", sensed, 3)
+        rotors = next((f for f, v in self.runs(4) if _like_rotors(v)), None)
+        if rotors is not None:
+            yield self.take("rotor_speed", rotors, 4)
+
+    def _attitude(self) -> tuple[int, Rotation, int] | None:
+        """Find the quaternion whose derivative explains three other columns best."""
+        best: tuple[float, int, Rotation, int] | None = None
+        for first, values in self.runs(4):
+            if float(np.quantile(np.abs(np.linalg.norm(values, axis=1) - 1), 0.95)) > _UNIT_LENGTH:
+                continue
+            for key in (("xyzw", False), ("wxyz", False), ("xyzw", True), ("wxyz", True)):
+                rotation = on_clock(rotations_of(values, *key), self.time, self.grid)
+                for rates, measured in self.runs(3):
+                    fit = fit_rates(rotation, measured, self.rate_hz)
+                    apart = rates + 3 <= first or rates >= first + 4
+                    if apart and fit is not None and fit.as_named > max(_FOLLOWS, best[0] if best else 0.0):
+                        best = (fit.as_named, first, rotation, rates)
+        return None if best is None else best[1:]
+
+    def _places(self, rotation: Rotation) -> Iterator[Named]:
+        """Find three columns whose derivative, as it is or turned into the body, three others are."""
+        best: tuple[float, int, int] | None = None
+        for place, values in self.runs(3):
+            derived = first_derivative(values, self.rate_hz)
+            turned = rotation.inv().apply(derived)
+            for speed, measured in self.runs(3):
+                if abs(speed - place) < 3:
+                    continue
+                own = slow(measured, self.rate_hz, SLOW_HZ)
+                for reference in (derived, turned):
+                    fit = fit_axes(slow(reference, self.rate_hz, SLOW_HZ), own)
+                    near = 1 / _NEAR < fit.gain < _NEAR
+                    if near and fit.as_named > max(_FOLLOWS, best[0] if best else 0.0):
+                        best = (fit.as_named, place, speed)
+        if best is not None:
+            self.carried = self._sizes(best[1])
+            yield self.take("position", best[1], 3)
+            yield self.take("velocity", best[2], 3)
+
+    def _sizes(self, place: int) -> tuple[float, ...]:
+        """Give the usual size of what carries the vehicle, z of the position upward and downward."""
+        moving = second_derivative(self.table[:, place : place + 3], self.rate_hz)
+        sizes = (np.linalg.norm(moving + np.array([0.0, 0.0, up * standard_gravity]), axis=1) for up in (1.0, -1.0))
+        return tuple(float(np.median(size)) for size in sizes)
+
+    def _accelerometer(self) -> int | None:
+        """Find three columns of the size of what carries the vehicle, nearly all of it in the third."""
+        best: tuple[float, int] | None = None
+        for first, values in self.runs(3):
+            middle = np.median(np.abs(values), axis=0)
+            size = float(np.median(np.linalg.norm(values, axis=1)))
+            off = min(abs(size / own - 1) for own in self.carried)
+            if middle[:2].max() < 0.3 * middle[2] and off < (best[0] if best else _SIZE):
+                best = (off, first)
+        return None if best is None else best[1]
+
+
+def _like_rotors(values: Array) -> bool:
+    middle = np.median(values, axis=0)
+    return bool(values.min() >= 0 and middle.min() > _SLOWEST_ROTOR and middle.max() < _ALIKE * middle.min())

@@ -1,0 +1,389 @@
+"""One proposal for several logs of one vehicle: the same signals for all, what differs, and the vehicle itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from math import ceil, floor, log10
+from typing import Final
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.airframe import Airframe, Parameters, stated_airframe, thrust_number, usual_airframe
+from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition
+from cpfls_cli.flightlog.recognition import recognise
+from cpfls_cli.flightlog.settings import ColumnMap, SignalMap, SignalName
+from cpfls_cli.flightlog.topics import Topics
+from cpfls_cli.units import UnitName, known_unit
+
+_SURENESS: Final = ("data", "named", "guess")
+_SAME_PLACE_M = 0.005
+_WORTH_IT = 0.8
+"""Share of every flight that a stretch common to all logs has to keep."""
+
+_STEPS_BRIDGED = 2.5
+_WAY: Final = {1: "counter-clockwise", -1: "clockwise", 0: "?"}
+_LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
+_ROOM = 1.2
+_PROPELLERS = (0.003, 0.2)
+_MULTIROTORS: Final = (2, 13, 14, 15, 29)
+"""MAV_TYPE: quadrotor, hexarotor, octorotor, tricopter, dodecarotor."""
+
+_NOTED: Final = ("SYS_AUTOSTART", "MPC_THR_HOVER", "THR_MDL_FAC", "MOT_THST_HOVER", "MOT_THST_EXPO", "MOT_SPIN_MIN")
+
+
+@dataclass(frozen=True)
+class KnownLog:
+    """A log and what it is taken for.
+
+    Attributes
+    ----------
+    name : str
+        For messages.
+    parameters : mapping
+        That it states.
+    system : str
+        What wrote it; empty where that is not known.
+    columns : frozenset of str
+        Names of all of its columns.
+    """
+
+    name: str
+    recognition: Recognition
+    parameters: Parameters
+    system: str
+    columns: frozenset[str]
+
+
+def known_log(name: str, topics: Topics, units: Mapping[str, str], parameters: Parameters, system: str) -> KnownLog:
+    """Recognise a log, as its reader gives it.
+
+    Raises
+    ------
+    InputError
+        See `recognise`.
+    """
+    columns = (f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields)
+    recognition = recognise(topics, units, parameters, system)
+    return KnownLog(name, recognition, parameters, system, frozenset(columns))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proposal:
+    """What a config is to say of logs and their vehicle.
+
+    Attributes
+    ----------
+    logs : tuple of KnownLog
+        The first one leads.
+    time_column, time_unit : str or None, str
+        The clock of all of them; None for that of each log's fastest topic.
+    signals, choices : tuple
+        That hold for all of them.
+    crop_s : tuple of float or None
+        That suits all logs; None where none is to be cut, or none suits all.
+    crops : mapping from str to tuple of float or None
+        Of each log.
+    gap_s : float
+        Longest step that has to be bridged, s.
+    airframe : Airframe or None
+        None where neither parameters nor motion tell the rotors.
+    rotors : int
+        Number of rotors; 0 where no columns are theirs.
+    speed_max : float
+        Round number above the largest rotor speed, rad/s.
+    facts : tuple of str
+        That the logs state beside.
+    warnings : tuple of str
+    """
+
+    logs: tuple[KnownLog, ...]
+    time_column: str | None
+    time_unit: str
+    signals: tuple[Guess, ...]
+    choices: tuple[Choice, ...]
+    crop_s: tuple[float, float] | None
+    crops: Mapping[str, tuple[float, float] | None]
+    gap_s: float
+    airframe: Airframe | None
+    rotors: int
+    speed_max: float
+    facts: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def first(self) -> Recognition:
+        """What the first log is taken for."""
+        return self.logs[0].recognition
+
+    @property
+    def states_torque(self) -> bool:
+        """Whether a torque of the log takes the place of rotors."""
+        return any(guess.signal == "body_torque" for guess in self.signals)
+
+    @property
+    def share_of_speed(self) -> bool:
+        """Whether the rotors are told by commands that are shares alone."""
+        names = {guess.signal: guess for guess in self.signals}
+        command = names.get("rotor_command")
+        return "rotor_speed" not in names and command is not None and command.columns.unit == "1"
+
+
+def propose(logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None) -> Proposal:
+    """Make one proposal of what each of several logs is taken for.
+
+    Parameters
+    ----------
+    logs : sequence of KnownLog
+        One at least.
+    mass_kg : float or None
+        None: not known.
+    arm_m : float or None
+        From the middle of the vehicle to a rotor, m; None: not known.
+
+    Raises
+    ------
+    InputError
+        If the logs are of two vehicles, of something else than a multirotor, or no mapping suits them all; or if the
+        rotors that are stated cannot turn a vehicle.
+    """
+    for one in logs:
+        _require_multirotor(one)
+    for other in logs[1:]:
+        _require_same_vehicle(logs[0], other)
+    signals, slowest = _without_slow_voltage(logs, _merged_signals(logs))
+    if mass_kg is not None and arm_m is not None:
+        signals = tuple(_by_weight(guess, logs[0].recognition.speeds, mass_kg, arm_m) for guess in signals)
+    airframe, doubts = _airframe(logs)
+    if airframe is not None and arm_m is not None:
+        airframe = airframe.with_arm(arm_m)
+    crop, crops = _crops(logs)
+    warnings = [f"{one.name}: {warning}" for one in logs for warning in one.recognition.warnings]
+    return Proposal(
+        logs=tuple(logs),
+        time_column=_time_column(logs),
+        time_unit=logs[0].recognition.time_unit,
+        signals=signals,
+        choices=_merged_choices(logs),
+        crop_s=crop,
+        crops=crops,
+        gap_s=max(_LEAST_GAP_S, _rounded_up(_STEPS_BRIDGED * slowest)),
+        airframe=airframe,
+        rotors=len(airframe.rotors) if airframe else max(one.recognition.rotors for one in logs),
+        speed_max=_speed_max(logs, signals),
+        facts=tuple(_facts(logs[0])),
+        warnings=tuple(dict.fromkeys((*warnings, *doubts))),
+    )
+
+
+def _require_multirotor(one: KnownLog) -> None:
+    kind = one.parameters.get("MAV_TYPE")
+    if kind is not None and int(float(kind)) not in _MULTIROTORS:
+        raise InputError(f"{one.name}: MAV_TYPE = {int(float(kind))} in its parameters is no multirotor")
+
+
+def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
+    """Refuse two logs whose parameters, systems or rotors say that they are of two vehicles.
+
+    Raises
+    ------
+    InputError
+    """
+    differing = []
+    names = [one.system.partition(" ")[0] for one in (first, other)]
+    if names[0] != names[1]:
+        differing.append(f"written by {names[0] or 'something unknown'} and {names[1] or 'something unknown'}")
+    for key in sorted(first.parameters.keys() & other.parameters.keys()):
+        if key.startswith(("CA_ROTOR", "FRAME_", "SYS_AUTOSTART", "CA_AIRFRAME")) and not key.endswith(
+            ("_CT", "_SLEW")
+        ):
+            values = first.parameters[key], other.parameters[key]
+            if values[0] != values[1]:
+                differing.append(f"{key} {_plain(values[0])} and {_plain(values[1])}")
+    counts = first.recognition.rotors, other.recognition.rotors
+    if counts[0] != counts[1] and 0 not in counts:
+        differing.append(f"{counts[0]} and {counts[1]} rotors")
+    moved = [one.recognition.moved for one in (first, other)]
+    if all(found is not None and found.clear for found in moved):
+        orders = [[(r.name, r.spin) for r in found.airframe.rotors] for found in moved if found is not None]
+        if orders[0] != orders[1]:
+            differing.append("by their motion the rotors are numbered or turn differently")
+    if differing:
+        shown = "; ".join(differing[:3])
+        raise InputError(
+            f"{first.name} and {other.name} are of two vehicles ({shown}): run cpfls init for each of them"
+        )
+
+
+def _time_column(logs: Sequence[KnownLog]) -> str | None:
+    """Give the clock that suits all logs.
+
+    Raises
+    ------
+    InputError
+        If flat logs have stamps of other names or units.
+    """
+    first = logs[0]
+    if all(first.recognition.time_column in one.columns for one in logs):
+        wrong = [one for one in logs if one.recognition.time_unit != first.recognition.time_unit]
+    else:
+        # Every topic has stamps of its own.
+        wrong = [one for one in logs if "." not in one.recognition.time_column]
+        if not wrong:
+            return None
+    if wrong:
+        clocks = [f"{one.recognition.time_column} in {one.recognition.time_unit}" for one in (first, wrong[-1])]
+        raise InputError(
+            f"{first.name} and {wrong[-1].name}: the stamps are {clocks[0]} and {clocks[1]}, so one config cannot suit"
+            " both: run cpfls init for each of them"
+        )
+    return first.recognition.time_column
+
+
+def _merged_signals(logs: Sequence[KnownLog]) -> tuple[Guess, ...]:
+    merged = []
+    for name in dict.fromkeys(guess.signal for one in logs for guess in one.recognition.signals):
+        found = [(one, guess) for one in logs if (guess := one.recognition.signal(name)) is not None]
+        surest = min(found, key=lambda entry: _SURENESS.index(entry[1].sure))
+        lacking = [one for one in logs if not set(surest[1].columns.columns) <= one.columns]
+        others = {guess.columns: one.name for one, guess in found if one in lacking}
+        for one, guess in found:
+            if one not in lacking:
+                _require_same_map(name, surest, (one, guess))
+        merged.append(_standing_in(surest[1], others, [one.name for one in lacking]))
+    order = {guess.signal: number for number, guess in enumerate(logs[0].recognition.signals)}
+    return tuple(sorted(merged, key=lambda guess: order.get(guess.signal, len(order))))
+
+
+def _standing_in(guess: Guess, others: Mapping[SignalMap, str], lacking: Sequence[str]) -> Guess:
+    """Let other columns stand in where logs lack those of a guess; a signal that some lack altogether is optional."""
+    if not lacking:
+        return guess
+    maps = tuple(ColumnMap(**{each.name: getattr(own, each.name) for each in fields(ColumnMap)}) for own in others)
+    without = [name for name in lacking if name not in others.values()]
+    columns = replace(guess.columns, otherwise=maps, required=not without)
+    reason = f"{guess.reason}; {', '.join(lacking)} lacks these columns"
+    return replace(guess, columns=columns, reason=reason)
+
+
+def _require_same_map(name: SignalName, surest: tuple[KnownLog, Guess], other: tuple[KnownLog, Guess]) -> None:
+    """Refuse two maps of a signal that both logs are sure of."""
+    (first, kept), (second, guess) = surest, other
+    same = replace(kept.columns, required=True) == replace(guess.columns, required=True)
+    if same or "guess" in (guess.sure, kept.sure):
+        return
+    maps = [
+        f"{', '.join(g.columns.columns)} in {g.columns.unit} (sign {g.columns.sign or 'as logged'}) in {one.name}"
+        for one, g in (surest, other)
+    ]
+    raise InputError(
+        f"{first.name} and {second.name}: {name} is {maps[0]} and {maps[1]}, so one config cannot suit both: run cpfls"
+        " init for each of them"
+    )
+
+
+def _merged_choices(logs: Sequence[KnownLog]) -> tuple[Choice, ...]:
+    merged = []
+    for key in dict.fromkeys(choice.key for one in logs for choice in one.recognition.choices):
+        found = [(one, choice) for one in logs for choice in one.recognition.choices if choice.key == key]
+        first, kept = min(found, key=lambda entry: _SURENESS.index(entry[1].sure))
+        for one, choice in found:
+            if choice.value != kept.value and "guess" not in (choice.sure, kept.sure):
+                raise InputError(
+                    f"{first.name} and {one.name}: import.{key} would be {kept.value} for the one and {choice.value}"
+                    " for the other: run cpfls init for each of them"
+                )
+        merged.append(kept)
+    return tuple(merged)
+
+
+def _without_slow_voltage(logs: Sequence[KnownLog], signals: tuple[Guess, ...]) -> tuple[tuple[Guess, ...], float]:
+    """Leave a voltage out that would make gaps of all signals long; give the longest step of the others too."""
+    fastest = {one.name: one.recognition for one in logs}
+    slow = max(recognition.slowest_s for recognition in fastest.values())
+    others = max(recognition.slowest_but_voltage_s for recognition in fastest.values())
+    if slow > max(_SLOWEST_VOLTAGE_S, others):
+        return tuple(guess for guess in signals if guess.signal != "voltage"), others
+    return signals, slow
+
+
+def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float) -> Guess:
+    """Let the mass that rotors carry tell rad/s from rpm, where the size of their speeds does not."""
+    if guess.signal != "rotor_speed" or speeds is None or [rival.text for rival in guess.rivals] != ["unit: rpm"]:
+        return guess
+    units: tuple[UnitName, UnitName] = ("rad/s", "rpm")
+    numbers = {unit: thrust_number(mass_kg, arm_m, known_unit(unit).factor * speeds) for unit in units}
+    fitting = [unit for unit, own in numbers.items() if _PROPELLERS[0] < own < _PROPELLERS[1]]
+    if len(fitting) != 1:
+        return guess
+    columns = replace(guess.columns, unit=fitting[0])
+    reason = f"{guess.reason}; in {fitting[0]} propellers that fit the arms carry the mass at hover"
+    return replace(guess, columns=columns, reason=reason, sure="data", rivals=())
+
+
+def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
+    """Take the rotors that parameters state, else those that the motion tells, and hold the one against the other."""
+    try:
+        stated = next((found for one in logs if (found := stated_airframe(one.parameters)) is not None), None)
+    except InputError as error:
+        raise InputError(f"{logs[0].name}: {error}") from None
+    moved = [one.recognition.moved for one in logs if one.recognition.moved is not None]
+    best = max(moved, key=lambda found: (found.clear, sum(found.explained)), default=None)
+    if best is not None and best.clear and stated is None:
+        return best.airframe, []
+    four = logs[0].recognition.rotors == 4
+    taken = stated or (usual_airframe(logs[0].recognition.kind) if four else None)
+    if best is None:
+        return taken, []
+    says = f"{best.airframe.reason}: {', '.join(f'{r.name} {_WAY[r.spin]}' for r in best.airframe.rotors)}"
+    if taken is None:
+        return best.airframe, [f"where the rotors are and how they turn is a guess from {says}"]
+    orders = [[(rotor.name, rotor.spin) for rotor in found.rotors] for found in (taken, best.airframe)]
+    differ = best.clear and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
+    return taken, [f"the rotors are taken as in {taken.reason}, and others are told by {says}"] if differ else []
+
+
+def _crops(
+    logs: Sequence[KnownLog],
+) -> tuple[tuple[float, float] | None, dict[str, tuple[float, float] | None]]:
+    """Find one stretch that suits all logs; None where there is none, or nothing is to be cut."""
+    crops = {one.name: one.recognition.flown.span_s for one in logs}
+    known = [crop for crop in crops.values() if crop is not None]
+    if not known:
+        return None, crops
+    if len(logs) == 1:
+        return known[0], crops
+    begin, end = max(crop[0] for crop in known), min(crop[1] for crop in known)
+    keeps = all(end - begin >= _WORTH_IT * (crop[1] - crop[0]) for crop in known)
+    return ((begin, end) if keeps and len(known) == len(logs) else None), crops
+
+
+def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:
+    """Round up what is somewhat above the largest speed; for commands any number will do, and 1000 is taken."""
+    largest = 0.0
+    units = {guess.signal: guess.columns.unit for guess in signals}
+    unit = units.get("rotor_speed", units.get("rotor_command", "1"))
+    for one in logs:
+        if one.recognition.speeds is not None and unit != "1":
+            own = float(np.quantile(np.abs(one.recognition.speeds), 0.999))
+            guessed = one.recognition.signal("rotor_speed")
+            changed = guessed is not None and guessed.columns.unit == "rad/s" and unit == "rpm"
+            largest = max(largest, own * (known_unit("rpm").factor if changed else 1.0))
+    return _rounded_up(_ROOM * largest) if largest else 1000.0
+
+
+def _rounded_up(value: float) -> float:
+    """Round up to two digits."""
+    unit = 10.0 ** (floor(log10(value)) - 1)
+    return float(f"{ceil(value / unit - 1e-9) * unit:.6g}")
+
+
+def _facts(one: KnownLog) -> list[str]:
+    noted = [f"{key} = {_plain(one.parameters[key])}" for key in _NOTED if key in one.parameters]
+    return [*([f"written by {one.system}"] if one.system else []), *noted]
+
+
+def _plain(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"

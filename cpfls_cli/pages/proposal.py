@@ -1,0 +1,363 @@
+"""What a log is taken for: the answer of `cpfls init`, and the commented config that it writes."""
+
+from __future__ import annotations
+
+import json
+import re
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from cpfls_cli.config.load import ASK
+from cpfls_cli.flightlog.airframe import Airframe, RotorPlace
+from cpfls_cli.flightlog.proposal import Proposal
+from cpfls_cli.flightlog.recognised import Choice, Guess, Rival
+from cpfls_cli.flightlog.settings import ColumnMap
+from cpfls_cli.report.content import Block, Cell, Table, Text
+from cpfls_cli.report.numbers import number
+
+_WIDTH = 110
+_SURE: Final = {"data": "the data", "named": "its name", "guess": "a guess"}
+NOT_KNOWN: Final = {"inertia": "null", "thrust": "null", "drag": "null"}
+"""What stands for numbers that the identification of the vehicle finds."""
+
+_ORDER: Final = ("body_frame", "world_frame", "quaternion_order", "acceleration_frame", "rotor_command_is")
+_FASTEST_HZ, _RATE_HZ, _LOWPASS_HZ = 500.0, 250.0, 60.0
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What the person who asks knows.
+
+    Attributes
+    ----------
+    mass_kg, arm_m : float or None
+        None where it is not said.
+    """
+
+    mass_kg: float | None = None
+    arm_m: float | None = None
+
+
+def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
+    """List the keys of the config that only a person can fill in."""
+    keys = [] if stated.mass_kg is not None else ["vehicle.mass_kg"]
+    airframe = proposal.airframe
+    for index in range(proposal.rotors):
+        if airframe is None or not airframe.in_metres:
+            keys.append(f"vehicle.rotors.{index}.position_m")
+        if airframe is None or airframe.rotors[index].spin == 0:
+            keys.append(f"vehicle.rotors.{index}.spin")
+    return tuple(keys)
+
+
+def answer(proposal: Proposal, stated: Stated, output: str) -> Iterator[Block]:
+    """Say what every column is taken for and why, what was cut, what is asked, and what comes next."""
+    names = ", ".join(one.name for one in proposal.logs)
+    yield Text("; ".join([names, *proposal.facts]))
+    rows = [
+        _row(guess.signal, _columns(guess.columns.columns), _unit(guess.columns), guess) for guess in proposal.signals
+    ]
+    rows += [_row(choice.key, choice.value, "", choice) for choice in proposal.choices]
+    header = ("Signal or key", "Columns or value", "Unit", "Told by", "Why")
+    yield Table(
+        "signals", "What the log is taken for.", header, rows, words=frozenset(range(4)), sentences=frozenset({4})
+    )
+    for entry, rival in _rivals(proposal):
+        yield Text(f"{entry}: the data cannot rule out {rival.text}: {rival.reason}", "warning")
+    for one in proposal.logs:
+        prefix = f"{one.name}: " if len(proposal.logs) > 1 else ""
+        reasons = one.recognition.flown.reasons or ("all of it is flown, nothing is cut",)
+        yield from (Text(f"{prefix}{reason}") for reason in reasons)
+        yield from (Text(f"{prefix}not mapped: {words}", "note") for words in one.recognition.left_out)
+    yield Text(_rotors_in_words(proposal))
+    yield from (Text(warning, "warning") for warning in proposal.warnings)
+    yield from _what_next(proposal, stated, output)
+
+
+def _row(name: str, value: str, unit: str, entry: Guess | Choice) -> list[str | Cell]:
+    return [name, value, unit, Cell(_SURE[entry.sure], "warning" if entry.sure == "guess" else "plain"), entry.reason]
+
+
+def _columns(columns: Sequence[str]) -> str:
+    return ", ".join(columns)
+
+
+def _unit(columns: ColumnMap) -> str:
+    scale = "" if columns.scale == 1.0 else f" x {number(columns.scale, 4)}"
+    offset = "" if columns.offset == 0.0 else f" {'+' if columns.offset > 0 else '-'} {number(abs(columns.offset), 4)}"
+    sign = "" if columns.sign is None else f", sign {' '.join('+' if s > 0 else '-' for s in columns.sign)}"
+    return f"{columns.unit}{scale}{offset}{sign}"
+
+
+def _rivals(proposal: Proposal) -> Iterator[tuple[str, Rival]]:
+    for guess in proposal.signals:
+        yield from ((guess.signal, rival) for rival in guess.rivals)
+    for choice in proposal.choices:
+        yield from ((choice.key, rival) for rival in choice.rivals)
+
+
+def _rotors_in_words(proposal: Proposal) -> str:
+    if proposal.states_torque:
+        return "the log states a torque and no rotors"
+    if not proposal.rotors:
+        return "no column is recognised as a rotor's, so nothing here drives a model of the vehicle"
+    if proposal.airframe is None:
+        unknown = "neither parameters nor the motion say where they are; a livelier log beside this one may"
+        return f"{proposal.rotors} rotors; {unknown}"
+    places = ", ".join(
+        f"{index} {rotor.name or 'at its place'} {_turning(rotor)}".replace("  ", " ")
+        for index, rotor in enumerate(proposal.airframe.rotors, start=1)
+    )
+    return f"rotors: {places} ({proposal.airframe.reason})"
+
+
+def _turning(rotor: RotorPlace) -> str:
+    return {1: "counter-clockwise", -1: "clockwise", 0: "turning an unknown way"}[rotor.spin]
+
+
+def _what_next(proposal: Proposal, stated: Stated, output: str) -> Iterator[Text]:
+    asked = asked_keys(proposal, stated)
+    if asked:
+        yield Text(f"to be filled in by hand, marked {ASK} in {output}: {', '.join(asked)}", "warning")
+    log = proposal.logs[0].name
+    yield Text(f"next: cpfls import {output} {log} -o flight.h5")
+    if proposal.rotors:
+        yield Text(f"then: cpfls vehicle {output} flight.h5 -o vehicle.h5")
+
+
+def summary(proposal: Proposal, stated: Stated, output: str) -> dict[str, Any]:
+    """Give the proposal for machines."""
+    return {
+        "output": output,
+        "logs": [one.name for one in proposal.logs],
+        "systems": [one.system for one in proposal.logs],
+        "time_column": proposal.time_column,
+        "time_unit": proposal.time_unit,
+        "signals": {guess.signal: {**_map(guess.columns), **_grounds(guess)} for guess in proposal.signals},
+        "choices": {choice.key: {"value": choice.value, **_grounds(choice)} for choice in proposal.choices},
+        "crop_s": proposal.crop_s,
+        "crops_s": dict(proposal.crops),
+        "cut": {one.name: list(one.recognition.flown.reasons) for one in proposal.logs},
+        "left_out": {one.name: list(one.recognition.left_out) for one in proposal.logs},
+        "rotors": [
+            {"name": rotor.name, "spin": rotor.spin, "position_m": _position(rotor, proposal.airframe)}
+            for rotor in (proposal.airframe.rotors if proposal.airframe else ())
+        ],
+        "asked": list(asked_keys(proposal, stated)),
+        "warnings": list(proposal.warnings),
+    }
+
+
+def _grounds(entry: Guess | Choice) -> dict[str, Any]:
+    rivals = [{"text": rival.text, "reason": rival.reason} for rival in entry.rivals]
+    return {"told_by": entry.sure, "reason": entry.reason, "rivals": rivals}
+
+
+def _map(columns: ColumnMap) -> dict[str, Any]:
+    return {
+        "columns": list(columns.columns),
+        "unit": columns.unit,
+        "sign": None if columns.sign is None else list(columns.sign),
+        "scale": columns.scale,
+        "offset": columns.offset,
+    }
+
+
+def _position(rotor: RotorPlace, airframe: Airframe | None) -> list[float] | None:
+    if airframe is None or not airframe.in_metres:
+        return None
+    return [round(value, 6) + 0.0 for value in (*rotor.direction, rotor.height_m)]
+
+
+def config_text(proposal: Proposal, stated: Stated) -> str:
+    """Write the config, with the reason of every guess above it."""
+    names = ", ".join(one.name for one in proposal.logs)
+    lines = [
+        *_comment(f"Proposed by `cpfls init` from {names}{''.join(f'; {fact}' for fact in proposal.facts)}.", 0),
+        "# The reason of every guess stands above it; what is wrong can be changed here.",
+        "seed: 1",
+        "",
+        "vehicle:",
+        *_vehicle(proposal, stated),
+        "",
+        "import:",
+        *_import(proposal),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _vehicle(proposal: Proposal, stated: Stated) -> Iterator[str]:
+    if stated.mass_kg is None:
+        yield from _comment("In kg, as it flew, with battery: no log says it.", 2)
+    yield f"  mass_kg: {ASK if stated.mass_kg is None else _flow(stated.mass_kg)}"
+    yield from _comment("null: not known; `cpfls vehicle` finds what the flights determine.", 2)
+    yield f"  inertia_kg_m2: {NOT_KNOWN['inertia']}"
+    if proposal.share_of_speed:
+        yield from _comment(
+            "The commands are shares of the largest speed, which the log does not state: with another number here the"
+            " thrust factor comes out as another one, and the thrust as the same.",
+            2,
+        )
+    yield f"  rotor_speed_max_rad_s: {_flow(proposal.speed_max)}"
+    yield from _rotors(proposal)
+
+
+def _rotors(proposal: Proposal) -> Iterator[str]:
+    if not proposal.rotors:
+        states = "states a torque and no rotors" if proposal.states_torque else "has no columns of rotors"
+        yield from _comment(f"The log {states}: none are described here, and those of the default are of no use.", 2)
+        return
+    airframe = proposal.airframe
+    if airframe is None:
+        yield from _comment(
+            "Neither parameters nor the motion say where the rotors are: x forward, y left, z up from the centre of"
+            " mass, in m; spin 1 turns counter-clockwise seen from above, -1 clockwise.",
+            2,
+        )
+    else:
+        yield from _comment(f"Told by {airframe.reason}.", 2)
+        if airframe.moment_ratio_m:
+            yield from _comment(
+                f"The parameters state a drag factor of {number(airframe.moment_ratio_m, 3)} m times the thrust factor;"
+                " often a number that nobody measured.",
+                2,
+            )
+        if not airframe.in_metres:
+            yield from _comment(
+                "In m from the centre of mass, x forward, y left, z up; a is the distance from the middle to a rotor,"
+                " which `cpfls init --arm` fills in.",
+                2,
+            )
+    yield "  rotors:"
+    for index in range(proposal.rotors):
+        yield _rotor(None if airframe is None else airframe.rotors[index], airframe)
+
+
+def _rotor(rotor: RotorPlace | None, airframe: Airframe | None) -> str:
+    position = None if rotor is None else _position(rotor, airframe)
+    spin = ASK if rotor is None or rotor.spin == 0 else str(rotor.spin)
+    entry = (
+        f"    - {{position_m: {ASK if position is None else _flow(position)}, spin: {spin},"
+        f" thrust_factor_n_s2: {NOT_KNOWN['thrust']}, drag_factor_n_m_s2: {NOT_KNOWN['drag']}}}"
+    )
+    if rotor is None:
+        return entry
+    where = rotor.name
+    if position is None:
+        x, y = (f"{value:.3g} a" if value else "0.0" for value in rotor.direction)
+        where = f"{where}: [{x}, {y}, 0.0]"
+    return f"{entry}  # {where}" if where else entry
+
+
+def _import(proposal: Proposal) -> Iterator[str]:
+    first = proposal.first
+    yield f"  time_column: {_flow(proposal.time_column)}"
+    yield f"  time_unit: {proposal.time_unit}"
+    choices = {choice.key: choice for choice in proposal.choices}
+    for key in _ORDER:
+        if key in choices:
+            yield from _entry(choices[key].reason, choices[key].rivals, [f"  {key}: {choices[key].value}"], 2)
+    yield "  signals:"
+    for guess in proposal.signals:
+        yield from _entry(guess.reason, guess.rivals, list(_signal(guess)), 4)
+    if proposal.states_torque:
+        yield "  torque_source: column"
+    else:
+        yield from _comment(
+            "No torque is computed: `cpfls vehicle` works with the rotors. For `cpfls identify`, name rotor-speed or"
+            " rotor-command here when the factors above are numbers.",
+            2,
+        )
+        yield "  torque_source: null"
+    yield from _crop(proposal)
+    yield f"  gap_s: {_flow(proposal.gap_s)}"
+    yield "  gap_rule: longest-part"
+    if first.rate_hz > _FASTEST_HZ:
+        yield from _comment(
+            f"Logged at {first.rate_hz:.4g} Hz: the shaking of propellers is filtered away before the rate is lowered.",
+            2,
+        )
+        yield f"  rate_hz: {_flow(_RATE_HZ)}"
+        yield f"  lowpass_hz: {_flow(_LOWPASS_HZ)}"
+
+
+def _entry(reason: str, rivals: Sequence[Rival], lines: Sequence[str], indent: int) -> Iterator[str]:
+    yield from _comment(f"{reason[0].upper()}{reason[1:]}.", indent)
+    yield from lines
+    for rival in rivals:
+        yield from _comment(f"or {rival.text} ({rival.reason})", indent)
+
+
+def _signal(guess: Guess) -> Iterator[str]:
+    columns = guess.columns
+    entries = _entries(columns)
+    if not columns.required:
+        entries["required"] = False
+    line = f"    {guess.signal}: {_flow(entries)}"
+    if len(line) <= _WIDTH and not columns.otherwise:
+        yield line
+        return
+    yield f"    {guess.signal}:"
+    for key, value in entries.items():
+        yield from _long(f"      {key}: ", value)
+    if columns.otherwise:
+        yield "      otherwise:"
+        yield from (f"        - {_flow(_entries(other))}" for other in columns.otherwise)
+
+
+def _long(start: str, value: Any) -> Iterator[str]:
+    line = start + _flow(value)
+    if len(line) <= _WIDTH or not isinstance(value, list):
+        yield line
+        return
+    yield start.rstrip()
+    indent = " " * (len(start) - len(start.lstrip()) + 2)
+    yield from (f"{indent}- {_flow(item)}" for item in value)
+
+
+def _entries(columns: ColumnMap) -> dict[str, Any]:
+    entries: dict[str, Any] = {"columns": list(columns.columns), "unit": columns.unit}
+    if columns.sign is not None:
+        entries["sign"] = [int(sign) for sign in columns.sign]
+    entries |= {"scale": columns.scale} if columns.scale != 1.0 else {}
+    entries |= {"offset": columns.offset} if columns.offset != 0.0 else {}
+    return entries
+
+
+def _crop(proposal: Proposal) -> Iterator[str]:
+    alone = len(proposal.logs) == 1
+    for one in proposal.logs:
+        for reason in one.recognition.flown.reasons:
+            yield from _comment(reason if alone else f"{one.name}: {reason}", 2)
+    if proposal.crop_s is None and any(proposal.crops.values()):
+        yield from _comment("No one stretch suits all logs; each takes its own:", 2)
+        for name, crop in proposal.crops.items():
+            yield f"  # {name}: {'null' if crop is None else f'--set import.crop_s=[{crop[0]:g},{crop[1]:g}]'}"
+    yield f"  crop_s: {'null' if proposal.crop_s is None else _flow(list(proposal.crop_s))}"
+
+
+def _comment(text: str, indent: int) -> Iterator[str]:
+    start = f"{' ' * indent}# "
+    for line in textwrap.wrap(text, _WIDTH - len(start), break_long_words=False, break_on_hyphens=False):
+        yield start + line
+
+
+_PLAIN = re.compile(r"[A-Za-z_][\w./^ -]*")
+
+
+def _flow(value: Any) -> str:
+    """Write a value on one line of YAML."""
+    match value:
+        case Mapping():
+            return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
+        case list():
+            return "[" + ", ".join(_flow(item) for item in value) + "]"
+        case str():
+            plain = (
+                _PLAIN.fullmatch(value) and value.strip() == value and value.lower() not in ("true", "false", "null")
+            )
+            return value if plain else json.dumps(value, ensure_ascii=False)
+        case _:
+            return json.dumps(value)

@@ -1,0 +1,280 @@
+"""`cpfls init`: a log is looked into, a config proposed, and what only a person knows is asked for."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.builders.unknown_logs import FLIP, HUBS, flat_log, flight, named, ulog_of_flight, with_ground, write_csv
+
+MASS, ARM = "0.8", "0.16"
+
+
+@pytest.fixture(scope="module")
+def own():
+    return flight(seconds=20.0)
+
+
+@pytest.fixture
+def log(tmp_path, own):
+    return write_csv(tmp_path / "log.csv", flat_log(own))
+
+
+@pytest.fixture
+def proposed(cpfls, tmp_path):
+    """Run init, and give what it printed, what it wrote and that as data."""
+
+    def call(*words, output="study.yaml"):
+        result = cpfls("init", *words, "-o", tmp_path / output)
+        assert result.exit_code == 0, result.stderr
+        text = (tmp_path / output).read_text()
+        return result, text, yaml.safe_load(text)
+
+    return call
+
+
+def test_the_next_commands_take_what_it_wrote(cpfls, proposed, log, tmp_path):
+    proposed(log, "--mass", MASS, "--arm", ARM)
+    study, made = tmp_path / "study.yaml", tmp_path / "flight.h5"
+    imported = cpfls("import", study, log, "-o", made, "--json")
+    assert imported.exit_code == 0, imported.stderr
+    summary = json.loads(imported.stdout)
+    assert {"attitude", "body_rate", "specific_force", "position", "velocity", "rotor_speed"} <= set(summary["signals"])
+    assert summary["samples"] == 2000
+    found = cpfls("vehicle", study, made, "-o", tmp_path / "vehicle.h5", "--dry-run")
+    assert found.exit_code == 0, found.stderr
+
+
+def test_every_guess_has_its_reason_in_the_file_and_in_the_answer(proposed, log):
+    result, text, data = proposed(log, "--mass", MASS, "--arm", ARM)
+    signals = data["import"]["signals"]
+    assert signals["body_rate"] == {"columns": ["gyro_x", "gyro_y", "gyro_z"], "unit": "rad/s"}
+    assert signals["rotor_speed"]["unit"] == "rpm"
+    lines = text.splitlines()
+    for name in (*signals, *(key for key in ("body_frame", "world_frame", "acceleration_frame") if key in text)):
+        place = next(index for index, line in enumerate(lines) if line.strip().startswith(f"{name}:"))
+        assert lines[place - 1].strip().startswith("#"), name
+        assert name in result.stdout
+    assert max(len(line) for line in lines if line.lstrip().startswith("#")) <= 110
+    assert [rotor["spin"] for rotor in data["vehicle"]["rotors"]] == [spin for _, _, spin in HUBS]
+    assert [rotor["position_m"][:2] for rotor in data["vehicle"]["rotors"]] == [
+        pytest.approx([0.16 * x / np.sqrt(2), 0.16 * y / np.sqrt(2)], abs=1e-6) for x, y, _ in HUBS
+    ]
+    assert data["vehicle"]["inertia_kg_m2"] is None
+    assert {rotor["thrust_factor_n_s2"] for rotor in data["vehicle"]["rotors"]} == {None}
+
+
+def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls, proposed, refuse, log, tmp_path):
+    result, text, _ = proposed(log)
+    assert "mass_kg: ASK" in text
+    assert "front right: [0.707 a, -0.707 a, 0.0]" in text
+    asked = "vehicle.mass_kg, " + ", ".join(f"vehicle.rotors.{index}.position_m" for index in range(4))
+    assert f"to be filled in by hand, marked ASK in {tmp_path / 'study.yaml'}: {asked}" in result.stderr
+    study = tmp_path / "study.yaml"
+    sentence = (
+        f"{study}: {asked} = ASK: no log says them; write numbers in place of ASK (cpfls init --mass KG --arm M fills"
+        " in mass and arm length)"
+    )
+    for words in (
+        ("import", study, log, "-o", tmp_path / "flight.h5"),
+        ("vehicle", study, log, "-o", tmp_path / "vehicle.h5"),
+        ("trajectory", study, "-o", tmp_path / "path.h5"),
+        ("config", study),
+    ):
+        assert refuse(*words) == [sentence]
+    filled = text.replace("mass_kg: ASK", "mass_kg: 0.8").replace("position_m: ASK", "position_m: [0.1, 0.1, 0.0]")
+    study.write_text(filled)
+    assert cpfls("config", study).exit_code == 0
+    study.write_text(filled.replace("mass_kg: 0.8", "mass_kg: ASK"))
+    assert refuse("config", study) == [
+        f"{study}: vehicle.mass_kg = ASK: no log says it; write the number in place of ASK (cpfls init --mass KG"
+        " --arm M fills in mass and arm length)"
+    ]
+    assert cpfls("config", study, "--set", "vehicle.mass_kg=0.8").exit_code == 0
+
+
+def test_the_same_log_gives_the_same_file_and_never_over_another(proposed, refuse, log, tmp_path):
+    _, text, _ = proposed(log, "--mass", MASS)
+    assert refuse("init", log, "-o", tmp_path / "study.yaml") == [
+        f"{tmp_path / 'study.yaml'}: exists already; --force replaces it"
+    ]
+    assert proposed(log, "--mass", MASS, "--force")[1] == text
+
+
+def test_a_dry_run_writes_nothing(cpfls, log, tmp_path):
+    result = cpfls("init", log, "-o", tmp_path / "other.yaml", "--dry-run")
+    assert result.exit_code == 0
+    assert not (tmp_path / "other.yaml").exists()
+
+
+def test_the_answer_for_machines(proposed, log):
+    result, _, _ = proposed(log, "--json")
+    summary = json.loads(result.stdout)
+    assert summary["asked"] == ["vehicle.mass_kg", *(f"vehicle.rotors.{index}.position_m" for index in range(4))]
+    assert summary["signals"]["body_rate"]["told_by"] == "data"
+    assert summary["signals"]["body_rate"]["columns"] == ["gyro_x", "gyro_y", "gyro_z"]
+    assert summary["choices"]["body_frame"]["value"] == "FLU"
+    assert [rotor["name"] for rotor in summary["rotors"]] == ["front right", "rear left", "front left", "rear right"]
+    assert summary["crop_s"] is None
+
+
+def test_time_on_the_ground_is_cut_and_said(proposed, tmp_path, own):
+    path = write_csv(tmp_path / "ground.csv", flat_log(with_ground(own)))
+    result, text, data = proposed(path, "--mass", MASS, "--arm", ARM)
+    assert data["import"]["crop_s"] == pytest.approx([5.5, 24.5], abs=0.1)
+    assert "the first 5.5 s are cut: the rotors below 60 % of their level at hover" in result.stdout
+    assert "# the last 4.5 s are cut: the rotors stand" in text
+
+
+def test_two_guesses_that_the_data_cannot_part_are_both_listed(proposed, tmp_path, own):
+    speed = named(own.speed, "rotor1", "rotor2", "rotor3", "rotor4")
+    result, text, _ = proposed(write_csv(tmp_path / "log.csv", flat_log(own, speed=speed)))
+    assert re.search(r"# or unit: rpm \(a level of 57\d\.\d is possible in both\)", text)
+    assert "rotor_speed: the data cannot rule out unit: rpm: a level of 57" in result.stderr
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1.0, "rad/s"), (60 / (2 * np.pi), "rpm")])
+def test_mass_and_arm_part_two_units_of_speed(proposed, tmp_path, own, factor, unit):
+    # A vehicle with slow propellers, whose speeds in rpm look like those of others in rad/s.
+    slow = factor * own.speed * (1.0 if unit == "rad/s" else 0.4)
+    path = write_csv(tmp_path / "log.csv", flat_log(own, speed=named(slow, "rotor1", "rotor2", "rotor3", "rotor4")))
+    arm = ARM if unit == "rad/s" else "0.3"
+    result, _, data = proposed(path, "--mass", MASS, "--arm", arm)
+    assert data["import"]["signals"]["rotor_speed"]["unit"] == unit
+    assert "propellers that fit the arms carry the mass at hover" in result.stdout
+    assert "cannot rule out" not in result.stderr
+
+
+def test_several_logs_share_one_mapping(proposed, tmp_path, own):
+    first = write_csv(tmp_path / "one.csv", flat_log(own))
+    second = write_csv(tmp_path / "two.csv", flat_log(flight(seconds=20.0, seed=5), velocity=None))
+    _, text, data = proposed(first, second, "--mass", MASS, "--arm", ARM)
+    assert data["import"]["signals"]["velocity"]["required"] is False
+    assert data["import"]["signals"]["attitude"].get("required", True) is True
+    assert f"{second} lacks these columns" in " ".join(text.replace("#", "").split())
+
+
+def test_logs_of_two_versions_share_a_config_by_columns_that_stand_in(cpfls, proposed, tmp_path, own):
+    first, second = tmp_path / "new.ulg", tmp_path / "old.ulg"
+    first.write_bytes(ulog_of_flight(own))
+    second.write_bytes(ulog_of_flight(flight(seconds=20.0, seed=7), without="vehicle_angular_velocity"))
+    _, _, data = proposed(first, second, "--mass", MASS)
+    assert data["import"]["time_column"] is None
+    stand_in = data["import"]["signals"]["body_rate"]["otherwise"]
+    assert stand_in == [{"columns": [f"sensor_combined.gyro_rad[{axis}]" for axis in range(3)], "unit": "rad/s"}]
+    for log in (first, second):
+        result = cpfls("import", tmp_path / "study.yaml", log, "-o", tmp_path / f"{log.stem}.h5")
+        assert result.exit_code == 0, result.stderr
+
+
+def test_logs_with_clocks_of_other_names_are_refused(refuse, tmp_path, own):
+    first = write_csv(tmp_path / "one.csv", flat_log(own))
+    second = write_csv(tmp_path / "two.csv", flat_log(own, t={"time_us": 1e6 * own.time}))
+    assert refuse("init", first, second, "-o", tmp_path / "study.yaml") == [
+        f"{first} and {second}: the stamps are t in s and time_us in us, so one config cannot suit both: run cpfls init"
+        " for each of them"
+    ]
+
+
+def test_logs_that_are_cut_differently_each_get_their_own_cut(proposed, tmp_path, own):
+    first = write_csv(tmp_path / "one.csv", flat_log(with_ground(own)))
+    second = write_csv(tmp_path / "two.csv", flat_log(with_ground(own, before_s=15.0)))
+    _, text, data = proposed(first, second, "--mass", MASS, "--arm", ARM)
+    assert data["import"]["crop_s"] is None
+    assert re.search(r"two\.csv: --set import\.crop_s=\[15\.\d+,3\d\.\d+\]", text)
+
+
+def test_one_config_cannot_suit_logs_of_other_axes(refuse, tmp_path, own):
+    first = write_csv(tmp_path / "one.csv", flat_log(own))
+    turned = named(own.rate @ FLIP, "gyro_x", "gyro_y", "gyro_z")
+    second = write_csv(tmp_path / "two.csv", flat_log(own, rate=turned))
+    (line,) = refuse("init", first, second, "-o", tmp_path / "study.yaml")
+    assert line.startswith(f"{first} and {second}: ")
+    assert line.endswith("so one config cannot suit both: run cpfls init for each of them")
+
+
+def test_two_vehicles_in_one_call_are_refused(refuse, tmp_path, own):
+    first = write_csv(tmp_path / "one.csv", flat_log(own))
+    swapped = named(own.speed[:, [1, 0, 2, 3]] * 60 / (2 * np.pi), "rpm1", "rpm2", "rpm3", "rpm4")
+    second = write_csv(tmp_path / "two.csv", flat_log(own, speed=swapped))
+    assert refuse("init", first, second, "-o", tmp_path / "study.yaml") == [
+        f"{first} and {second} are of two vehicles (by their motion the rotors are numbered or turn differently):"
+        " run cpfls init for each of them"
+    ]
+
+
+def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tmp_path, own):
+    path = write_csv(tmp_path / "log.csv", flat_log(own, speed=None))
+    result, text, data = proposed(path, "--mass", MASS)
+    assert "no column is recognised as a rotor's, so nothing here drives a model of the vehicle" in result.stdout
+    assert "then: cpfls vehicle" not in result.stdout
+    assert "rotors" not in data["vehicle"]
+    assert cpfls("import", tmp_path / "study.yaml", path, "-o", tmp_path / "flight.h5").exit_code == 0
+    assert "The log has no columns of rotors" in text
+
+
+def test_rotors_that_nothing_tells_are_asked_for(proposed, tmp_path, own):
+    noise = np.random.default_rng(2).normal(500, 3, own.speed.shape)
+    speed = named(noise, "rotor1", "rotor2", "rotor3", "rotor4")
+    result, _, data = proposed(
+        write_csv(tmp_path / "log.csv", flat_log(own, speed=speed)), "--mass", MASS, "--arm", ARM
+    )
+    assert {(rotor["position_m"], rotor["spin"]) for rotor in data["vehicle"]["rotors"]} == {("ASK", "ASK")}
+    assert "4 rotors; neither parameters nor the motion say where they are" in result.stdout
+
+
+def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulog_of_flight(own))
+    result, text, data = proposed(path, "--mass", MASS)
+    signals = data["import"]["signals"]
+    assert signals["quaternion"]["columns"][0] == "vehicle_attitude.q[0]"
+    assert signals["rotor_command"]["columns"] == [f"actuator_motors.control[{index}]" for index in range(4)]
+    assert (data["import"]["body_frame"], data["import"]["world_frame"]) == ("FRD", "NED")
+    assert data["import"]["rotor_command_is"] == "thrust"
+    assert "THR_MDL_FAC is 1" in text
+    assert [rotor["spin"] for rotor in data["vehicle"]["rotors"]] == [spin for _, _, spin in HUBS]
+    assert data["vehicle"]["rotors"][0]["position_m"] == pytest.approx([0.11, -0.12, 0.0])
+    assert "marked ASK" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        (
+            {f"CA_ROTOR{index}_KM": 0.05 for index in range(4)},
+            "CA_ROTOR*_PX, _PY and the signs of _KM in the log: these 4 rotors cannot turn the vehicle about"
+            " yaw by themselves; correct the parameters in the autopilot, or state vehicle.rotors by hand",
+        ),
+        ({"MAV_TYPE": 1}, "MAV_TYPE = 1 in its parameters is no multirotor"),
+    ],
+)
+def test_parameters_that_contradict_a_multirotor_are_refused(refuse, tmp_path, own, parameters, message):
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulog_of_flight(own, **parameters))
+    assert refuse("init", path, "-o", tmp_path / "study.yaml") == [f"{path}: {message}"]
+
+
+def test_a_vehicle_of_other_parameters_is_another_vehicle(refuse, tmp_path, own):
+    first, second = tmp_path / "one.ulg", tmp_path / "two.ulg"
+    first.write_bytes(ulog_of_flight(own))
+    second.write_bytes(ulog_of_flight(own, CA_ROTOR0_PX=0.3, SYS_AUTOSTART=4002))
+    (line,) = refuse("init", first, second, "-o", tmp_path / "study.yaml")
+    assert line.startswith(f"{first} and {second} are of two vehicles (CA_ROTOR0_PX 0.11 and 0.3; ")
+    assert "SYS_AUTOSTART 4001 and 4002" in line
+
+
+def test_bad_logs_are_refused_with_one_message(refuse, tmp_path, own):
+    output = tmp_path / "study.yaml"
+    cut, text, still = tmp_path / "cut.ulg", tmp_path / "notes.txt", tmp_path / "still.csv"
+    cut.write_bytes(ulog_of_flight(own)[:12])
+    text.write_text("no log\n")
+    write_csv(still, flat_log(own, speed=named(np.zeros((2000, 4)), "cmd1", "cmd2", "cmd3", "cmd4")))
+    assert refuse("init", still, "-o", output) == [f"{still}: nothing flies in it: the rotors (cmd*) never change"]
+    assert refuse("init", tmp_path / "none.csv", "-o", output) == [f"{tmp_path / 'none.csv'}: no such file"]
+    (line,) = refuse("init", text, "-o", output)
+    assert line.startswith(f"{text}: not a log")
+    (line,) = refuse("init", cut, "-o", output)
+    assert line.startswith(f"{cut}: a broken ULog file")

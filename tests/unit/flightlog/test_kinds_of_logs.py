@@ -1,0 +1,119 @@
+"""The made-up flight as autopilots and robots write it down: topics with clocks of their own, units, parameters."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.flightlog.proposal import known_log, propose
+from tests.builders.unknown_logs import FLIP, NED, flight, named
+
+NAMES = ["front right", "rear left", "front left", "rear right"]
+
+
+@pytest.fixture(scope="module")
+def own():
+    return flight()
+
+
+def topic(own, every, columns):
+    """A topic that has a sample at every so many."""
+    return {"timestamp": own.time[::every], **{name: values[::every] for name, values in columns.items()}}
+
+
+def proposed(topics, system, parameters=None, units=None):
+    return propose([known_log("log", topics, units or {}, parameters or {}, system)], None, None)
+
+
+def maps(proposal):
+    return {guess.signal: guess.columns for guess in proposal.signals}
+
+
+def ardupilot(own):
+    turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
+    angles = np.degrees(turned.as_euler("ZYX")[:, ::-1])
+    # Outputs 5 to 8 drive the motors 1 to 4; the first four are servos.
+    pulses = np.column_stack([np.full((len(own.time), 4), 1500.0), 1000 + own.speed])
+    topics = {
+        "ATT": topic(own, 4, named(angles, "Roll", "Pitch", "Yaw")),
+        "IMU": topic(own, 1, named(own.rate @ FLIP, "GyrX", "GyrY", "GyrZ"))
+        | named(own.specific_force @ FLIP, "AccX", "AccY", "AccZ"),
+        "IMU[1]": topic(own, 1, named(own.rate @ FLIP, "GyrX", "GyrY", "GyrZ")),
+        "XKF1": topic(own, 10, named(own.position @ NED.T, "PN", "PE", "PD")),
+        "RCOU": topic(own, 2, named(pulses, *(f"C{number}" for number in range(1, 9)))),
+    }
+    for motor in range(4):
+        rpm = own.speed[:, motor] * 60 / (2 * np.pi)
+        topics[f"ESC[{motor}]" if motor else "ESC"] = topic(own, 2, {"RPM": rpm})
+    return topics
+
+
+def test_a_log_of_ardupilot_names_its_motors_by_the_functions_of_its_outputs(own):
+    functions = {f"SERVO{4 + motor}_FUNCTION": 32.0 + motor for motor in range(1, 5)}
+    parameters = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0, "MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0, **functions}
+    proposal = proposed(ardupilot(own), "ArduCopter 4.5.1", parameters, {"ATT.Roll": "deg", "IMU.GyrX": "rad/s"})
+    found = maps(proposal)
+    assert found["rotor_command"].columns == ("RCOU.C5", "RCOU.C6", "RCOU.C7", "RCOU.C8")
+    assert (found["rotor_command"].scale, found["rotor_command"].offset) == pytest.approx((1e-3, -1.0))
+    assert found["rotor_speed"].columns == ("ESC.RPM", "ESC[1].RPM", "ESC[2].RPM", "ESC[3].RPM")
+    assert found["rotor_speed"].unit == "rpm"
+    assert (found["attitude"].unit, found["body_rate"].columns[0]) == ("deg", "IMU.GyrX")
+    assert {choice.key: choice.value for choice in proposal.choices}["body_frame"] == "FRD"
+    assert [rotor.name for rotor in proposal.airframe.rotors] == NAMES
+    assert proposal.warnings == ()
+
+
+def test_parameters_that_the_motion_contradicts_are_warned_of(own):
+    swapped = ardupilot(own)
+    swapped["ESC"], swapped["ESC[1]"] = swapped["ESC[1]"], swapped["ESC"]
+    proposal = proposed(swapped, "ArduCopter 4.5.1", {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0})
+    (warning,) = proposal.warnings
+    assert warning.startswith(
+        "the rotors are taken as in FRAME_CLASS and FRAME_TYPE in the log: quad X, and others are"
+    )
+    assert "rear left counter-clockwise, front right counter-clockwise, front left clockwise" in warning
+
+
+def test_a_blackbox_log_is_known_by_its_header(own):
+    columns = {
+        "time": own.time,
+        **named(np.degrees(own.rate), *(f"gyroADC[{axis}]" for axis in range(3))),
+        **named(own.specific_force / 9.80665, *(f"accSmooth[{axis}]" for axis in range(3))),
+        **named(own.speed[:, [3, 0, 1, 2]] * 1.9 + 48, *(f"motor[{motor}]" for motor in range(4))),
+    }
+    units = {"time": "s", **{f"gyroADC[{axis}]": "deg/s" for axis in range(3)}}
+    proposal = proposed({"": columns}, "Betaflight 4.4.2", {"motorOutput": "48,1948"}, units)
+    found = maps(proposal)
+    assert (found["body_rate"].unit, found["acceleration"].unit) == ("deg/s", "g")
+    assert (found["rotor_command"].scale, found["rotor_command"].offset) == pytest.approx((1 / 1900, -48 / 1900))
+    assert [rotor.name for rotor in proposal.airframe.rotors] == [
+        "rear right",
+        "front right",
+        "rear left",
+        "front left",
+    ]
+    assert (proposal.time_column, proposal.time_unit) == ("time", "s")
+
+
+def test_messages_of_ros_are_known_by_their_fields(own):
+    scalar_last = ("orientation.x", "orientation.y", "orientation.z", "orientation.w")
+    topics = {
+        "/imu/data": topic(own, 1, named(own.rotation.as_quat(), *scalar_last))
+        | named(own.rate, *(f"angular_velocity.{axis}" for axis in "xyz"))
+        | named(own.specific_force, *(f"linear_acceleration.{axis}" for axis in "xyz")),
+        "/odom": topic(own, 2, named(own.position, *(f"pose.pose.position.{axis}" for axis in "xyz")))
+        | {
+            name: values[::2]
+            for name, values in named(
+                own.rotation.inv().apply(own.velocity), *(f"twist.twist.linear.{axis}" for axis in "xyz")
+            ).items()
+        },
+        "/motor_speed": topic(own, 2, named(own.speed, *(f"angular_velocities[{motor}]" for motor in range(4)))),
+    }
+    proposal = proposed(topics, "")
+    found = maps(proposal)
+    assert set(found) == {"quaternion", "body_rate", "acceleration", "position", "rotor_speed"}
+    assert found["rotor_speed"].columns[0] == "/motor_speed.angular_velocities[0]"
+    # The twist of an odometry is in the axes of its child, the body.
+    assert "a velocity in body axes" in proposal.first.left_out[0]
+    assert [rotor.name for rotor in proposal.airframe.rotors] == NAMES
+    assert proposal.time_column == "/imu/data.timestamp"

@@ -1,0 +1,90 @@
+"""Names of columns: which belong together, what they may be, what they are not."""
+
+import pytest
+
+from cpfls_cli.flightlog.names import column_groups, named_signals
+
+
+def first(names, signal, system=""):
+    """Columns of the best candidate for a signal; None without one."""
+    found = [named for named in named_signals(column_groups(tuple(names.split())), system) if named.signal == signal]
+    return min(found, key=lambda named: named.rank, default=None)
+
+
+@pytest.mark.parametrize(
+    ("names", "signal", "columns"),
+    [
+        ("t phi theta psi", "attitude", "phi theta psi"),
+        ("q_w q_x q_y q_z", "quaternion", "q_w q_x q_y q_z"),
+        ("qx qy qz qw", "quaternion", "qw qx qy qz"),
+        ("omega_x omega_y omega_z", "body_rate", "omega_x omega_y omega_z"),
+        ("gyro.x gyro.y gyro.z", "body_rate", "gyro.x gyro.y gyro.z"),
+        ("gyroADC[0] gyroADC[1] gyroADC[2]", "body_rate", "gyroADC[0] gyroADC[1] gyroADC[2]"),
+        ("IMU.GyrX IMU.GyrY IMU.GyrZ", "body_rate", "IMU.GyrX IMU.GyrY IMU.GyrZ"),
+        ("RATE.R RATE.P RATE.Y", "body_rate", "RATE.R RATE.P RATE.Y"),
+        ("rollspeed pitchspeed yawspeed", "body_rate", "rollspeed pitchspeed yawspeed"),
+        ("p q r", "body_rate", "p q r"),
+        ("sfx sfy sfz", "acceleration", "sfx sfy sfz"),
+        (
+            "/imu.linear_acceleration.x /imu.linear_acceleration.y /imu.linear_acceleration.z",
+            "acceleration",
+            "/imu.linear_acceleration.x /imu.linear_acceleration.y /imu.linear_acceleration.z",
+        ),
+        (
+            "stateEstimateZ_x stateEstimateZ_y stateEstimateZ_z",
+            "position",
+            "stateEstimateZ_x stateEstimateZ_y stateEstimateZ_z",
+        ),
+        ("XKF1.PN XKF1.PE XKF1.PD", "position", "XKF1.PN XKF1.PE XKF1.PD"),
+        ("vx vy vz", "velocity", "vx vy vz"),
+        ("m1_rads m2_rads m3_rads m4_rads", "rotor_speed", "m1_rads m2_rads m3_rads m4_rads"),
+        ("om1 om2 om3 om4 omcmd1 omcmd2 omcmd3 omcmd4", "rotor_speed", "om1 om2 om3 om4"),
+        ("om1 om2 om3 om4 omcmd1 omcmd2 omcmd3 omcmd4", "rotor_command", "omcmd1 omcmd2 omcmd3 omcmd4"),
+        ("pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "rotor_command", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm"),
+        ("u1 u2 u3 u4", "rotor_command", "u1 u2 u3 u4"),
+        # The first instance of a topic bears no number.
+        ("ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM", "rotor_speed", "ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM"),
+    ],
+)
+def test_columns_are_found_by_their_names(names, signal, columns):
+    assert first(names, signal).group.columns == tuple(columns.split())
+
+
+@pytest.mark.parametrize(
+    ("names", "signal"),
+    [
+        ("ctrltarget_x ctrltarget_y ctrltarget_z", "position"),
+        ("vx_r vy_r vz_r", "velocity"),
+        ("rpydx rpydy rpydz", "attitude"),
+        ("omegar_x omegar_y omegar_z", "body_rate"),
+        ("qx_poses qy_poses qz_poses qw_poses", "position"),
+        ("m1_rads2 m2_rads2 m3_rads2 m4_rads2", "rotor_speed"),
+        ("ATT.DesRoll ATT.DesPitch ATT.DesYaw", "attitude"),
+        ("gyro_bias_x gyro_bias_y gyro_bias_z", "body_rate"),
+    ],
+)
+def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
+    assert first(names, signal) is None
+
+
+def test_a_kind_of_log_knows_its_columns_before_their_words_are_read():
+    names = "vehicle_angular_velocity.xyz[0] vehicle_angular_velocity.xyz[1] vehicle_angular_velocity.xyz[2]"
+    named = first(f"{names} sensor_gyro.x sensor_gyro.y sensor_gyro.z", "body_rate", "PX4 1.14.0")
+    assert (named.group.columns, named.unit, named.frame, named.known) == (
+        tuple(names.split()),
+        "rad/s",
+        "FRD",
+        "PX4",
+    )
+
+
+def test_of_an_autopilot_only_known_columns_drive_rotors():
+    names = " ".join(f"vehicle_command.param{number}" for number in range(1, 8))
+    named = f"control_allocator_status.actuator_saturation[{{}}] {names}"
+    saturation = " ".join(named.format(number) for number in range(4))
+    assert first(saturation, "rotor_command", "PX4 1.15") is None
+
+
+def test_events_of_a_card_stand_before_the_names_of_a_crazyflie():
+    named = first("fixedFrequency.gyro.x fixedFrequency.gyro.y fixedFrequency.gyro.z", "body_rate", "Crazyflie uSD")
+    assert (named.unit, named.frame) == ("deg/s", "FLU")

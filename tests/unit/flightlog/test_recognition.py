@@ -1,0 +1,261 @@
+"""Columns recognised: a made-up flight written down in many ways, each of which has one right answer."""
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.conversion import to_program_frames
+from cpfls_cli.flightlog.recognition import recognise
+from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.units import known_unit
+from tests.builders.unknown_logs import FLIP, NED, flat_log, flight, named, quaternion, with_ground
+
+GYRO = ("gyro_x", "gyro_y", "gyro_z")
+ACC = ("acc_x", "acc_y", "acc_z")
+PLACE, SPEED = ("x", "y", "z"), ("vx", "vy", "vz")
+
+
+@pytest.fixture(scope="module")
+def own():
+    return flight()
+
+
+def seen(log):
+    return recognise(log.topics, log.units, log.parameters, log.system)
+
+
+def imported(log, recognition):
+    """What the import makes of the log by this recognition: arrays in FLU, ENU and SI."""
+    signals = {guess.signal: guess.columns for guess in recognition.signals}
+    choices = {choice.key: choice.value for choice in recognition.choices}
+    settings = ImportSettings(signals=signals, torque_source=None, time_column="t", **choices)
+    values = {}
+    for name, columns in signals.items():
+        logged = np.column_stack([log.topics[""][column] for column in columns.columns])
+        scaled = (columns.scale * logged + columns.offset) * np.asarray(columns.sign or 1.0)
+        values[name] = scaled * known_unit(columns.unit).factor
+    return to_program_frames(values, settings)
+
+
+def assert_the_flight_comes_back(log, own, *, yaw_turned=False):
+    """The import of what was recognised is the flight itself, up to where the world's x points."""
+    recognition = seen(log)
+    flown = imported(log, recognition)
+    up = Rotation.from_euler("ZYX", flown["attitude"][:, ::-1]).as_matrix()[:, 2]
+    np.testing.assert_allclose(up, own.rotation.as_matrix()[:, 2], atol=1e-6)
+    np.testing.assert_allclose(flown["body_rate"], own.rate, atol=1e-6)
+    np.testing.assert_allclose(flown["specific_force"], own.specific_force, atol=1e-6)
+    np.testing.assert_allclose(flown["rotor_speed"], own.speed, rtol=1e-9)
+    if not yaw_turned:
+        np.testing.assert_allclose(flown["position"], own.position, atol=1e-9)
+        np.testing.assert_allclose(flown["velocity"], own.velocity, atol=1e-9)
+    return recognition
+
+
+def test_plain_names_in_si_are_taken_as_they_are(own):
+    recognition = assert_the_flight_comes_back(flat_log(own), own)
+    assert {guess.sure for guess in recognition.signals} <= {"data", "named"}
+    assert recognition.left_out == recognition.warnings == ()
+    assert recognition.flown.span_s is None
+    assert (recognition.time_column, recognition.time_unit) == ("t", "s")
+
+
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+def test_axes_of_a_gyroscope_in_any_order_are_put_back(own, order):
+    rate = named(own.rate[:, list(order)], *GYRO)
+    assert_the_flight_comes_back(flat_log(own, rate=rate), own)
+
+
+@pytest.mark.parametrize("sign", list(product((1.0, -1.0), repeat=3)))
+def test_signs_of_a_gyroscope_are_put_back(own, sign):
+    # With quaternions no angle can be reversed in its stead.
+    attitude = named(quaternion(own.rotation), "qw", "qx", "qy", "qz")
+    assert_the_flight_comes_back(flat_log(own, rate=named(own.rate * sign, *GYRO), attitude=attitude), own)
+
+
+@pytest.mark.parametrize("scale", [np.degrees(1.0), 1000.0])
+def test_the_unit_of_a_gyroscope_follows_from_the_attitude(own, scale):
+    assert_the_flight_comes_back(flat_log(own, rate=named(own.rate * scale, *GYRO)), own)
+
+
+@pytest.mark.parametrize("sign", [(1, 1, 1), (1, -1, 1), (1, 1, -1), (1, -1, -1)])
+@pytest.mark.parametrize("unit", ["rad", "deg"])
+def test_angles_of_either_unit_and_of_reversed_axes_are_put_right(own, sign, unit):
+    angles = own.angles * sign * (np.degrees(1.0) if unit == "deg" else 1.0)
+    recognition = assert_the_flight_comes_back(flat_log(own, attitude=named(angles, "roll", "pitch", "yaw")), own)
+    assert recognition.signal("attitude").columns.unit == unit
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+@pytest.mark.parametrize("inverse", [False, True])
+def test_quaternions_of_either_order_and_direction_are_told_apart(own, order, inverse):
+    rotation = own.rotation.inv() if inverse else own.rotation
+    attitude = named(quaternion(rotation, order), "q[0]", "q[1]", "q[2]", "q[3]")
+    recognition = assert_the_flight_comes_back(flat_log(own, attitude=attitude), own)
+    assert recognition.choice("quaternion_order") == order
+
+
+def test_a_gyroscope_with_other_axes_does_not_hide_the_order_of_a_quaternion(own):
+    attitude = named(quaternion(own.rotation, "xyzw"), "q0", "q1", "q2", "q3")
+    rate = named(np.degrees(own.rate[:, [1, 2, 0]] * [1, -1, 1]), *GYRO)
+    recognition = assert_the_flight_comes_back(flat_log(own, attitude=attitude, rate=rate), own)
+    assert recognition.choice("quaternion_order") == "xyzw"
+
+
+def test_frd_in_ned_is_told_from_flu_in_enu(own):
+    turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
+    log = flat_log(
+        own,
+        attitude=named(quaternion(turned), "qw", "qx", "qy", "qz"),
+        rate=named(own.rate @ FLIP, *GYRO),
+        force=named(own.specific_force @ FLIP, *ACC),
+        position=named(own.position @ NED.T, *PLACE),
+        velocity=named(own.velocity @ NED.T, *SPEED),
+    )
+    recognition = assert_the_flight_comes_back(log, own)
+    assert (recognition.choice("body_frame"), recognition.choice("world_frame")) == ("FRD", "NED")
+
+
+def test_a_position_in_other_axes_than_the_attitude_is_turned(own):
+    turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
+    log = flat_log(
+        own,
+        attitude=named(quaternion(turned), "qw", "qx", "qy", "qz"),
+        rate=named(own.rate @ FLIP, *GYRO),
+        force=named(own.specific_force @ FLIP, *ACC),
+    )
+    assert_the_flight_comes_back(log, own)
+
+
+@pytest.mark.parametrize(("factor", "unit", "scale"), [(1 / 9.80665, "g", 1.0), (1000 / 9.80665, "g", 1e-3)])
+def test_the_unit_of_an_accelerometer_follows_from_gravity(own, factor, unit, scale):
+    columns = seen(flat_log(own, force=named(own.specific_force * factor, *ACC))).signal("acceleration").columns
+    assert (columns.unit, columns.scale) == (unit, scale)
+
+
+def test_gravity_logged_in_place_of_what_carries_is_turned_round(own):
+    recognition = assert_the_flight_comes_back(flat_log(own, force=named(-own.specific_force, *ACC)), own)
+    assert recognition.signal("acceleration").columns.sign == (-1.0, -1.0, -1.0)
+
+
+def test_an_acceleration_of_the_world_is_told_from_what_is_sensed(own):
+    recognition = seen(flat_log(own, force=named(own.acceleration, *ACC)))
+    assert recognition.choice("acceleration_frame") == "world"
+    with_gravity = seen(flat_log(own, force=named(own.acceleration + np.array([0.0, 0.0, 9.81]), *ACC)))
+    assert with_gravity.signal("acceleration") is None
+    assert "an acceleration of the world with gravity in it" in with_gravity.left_out[0]
+
+
+def test_a_velocity_in_body_axes_is_left_out(own):
+    body = own.rotation.inv().apply(own.velocity)
+    recognition = seen(flat_log(own, velocity=named(body, *SPEED)))
+    assert recognition.signal("velocity") is None
+    assert "a velocity in body axes" in recognition.left_out[0]
+
+
+def test_lengths_in_millimetres_are_told_by_what_the_lean_does(own):
+    log = flat_log(own, position=named(1000 * own.position, *PLACE), velocity=named(1000 * own.velocity, *SPEED))
+    recognition = assert_the_flight_comes_back(log, own)
+    assert recognition.signal("position").columns.unit == "mm"
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "scale", "offset"),
+    [
+        (lambda speed: speed / 1000, "1", 1.0, 0.0),
+        (lambda speed: speed / 10, "1", 0.01, 0.0),
+        (lambda speed: 1000 + speed, "1", 1e-3, -1.0),
+        (lambda speed: 65.536 * speed, "1", 1 / 65536, 0.0),
+    ],
+)
+def test_the_range_of_a_command_tells_its_unit(own, values, unit, scale, offset):
+    speed = named(values(own.speed), "cmd1", "cmd2", "cmd3", "cmd4")
+    columns = seen(flat_log(own, speed=speed)).signal("rotor_command").columns
+    assert (columns.unit, columns.scale, columns.offset) == (unit, pytest.approx(scale), pytest.approx(offset))
+
+
+def test_two_guesses_that_the_data_cannot_part_are_both_listed(own):
+    speed = named(own.speed, "rotor1", "rotor2", "rotor3", "rotor4")
+    guess = seen(flat_log(own, speed=speed)).signal("rotor_speed")
+    assert (guess.sure, [rival.text for rival in guess.rivals]) == ("guess", ["unit: rpm"])
+
+
+def test_outputs_without_a_motor_are_left_out(own):
+    idle = np.full((len(own.time), 2), 1500.0)
+    names = [f"motor{number}_pwm" for number in range(1, 7)]
+    guess = seen(flat_log(own, speed=named(np.hstack([1000 + own.speed, idle]), *names))).signal("rotor_command")
+    assert guess.columns.columns == tuple(names[:4])
+
+
+def test_stamps_in_microseconds_are_known_by_their_steps(own):
+    recognition = seen(flat_log(own, t={"timestamp": 1e6 * own.time}))
+    assert (recognition.time_column, recognition.time_unit) == ("timestamp", "us")
+
+
+def test_time_on_the_ground_and_idling_is_cut(own):
+    recognition = seen(flat_log(with_ground(own)))
+    begin, end = recognition.flown.span_s
+    assert begin == pytest.approx(5.5, abs=0.1)
+    assert end == pytest.approx(34.5, abs=0.1)
+    assert len(recognition.flown.reasons) == 2
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"speed": named(np.zeros((3000, 4)), "cmd1", "cmd2", "cmd3", "cmd4")}, "the rotors (cmd*) never change"),
+        ({"t": None}, "no column of time stamps is recognised"),
+    ],
+)
+def test_what_is_no_flight_is_refused(own, changed, message):
+    with pytest.raises(InputError, match=message.replace("(", r"\(").replace(")", r"\)").replace("*", r"\*")):
+        seen(flat_log(own, **changed))
+
+
+def test_a_stand_with_idling_rotors_is_no_flight(own):
+    still = with_ground(own, idle=0.3)
+    count = 480
+    for name in ("time", "angles", "rate", "position", "velocity", "specific_force", "speed"):
+        still.__dict__[name] = getattr(still, name)[:count]
+    noise = np.random.default_rng(1)
+    for name in ("angles", "rate", "position", "velocity", "speed"):
+        still.__dict__[name] = getattr(still, name) + noise.normal(0, 1e-3, getattr(still, name).shape)
+    with pytest.raises(InputError, match="the vehicle neither turns nor moves"):
+        seen(flat_log(still))
+
+
+def test_a_matrix_without_names_is_recognised_by_how_its_columns_move_together(own):
+    body_velocity = own.rotation.inv().apply(own.velocity)
+    noise = np.random.default_rng(4).normal(0, 300, (len(own.time), 3))
+    table = np.column_stack(
+        [own.time, noise, own.rate, quaternion(own.rotation, "xyzw"), own.specific_force, body_velocity, own.position]
+    )
+    table = np.column_stack([table, own.speed])
+    log = {"": {f"data[{column}]": values for column, values in enumerate(table.T)}}
+    recognition = recognise(log, {}, {}, "")
+    assert (recognition.time_column, recognition.time_unit) == ("data[0]", "s")
+    found = {guess.signal: [int(name[5:-1]) for name in guess.columns.columns] for guess in recognition.signals}
+    assert found == {
+        "body_rate": [4, 5, 6],
+        "quaternion": [7, 8, 9, 10],
+        "acceleration": [11, 12, 13],
+        "position": [17, 18, 19],
+        "rotor_speed": [20, 21, 22, 23],
+    }
+    assert recognition.choice("quaternion_order") == "xyzw"
+    assert "columns data[14] to data[16]: a velocity in body axes" in recognition.left_out[0]
+
+
+def test_a_flight_that_is_never_near_hover_shows_what_carries_it():
+    columns = seen(flat_log(flight(seconds=20.0, push=15.0))).signal("acceleration")
+    assert (columns.columns.unit, columns.columns.sign) == ("m/s^2", None)
+    assert "times gravity, as it moves" in columns.reason
+
+
+def test_columns_of_something_else_are_refused_by_name():
+    log = {"": {"t": np.arange(100.0), "price": np.arange(100.0) ** 2}}
+    with pytest.raises(InputError, match=r"no column is recognised as a signal of a flight \(columns: t, price\)"):
+        recognise(log, {}, {}, "")
