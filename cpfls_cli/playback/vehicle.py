@@ -153,7 +153,7 @@ def find_vehicle(
         Of the same search, stopped before.
     """
     own = [flight for flight in flights if not flight.group]
-    begun, sensed = _begun(vehicle, own)
+    begun, sensed = carrying_weight(vehicle, own)
     choice = choose(begun, own, settings, rng, progress, kept)
     chosen = choice.chosen
     flown = {flight.group for flight in flights}
@@ -164,7 +164,7 @@ def find_vehicle(
     joint = layout if isinstance(layout, JointLayout) else None
     return FoundVehicle(
         model,
-        (*sensed, *_numbers(fitted, spread)),
+        (*sensed, *found_numbers(fitted, spread)),
         *_shares(model, own),
         tuple(_trades(fitted.layout, spread)),
         choice,
@@ -176,13 +176,20 @@ def find_vehicle(
     )
 
 
-def _begun(
+def carrying_weight(
     vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]
 ) -> tuple[VehicleSettings, tuple[FoundNumber, ...]]:
     """Replace the guess of the thrust factor by what carries the weight; a guessed drag factor scales with it.
 
     Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found;
     without one either nothing tells thrust from weight, and the guess stays.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        As stated, with guesses of what is not known.
+    flights : sequence of PlaybackFlight
+        Of this configuration.
     """
     if "thrust_factor" not in vehicle.unknown:
         return vehicle, ()
@@ -245,8 +252,15 @@ def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tup
     return shares, float(np.quantile(np.concatenate(speeds), 0.95))
 
 
-def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
-    """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that."""
+def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
+    """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that.
+
+    Parameters
+    ----------
+    fitted : Fitted
+    spread : Uncertainty
+        Of this fit.
+    """
     layout, values = fitted.layout, fitted.values
     physical = layout.physical(values)
     stated = layout.physical(layout.starts)
