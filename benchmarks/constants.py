@@ -25,6 +25,7 @@ from benchmarks.shared.measure import pin_threads, table
 pin_threads()
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.fit import Fitted, fit, uncertainty, windows_of
@@ -47,6 +48,7 @@ from tests.builders.playback_flights import (
     TRUE_BLOCKS,
     flown,
     loaded,
+    logged,
     nothing_known,
     rotorpy_flight,
     true_numbers,
@@ -144,9 +146,8 @@ def search() -> None:
         chosen = vehicle.choice.chosen.structure.blocks
         differ = ("none", *(block for block in (*chosen, *flew) if (block in chosen) != (block in flew)))
         errors = compared(vehicle.numbers, true_numbers())
-        for name in ASKED:
-            if name in errors:
-                rows.append((str(seed), ", ".join(differ[1:] or differ), name, *single(errors[name])))
+        known = {name: errors[name] for name in ASKED if name in errors}
+        rows += [(str(seed), ", ".join(differ[1:] or differ), name, *single(row)) for name, row in known.items()]
     table("constants_search", ("seed", "blocks more or less", "number", *SINGLE), rows)
 
 
@@ -201,14 +202,25 @@ def rotorpy() -> None:
         return
     rows = []
     for name, hidden in ROTORPY_HIDDEN.items():
-        _, numbers, _ = found(nothing_known(ROTORPY), [rotorpy_flight(name)], [effect.name for effect in hidden])
-        rows += [(name, *row) for row in of_one(numbers, stated_numbers(ROTORPY, hidden))]
-    table("constants_rotorpy", ("flight", "number", *SINGLE), rows)
+        flight, true = rotorpy_flight(name), stated_numbers(ROTORPY, hidden)
+
+        def errors(given: PlaybackFlight, hidden=hidden, true=true) -> dict[str, Compared]:
+            _, numbers, _ = found(nothing_known(ROTORPY), [given], [effect.name for effect in hidden])
+            return compared(numbers, true)
+
+        clean = errors(flight)
+        noisy = [errors(with_noise(flight, np.random.default_rng(seed))) for seed in range(1, SEEDS + 1)]
+        at_once = {number: f"{row.error:+.2f} {row.unit}" for number, row in clean.items()}
+        rows += [(name, number, at_once.get(number, ""), *row) for number, *row in by_number(noisy)]
+    table("constants_rotorpy", ("flight", "number", "without noise", *COLUMNS[1:]), rows)
 
 
-def of_one(numbers, true: Mapping[str, float]) -> Iterator[tuple[str, ...]]:
-    for name, row in compared(numbers, true).items():
-        yield name, *single(row)
+def with_noise(flight: PlaybackFlight, rng: np.random.Generator) -> PlaybackFlight:
+    """Log a flight that has no noise once more."""
+    motion = flight.motion
+    turned = Rotation.from_matrix(motion.rotation).as_quat()
+    states = np.hstack([motion.position, motion.velocity, turned, motion.rate])
+    return logged(flight.name, states, flight.speed, motion.period, flight.hold, MIDDLING, rng)
 
 
 def stated_numbers(vehicle: VehicleSettings, effects=()) -> dict[str, float]:
@@ -239,6 +251,10 @@ def weight() -> None:
     groups = (Group(name, (MASS, "com_offset", "inertia")),)
     true = {f"{name}: added mass": ADDED_KG}
     true |= {f"{name}: place of the added mass, {axis}": at for axis, at in zip("xy", ADDED_AT.tolist(), strict=True)}
+    moments = (stated_numbers(model.vehicle) for model in (loaded(), truth()))
+    more, own = ({key: value for key, value in each.items() if "inertia" in key} for each in moments)
+    true |= {f"{name}: {key}": value for key, value in more.items()}
+    true |= {f"{name}: added {key.removeprefix('inertia.')}": value - own[key] for key, value in more.items()}
     fits = []
     for seed in range(1, LOADED + 1):
         own = flown(truth(), KINDS * TIMES, seed=seed, noise=MIDDLING)

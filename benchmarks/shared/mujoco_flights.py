@@ -50,9 +50,7 @@ def mujoco_flights(seed: int, times: int, duration_s: float = 20.0) -> list[Play
     rng, kinds = np.random.default_rng(seed), KINDS * times
     plan = planned(kinds, PERIOD * np.arange(round(duration_s / PERIOD)), rng)
     names = [f"mujoco-{kind}-{number}" for number, kind in enumerate(kinds)]
-    return [
-        logged(name, *_flown(plan, number), PERIOD, "previous", MIDDLING, rng) for number, name in enumerate(names)
-    ]
+    return [logged(name, *_flown(plan, number), PERIOD, "previous", MIDDLING, rng) for number, name in enumerate(names)]
 
 
 def _flown(plans: Plan, number: int) -> tuple[Array, Array]:

@@ -70,15 +70,30 @@ def test_model_of_each_configuration_has_its_mass(found):
     assert offset.coefficients == pytest.approx(ADDED_KG * ADDED_AT / (STATED.mass_kg + ADDED_KG), rel=0.03)
 
 
-def test_gradient_by_a_number_of_a_group_is_that_of_its_flights(flights):
+def test_effects_stay_what_they_are_where_the_inertia_differs():
+    """Damping and flapping are torques of the air: a body that gains 2 % does not gain 2 % of them."""
+    others = [replace(flight, group="payload") for flight in flown(loaded(), KINDS, seed=51)]
+    windows = windows_of([*flown(truth(), KINDS, seed=1), *others], 0.5, 0.6)
+    found = fit(JOINT, windows, {}, 60, 3e-5)
+    for group, flew in (("", truth()), ("payload", loaded())):
+        model = JOINT.model(found.values, group)
+        assert model.vehicle.inertia_kg_m2[:3] == pytest.approx(flew.vehicle.inertia_kg_m2, rel=0.001)
+        known = {effect.name: effect.coefficients for effect in flew.effects}
+        for effect in model.effects:
+            assert effect.coefficients == pytest.approx(known[effect.name], rel=0.002)
+
+
+@pytest.mark.parametrize("blocks", [TRUE_BLOCKS, TRUE_BLOCKS[1:]], ids=["inertia of all", "of the group alone"])
+def test_gradient_by_a_number_of_a_group_is_that_of_its_flights(flights, blocks):
     """Against difference quotients, for all numbers, shared ones and those of the group."""
     from cpfls_cli.playback.fit import _evaluated
 
     windows = windows_of([flights[0], flights[-1]], 0.2, 2.0)
-    values = JOINT.starts + 0.1 * JOINT.scales
-    gradient = _evaluated(JOINT, windows, values).gradient
-    for place, scale in enumerate(JOINT.scales):
+    layout = replace(JOINT, base=Layout(STATED, blocks, NO_REMAINDER))
+    values = layout.starts + 0.1 * layout.scales
+    gradient = _evaluated(layout, windows, values).gradient
+    for place, scale in enumerate(layout.scales):
         step = np.zeros(len(values))
         step[place] = 1e-6 * scale
-        ahead, behind = (_evaluated(JOINT, windows, values + sign * step).objective for sign in (1, -1))
+        ahead, behind = (_evaluated(layout, windows, values + sign * step).objective for sign in (1, -1))
         assert gradient[place] == pytest.approx((ahead - behind) / 2e-6, rel=2e-4, abs=2e-7)
