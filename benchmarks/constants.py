@@ -70,6 +70,10 @@ ASKED |= {f"place of the added mass, {axis}": "3 mm" for axis in "xy"}
 LINEAR, LARGEST_SPEED, NOMINAL_SPEED = 0.6, 1250.0, 1000.0
 """Thrust curve of the flights without rotor speeds; the speed at a command of 1, and what a config says of it."""
 
+NOMINAL = nothing_known(replace(STATED, rotor_speed_max_rad_s=NOMINAL_SPEED))
+OF_COMMANDS = (LAG, "inertia.Ixx", "inertia.Iyy", "inertia.Izz")
+"""Numbers that do not depend on what a command of 1 is."""
+
 NOISE_OF_COMMANDS = replace(MIDDLING, speed=0.0)
 """A command is logged as it was sent."""
 
@@ -138,17 +142,29 @@ def speeds() -> None:
 
 
 def search() -> None:
+    """Look for the structure as well, with small settings: where speeds are logged, and once where commands are."""
     rows = []
     for seed in range(1, SEARCHES + 1):
         flights = flown(truth(), KINDS * TIMES, seed=seed, noise=MIDDLING)
-        vehicle = find_vehicle(nothing_known(), flights, SEARCH, np.random.default_rng(seed), lambda *_: None)
-        flew = [block for block in TRUE_BLOCKS if block not in nothing_known().unknown]
-        chosen = vehicle.choice.chosen.structure.blocks
-        differ = ("none", *(block for block in (*chosen, *flew) if (block in chosen) != (block in flew)))
-        errors = compared(vehicle.numbers, true_numbers())
-        known = {name: errors[name] for name in ASKED if name in errors}
-        rows += [(str(seed), ", ".join(differ[1:] or differ), name, *single(row)) for name, row in known.items()]
-    table("constants_search", ("seed", "blocks more or less", "number", *SINGLE), rows)
+        rows += searched(f"speeds {seed}", nothing_known(), flights, TRUE_BLOCKS, true_numbers())
+    known = {name: value for name, value in true_numbers().items() if name in OF_COMMANDS}
+    rows += searched("commands 1", NOMINAL, without_speeds(1), (*TRUE_BLOCKS, "thrust_law"), known)
+    table("constants_search", ("flights", "blocks too many", "missed", "number", *SINGLE), rows)
+
+
+def searched(
+    name: str,
+    vehicle: VehicleSettings,
+    flights: Sequence[PlaybackFlight],
+    blocks: Sequence[str],
+    true: Mapping[str, float],
+) -> list[tuple[str, ...]]:
+    result = find_vehicle(vehicle, flights, SEARCH, np.random.default_rng(1), lambda *_: None)
+    chosen, flew = result.choice.chosen.structure.blocks, [block for block in blocks if block not in vehicle.unknown]
+    more, missed = ([b for b in one if b not in other] for one, other in ((chosen, flew), (flew, chosen)))
+    about = (", ".join(more) or "none", ", ".join(missed) or "none")
+    errors = compared(result.numbers, true)
+    return [(name, *about, number, *single(errors[number])) for number in ASKED if number in errors]
 
 
 SINGLE = ("error", "half interval", "holds it")
@@ -158,8 +174,8 @@ def single(row: Compared) -> tuple[str, str, str]:
     return f"{row.error:+.2f} {row.unit}", f"{row.half:.2f} {row.unit}", "yes" if row.held else "no"
 
 
-def commands() -> None:
-    """Fly a thrust curve with a linear and a square part; logged is a share of a largest speed that nobody knows."""
+def curved() -> VehicleModel:
+    """Give rotors whose thrust has a linear and a square part, and that hover at the speeds of `truth`."""
     vehicle = truth().vehicle
     rotors = tuple(
         replace(
@@ -169,22 +185,29 @@ def commands() -> None:
         )
         for rotor in vehicle.rotors
     )
-    model = replace(truth(), thrust_linear=LINEAR, vehicle=replace(vehicle, rotors=rotors))
-    stated = nothing_known(replace(STATED, rotor_speed_max_rad_s=NOMINAL_SPEED))
+    return replace(truth(), thrust_linear=LINEAR, vehicle=replace(vehicle, rotors=rotors))
+
+
+def without_speeds(seed: int) -> list[PlaybackFlight]:
+    """Fly; logged is a share of a largest speed that nobody knows, and taken as one of the nominal speed."""
+    flights = flown(curved(), KINDS * TIMES, seed=seed, noise=NOISE_OF_COMMANDS)
+    return [replace(flight, speed=NOMINAL_SPEED / LARGEST_SPEED * flight.speed) for flight in flights]
+
+
+def commands() -> None:
     fits, curves = [], []
+    true = {name: value for name, value in true_numbers().items() if name in OF_COMMANDS}
     for seed in range(1, SEEDS + 1):
-        flights = flown(model, KINDS * TIMES, seed=seed, noise=NOISE_OF_COMMANDS)
-        shares = [flight.speed / LARGEST_SPEED for flight in flights]
-        given = [replace(each, speed=NOMINAL_SPEED * share) for each, share in zip(flights, shares, strict=True)]
-        fitted, numbers, _ = found(stated, given, (*TRUE_BLOCKS, "thrust_law"))
-        wanted = {name: value for name, value in true_numbers().items() if name == LAG or "inertia" in name}
-        fits.append(compared(numbers, wanted))
-        flew = np.linspace(min(map(np.min, shares)), max(map(np.max, shares)), 200)
-        true = thrust(model, LARGEST_SPEED * flew)
-        away = thrust(fitted.layout.model(fitted.values), NOMINAL_SPEED * flew) - true
-        curves.append((flew[0], flew[-1], 100 * np.abs(away).max() / true.max()))
-    low, high, away = np.array(curves).T
-    row = (f"{low.mean():.2f} to {high.mean():.2f}", "2 %", f"{np.median(away):.2f} %", f"{away.max():.2f} %")
+        flights = without_speeds(seed)
+        fitted, numbers, _ = found(NOMINAL, flights, (*TRUE_BLOCKS, "thrust_law"))
+        fits.append(compared(numbers, true))
+        speeds = np.concatenate([flight.speed for flight in flights]) / NOMINAL_SPEED
+        flew = np.linspace(speeds.min(), speeds.max(), 200)
+        curve = thrust(curved(), LARGEST_SPEED * flew)
+        away = thrust(fitted.layout.model(fitted.values), NOMINAL_SPEED * flew) - curve
+        curves.append((flew[0], flew[-1], 100 * np.abs(away).max() / curve.max()))
+    low, high, largest = np.array(curves).T
+    row = (f"{low.mean():.2f} to {high.mean():.2f}", "2 %", f"{np.median(largest):.2f} %", f"{largest.max():.2f} %")
     table("constants_curve", ("commands flown", "asked", "median of the largest deviation", "largest"), [row])
     print()
     table("constants_commands", COLUMNS, list(by_number(fits)))
