@@ -97,7 +97,7 @@ def found(
     vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], blocks: Sequence[str], groups: tuple[Group, ...] = ()
 ) -> tuple[Fitted, list[FoundNumber], list]:
     """Fit blocks beside what is not known, as `cpfls vehicle` does when it has chosen them."""
-    begun = carrying_weight(vehicle, [flight for flight in flights if not flight.group])
+    begun, _ = carrying_weight(vehicle, [flight for flight in flights if not flight.group])
     layout = Structure(tuple(block for block in blocks if block not in begun.unknown)).layout(begun)
     windows = windows_of(flights, USUAL.horizon_s, USUAL.window_interval_s)
     joint = JointLayout(layout, groups)

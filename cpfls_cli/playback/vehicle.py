@@ -190,6 +190,13 @@ def carrying_weight(
         As stated, with guesses of what is not known.
     flights : sequence of PlaybackFlight
         Of this configuration.
+
+    Returns
+    -------
+    VehicleSettings
+        With better guesses; a thrust factor that nothing tells in runs is no longer unknown to them.
+    tuple of FoundNumber
+        The thrust factor, where the accelerometer tells it.
     """
     if "thrust_factor" not in vehicle.unknown:
         return vehicle, ()
