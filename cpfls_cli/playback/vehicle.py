@@ -166,7 +166,7 @@ def find_vehicle(
         model,
         (*sensed, *found_numbers(fitted, spread)),
         *_shares(model, own),
-        tuple(_trades(fitted.layout, spread)),
+        tuple(_trades(fitted, spread)),
         choice,
         fitted.condition_number,
         spread.blocks,
@@ -286,14 +286,19 @@ def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
 
 def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
     """Turn the covariance of a fit into half widths of 95 % intervals of what follows from its numbers."""
+    deviation = np.sqrt(np.diag(_covariance(physical, fitted, spread)))
+    return np.asarray(student.ppf(0.975, spread.blocks - 1) * deviation)
+
+
+def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
+    """Turn the covariance of a fit into that of what follows from its numbers."""
     values = fitted.values
     slopes = []
     for place, step in enumerate(_STEP * fitted.layout.scales * np.eye(len(values))):
         ahead, behind = physical(values + step), physical(values - step)
         slopes.append([(ahead[name].value - behind[name].value) / (2 * step[place]) for name in ahead])
     by_number = np.array(slopes).reshape(len(values), -1)
-    deviation = np.sqrt(np.diag(by_number.T @ spread.covariance @ by_number))
-    return np.asarray(student.ppf(0.975, spread.blocks - 1) * deviation)
+    return np.asarray(by_number.T @ spread.covariance @ by_number)
 
 
 def differences(joint: JointLayout, fitted: Fitted, spread: Uncertainty) -> Iterator[Difference]:
@@ -329,7 +334,10 @@ def _interval(value: float, half: float, *, positive: bool) -> tuple[float, floa
     return value / factor, value * factor
 
 
-def _trades(layout: AnyLayout, spread: Uncertainty) -> Iterator[Trade]:
-    names, correlation = list(layout.physical(layout.starts)), spread.correlation
+def _trades(fitted: Fitted, spread: Uncertainty) -> Iterator[Trade]:
+    """Name pairs of numbers, as people know them, whose estimates go together."""
+    names, covariance = list(fitted.layout.physical(fitted.values)), _covariance(fitted.layout.physical, fitted, spread)
+    deviation = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.maximum(np.outer(deviation, deviation), np.finfo(float).tiny)
     for first, second in np.argwhere(np.triu(np.abs(correlation) > _TRADED, 1)).tolist():
         yield Trade(names[first], names[second], float(correlation[first, second]))

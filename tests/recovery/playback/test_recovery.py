@@ -83,6 +83,9 @@ def test_from_mass_and_geometry_alone_the_constants_come_back():
         assert number.low < true[name] < number.high
         assert number.determined
     assert by_name["lag.time_constant_s"].value == pytest.approx(truth().response.lag_s, abs=0.002)
+    # About yaw all is known by its inertia far better than by itself, and named as it is known.
+    pairs = {(trade.first, trade.second) for trade in found.trades}
+    assert {("drag_factor", "inertia.Izz"), ("drag_factor", "linear_damping.d_z")} <= pairs
 
 
 def test_the_blocks_that_are_there_are_chosen_and_no_others(noisy):
