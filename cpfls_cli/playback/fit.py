@@ -347,12 +347,6 @@ class Uncertainty:
     blocks: int
     determined: BoolArray
 
-    @property
-    def correlation(self) -> Array:
-        """Correlation of the estimates, shape (number, number)."""
-        deviation = np.sqrt(np.diag(self.covariance))
-        return np.asarray(self.covariance / np.maximum(np.outer(deviation, deviation), np.finfo(float).tiny))
-
 
 _BLOCKS = 30
 _INFORMED = 10.0

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import MASS, Layout, Number, Numbered, Physical
+from cpfls_cli.playback.parameters import AS_STATED, COUNTED, INERTIA, MASS, Layout, Number, Numbered, Physical
 
 _CENTRE = ("com_offset.c_x", "com_offset.c_y")
 
@@ -42,7 +42,9 @@ class JointLayout(Numbered):
     def _layouts(self) -> dict[str, Layout]:
         found = {"": self.base}
         for group in self.groups:
-            more = tuple(block for block in group.differs if block not in self.base.blocks)
+            more = [block for block in group.differs if block not in self.base.blocks]
+            if INERTIA in group.differs:
+                more.append(COUNTED if INERTIA in self.base.blocks else AS_STATED)
             found[group.name] = replace(self.base, chosen=(*self.base.chosen, *more))
         return found
 
@@ -69,8 +71,13 @@ class JointLayout(Numbered):
         return self._layouts[flight.group], self._places(flight.group)
 
     def _places(self, group: str) -> IntArray:
-        names = (number.name for number in self._layouts[group].numbers)
-        return np.array([self.index.get(f"{group}: {name}", self.index.get(name, -1)) for name in names])
+        numbers = self._layouts[group].numbers
+        return np.array([self._place(group, number.name) for number in numbers], dtype=np.int64)
+
+    def _place(self, group: str, name: str) -> int:
+        if name.startswith(COUNTED):
+            return self.index[name.replace(COUNTED, INERTIA)]
+        return self.index[own if (own := f"{group}: {name}") in self.index else name]
 
     def physical(self, values: Array) -> dict[str, Physical]:
         """Give all numbers as people know them, in order."""
@@ -106,13 +113,13 @@ class JointLayout(Numbered):
                     place = (own[MASS].value * own[name].value - mass * before) / added if added else np.nan
                     found[f"{group.name}: place of the added mass, {axis}"] = Physical(place, "m")
             inertia = self._layouts[group.name].inertia(values[self._places(group.name)])
-            if "inertia" in group.differs:
+            if INERTIA in group.differs:
                 difference = inertia - self.base.inertia(values[: len(self.base.numbers)])
                 for name, moment in zip(INERTIA_PARAMETERS, np.diag(difference).tolist(), strict=False):
                     found[f"{group.name}: added {name}"] = Physical(moment, "kg m^2")
             for name, known in own.items():
                 block = name.split(".")[0]
-                if block in group.differs and block not in (MASS, "com_offset", "inertia"):
+                if block in group.differs and block not in (MASS, "com_offset", INERTIA):
                     before = base[name].value if name in base else 0.0
                     found[f"{group.name}: {name} less that of the config"] = Physical(known.value - before, known.unit)
         return found

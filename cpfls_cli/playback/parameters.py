@@ -44,7 +44,12 @@ _THRUST, _DRAG, _LAW = "thrust_factor.scale", "drag_factor.scale", "thrust_law.l
 MASS = "mass"
 """Block of groups of flights alone: one configuration has the stated mass, which gives all else its size."""
 
+COUNTED, AS_STATED = "counted", "as_stated"
+"""Blocks of groups of flights alone: coefficients of torque, shared with the vehicle of the config, are counted by its
+inertia and not by that of the group; as numbers, or none where it is the stated one."""
+
 _MASS = "mass.log_mass"
+_COUNTED = tuple(f"{COUNTED}.log_{name}" for name in INERTIA_PARAMETERS[:3])
 
 _ROOM = 10.0
 """Bounds of a coefficient here, in multiples of those of the catalogue: an effective number may lie beyond them."""
@@ -126,6 +131,8 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
         Number(_SLOW, "", float(np.log(0.3)), 0.7, float(np.log(0.03)), float(np.log(5.0)), 2.0),
     ),
     MASS: (Number(_MASS, "", 0.0, 0.1, -2.0, 2.0, 3.0),),
+    COUNTED: tuple(Number(name, "", 0.0, 0.5, -4.0, 4.0, 3.0) for name in _COUNTED),
+    AS_STATED: (),
 }
 """Blocks that are the same for all vehicles."""
 
@@ -150,7 +157,7 @@ def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
     effects = (
         name for name, known in CATALOGUE.items() if not known.shapes and polynomial(known, probe, {}) is not None
     )
-    known = (block for block in _OF_ROTORS if block != MASS and block not in vehicle.unknown)
+    known = (block for block in _OF_ROTORS if block not in (MASS, COUNTED, AS_STATED, *vehicle.unknown))
     return (*known, _PRODUCTS_BLOCK, *effects, *LEARNED)
 
 
@@ -332,6 +339,14 @@ class Layout(Numbered):
     def _log_inertia(self, values: Array) -> Array:
         return np.array([self._get(values, name, 0.0) for name in _INERTIA])
 
+    @property
+    def _counting(self) -> tuple[str, ...]:
+        return _INERTIA if {COUNTED, AS_STATED}.isdisjoint(self.blocks) else _COUNTED
+
+    def _log_counted(self, values: Array) -> Array:
+        """Give the inertia, as logarithms of ratios, in units of which coefficients of torque are counted."""
+        return np.array([self._get(values, name, 0.0) for name in self._counting])
+
     def inertia(self, values: Array) -> Array:
         """Build the inertia tensor, shape (3, 3), kg m^2."""
         root = np.exp(0.5 * self._log_inertia(values))
@@ -358,9 +373,9 @@ class Layout(Numbered):
 
     def coefficients(self, values: Array) -> dict[str, float]:
         """Give the coefficients of effects and remainder in SI, by name."""
-        log_inertia = self._log_inertia(values)
+        log_counted = self._log_counted(values)
         return {
-            name: float(values[self.index[name]] * np.exp(column.share @ log_inertia))
+            name: float(values[self.index[name]] * np.exp(column.share @ log_counted))
             for name, column in self._columns.items()
         }
 
@@ -384,6 +399,8 @@ class Layout(Numbered):
             elif name == _DRAG:
                 factor = value * rotor.drag_factor_n_m_s2
                 found["drag_factor"] = Physical(factor, "N m s^2", positive=True, stated=stated[number.block])
+            elif name in _COUNTED:
+                found[name] = Physical(value, "")
             elif name == _MASS:
                 found["mass"] = Physical(self._mass(values), "kg", positive=True, stated=True)
             elif name == _SLOW:
@@ -412,22 +429,22 @@ class Layout(Numbered):
 
     def table_derivatives(self, values: Array) -> list[Array | None]:
         """Differentiate the weights by each number; None by those of the rotors' response in time."""
-        coefficients, log_inertia = self.coefficients(values), self._log_inertia(values)
-        found = [self._derivative(number.name, values, coefficients, log_inertia) for number in self.numbers]
+        coefficients, log_counted = self.coefficients(values), self._log_counted(values)
+        found = [self._derivative(number.name, values, coefficients, log_counted) for number in self.numbers]
         by_mass = self._forces_by_mass(values)
         return [None if derivative is None else derivative * by_mass for derivative in found]
 
     def _derivative(
-        self, name: str, values: Array, coefficients: Mapping[str, float], log_inertia: Array
+        self, name: str, values: Array, coefficients: Mapping[str, float], log_counted: Array
     ) -> Array | None:
         if name in (_DELAY, _LAG, _SLOW):
             return None
         if name in self._columns:
             column = self._columns[name]
-            return np.asarray(np.exp(column.share @ log_inertia) * column.weights)
+            return np.asarray(np.exp(column.share @ log_counted) * column.weights)
         derivative = np.zeros_like(self._template)
-        if name in _INERTIA:
-            axis = _INERTIA.index(name)
+        if name in self._counting:
+            axis = self._counting.index(name)
             for each, column in self._columns.items():
                 derivative += coefficients[each] * column.share[axis] * column.weights
         elif name == _MASS:

@@ -153,7 +153,7 @@ def find_vehicle(
         Of the same search, stopped before.
     """
     own = [flight for flight in flights if not flight.group]
-    begun, sensed = _begun(vehicle, own)
+    begun, sensed = carrying_weight(vehicle, own)
     choice = choose(begun, own, settings, rng, progress, kept)
     chosen = choice.chosen
     flown = {flight.group for flight in flights}
@@ -164,9 +164,9 @@ def find_vehicle(
     joint = layout if isinstance(layout, JointLayout) else None
     return FoundVehicle(
         model,
-        (*sensed, *_numbers(fitted, spread)),
+        (*sensed, *found_numbers(fitted, spread)),
         *_shares(model, own),
-        tuple(_trades(fitted.layout, spread)),
+        tuple(_trades(fitted, spread)),
         choice,
         fitted.condition_number,
         spread.blocks,
@@ -176,13 +176,27 @@ def find_vehicle(
     )
 
 
-def _begun(
+def carrying_weight(
     vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]
 ) -> tuple[VehicleSettings, tuple[FoundNumber, ...]]:
     """Replace the guess of the thrust factor by what carries the weight; a guessed drag factor scales with it.
 
     Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found;
     without one either nothing tells thrust from weight, and the guess stays.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        As stated, with guesses of what is not known.
+    flights : sequence of PlaybackFlight
+        Of this configuration.
+
+    Returns
+    -------
+    VehicleSettings
+        With better guesses; a thrust factor that nothing tells in runs is no longer unknown to them.
+    tuple of FoundNumber
+        The thrust factor, where the accelerometer tells it.
     """
     if "thrust_factor" not in vehicle.unknown:
         return vehicle, ()
@@ -245,8 +259,15 @@ def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tup
     return shares, float(np.quantile(np.concatenate(speeds), 0.95))
 
 
-def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
-    """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that."""
+def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
+    """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that.
+
+    Parameters
+    ----------
+    fitted : Fitted
+    spread : Uncertainty
+        Of this fit.
+    """
     layout, values = fitted.layout, fitted.values
     physical = layout.physical(values)
     stated = layout.physical(layout.starts)
@@ -265,14 +286,19 @@ def _numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
 
 def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
     """Turn the covariance of a fit into half widths of 95 % intervals of what follows from its numbers."""
+    deviation = np.sqrt(np.diag(_covariance(physical, fitted, spread)))
+    return np.asarray(student.ppf(0.975, spread.blocks - 1) * deviation)
+
+
+def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
+    """Turn the covariance of a fit into that of what follows from its numbers."""
     values = fitted.values
     slopes = []
     for place, step in enumerate(_STEP * fitted.layout.scales * np.eye(len(values))):
         ahead, behind = physical(values + step), physical(values - step)
         slopes.append([(ahead[name].value - behind[name].value) / (2 * step[place]) for name in ahead])
     by_number = np.array(slopes).reshape(len(values), -1)
-    deviation = np.sqrt(np.diag(by_number.T @ spread.covariance @ by_number))
-    return np.asarray(student.ppf(0.975, spread.blocks - 1) * deviation)
+    return np.asarray(by_number.T @ spread.covariance @ by_number)
 
 
 def differences(joint: JointLayout, fitted: Fitted, spread: Uncertainty) -> Iterator[Difference]:
@@ -308,7 +334,10 @@ def _interval(value: float, half: float, *, positive: bool) -> tuple[float, floa
     return value / factor, value * factor
 
 
-def _trades(layout: AnyLayout, spread: Uncertainty) -> Iterator[Trade]:
-    names, correlation = list(layout.physical(layout.starts)), spread.correlation
+def _trades(fitted: Fitted, spread: Uncertainty) -> Iterator[Trade]:
+    """Name pairs of numbers, as people know them, whose estimates go together."""
+    names, covariance = list(fitted.layout.physical(fitted.values)), _covariance(fitted.layout.physical, fitted, spread)
+    deviation = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.maximum(np.outer(deviation, deviation), np.finfo(float).tiny)
     for first, second in np.argwhere(np.triu(np.abs(correlation) > _TRADED, 1)).tolist():
         yield Trade(names[first], names[second], float(correlation[first, second]))

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from cpfls_cli.config.unknown import with_guesses
 from cpfls_cli.effects.polynomial import state_terms
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -96,6 +97,35 @@ def pushed(vehicle=STATED):
     return replace(model, effects=effects, remainder=remainder)
 
 
+ADDED_KG, ADDED_AT = 0.05 * STATED.mass_kg, np.array([0.04, 0.03])
+"""A weight 5 cm off the centre."""
+
+
+def loaded():
+    """Add a point mass to `truth`, in the plane of its centre of mass."""
+    known, mass = truth(), STATED.mass_kg
+    x, y = ADDED_AT
+    added = ADDED_KG * mass / (ADDED_KG + mass) * np.array([y * y, x * x, x * x + y * y])
+    inertia = tuple((np.array(known.vehicle.inertia_kg_m2) + added).tolist())
+    offset = ModelEffect("com_offset", {}, ADDED_KG * ADDED_AT / (mass + ADDED_KG))
+    vehicle = replace(known.vehicle, mass_kg=mass + ADDED_KG, inertia_kg_m2=inertia)
+    return replace(known, vehicle=vehicle, effects=(*known.effects, offset))
+
+
+def nothing_known(vehicle=STATED):
+    """Keep mass and geometry of a vehicle, with guesses of the rest as a config that leaves it null has."""
+    open_ = {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+    rotors = [{"position_m": rotor.position_m, "spin": rotor.spin, **open_} for rotor in vehicle.rotors]
+    known = {"mass_kg": vehicle.mass_kg, "rotor_speed_max_rad_s": vehicle.rotor_speed_max_rad_s}
+    guessed = with_guesses({"vehicle": {**known, "inertia_kg_m2": [None] * 3, "rotors": rotors}})["vehicle"]
+    return VehicleSettings(
+        **known,
+        inertia_kg_m2=tuple(guessed["inertia_kg_m2"]),
+        rotors=tuple(RotorSettings(**rotor) for rotor in guessed["rotors"]),
+        unknown=tuple(guessed["unknown"]),
+    )
+
+
 def true_numbers(vehicle=STATED):
     """Name the numbers of `truth` as a fit does, SI."""
     model, (rotor, *_) = truth(vehicle), truth(vehicle).vehicle.rotors
@@ -129,11 +159,9 @@ def flown(model, kinds=KINDS, *, stated=STATED, duration_s=20.0, rate_hz=100.0, 
     rng = np.random.default_rng(seed)
     period = 1 / rate_hz
     time = period * np.arange(round(duration_s * rate_hz))
-    plans = [reference(kind, time, rng) for kind in kinds]
-    plan = Plan(*(np.stack(part, axis=1) for part in zip(*plans, strict=True)))
-    states, speeds = _Fleet(model, stated, plan, period, hold).flown(len(time))
+    states, speeds = _Fleet(model, stated, planned(kinds, time, rng), period, hold).flown(len(time))
     return [
-        _logged(f"{kind}-{seed}-{number}", states[:, number], speeds[:, number], period, hold, noise or Noise(), rng)
+        logged(f"{kind}-{seed}-{number}", states[:, number], speeds[:, number], period, hold, noise or Noise(), rng)
         for number, kind in enumerate(kinds)
     ]
 
@@ -147,6 +175,12 @@ class Plan(NamedTuple):
     held: np.ndarray
     kick: np.ndarray
     """Angular acceleration that is added, rad/s^2."""
+
+
+def planned(kinds, time, rng):
+    """Plan several flights."""
+    plans = [reference(kind, time, rng) for kind in kinds]
+    return Plan(*(np.stack(part, axis=1) for part in zip(*plans, strict=True)))
 
 
 def reference(kind, time, rng):
@@ -174,17 +208,16 @@ class _Fleet:
     """Several flights of one model at a time, each with its own plan."""
 
     def __init__(self, model, stated, plan, period, hold):
-        self.model, self.stated, self.plan, self.period, self.hold = model, stated, plan, period, hold
+        self.model, self.plan, self.period, self.hold = model, plan, period, hold
+        self.autopilot = Autopilot(stated)
         self.rotors, self.flights = model.rotors, plan.held.shape[1]
         # Delayed speeds jump within a sample: a step ends there.
         even = np.linspace(0.0, 1.0, int(np.ceil(period / FINE_STEP_S - 1e-9)) + 1)
         self.marks = np.unique(np.append(even, np.round(model.response.delay_s / period % 1.0, 9)))
         self.ends = np.cumsum([3, 3, 4, 3, self.rotors])
-        self.inverse = np.linalg.pinv(allocation_matrix(stated))
         self.weight = np.array([0.0, 0.0, model.vehicle.gravity_m_s2])
         self.used = np.flatnonzero(np.any(model.weights, axis=(0, 2)))
         self.weights = model.weights[:, self.used].reshape(-1, model.weights.shape[2]).T
-        self.hover = np.sqrt(stated.mass_kg * stated.gravity_m_s2 / allocation_matrix(stated)[0].sum())
 
     def flown(self, samples):
         """Give states and logged rotor speeds at all samples, time first."""
@@ -192,11 +225,11 @@ class _Fleet:
         state[:, 9] = 1.0
         state[:, :3], state[:, 3:6] = self.plan.position[0], self.plan.velocity[0]
         # A model knows nothing of what was before a log, and takes the rotors to have settled at its first speeds.
-        first = self.command(0, state) if self.hold == "previous" else self.hover
+        first = self.command(0, state) if self.hold == "previous" else self.autopilot.hover
         state[:, self.ends[3] : self.ends[4]], state[:, self.ends[4] :] = first, first**2
         states, self.log = (
             np.empty((samples, *state.shape)),
-            np.full((samples + 2, self.flights, self.rotors), self.hover),
+            np.full((samples + 2, self.flights, self.rotors), self.autopilot.hover),
         )
         for sample in range(samples):
             command = self.command(sample, state)
@@ -258,9 +291,22 @@ class _Fleet:
         )
 
     def command(self, sample, state):
-        """Ask for rotor speeds as a cascade of velocity, attitude and rate does."""
+        """Ask for rotor speeds."""
         position, velocity, quaternion, rate = np.split(state, self.ends, axis=1)[:4]
-        plan, stated = self.plan, self.stated
+        return self.autopilot.speeds(self.plan, sample, position, velocity, quaternion, rate)
+
+
+class Autopilot:
+    """Asks for rotor speeds as a cascade of velocity, attitude and rate does, of a stated vehicle."""
+
+    def __init__(self, stated):
+        self.stated, thrusts = stated, allocation_matrix(stated)
+        self.inverse = np.linalg.pinv(thrusts)
+        self.hover = np.sqrt(stated.mass_kg * stated.gravity_m_s2 / thrusts[0].sum())
+
+    def speeds(self, plan, sample, position, velocity, quaternion, rate):
+        """Ask for speeds of several flights, shape (flight, rotor), rad/s; quaternions x, y, z, w."""
+        stated = self.stated
         pull = 2.5 * (plan.velocity[sample] - velocity) + [0.0, 0.0, stated.gravity_m_s2]
         pull += 1.8 * plan.held[sample][:, None] * (plan.position[sample] - position)
         # Rotors have to be left for the torques: no steep tilts, no hard turns of the heading.
@@ -308,8 +354,8 @@ def _upright(pull, heading):
     return np.stack([forward, np.cross(up, forward), up], axis=2)
 
 
-def _logged(name, states, speed, period, hold, noise, rng):
-    """Log states with noise."""
+def logged(name, states, speed, period, hold, noise, rng):
+    """Log states (position, velocity, quaternion x, y, z, w, rate) with noise."""
 
     def noisy(values, size):
         return np.ascontiguousarray(values + noise.drawn(size, values, period, rng))

@@ -10,6 +10,7 @@ from cpfls_cli.playback.model import wrench_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure, choose, fitted_to_all
+from cpfls_cli.playback.vehicle import find_vehicle
 from tests.builders.playback_flights import (
     KINDS,
     MIDDLING,
@@ -19,6 +20,7 @@ from tests.builders.playback_flights import (
     TRUE_BLOCKS,
     flown,
     judged,
+    nothing_known,
     pushed,
     rotorpy_flight,
     true_numbers,
@@ -63,6 +65,27 @@ def test_with_noise_they_come_back_and_predict_another_flight(noisy):
         for model in (found.layout.model(found.values), truth())
     )
     assert (by_found.sums < 1.1 * by_truth.sums).all()
+
+
+def test_from_mass_and_geometry_alone_the_constants_come_back():
+    """Thrust factor, drag factor and inertia are guesses, up to twice too large or a third of what they are."""
+    flights = flown(truth(), ("multisine", "figure"), seed=1, noise=MIDDLING)
+    others = tuple(block for block in blocks_of(nothing_known()) if block not in TRUE_BLOCKS)
+    settings = PlaybackSettings(leave_out=others, search_windows=40, folds=2, population=2, generations=0)
+    found = find_vehicle(nothing_known(), flights, settings, np.random.default_rng(1), lambda *_: None)
+    true, guessed = true_numbers(), nothing_known()
+    assert guessed.rotors[0].drag_factor_n_m_s2 < 0.3 * true["drag_factor"]
+    by_name = {number.name: number for number in found.numbers}
+    asked = dict.fromkeys(("drag_factor", *(name for name in true if name.startswith("inertia"))), 0.03)
+    for name, part in {"thrust_factor": 0.01, **asked}.items():
+        number = by_name[name]
+        assert number.value == pytest.approx(true[name], rel=part)
+        assert number.low < true[name] < number.high
+        assert number.determined
+    assert by_name["lag.time_constant_s"].value == pytest.approx(truth().response.lag_s, abs=0.002)
+    # About yaw all is known by its inertia far better than by itself, and named as it is known.
+    pairs = {(trade.first, trade.second) for trade in found.trades}
+    assert {("drag_factor", "inertia.Izz"), ("drag_factor", "linear_damping.d_z")} <= pairs
 
 
 def test_the_blocks_that_are_there_are_chosen_and_no_others(noisy):

@@ -8,33 +8,30 @@ import pytest
 from cpfls_cli.playback.fit import fit, uncertainty, windows_of
 from cpfls_cli.playback.groups import Group, JointLayout
 from cpfls_cli.playback.kernels import Airflow
-from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.parameters import Layout
 from cpfls_cli.playback.vehicle import Difference, differences
-from tests.builders.playback_flights import KINDS, MIDDLING, STATED, TRUE_BLOCKS, flown, truth
+from tests.builders.playback_flights import (
+    ADDED_AT,
+    ADDED_KG,
+    KINDS,
+    MIDDLING,
+    STATED,
+    TRUE_BLOCKS,
+    flown,
+    loaded,
+    truth,
+)
 
 NO_REMAINDER = Airflow(np.zeros(0), 0)
-ADDED, PLACE = 0.05 * STATED.mass_kg, np.array([0.04, 0.03])
 JOINT = JointLayout(Layout(STATED, TRUE_BLOCKS, NO_REMAINDER), (Group("payload", ("mass", "com_offset", "inertia")),))
-
-
-def with_payload():
-    """The truth with a point mass in the plane of its centre of mass."""
-    known, mass = truth(), STATED.mass_kg
-    x, y = PLACE
-    added = ADDED * mass / (ADDED + mass) * np.array([y * y, x * x, x * x + y * y])
-    inertia = tuple((np.array(known.vehicle.inertia_kg_m2) + added).tolist())
-    offset = ModelEffect("com_offset", {}, ADDED * PLACE / (mass + ADDED))
-    vehicle = replace(known.vehicle, mass_kg=mass + ADDED, inertia_kg_m2=inertia)
-    return replace(known, vehicle=vehicle, effects=(*known.effects, offset))
 
 
 @pytest.fixture(scope="module")
 def flights():
-    loaded = flown(with_payload(), KINDS, noise=MIDDLING, seed=51, hold="linear")
+    with_weight = flown(loaded(), KINDS, noise=MIDDLING, seed=51, hold="linear")
     return [
         *flown(truth(), KINDS, noise=MIDDLING, seed=1, hold="linear"),
-        *(replace(flight, group="payload") for flight in loaded),
+        *(replace(flight, group="payload") for flight in with_weight),
     ]
 
 
@@ -56,9 +53,9 @@ def test_shared_numbers_stand_once_and_own_ones_beside_them():
 def test_added_mass_and_its_place_are_found(found):
     by_name: dict[str, Difference] = {each.name: each for each in differences(JOINT, *found)}
     mass = by_name["payload: added mass"]
-    assert mass.low < ADDED < mass.high
-    assert mass.value == pytest.approx(ADDED, rel=0.06)
-    for axis, place in zip("xy", PLACE, strict=True):
+    assert mass.low < ADDED_KG < mass.high
+    assert mass.value == pytest.approx(ADDED_KG, rel=0.06)
+    for axis, place in zip("xy", ADDED_AT, strict=True):
         where = by_name[f"payload: place of the added mass, {axis}"]
         assert where.value == pytest.approx(place, abs=0.003)
         assert where.low < place < where.high
@@ -68,20 +65,35 @@ def test_model_of_each_configuration_has_its_mass(found):
     fitted, _ = found
     assert JOINT.model(fitted.values).vehicle.mass_kg == STATED.mass_kg
     loaded = JOINT.model(fitted.values, "payload")
-    assert loaded.vehicle.mass_kg == pytest.approx(STATED.mass_kg + ADDED, rel=0.003)
+    assert loaded.vehicle.mass_kg == pytest.approx(STATED.mass_kg + ADDED_KG, rel=0.003)
     offset = next(each for each in loaded.effects if each.name == "com_offset")
-    assert offset.coefficients == pytest.approx(ADDED * PLACE / (STATED.mass_kg + ADDED), rel=0.03)
+    assert offset.coefficients == pytest.approx(ADDED_KG * ADDED_AT / (STATED.mass_kg + ADDED_KG), rel=0.03)
 
 
-def test_gradient_by_a_number_of_a_group_is_that_of_its_flights(flights):
+def test_effects_stay_what_they_are_where_the_inertia_differs():
+    """Damping and flapping are torques of the air: a body that gains 2 % does not gain 2 % of them."""
+    others = [replace(flight, group="payload") for flight in flown(loaded(), KINDS, seed=51)]
+    windows = windows_of([*flown(truth(), KINDS, seed=1), *others], 0.5, 0.6)
+    found = fit(JOINT, windows, {}, 60, 3e-5)
+    for group, flew in (("", truth()), ("payload", loaded())):
+        model = JOINT.model(found.values, group)
+        assert model.vehicle.inertia_kg_m2[:3] == pytest.approx(flew.vehicle.inertia_kg_m2, rel=0.001)
+        known = {effect.name: effect.coefficients for effect in flew.effects}
+        for effect in model.effects:
+            assert effect.coefficients == pytest.approx(known[effect.name], rel=0.002)
+
+
+@pytest.mark.parametrize("blocks", [TRUE_BLOCKS, TRUE_BLOCKS[1:]], ids=["inertia of all", "of the group alone"])
+def test_gradient_by_a_number_of_a_group_is_that_of_its_flights(flights, blocks):
     """Against difference quotients, for all numbers, shared ones and those of the group."""
     from cpfls_cli.playback.fit import _evaluated
 
     windows = windows_of([flights[0], flights[-1]], 0.2, 2.0)
-    values = JOINT.starts + 0.1 * JOINT.scales
-    gradient = _evaluated(JOINT, windows, values).gradient
-    for place, scale in enumerate(JOINT.scales):
+    layout = replace(JOINT, base=Layout(STATED, blocks, NO_REMAINDER))
+    values = layout.starts + 0.1 * layout.scales
+    gradient = _evaluated(layout, windows, values).gradient
+    for place, scale in enumerate(layout.scales):
         step = np.zeros(len(values))
         step[place] = 1e-6 * scale
-        ahead, behind = (_evaluated(JOINT, windows, values + sign * step).objective for sign in (1, -1))
+        ahead, behind = (_evaluated(layout, windows, values + sign * step).objective for sign in (1, -1))
         assert gradient[place] == pytest.approx((ahead - behind) / 2e-6, rel=2e-4, abs=2e-7)

@@ -98,7 +98,7 @@ def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
     flights = flown(VehicleModel(vehicle=STATED), ("multisine", "steps"), duration_s=4.0, noise=MIDDLING, seed=1)
     windows = [Windows.of(each, 20, 20) for each in flights]
     fitted = fit(Layout(STATED, ("lag", "inertia"), RULES["one rule"]), windows, {}, 30, 1e-5)
-    lag, *inertia = vehicle._numbers(fitted, uncertainty(fitted, windows))
+    lag, *inertia = vehicle.found_numbers(fitted, uncertainty(fitted, windows))
     assert (lag.value, lag.low, lag.at_bound) == (0.001, 0.001, True)
     assert 0.001 < lag.high < 0.003
     for number in inertia:

@@ -1,0 +1,302 @@
+"""Start from mass and geometry alone, and find the rest in flights: errors of the numbers, intervals that hold them.
+
+    python benchmarks/constants.py [PART...]
+
+The parts, all if none is named: `speeds` (rotor speeds logged), `search` (and the structure looked for), `commands`
+(in per cent, and no rotor speed), `rotorpy` (flights in CPFLS_FLIGHTS), `mujoco` (flown there), `weight` (added).
+Nothing but mass, places and spins of the rotors and a largest rotor speed is known to a fit; what else it starts from
+is guessed as for a config that leaves it null. Noise as in playback_truth.py; fits have the structure that flew, except
+for those of `search`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.playback.fit import Fitted, fit, uncertainty, windows_of
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.groups import Group, JointLayout
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.parameters import MASS
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.structure import Structure
+from cpfls_cli.playback.vehicle import FoundNumber, carrying_weight, differences, find_vehicle, found_numbers
+from cpfls_cli.vehicle import VehicleSettings
+from tests.builders.playback_flights import (
+    ADDED_AT,
+    ADDED_KG,
+    KINDS,
+    MIDDLING,
+    ROTORPY,
+    ROTORPY_HIDDEN,
+    STATED,
+    TRUE_BLOCKS,
+    flown,
+    loaded,
+    logged,
+    nothing_known,
+    rotorpy_flight,
+    true_numbers,
+    truth,
+)
+from tests.builders.recorded_flights import FLIGHTS
+
+SEEDS, SEARCHES, LOADED = 20, 2, 10
+TIMES = 3
+"""How often each kind of excitation is flown for a fit: nine flights of 20 s."""
+
+STEPS, TOLERANCE = 60, 3e-5
+USUAL = PlaybackSettings()
+SEARCH = PlaybackSettings(search_windows=120, population=6, generations=1)
+LAG = "lag.time_constant_s"
+ASKED = {"thrust_factor": "1 %", "drag_factor": "3 %", LAG: "2 ms", "added mass": "3 %"}
+ASKED |= {f"inertia.I{axis}": "3 %" for axis in ("xx", "yy", "zz")}
+ASKED |= {f"place of the added mass, {axis}": "3 mm" for axis in "xy"}
+LINEAR, LARGEST_SPEED, NOMINAL_SPEED = 0.6, 1250.0, 1000.0
+"""Thrust curve of the flights without rotor speeds; the speed at a command of 1, and what a config says of it."""
+
+NOMINAL = nothing_known(replace(STATED, rotor_speed_max_rad_s=NOMINAL_SPEED))
+OF_COMMANDS = (LAG, "inertia.Ixx", "inertia.Iyy", "inertia.Izz")
+"""Numbers that do not depend on what a command of 1 is."""
+
+NOISE_OF_COMMANDS = replace(MIDDLING, speed=0.0)
+"""A command is logged as it was sent."""
+
+
+class Compared(NamedTuple):
+    """A number against its true value: error and half width of its interval in per cent, or ms, or mm."""
+
+    error: float
+    half: float
+    held: bool
+    unit: str
+
+
+def main(*asked: str) -> None:
+    for name in asked or PARTS:
+        print(f"\n{name}:\n")
+        PARTS[name]()
+
+
+def found(
+    vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], blocks: Sequence[str], groups: tuple[Group, ...] = ()
+) -> tuple[Fitted, list[FoundNumber], list]:
+    """Fit blocks beside what is not known, as `cpfls vehicle` does when it has chosen them."""
+    begun, _ = carrying_weight(vehicle, [flight for flight in flights if not flight.group])
+    layout = Structure(tuple(block for block in blocks if block not in begun.unknown)).layout(begun)
+    windows = windows_of(flights, USUAL.horizon_s, USUAL.window_interval_s)
+    joint = JointLayout(layout, groups)
+    fitted = fit(joint if groups else layout, windows, {}, STEPS, TOLERANCE)
+    spread = uncertainty(fitted, windows)
+    between = list(differences(joint, fitted, spread)) if groups else []
+    return fitted, list(found_numbers(fitted, spread)), between
+
+
+def compared(numbers, true: Mapping[str, float]) -> dict[str, Compared]:
+    """Compare numbers, or differences, with those that are true."""
+    rows = {}
+    for each in numbers:
+        if each.name in true:
+            factor, unit = (1000.0, f"m{each.unit}") if each.unit in ("s", "m") else (100 / abs(true[each.name]), "%")
+            error, half = factor * (each.value - true[each.name]), factor * (each.high - each.low) / 2
+            rows[each.name] = Compared(error, half, each.low <= true[each.name] <= each.high, unit)
+    return rows
+
+
+COLUMNS = ("number", "asked", "median error", "largest", "mean", "median half interval", "intervals that hold it")
+
+
+def by_number(fits: Sequence[Mapping[str, Compared]]) -> Iterator[tuple[str, ...]]:
+    for name in fits[0]:
+        rows = [each[name] for each in fits]
+        errors, unit = np.array([row.error for row in rows]), rows[0].unit
+        sizes = (np.median(np.abs(errors)), np.abs(errors).max())
+        half, held = np.median([row.half for row in rows]), sum(row.held for row in rows)
+        texts = (*(f"{size:.2f} {unit}" for size in sizes), f"{errors.mean():+.2f} {unit}", f"{half:.2f} {unit}")
+        yield name, ASKED.get(name.rpartition(": ")[2], ""), *texts, f"{held} of {len(rows)}"
+    held = [row.held for each in fits for row in each.values()]
+    yield "all", "90 to 98 %", "", "", "", "", f"{100 * np.mean(held):.1f} %"
+
+
+def speeds() -> None:
+    fits = []
+    for seed in range(1, SEEDS + 1):
+        flights = flown(truth(), KINDS * TIMES, seed=seed, noise=MIDDLING)
+        fits.append(compared(found(nothing_known(), flights, TRUE_BLOCKS)[1], true_numbers()))
+    table("constants_speeds", COLUMNS, list(by_number(fits)))
+
+
+def search() -> None:
+    """Look for the structure as well, with small settings: where speeds are logged, and once where commands are."""
+    rows = []
+    for seed in range(1, SEARCHES + 1):
+        flights = flown(truth(), KINDS * TIMES, seed=seed, noise=MIDDLING)
+        rows += searched(f"speeds {seed}", nothing_known(), flights, TRUE_BLOCKS, true_numbers())
+    known = {name: value for name, value in true_numbers().items() if name in OF_COMMANDS}
+    rows += searched("commands 1", NOMINAL, without_speeds(1), (*TRUE_BLOCKS, "thrust_law"), known)
+    table("constants_search", ("flights", "blocks too many", "missed", "number", *SINGLE), rows)
+
+
+def searched(
+    name: str,
+    vehicle: VehicleSettings,
+    flights: Sequence[PlaybackFlight],
+    blocks: Sequence[str],
+    true: Mapping[str, float],
+) -> list[tuple[str, ...]]:
+    result = find_vehicle(vehicle, flights, SEARCH, np.random.default_rng(1), lambda *_: None)
+    chosen, flew = result.choice.chosen.structure.blocks, [block for block in blocks if block not in vehicle.unknown]
+    more, missed = ([b for b in one if b not in other] for one, other in ((chosen, flew), (flew, chosen)))
+    about = (", ".join(more) or "none", ", ".join(missed) or "none")
+    errors = compared(result.numbers, true)
+    return [(name, *about, number, *single(errors[number])) for number in ASKED if number in errors]
+
+
+SINGLE = ("error", "half interval", "holds it")
+
+
+def single(row: Compared) -> tuple[str, str, str]:
+    return f"{row.error:+.2f} {row.unit}", f"{row.half:.2f} {row.unit}", "yes" if row.held else "no"
+
+
+def curved() -> VehicleModel:
+    """Give rotors whose thrust has a linear and a square part, and that hover at the speeds of `truth`."""
+    vehicle = truth().vehicle
+    rotors = tuple(
+        replace(
+            rotor,
+            thrust_factor_n_s2=rotor.thrust_factor_n_s2 / (1 + LINEAR),
+            drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 / (1 + LINEAR),
+        )
+        for rotor in vehicle.rotors
+    )
+    return replace(truth(), thrust_linear=LINEAR, vehicle=replace(vehicle, rotors=rotors))
+
+
+def without_speeds(seed: int) -> list[PlaybackFlight]:
+    """Fly; logged is a share of a largest speed that nobody knows, and taken as one of the nominal speed."""
+    flights = flown(curved(), KINDS * TIMES, seed=seed, noise=NOISE_OF_COMMANDS)
+    return [replace(flight, speed=NOMINAL_SPEED / LARGEST_SPEED * flight.speed) for flight in flights]
+
+
+def commands() -> None:
+    fits, curves = [], []
+    true = {name: value for name, value in true_numbers().items() if name in OF_COMMANDS}
+    for seed in range(1, SEEDS + 1):
+        flights = without_speeds(seed)
+        fitted, numbers, _ = found(NOMINAL, flights, (*TRUE_BLOCKS, "thrust_law"))
+        fits.append(compared(numbers, true))
+        speeds = np.concatenate([flight.speed for flight in flights]) / NOMINAL_SPEED
+        flew = np.linspace(speeds.min(), speeds.max(), 200)
+        curve = thrust(curved(), LARGEST_SPEED * flew)
+        away = thrust(fitted.layout.model(fitted.values), NOMINAL_SPEED * flew) - curve
+        curves.append((flew[0], flew[-1], 100 * np.abs(away).max() / curve.max()))
+    low, high, largest = np.array(curves).T
+    row = (f"{low.mean():.2f} to {high.mean():.2f}", "2 %", f"{np.median(largest):.2f} %", f"{largest.max():.2f} %")
+    table("constants_curve", ("commands flown", "asked", "median of the largest deviation", "largest"), [row])
+    print()
+    table("constants_commands", COLUMNS, list(by_number(fits)))
+
+
+def thrust(model: VehicleModel, speed: Array) -> Array:
+    """Compute the thrust of a rotor, N."""
+    upwards = model.part_weights()["rotors"][5, 0]
+    return np.asarray(speed * upwards[1] + speed**2 * upwards[1 + model.rotors])
+
+
+def rotorpy() -> None:
+    if not (FLIGHTS / "rotorpy").exists():
+        print(f"{FLIGHTS / 'rotorpy'} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
+        return
+    rows = []
+    for name, hidden in ROTORPY_HIDDEN.items():
+        flight, true = rotorpy_flight(name), stated_numbers(ROTORPY, hidden)
+
+        def errors(given: PlaybackFlight, hidden=hidden, true=true) -> dict[str, Compared]:
+            _, numbers, _ = found(nothing_known(ROTORPY), [given], [effect.name for effect in hidden])
+            return compared(numbers, true)
+
+        clean = errors(flight)
+        noisy = [errors(with_noise(flight, np.random.default_rng(seed))) for seed in range(1, SEEDS + 1)]
+        at_once = {number: f"{row.error:+.2f} {row.unit}" for number, row in clean.items()}
+        rows += [(name, number, at_once.get(number, ""), *row) for number, *row in by_number(noisy)]
+    table("constants_rotorpy", ("flight", "number", "without noise", *COLUMNS[1:]), rows)
+
+
+def with_noise(flight: PlaybackFlight, rng: np.random.Generator) -> PlaybackFlight:
+    """Log a flight that has no noise once more."""
+    motion = flight.motion
+    turned = Rotation.from_matrix(motion.rotation).as_quat()
+    states = np.hstack([motion.position, motion.velocity, turned, motion.rate])
+    return logged(flight.name, states, flight.speed, motion.period, flight.hold, MIDDLING, rng)
+
+
+def stated_numbers(vehicle: VehicleSettings, effects=()) -> dict[str, float]:
+    rotor, moments = vehicle.rotors[0], vehicle.inertia_kg_m2
+    known = dict(zip(("inertia.Ixx", "inertia.Iyy", "inertia.Izz"), moments, strict=False))
+    known |= {"thrust_factor": rotor.thrust_factor_n_s2, "drag_factor": rotor.drag_factor_n_m_s2}
+    offset = [effect.coefficients.tolist() for effect in effects if effect.name == "com_offset"]
+    return known | {f"com_offset.c_{axis}": value for pair in offset for axis, value in zip("xy", pair, strict=True)}
+
+
+def mujoco() -> None:
+    if find_spec("mujoco") is None:
+        print("not flown: MuJoCo is not installed; `pip install .[bench]` brings it")
+        return
+    from benchmarks.shared.mujoco_flights import LAG_S, VEHICLE, mujoco_flights
+
+    true = stated_numbers(VEHICLE) | {LAG: LAG_S}
+    fits = [
+        compared(found(nothing_known(VEHICLE), mujoco_flights(seed, TIMES), ["lag"])[1], true)
+        for seed in range(1, SEEDS + 1)
+    ]
+    table("constants_mujoco", COLUMNS, list(by_number(fits)))
+
+
+def weight() -> None:
+    """Fly as often with a weight of 5 % of the mass, 5 cm off the centre, as without."""
+    name = "loaded"
+    groups = (Group(name, (MASS, "com_offset", "inertia")),)
+    true = {f"{name}: added mass": ADDED_KG}
+    true |= {f"{name}: place of the added mass, {axis}": at for axis, at in zip("xy", ADDED_AT.tolist(), strict=True)}
+    moments = (stated_numbers(model.vehicle) for model in (loaded(), truth()))
+    more, own = ({key: value for key, value in each.items() if "inertia" in key} for each in moments)
+    true |= {f"{name}: {key}": value for key, value in more.items()}
+    true |= {f"{name}: added {key.removeprefix('inertia.')}": value - own[key] for key, value in more.items()}
+    fits = []
+    for seed in range(1, LOADED + 1):
+        own = flown(truth(), KINDS * TIMES, seed=seed, noise=MIDDLING)
+        others = flown(loaded(), KINDS * TIMES, seed=1000 + seed, noise=MIDDLING)
+        flights = [*own, *(replace(flight, group=name) for flight in others)]
+        _, numbers, between = found(nothing_known(), flights, TRUE_BLOCKS, groups)
+        fits.append(compared([*between, *numbers], true | true_numbers()))
+    table("constants_weight", COLUMNS, list(by_number(fits)))
+
+
+PARTS = {
+    "speeds": speeds,
+    "search": search,
+    "commands": commands,
+    "rotorpy": rotorpy,
+    "mujoco": mujoco,
+    "weight": weight,
+}
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
