@@ -17,16 +17,15 @@ _DIGITS = 6
 THRUST, DRAG = "rotors.thrust_factor_n_s2", "rotors.drag_factor_n_m_s2"
 INERTIA = tuple(f"inertia_kg_m2.{place}" for place in range(6))
 LAG, DELAY, CENTRE = "motor_lag_s", "delay_s", ("com_m.0", "com_m.1")
-FOUND_AS = {
+_FOUND_AS = {
     THRUST: "thrust_factor",
     DRAG: "drag_factor",
     **dict(zip(INERTIA[:3], (f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]), strict=True)),
     **dict(zip(INERTIA[3:], (f"products.{name}" for name in INERTIA_PARAMETERS[3:]), strict=True)),
     LAG: "lag.time_constant_s",
     DELAY: "delay.delay_s",
-    **dict(zip(CENTRE, ("com_offset.c_x", "com_offset.c_y"), strict=True)),
 }
-"""Numbers of a fit, by the keys under which people look for them."""
+"""Numbers of a fit, by the keys under which people look for them; the centre of mass is an effect (`found_as`)."""
 
 _UNITS = {THRUST: "N s^2", DRAG: "N m s^2", LAG: "s", DELAY: "s", **dict.fromkeys(CENTRE, "m")}
 STATED = (THRUST, DRAG, *INERTIA)
@@ -64,11 +63,18 @@ class Parameter(NamedTuple):
     reason: str
 
 
+def found_as() -> dict[str, str]:
+    """Give the numbers of a fit by the keys under which people look for them."""
+    from cpfls_cli.playback import groups
+
+    return _FOUND_AS | dict(zip(CENTRE, groups.CENTRE, strict=True))
+
+
 def parameters_of(record: VehicleRecord) -> Iterator[Parameter]:
     """List the constants of a vehicle that was found, known or not."""
     found = {row["name"]: row for row in rows_of(record.found)}
     guesses = {key for name in record.guess or () for key in _GUESSES[name]}
-    for key, name in FOUND_AS.items():
+    for key, name in found_as().items():
         unit = _UNITS.get(key, "kg m^2")
         if name in found:
             row = found[name]

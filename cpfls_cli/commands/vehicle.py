@@ -198,7 +198,7 @@ def _check_blocks(study: Study) -> None:
     for name in study.playback.leave_out:
         _check_block("playback.leave_out", name, known)
     for group in study.playback.groups:
-        for name in group.differs:
+        for name in group.differs or ():
             _check_block(f"playback.groups: {group.name}: differs", name, (MASS, *study.vehicle.unknown, *known))
 
 

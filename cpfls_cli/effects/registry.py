@@ -23,6 +23,7 @@ CATALOGUE: Mapping[str, Effect] = _discover()
 """Effects by identifier."""
 
 VEHICLE_NUMBERS: Effect = next(known for known in CATALOGUE.values() if known.kind == "parameter")
+CENTRE_OF_MASS: Effect = next(known for known in CATALOGUE.values() if known.of_all_forces)
 """The vehicle's own numbers, which stay free in every fit."""
 
 

@@ -12,11 +12,11 @@ from cpfls_cli.artifacts.parameters import (
     CENTRE,
     DELAY,
     DRAG,
-    FOUND_AS,
     INERTIA,
     LAG,
     THRUST,
     Parameter,
+    found_as,
     parameters_of,
     vehicle_section,
 )
@@ -84,7 +84,7 @@ def answer(found: Source[VehicleRecord]) -> Iterator[Block]:
         yield errors_table(found.record.held_out, 1)
     yield from _differences_table(found.record, 1)
     yield from _constants(found.record, 1)
-    yield _numbers_table(found, 1)
+    yield from _numbers_table(found, 1)
     yield _section_to_paste(found.record)
     yield from (Text(warning, "warning") for warning in warnings(found.record))
 
@@ -190,9 +190,9 @@ def _far(value: float, stated: float) -> bool:
     return bool(np.isfinite(stated) and stated > 0 and not 1 / _FAR < value / stated < _FAR)
 
 
-def _numbers_table(found: Source[VehicleRecord], index: int) -> Table:
-    """Show what was found beside the constants."""
-    numbers = rows_of(found.record.found)
+def _numbers_table(found: Source[VehicleRecord], index: int) -> Iterator[Table]:
+    """Show what was found beside the constants, if anything was."""
+    numbers, constants = rows_of(found.record.found), found_as().values()
     rows = [
         [
             row["name"],
@@ -202,13 +202,14 @@ def _numbers_table(found: Source[VehicleRecord], index: int) -> Table:
             number(row["high"], 3),
         ]
         for row in numbers
-        if row["name"] not in FOUND_AS.values() and not _is_learned(row["name"])
+        if row["name"] not in constants and not _is_learned(row["name"])
     ]
     learned = sum(_is_learned(row["name"]) for row in numbers)
     more = f" {learned} more make the learned remainder; they stand in /found of the file." if learned else ""
     caption = f"Other numbers of the vehicle with 95 % intervals from blocks of the flights.{more}"
     header = ("Number", "Unit", "Value", "From", "To")
-    return Table(f"vehicle-numbers-{index}", caption, header, rows, frozenset({0, 1}))
+    if rows or learned:
+        yield Table(f"vehicle-numbers-{index}", caption, header, rows, frozenset({0, 1}))
 
 
 def _constants(record: VehicleRecord, index: int) -> Iterator[Block]:
@@ -305,7 +306,7 @@ def _section(found: Source[VehicleRecord], index: int) -> Iterator[Block]:
         yield horizon_figure(f"vehicle-errors-{index}", record.held_out)
     yield from _differences_table(record, index)
     yield from _constants(record, index)
-    yield _numbers_table(found, index)
+    yield from _numbers_table(found, index)
     yield _section_to_paste(record)
     yield from (Text(warning, "warning") for warning in warnings(record))
     yield _structures_table(record, index)
@@ -342,7 +343,7 @@ def _structures_table(record: VehicleRecord, index: int) -> Table:
     ]
     caption = (
         "Structures, judged on parts of the flights kept aside in turn. Chosen: the fewest numbers within one standard "
-        "error, or 2 %, of the smallest error; one by one: blocks added while they lower the error."
+        "error of the smallest error, or not visibly worse; one by one: blocks added while they lower the error."
     )
     header = ("Structure", "Error", "Worse than the best", "Numbers", "Condition", "Blocks")
     return Table(f"vehicle-structures-{index}", caption, header, rows, frozenset({0, 5}), frozenset({0, 5}))

@@ -407,3 +407,10 @@ def window_errors(fitted: Fitted, window: Windows) -> Array:
     weight, delta = window.loss.weight, window.loss.delta
     root = np.sqrt(1.0 + (errors**2).sum(axis=3) / delta**2)
     return np.asarray((weight * delta**2 * (root - 1.0)).sum(axis=(1, 2)))
+
+
+def stays_error(window: Windows) -> float:
+    """Weigh the mean errors of "rate stays" on windows of a flight as the fit does."""
+    weight, delta = window.loss.weight, window.loss.delta
+    size = rate_stays(window.flight, window.starts, window.horizon)
+    return float((weight * delta**2 * (np.sqrt(1.0 + (size / delta) ** 2) - 1.0)).sum())

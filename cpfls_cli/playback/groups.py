@@ -10,12 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.registry import CENTRE_OF_MASS
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import AS_STATED, COUNTED, INERTIA, MASS, Layout, Number, Numbered, Physical
 
-_CENTRE = ("com_offset.c_x", "com_offset.c_y")
+CENTRE = tuple(f"{CENTRE_OF_MASS.name}.{coefficient.name}" for coefficient in CENTRE_OF_MASS.coefficients)
+"""Numbers of a fit that say where the centre of mass is, ahead and to the left."""
+
+OF_A_WEIGHT = (MASS, CENTRE_OF_MASS.name, INERTIA)
+"""Blocks that an added weight changes."""
 
 
 class Group(NamedTuple):
@@ -107,8 +112,8 @@ class JointLayout(Numbered):
             added = own[MASS].value - mass if MASS in own else 0.0
             if MASS in own:
                 found[f"{group.name}: added mass"] = Physical(added, "kg")
-            if MASS in own and "com_offset" in group.differs:
-                for name, axis in zip(_CENTRE, "xy", strict=True):
+            if MASS in own and CENTRE_OF_MASS.name in group.differs:
+                for name, axis in zip(CENTRE, "xy", strict=True):
                     before = base[name].value if name in base else 0.0
                     place = (own[MASS].value * own[name].value - mass * before) / added if added else np.nan
                     found[f"{group.name}: place of the added mass, {axis}"] = Physical(place, "m")
@@ -119,7 +124,7 @@ class JointLayout(Numbered):
                     found[f"{group.name}: added {name}"] = Physical(moment, "kg m^2")
             for name, known in own.items():
                 block = name.split(".")[0]
-                if block in group.differs and block not in (MASS, "com_offset", INERTIA):
+                if block in group.differs and block not in OF_A_WEIGHT:
                     before = base[name].value if name in base else 0.0
                     found[f"{group.name}: {name} less that of the config"] = Physical(known.value - before, known.unit)
         return found

@@ -18,10 +18,9 @@ class GroupSettings(Settings):
     name: Annotated[str, MinLen(1), Doc("of the configuration")]
     flights: Annotated[tuple[str, ...], MinLen(1), Doc("its flights: names of files, * and ? as in a shell")]
     differs: Annotated[
-        tuple[str, ...],
-        MinLen(1),
-        Doc("blocks of numbers that it has of its own, mass among them; all others are shared"),
-    ] = ("mass", "com_offset", "inertia")
+        tuple[str, ...] | None,
+        Doc("blocks of numbers of its own, all others shared; null: what a weight changes, mass, its centre, inertia"),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
@@ -13,7 +14,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
-from cpfls_cli.playback.fit import Fitted, Windows, fit, window_errors, windows_of
+from cpfls_cli.playback.fit import Fitted, Windows, fit, stays_error, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointLayout
 from cpfls_cli.playback.kernels import Airflow
@@ -27,8 +28,9 @@ _FEWEST_BLOCKS = 8
 _UNSEEN = 3.0
 """How many times as fast about an axis a part turns, at least, that is nothing like the others."""
 
-_VISIBLE = 0.02
-"""Share of the error that is worth a name: on long flights less is significant, and is the step of the integrator."""
+_VISIBLE = 0.002
+"""Share of the error of "rate stays" that is worth a name: on long flights less is significant, and is the step of the
+integrator, which leaves 0.004 of it."""
 
 _HALF = 2**15
 
@@ -159,6 +161,13 @@ class _Bench:
     expected: int
     kept: Kept
     known: dict[Structure, Judged] = field(default_factory=dict)
+
+    @cached_property
+    def stays(self) -> float:
+        """Error of rates that stay, over the windows of all parts."""
+        windows = [each for part in self.parts for each in part]
+        counts = [len(each.starts) for each in windows]
+        return float(np.average([stays_error(each) for each in windows], weights=counts))
 
     def judge(self, structure: Structure, first: VehicleSettings | None = None) -> Judged:
         """Fit and judge a structure; fitted to another vehicle first, where one is given."""
@@ -403,7 +412,7 @@ def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
     """Sort what is judged by numbers, and give the best and the choice."""
     judged = sorted(bench.known.values(), key=lambda each: (each.numbers, each.error))
     best = min(judged, key=lambda each: each.error)
-    return judged, best, _simplest(judged, best)
+    return judged, best, _simplest(judged, best, _VISIBLE * bench.stays)
 
 
 def _refine(bench: _Bench, blocks: tuple[str, ...]) -> None:
@@ -468,11 +477,11 @@ def _encoded(structure: Structure, blocks: tuple[str, ...]) -> list[int]:
     return [*middle, (2 * place + 1) * _HALF // len(REMAINDERS)]
 
 
-def _simplest(judged: Sequence[Judged], best: Judged) -> Judged:
+def _simplest(judged: Sequence[Judged], best: Judged, visible: float) -> Judged:
     """Choose the fewest numbers within one standard error of the best, or not visibly worse."""
     for each in judged:
         worse, uncertain = each.worse_than(best)
-        if worse <= max(uncertain, _VISIBLE * best.error):
+        if worse <= max(uncertain, visible):
             return each
     return best
 

@@ -13,7 +13,7 @@ from scipy.stats import t as student
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.fit import AnyLayout, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import Group, JointLayout
+from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointLayout
 from cpfls_cli.playback.model import VehicleModel, wrench_of
 from cpfls_cli.playback.parameters import Physical, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -157,7 +157,7 @@ def find_vehicle(
     choice = choose(begun, own, settings, rng, progress, kept)
     chosen = choice.chosen
     flown = {flight.group for flight in flights}
-    groups = tuple(Group(group.name, group.differs) for group in settings.groups if group.name in flown)
+    groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fits[0], groups)
     spread, layout = uncertainty(fitted, windows), fitted.layout
     model = layout.model(fitted.values)
