@@ -194,12 +194,12 @@ def _horizon(job: Job, flight: LoggedFlight) -> int:
 
 def _check_blocks(study: Study) -> None:
     """Refuse names of blocks that no vehicle has."""
-    known = blocks_of(study.vehicle)
+    known = (*study.vehicle.unknown, *blocks_of(study.vehicle))
     for name in study.playback.leave_out:
         _check_block("playback.leave_out", name, known)
     for group in study.playback.groups:
         for name in group.differs or ():
-            _check_block(f"playback.groups: {group.name}: differs", name, (MASS, *study.vehicle.unknown, *known))
+            _check_block(f"playback.groups: {group.name}: differs", name, (MASS, *known))
 
 
 def _check_block(key: str, name: str, known: Sequence[str]) -> None:

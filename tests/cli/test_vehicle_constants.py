@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from cpfls_cli.config.load import load_study
-from tests.cli.test_vehicle import CONFIG, TRIED, left_out
+from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
 SEARCH = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "leave_out": left_out(TRIED)}
 KEYS = {

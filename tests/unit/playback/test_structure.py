@@ -89,6 +89,8 @@ def test_a_search_goes_on_from_what_was_kept(flights, number):
 class Bench:
     """Knows the error of each structure, its blocks one letter each, with noise that no comparison sees through."""
 
+    stays = 1.0
+
     def __init__(self, errors):
         self.errors, self.known = errors, {}
 
@@ -111,6 +113,33 @@ def test_no_block_can_be_left_out_of_the_choice():
     structure._refine(bench, ("a", "b", "c"))
     assert structure._preferred(bench)[2].structure.blocks == ("a", "b")
     assert Structure(("a",)) in bench.known
+
+
+def test_what_is_significant_and_not_visible_is_worth_no_number():
+    bench = Bench({"a": 0.0115, "ab": 0.0101, "abc": 0.01})
+    for blocks in ("a", "ab", "abc"):
+        bench.judge(Structure(tuple(blocks)))
+    assert structure._preferred(bench)[2].structure.blocks == ("a",)
+    bench.errors["a"] = 0.0130
+    bench.known.clear()
+    for blocks in ("a", "ab", "abc"):
+        bench.judge(Structure(tuple(blocks)))
+    assert structure._preferred(bench)[2].structure.blocks == ("a", "b")
+
+
+def test_flights_of_one_axis_each_are_cut(flights):
+    """No model can be asked for an axis that nothing has shown it."""
+
+    def turning(axis):
+        motion = flights[0].motion
+        rate = 0.1 * motion.rate
+        rate[:, axis] *= 100.0
+        return replace(flights[0], motion=motion._replace(rate=rate), name=f"about {axis}")
+
+    parts = parts_of([turning(0), turning(1)], QUICK)
+    assert [[windows.flight.name for windows in part] for part in parts] == [["about 0", "about 1"]] * 2
+    for first, second in zip(*parts, strict=True):
+        assert first.starts[-1] + first.horizon < second.starts[0]
 
 
 def test_flights_that_do_not_translate_are_asked_for_rotation_alone(flights):
