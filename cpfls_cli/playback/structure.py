@@ -28,9 +28,11 @@ _FEWEST_BLOCKS = 8
 _UNSEEN = 3.0
 """How many times as fast about an axis a part turns, at least, that is nothing like the others."""
 
-_VISIBLE = 0.002
-"""Share of the error of "rate stays" that is worth a name: on long flights less is significant, and is the step of the
-integrator, which leaves 0.004 of it."""
+_VISIBLE = 0.02
+"""Share of the error of the best that is worth a name: on long flights less is significant."""
+
+_VISIBLE_OF_STAYS = 0.002
+"""Most that is asked of a name, as a share of the error of "rate stays"."""
 
 _HALF = 2**15
 
@@ -412,7 +414,7 @@ def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
     """Sort what is judged by numbers, and give the best and the choice."""
     judged = sorted(bench.known.values(), key=lambda each: (each.numbers, each.error))
     best = min(judged, key=lambda each: each.error)
-    return judged, best, _simplest(judged, best, _VISIBLE * bench.stays)
+    return judged, best, _simplest(judged, best, min(_VISIBLE * best.error, _VISIBLE_OF_STAYS * bench.stays))
 
 
 def _refine(bench: _Bench, blocks: tuple[str, ...]) -> None:

@@ -115,16 +115,18 @@ def test_no_block_can_be_left_out_of_the_choice():
     assert Structure(("a",)) in bench.known
 
 
-def test_what_is_significant_and_not_visible_is_worth_no_number():
-    bench = Bench({"a": 0.0115, "ab": 0.0101, "abc": 0.01})
-    for blocks in ("a", "ab", "abc"):
+@pytest.mark.parametrize(
+    ("errors", "chosen"),
+    [
+        pytest.param({"a": 0.0115, "ab": 0.0101, "abc": 0.01}, "ab", id="of what is left, where little is"),
+        pytest.param({"a": 0.505, "ab": 0.501, "abc": 0.5}, "ab", id="of what there is to predict, where much is"),
+    ],
+)
+def test_what_is_significant_and_not_visible_is_worth_no_number(errors, chosen):
+    bench = Bench(errors)
+    for blocks in errors:
         bench.judge(Structure(tuple(blocks)))
-    assert structure._preferred(bench)[2].structure.blocks == ("a",)
-    bench.errors["a"] = 0.0130
-    bench.known.clear()
-    for blocks in ("a", "ab", "abc"):
-        bench.judge(Structure(tuple(blocks)))
-    assert structure._preferred(bench)[2].structure.blocks == ("a", "b")
+    assert structure._preferred(bench)[2].structure.blocks == tuple(chosen)
 
 
 def test_flights_of_one_axis_each_are_cut(flights):
