@@ -84,9 +84,10 @@ _SHORTEST_NUMBERED, _LONGEST_NUMBERED = 3, 16
 def column_groups(names: Mapping[str, object] | tuple[str, ...]) -> tuple[ColumnGroup, ...]:
     """Find columns whose names differ in an axis or a number alone, and leave every other one as its own group."""
     known = dict.fromkeys(names)
-    found: dict[tuple[str, Kind], ColumnGroup] = {}
+    # roll, pitch, yaw and p, q, r have one pattern, a star alone, and are two groups.
+    found: dict[tuple[str, Kind, tuple[str, ...]], ColumnGroup] = {}
     for group in (*_of_axes(known), *_numbered(known)):
-        found.setdefault((group.pattern, group.kind), group)
+        found.setdefault((group.pattern, group.kind, group.columns), group)
     single = tuple(ColumnGroup(name, "one", (name,)) for name in known)
     return (*found.values(), *single)
 
@@ -206,6 +207,7 @@ _KNOWN: Final = (
 _SUFFICIENT_COLUMNS: Final = {"quaternion": {4}, "thrust": {1}, "voltage": {1}}
 _ROTOR_SIGNALS = ("rotor_speed", "rotor_command")
 _FEWEST_ROTORS = 3
+_AXES_OF_A_BODY = 3
 _BY_WORDS = 100.0
 _OF_OTHER_INSTANCE = 50.0
 _WORDS: Final = {
@@ -368,7 +370,7 @@ def _means(signal: SignalName, group: ColumnGroup, words: list[str], meant: set[
     if signal == "body_rate" and group.kind == "angles":
         return bool(set(words) & (meant | {"speed"})) or group.columns == ("p", "q", "r")
     if signal in _ROTOR_SIGNALS:
-        return _means_rotors(signal, words)
+        return _means_rotors(signal, group, words)
     if signal == "quaternion" and group.kind == "numbers":
         return words[-1:] in (["q"], ["quat"], ["quaternion"], ["orientation"])
     if signal == "acceleration":
@@ -385,12 +387,13 @@ def _means_position(group: ColumnGroup, words: list[str], meant: set[str]) -> bo
     return group.kind == "xyz" and alone and not set(words) & (others | {"home", "global"})
 
 
-def _means_rotors(signal: SignalName, words: list[str]) -> bool:
+def _means_rotors(signal: SignalName, group: ColumnGroup, words: list[str]) -> bool:
     """Tell speeds from commands: what is asked for is none that was measured, and a motor alone is driven."""
     if {"squared", "sq"} & set(words):
         return False
     asked = bool(set(words) & _ASKED)
-    fast = bool(set(words) & _FAST)
+    # Three of the letter w are the axes of a gyroscope.
+    fast = bool(set(words) & _FAST) or (words == ["w"] and len(group.columns) > _AXES_OF_A_BODY)
     if signal == "rotor_speed":
         return fast and not asked
     motors = words == ["m"] or bool({"motor", "motors"} & set(words))

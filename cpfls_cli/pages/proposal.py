@@ -102,7 +102,10 @@ def _rotors_in_words(proposal: Proposal) -> str:
     if proposal.states_torque:
         return "the log states a torque and no rotors"
     if not proposal.rotors:
-        return "no column is recognised as a rotor's, so nothing here drives a model of the vehicle"
+        return (
+            "no column is recognised as a rotor's, so nothing here drives a model of the vehicle; if some are, name"
+            " them in import.signals (rotor_speed or rotor_command) and state vehicle.rotors"
+        )
     if proposal.airframe is None:
         unknown = "neither parameters nor the motion say where they are; a livelier log beside this one may"
         return f"{proposal.rotors} rotors; {unknown}"

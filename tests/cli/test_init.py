@@ -208,7 +208,9 @@ def test_two_vehicles_in_one_call_are_refused(refuse, tmp_path, own):
 def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tmp_path, own):
     path = write_csv(tmp_path / "log.csv", flat_log(own, speed=None))
     result, text, data = proposed(path, "--mass", MASS)
-    assert "no column is recognised as a rotor's, so nothing here drives a model of the vehicle" in result.stdout
+    said = " ".join(result.stdout.split())
+    assert "no column is recognised as a rotor's, so nothing here drives a model of the vehicle; if some are" in said
+    assert "name them in import.signals (rotor_speed or rotor_command) and state vehicle.rotors" in said
     assert "then: cpfls vehicle" not in result.stdout
     assert "rotors" not in data["vehicle"]
     assert cpfls("import", tmp_path / "study.yaml", path, "-o", tmp_path / "flight.h5").exit_code == 0

@@ -24,6 +24,10 @@ def first(names, signal, system=""):
         ("RATE.R RATE.P RATE.Y", "body_rate", "RATE.R RATE.P RATE.Y"),
         ("rollspeed pitchspeed yawspeed", "body_rate", "rollspeed pitchspeed yawspeed"),
         ("p q r", "body_rate", "p q r"),
+        ("roll pitch yaw p q r", "body_rate", "p q r"),
+        ("roll pitch yaw p q r", "attitude", "roll pitch yaw"),
+        ("w0 w1 w2", "body_rate", "w0 w1 w2"),
+        ("w1 w2 w3 w4", "rotor_speed", "w1 w2 w3 w4"),
         ("sfx sfy sfz", "acceleration", "sfx sfy sfz"),
         (
             "/imu.linear_acceleration.x /imu.linear_acceleration.y /imu.linear_acceleration.z",
@@ -61,6 +65,7 @@ def test_columns_are_found_by_their_names(names, signal, columns):
         ("m1_rads2 m2_rads2 m3_rads2 m4_rads2", "rotor_speed"),
         ("ATT.DesRoll ATT.DesPitch ATT.DesYaw", "attitude"),
         ("gyro_bias_x gyro_bias_y gyro_bias_z", "body_rate"),
+        ("w0 w1 w2", "rotor_speed"),
     ],
 )
 def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
