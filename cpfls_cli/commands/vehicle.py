@@ -29,6 +29,7 @@ from cpfls_cli.playback.replay import replay
 from cpfls_cli.playback.settings import GroupSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError
 from cpfls_cli.playback.vehicle import FoundVehicle, find_vehicle
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.numbers import joined
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.search.checkpoint import VehicleCheckpoint
@@ -96,19 +97,22 @@ def run(
         warnings = [warning for flight in read for warning in flight.warnings]
         commanded = any(flight.parts[0].commanded for flight in training)
         record = finish(job, VehicleRecord.of(found, judged, warnings, commanded=commanded), inputs)
+    written: tuple[Text, ...] = ()
     if record.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
-        if config is not None:
-            _write_config(config, record)
+        written = _write_config(config, record)
         checkpoint.remove()
-    outcome = Outcome(record.summary, tuple(answer(source_of(job, record))))
+    outcome = Outcome(record.summary, (*answer(source_of(job, record)), *written))
     return stopped(outcome, "generations" if record.complete else "interrupted", signal, job.output)
 
 
-def _write_config(config: ConfigCopy, record: VehicleRecord) -> None:
-    """Write a config with the numbers that were found in the place of its section `vehicle`."""
+def _write_config(config: ConfigCopy | None, record: VehicleRecord) -> tuple[Text, ...]:
+    """Write a config with the numbers that were found in the place of its section `vehicle`, and say so."""
+    if config is None:
+        return ()
     data = read_config(config.config) | {"vehicle": vehicle_section(record)}
     write_text(config.copy, f"# {config.config.name}, with the vehicle that `cpfls vehicle` found\n{to_yaml(data)}")
+    return (Text(f"{config.copy}: written, the config with these constants"),)
 
 
 def _require_rotors(flight: LoggedFlight) -> None:

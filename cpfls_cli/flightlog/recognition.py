@@ -772,9 +772,9 @@ def _rates_by_data(named: Named, fit: AxisFit, unit: UnitName, scale: float, agr
     axes = "" if fit.is_as_named else ", with its axes in this order and with these signs"
     better = f"{fit.times_better:.1f} times better than in any other order or with other signs"
     share = f"{100 * fit.explained:.0f} %"
-    size = (
-        f" and is {fit.gain:.3g} times as large, so it is in {unit}" if scale == 1.0 else f", in thousandths of {unit}"
-    )
+    gain = f"{fit.gain:.3g}"
+    large = "as large" if gain == "1" else f"{gain} times as large"
+    size = f" and is {large}, so it is in {unit}" if scale == 1.0 else f", in thousandths of {unit}"
     return Guess(
         signal="body_rate",
         columns=SignalMap(columns=columns, unit=unit, scale=scale, sign=sign),

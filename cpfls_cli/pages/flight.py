@@ -16,7 +16,7 @@ from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Facts, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, count, number, plain
+from cpfls_cli.report.numbers import UNKNOWN, count, joined, number, plain
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ _LACKS = {
     "rotation": "the flight has neither attitude nor body rates: only the balance of its rotors where it hovers can be"
     " read from it",
     "torque": "the flight has no torque, so identify will refuse it: map one with import.signals.body_torque, or"
-    " rotors with import.signals.rotor_speed or rotor_command, and name it in import.torque_source",
+    " rotors with import.signals.rotor_speed or rotor_command, and name it in import.torque_source;"
+    " cpfls vehicle and replay need rotors instead",
 }
 _ORIGINS = {"trajectory": "simulated along", "log": "imported from", "model": "with"}
 _PAPER_VEHICLE = ("9.81", "6", "4", "0.3", "121.5 × 10⁻⁶", "2.7 × 10⁻⁶", "0.6", "0.6", "1.2")
@@ -202,6 +203,10 @@ def vehicle_section(sources: Sources) -> Section:
         "rotor from the z axis."
     )
     blocks: list[Block] = [Table("table-3-vehicle", caption, header, rows)]
+    unknown = sources.vehicle.unknown
+    if unknown:
+        names = joined(name.replace("_", " ") for name in unknown)
+        blocks.append(Text(f"Guesses stand here for what the config leaves open: {names}.", "warning"))
     other = [source.label for source in sources.all if source.vehicle != sources.vehicle]
     if other:
         blocks.append(Text(f"Made with another vehicle than this one: {', '.join(other)}.", "warning"))

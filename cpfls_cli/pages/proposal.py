@@ -204,10 +204,10 @@ def _vehicle(proposal: Proposal, stated: Stated) -> Iterator[str]:
             2,
         )
     yield f"  rotor_speed_max_rad_s: {_flow(proposal.speed_max)}"
-    yield from _rotors(proposal)
+    yield from _rotors(proposal, stated)
 
 
-def _rotors(proposal: Proposal) -> Iterator[str]:
+def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
     if not proposal.rotors:
         states = "states a torque and no rotors" if proposal.states_torque else "has no columns of rotors"
         yield from _comment(f"The log {states}: none are described here, and those of the default are of no use.", 2)
@@ -225,6 +225,12 @@ def _rotors(proposal: Proposal) -> Iterator[str]:
             yield from _comment(
                 f"The parameters state a drag factor of {number(airframe.moment_ratio_m, 3)} m times the thrust factor;"
                 " often a number that nobody measured.",
+                2,
+            )
+        if stated.arm_m is not None:
+            yield from _comment(
+                f"Placed for an arm of {stated.arm_m:g} m; measured x, y and z are better: torques go with"
+                " them, and so do the moments of inertia that are found.",
                 2,
             )
         if not airframe.in_metres:

@@ -53,6 +53,7 @@ def imported(cpfls, tmp_path):
 def test_what_later_stages_will_miss_is_said_and_kept(imported, signals, source, wanted):
     _, notes, flight = imported(*signals, source=source)
     assert [note[: len(start)] for note, start in zip(notes, wanted, strict=True)] == wanted
+    assert all(note.endswith("cpfls vehicle and replay need rotors instead") for note in notes if NO_TORQUE in note)
     with h5py.File(flight) as file:
         kept = list(file["quality/warning"].asstr()) if notes else []
         assert ("quality/warning" in file, kept) == (bool(notes), notes)

@@ -62,6 +62,7 @@ def test_every_guess_has_its_reason_in_the_file_and_in_the_answer(proposed, log)
     assert [rotor["position_m"][:2] for rotor in data["vehicle"]["rotors"]] == [
         pytest.approx([0.16 * x / np.sqrt(2), 0.16 * y / np.sqrt(2)], abs=1e-6) for x, y, _ in HUBS
     ]
+    assert "Placed for an arm of 0.16 m; measured x, y and z are better" in " ".join(text.replace("#", "").split())
     assert data["vehicle"]["inertia_kg_m2"] is None
     assert {rotor["thrust_factor_n_s2"] for rotor in data["vehicle"]["rotors"]} == {None}
 

@@ -5,6 +5,8 @@ import json
 import pytest
 import yaml
 
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import load_study
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
@@ -119,10 +121,11 @@ def heavier(flights, folder, change, name):
 def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     config = heavier(flights, folder, open_constants, "logs.yaml")
     copy = folder / "found.yaml"
-    words = ("vehicle", config, folder / "flight.csv", "-o", folder / "v.h5", "--write-config", copy, "--json")
+    words = ("vehicle", config, folder / "flight.csv", "-o", folder / "v.h5", "--write-config", copy)
     result = cpfls(*words)
     assert result.exit_code == 0, result.stderr
-    parameters = json.loads(result.stdout)["parameters"]
+    assert f"{copy}: written, the config with these constants" in result.stdout
+    parameters = read_record(folder / "v.h5", VehicleRecord).summary["parameters"]
     assert set(parameters) == KEYS
     assert set(parameters["motor_lag_s"]) == {"value", "unit", "low", "high", "stated", "determined", "reason"}
     thrust = parameters["rotors.thrust_factor_n_s2"]
@@ -133,7 +136,9 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     assert load_study(copy).import_ == load_study(config).import_
     shown = cpfls("report", config, folder / "v.h5", "-o", folder / "v.md")
     assert shown.exit_code == 0, shown.stderr
-    assert "which the thrust lifts, gives all forces their size" in (folder / "v.md").read_text()
+    page = (folder / "v.md").read_text()
+    assert "which the thrust lifts, gives all forces their size" in page
+    assert "Guesses stand here for what the config leaves open: drag factor, inertia and thrust factor." in page
 
 
 def test_an_added_mass_is_found_beside_what_is_shared(cpfls, flights, folder):

@@ -63,6 +63,11 @@ def test_plain_names_in_si_are_taken_as_they_are(own):
     assert (recognition.time_column, recognition.time_unit) == ("t", "s")
 
 
+def test_a_gyroscope_in_its_unit_is_as_large_as_the_turning(own):
+    recognition = assert_the_flight_comes_back(flat_log(own), own)
+    assert recognition.signal("body_rate").reason.endswith("and is as large, so it is in rad/s")
+
+
 @pytest.mark.parametrize("order", list(permutations(range(3))))
 def test_axes_of_a_gyroscope_in_any_order_are_put_back(own, order):
     rate = named(own.rate[:, list(order)], *GYRO)
