@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from cpfls_cli.gap.naming.held_out import HeldOut
     from cpfls_cli.gap.naming.results import Alternative, Unexplained
 
+KINDS = ("torque", "force")
+
 _PHYSICS = ("wrench", "actuator")
 """Kinds of effects that torque and force show; sensors and numbers of the vehicle are told on other grounds."""
 
@@ -37,8 +39,13 @@ class AlternativeGroup:
 
     name: tuple[str, ...] = dataset("name", "effects that the flights cannot tell from a named one", "alternative")
     instead_of: tuple[str, ...] = dataset("instead_of", "the named one", "alternative")
-    relative_gain: Array = dataset("relative_gain", "what it explains over what the named one explains", "alternative")
-    separated_by: tuple[str, ...] = dataset("separated_by", "the flight that would tell", "alternative")
+    relative_gain: Array = dataset(
+        "relative_gain",
+        "what it explains over what the named one explains; NaN where it could not be tried",
+        "alternative",
+        gaps=True,
+    )
+    separated_by: tuple[str, ...] = dataset("separated_by", "the flight, or the signal, that would tell", "alternative")
 
     @classmethod
     def of(cls, rivals: Sequence[Alternative]) -> Self:
@@ -200,7 +207,7 @@ class DiagnosisRecord(Record):
         ("disagreement", "held-out-1"),
     )
 
-    verdict: str = dataset("verdict", "NAMED, PARTIAL, AMBIGUOUS, UNEXPLAINED, NO_GAP or NOT_EXCITED")
+    verdict: str = dataset("verdict", "NAMED, PARTIAL, AMBIGUOUS, UNEXPLAINED, FLIGHTS_DIFFER, NO_GAP or NOT_EXCITED")
     share: float = dataset("share", "part of the held-out gap above the floor that the effects take off")
     split: str = dataset("split", "which flights trained and which were held out, and why")
     effects: NamedEffectsGroup = group("")
@@ -218,6 +225,16 @@ class DiagnosisRecord(Record):
     note: tuple[str, ...] = dataset("note", "what a reader should know", "note")
     base: BaseGroup = group("base")
     flights: FlightsGroup = group("")
+    difference: tuple[str, ...] | None = dataset(
+        "difference", "what differs between the flights that trained and those held out", "difference", default=None
+    )
+    shares: Array | None = dataset(
+        "share_by_kind",
+        "the share of torque and of force; NaN where there is no gap, or no name",
+        "2",
+        gaps=True,
+        default=None,
+    )
 
     @classmethod
     def of(
@@ -265,6 +282,8 @@ class DiagnosisRecord(Record):
             note=diagnosis.notes,
             base=base,
             flights=FlightsGroup.of([*training, *held], [TRAINING] * len(training) + [HELD_OUT] * len(held)),
+            difference=diagnosis.differences,
+            shares=np.array([diagnosis.shares.get(kind, np.nan) for kind in KINDS]),
         )
 
     @property
@@ -289,6 +308,8 @@ class DiagnosisRecord(Record):
         return {
             "verdict": self.verdict,
             "share": self.share,
+            "share_by_kind": None if self.shares is None else dict(zip(KINDS, self.shares.tolist(), strict=True)),
+            "differences": list(self.difference or ()),
             "effects": [effect_summary(effect) for effect in self.effects.named],
             "closest": [effect_summary(effect) for effect in self.effects.closest],
             "alternatives": rows_of(self.alternative),

@@ -31,7 +31,7 @@ _HOVER = 0.55
 _TAKEN = frozenset({"import", "vehicle", "replay", "report", "export", "predict", "compare"})
 """Commands that work with guesses; a report and an export are of a model, which has its own numbers.
 
-`predict` and `compare` do with that of a whole vehicle, and ask `require_known` themselves where theirs is another.
+`predict`, `replay` and `compare` do with that of a whole vehicle, and ask `require_known` where theirs is another.
 """
 
 

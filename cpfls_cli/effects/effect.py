@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.hooks import Actuation, CarriedBody, SensorLog, SensorTest
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -176,6 +176,11 @@ class Effect:
     accounts : callable or None
         ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself leaves,
         so that the number is not called wrong.
+    vehicle : callable or None
+        ``vehicle(stated, shape) -> VehicleSettings``: for effects that are a wrong number of the vehicle.
+    lever : callable or None
+        ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
+        possible, a torque being no larger than its force on a lever as long as the body.
     """
 
     name: str
@@ -206,6 +211,8 @@ class Effect:
     test: SensorTest | None = None
     inertia: Callable[[Array], Array] | None = None
     accounts: Callable[[str, Mapping[str, float]], float] | None = None
+    vehicle: Callable[[VehicleSettings, Mapping[str, float]], VehicleSettings] | None = None
+    lever: Callable[[Array, Array, VehicleSettings], BoolArray] | None = None
 
     @property
     def numbers(self) -> tuple[Coefficient | Shape, ...]:

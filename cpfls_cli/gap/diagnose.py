@@ -7,21 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import System, system
-from cpfls_cli.gap.balance.refine import refined
-from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.balance.balance_system import System
+from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
 from cpfls_cli.gap.naming.causes import JudgedEffect, impossible, judge_effect, sensor_fault, shares, wrong_numbers
-from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, weighted_estimates
-from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
-from cpfls_cli.gap.naming.leftover import Leftover, leftover, look_alikes, not_excited
+from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
+from cpfls_cli.gap.naming.earned import earned
+from cpfls_cli.gap.naming.estimate import Estimates
+from cpfls_cli.gap.naming.held_out import HeldOut
+from cpfls_cli.gap.naming.leftover import Leftover, not_excited, untried
 from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
-from cpfls_cli.gap.naming.search import SearchStep, block_index, forward_selection, rank_effects
+from cpfls_cli.gap.naming.search import SearchStep, forward_selection, rank_effects
 from cpfls_cli.gap.sensors.audit import Audit, Preparation, audit
 from cpfls_cli.gap.settings import GapSettings
 
@@ -98,23 +99,27 @@ def diagnose(
     effects = considered(settings)
     chosen, steps = forward_selection(weak, effects, settings, rng, lambda n: progress(0.1 + 0.1 * min(n, 5), "search"))
     progress(0.65, "estimates")
-    hypothesis, block, estimates = _sure(weak, chosen, steps[-1].floor, settings)
-    chosen = hypothesis.chosen
-    remainder = leftover(hypothesis, estimates.linear, steps[-1].floor, block, settings, rng)
-    held_out = judged_unseen(held, prepared, hypothesis, estimates.linear, remainder.scatter)
+    floor = steps[-1].floor
+    found, refusals = earned(weak, chosen, floor, settings)
+    judge = Judge(weak, prepared.logged(held), prepared.repaired(held), floor, settings, rng)
+    first = judge.judge(found)
+    judgement, unconfirmed = judge.confirmed(first)
+    refusals += unconfirmed
+    differ = differences(first, judgement, steps[0], judge, settings)
+    judgement = first if differ else judgement
+    hypothesis, _, estimates = judgement.found
     progress(0.75, "rivals")
-    effect_shares = shares(weak, chosen, estimates, steps[-1].floor)
+    effect_shares = shares(weak, hypothesis.chosen, estimates, floor)
     judged = [
-        judge_effect(weak, chosen, index, estimates, float(effect_shares[index]), effects, settings, rng)
-        for index in range(len(chosen))
+        judge_effect(weak, hypothesis.chosen, index, estimates, float(effect_shares[index]), effects, settings, rng)
+        for index in range(len(hypothesis.chosen))
     ]
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, effects)
-    diagnosis = _concluded(
-        judged, faults, estimates, held_out, remainder, steps, hypothesis, settings, torque_alone, audited
-    )
-    return DiagnosisRun(diagnosis, audited, hypothesis, estimates, remainder, held_out)
+    notes = () if differ else tuple(refused.sentence for refused in refusals)
+    diagnosis = _concluded(judged, faults, judgement, differ, notes, steps, settings, torque_alone, audited)
+    return DiagnosisRun(diagnosis, audited, hypothesis, estimates, judgement.remainder, judgement.held_out)
 
 
 def considered(settings: GapSettings) -> list[Effect]:
@@ -124,21 +129,6 @@ def considered(settings: GapSettings) -> list[Effect]:
         for name, effect in CATALOGUE.items()
         if effect.columns is not None and effect.kind != "parameter" and name not in settings.ignore
     ]
-
-
-def _sure(
-    weak: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings
-) -> tuple[System, IntArray, Estimates]:
-    """Fit the chosen effects, and refit without those whose size does not differ from zero."""
-    hypothesis = system(weak, chosen)
-    block = block_index(hypothesis, settings)
-    estimates = weighted_estimates(hypothesis, floor, block)
-    pairs = zip(chosen, estimates.effects, strict=True)
-    kept = [candidate for candidate, numbers in pairs if differs_from_zero(candidate.effect, numbers)]
-    if len(kept) == len(chosen):
-        return hypothesis, block, estimates
-    hypothesis = refined(weak, kept, floor)
-    return hypothesis, block, weighted_estimates(hypothesis, floor, block)
 
 
 def _torque_alone(
@@ -155,36 +145,47 @@ def _torque_alone(
 def _concluded(
     judged: Sequence[JudgedEffect],
     faults: Sequence[NamedEffect],
-    estimates: Estimates,
-    held_out: HeldOut,
-    remainder: Leftover,
+    judgement: Judgement,
+    differ: tuple[str, ...],
+    refusals: tuple[str, ...],
     steps: Sequence[SearchStep],
-    hypothesis: System,
     settings: GapSettings,
     torque_alone: tuple[tuple[str, float], ...],
     audited: Audit,
 ) -> Diagnosis:
+    (hypothesis, _, estimates), remainder, held_out = judgement
     named = sorted((each.effect for each in judged), key=lambda effect: -effect.share)
     effects = [*faults, *named]
-    numbers = wrong_numbers(estimates, effects, held_out.explained_by_parameters(), _pull(hypothesis, steps[-1].floor))
+    numbers = wrong_numbers(estimates, effects, held_out.removed_by_numbers(), _pull(hypothesis, steps[-1].floor))
     effects += [numbers] if numbers is not None else []
-    share = held_out.share() if named else 1.0
-    rivals = tuple(rival for each in judged for rival in each.alternatives)
+    removed = held_out.shares() if named else {}
+    share = min(removed.values(), default=1.0)
+    rivals = (*(rival for each in judged for rival in each.alternatives), *untried(hypothesis, named))
     gap = held_out.size(held_out.before).floors
-    known = [each for each in remainder.unexplained if matters(each, gap)] if effects else remainder.unexplained
-    stays = gap_stays(held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors)
-    verdict = verdict_of(effects, rivals, known, share, stays, _excited(hypothesis, steps[-1].floor), settings)
+    least = settings.named_share
+    known = [each for each in remainder.unexplained if matters(each, gap, least)] if effects else remainder.unexplained
+    stays = gap_stays(held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors, least)
+    verdict = verdict_of(
+        effects,
+        rivals,
+        known,
+        tuple(removed.values()) or (1.0,),
+        stays,
+        _excited(hypothesis, steps[-1].floor),
+        settings,
+    )
     wrong = impossible(estimates.parameters)
-    if wrong:
+    if differ:
+        verdict = GapVerdict.FLIGHTS_DIFFER
+    elif wrong:
         verdict = GapVerdict.UNEXPLAINED
-    refused = verdict is GapVerdict.UNEXPLAINED
-    alike = look_alikes(hypothesis, faults if refused else effects)
+    refused = verdict in (GapVerdict.UNEXPLAINED, GapVerdict.FLIGHTS_DIFFER)
     return Diagnosis(
         verdict,
         tuple(faults if refused else effects),
         tuple(named) if refused else (),
         rivals,
-        remainder.unexplained,
+        tuple(known) if verdict is GapVerdict.NAMED else remainder.unexplained,
         not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], steps[-1].floor),
         {number.name: number for number in estimates.parameters},
         share,
@@ -192,9 +193,10 @@ def _concluded(
         held_out.size(held_out.after),
         held_out.floor,
         torque_alone,
-        (*wrong, *alike, *audited.warnings, *audited.notes),
-        alike,
+        (*differ, *wrong, *refusals, *audited.warnings, *audited.notes),
         wrong,
+        differ,
+        removed,
     )
 
 

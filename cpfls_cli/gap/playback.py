@@ -76,7 +76,7 @@ def extended_player(
     moved = [actuated(part, model.chosen) for part in parts]
     late = any(now is not part for now, part in zip(moved, parts, strict=True))
     flight = playback_flight(name, moved, "linear" if late else hold)
-    vehicle, response = parts[0].vehicle, RotorResponse()
+    vehicle, response = moved[0].vehicle, RotorResponse()
     by_kind = _sorted(model, vehicle, speeds=flight.wrench is None)
     along = _along(by_kind.along, moved)
     stated = stated_along(flight, response)

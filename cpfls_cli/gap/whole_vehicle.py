@@ -54,7 +54,9 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Ar
     probe, times, not_held = Probe.of(vehicle), {"delay_s": 0.0, "lag_s": 0.0}, []
     for (known, shape), linear in acting:
         hooks = known.actuation
-        if known.inertia is not None:
+        if known.vehicle is not None:
+            vehicle = known.vehicle(vehicle, shape)
+        elif known.inertia is not None:
             corrected = corrected + known.inertia(linear)
         elif hooks is not None and (hooks.lag or hooks.delay):
             times |= {"lag_s": hooks.lag(shape)} if hooks.lag else {}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, PictureGroup, RunGroup
+from cpfls_cli.artifacts.diagnosis import KINDS, DiagnosisRecord, PictureGroup, RunGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.settings import CLEAR
@@ -60,6 +60,7 @@ _TONES: dict[str, Tone] = {
     GapVerdict.AMBIGUOUS: "note",
     GapVerdict.PARTIAL: "note",
     GapVerdict.UNEXPLAINED: "warning",
+    GapVerdict.FLIGHTS_DIFFER: "warning",
 }
 _ENERGY = {
     "feeds": "; it feeds energy into the motion",
@@ -134,6 +135,8 @@ def _headline(record: DiagnosisRecord) -> str:
             return "These flights move too little to show whether anything is missing."
         case GapVerdict.UNEXPLAINED:
             return "There is a gap that nothing in the catalogue explains."
+        case GapVerdict.FLIGHTS_DIFFER:
+            return "These flights differ: what shows in some of them does not show in the others."
         case GapVerdict.AMBIGUOUS if record.alternative.name:
             return _ambiguous(record)
     named = " ".join(_blame(record)) or "There is a gap without a name."
@@ -193,8 +196,16 @@ def _shrunk(record: DiagnosisRecord) -> Iterator[str]:
         return
     yield (
         f"On flights held out from the fit, the largest gap shrinks from {before} noise floors, in the {names[worst]}, "
-        f"to {after}, in the {names[largest]}. Of what stood above the noise, {share_words(record.share)} is gone."
+        f"to {after}, in the {names[largest]}. Of what stood above the noise, {_gone(record)}."
     )
+
+
+def _gone(record: DiagnosisRecord) -> str:
+    """Say how much is gone: of torque and force each, where both had a gap."""
+    if record.shares is None or not np.isfinite(record.shares).all():
+        return f"{share_words(record.share)} is gone"
+    each = (f"{share_words(float(share))} of the {kind}" for kind, share in zip(KINDS, record.shares, strict=True))
+    return f"{joined(tuple(each))} is gone"
 
 
 def _forces_decide(record: DiagnosisRecord) -> Iterator[Text]:

@@ -83,7 +83,8 @@ def effect_wrench(chosen: SimulatedEffects, hover: Signals) -> EffectWrench:
 
 
 def _by_columns(effect: Effect) -> bool:
-    return effect.columns is not None and effect.kind != "actuator" and effect.carried is None
+    elsewhere = effect.carried is not None or (effect.kind == "actuator" and effect.vehicle is None)
+    return effect.columns is not None and not elsewhere
 
 
 def _slopes(effects: tuple[SimulatedEffect, ...], moved: list[Signals], still: Signals) -> Array:

@@ -329,9 +329,9 @@ def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_
     assert flown.exit_code == 0, flown.stderr
 
 
-@pytest.mark.parametrize("command", ["compare", "predict"])
+@pytest.mark.parametrize("command", ["compare", "predict", "replay"])
 def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_config, tmp_path, command):
     left_open, log = open_config
-    words = (log,) if command == "compare" else (log, log)
+    words = {"compare": (log,), "predict": (log, log), "replay": ("vehicle", log)}[command]
     (line,) = refuse(command, left_open, *words, "-o", tmp_path / "x.h5")
     assert f"not known in this config, and `cpfls {command}` needs what is null there" in line

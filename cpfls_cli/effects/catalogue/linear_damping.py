@@ -36,6 +36,7 @@ EFFECT = Effect(
         "quadratic_damping": "repeat the same rate sweep at twice the amplitude",
         "rotor_plane_damping": "repeat the rate sweep at two thrusts: in hover the two are one column",
         "inflow": "climb and descend at constant attitude: only inflow changes the thrust",
+        "rotor_drag": "fly forward and sideways, and log velocity: at the hubs drag brakes yaw like a damping",
         "motor_lag": "log measured rotor speeds; lag looks like damping below zero",
         "command_delay": "log measured rotor speeds; a delay looks like damping below zero",
     },

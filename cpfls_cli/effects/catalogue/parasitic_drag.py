@@ -6,9 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
@@ -30,6 +32,14 @@ def _torque(letter: str) -> Coefficient:
     return Coefficient(f"cr_{letter}", "N s^2/m", -0.2, 0.2, meaning, scales.arm_drag_at_ten_metres_per_second)
 
 
+def _lever(linear: Array, error: Array, vehicle: VehicleSettings) -> BoolArray:
+    """Tell which torques a drag can have: its centre of pressure lies within a body length of the centre of mass."""
+    length, largest = 2 * scales.arm(vehicle), float((linear + 2 * error)[:3].max())
+    possible = np.ones(6, dtype=bool)
+    possible[3:] = np.abs(linear[3:]) - 2 * error[3:] <= length * max(largest, 0.0)
+    return possible
+
+
 EFFECT = Effect(
     name="parasitic_drag",
     order=90,
@@ -48,4 +58,5 @@ EFFECT = Effect(
     },
     source="RotorPy multirotor.py (c_Dx, c_Dy, c_Dz); AirSim (drag of each face)",
     columns=_columns,
+    lever=_lever,
 )

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import least_squares, minimize_scalar
+from scipy.optimize import least_squares, lsq_linear, minimize_scalar
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.effect import Shape
-from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 
 _EVALUATIONS = 14
 _JOINT_EVALUATIONS = 8
 _STEP = 1e-3
+_ON_BOUND = 1e-6
+"""Share of its range that a coefficient is from its bound at most to be on it."""
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
@@ -56,6 +58,73 @@ def fit(hypothesis: System, floor: Array) -> Array:
     scale = 1.0 / np.where(length > 0, length, 1.0)
     right = (hypothesis.residual / floor).reshape(-1)
     return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale)
+
+
+def fit_within_bounds(hypothesis: System, weight: Array) -> tuple[Array, BoolArray]:
+    """Fit all free columns by weighted least squares under the bounds of their coefficients.
+
+    Parameters
+    ----------
+    hypothesis : System
+    weight : array, shape (6,), N m and N
+        Standard deviation of each channel.
+
+    Returns
+    -------
+    linear : array, shape (column,)
+    held : array of bool, shape (column,)
+        Coefficients on a bound.
+    """
+    linear = fit(hypothesis, weight)
+    low, high = _bounds(hypothesis)
+    if ((linear >= low) & (linear <= high)).all() and _without_lever(hypothesis, linear) is None:
+        return linear, np.zeros(len(linear), dtype=bool)
+    matrix = (hypothesis.base / weight[:, None]).reshape(-1, len(linear))
+    length = np.linalg.norm(matrix, axis=0)
+    shown = length > 0
+    scale = np.where(shown, length, 1.0)
+    orthogonal, triangle = np.linalg.qr(matrix / scale)
+    right = orthogonal.T @ (hypothesis.residual / weight).reshape(-1)
+    out = np.zeros(len(linear), dtype=bool)
+    while True:
+        free = shown & ~out
+        bounds = (low[free] * scale[free], high[free] * scale[free])
+        linear = np.zeros(len(linear))
+        linear[free] = lsq_linear(triangle[:, free], right, bounds=bounds, method="bvls").x / scale[free]
+        leverless = _without_lever(hypothesis, linear)
+        if leverless is None:
+            break
+        out |= leverless
+    near = _ON_BOUND * np.where(np.isfinite(high - low), high - low, 0.0)
+    return linear, out | (free & ((linear <= low + near) | (linear >= high - near)))
+
+
+def _bounds(hypothesis: System) -> tuple[Array, Array]:
+    """Bound the coefficients of the base; those whose physical numbers are others are free."""
+    vehicle = hypothesis.flights[0].signals.vehicle
+    pairs: list[tuple[float, float]] = []
+    for candidate in hypothesis.free:
+        width = hypothesis.columns(candidate).shape[2]
+        known = candidate.effect.coefficients
+        # The vehicle's own numbers are free: one that no vehicle has says that the log is wrong.
+        bounded = is_free(candidate) and candidate.effect.physical is None and len(known) == width
+        pairs += [each.bounds(vehicle) for each in known] if bounded else [(-np.inf, np.inf)] * width
+    low, high = np.array(pairs).T
+    return low, high
+
+
+def _without_lever(hypothesis: System, linear: Array) -> BoolArray | None:
+    """Mark torques that the force of their effect leaves impossible; None where there is none."""
+    out, first = np.zeros(len(linear), dtype=bool), 0
+    if not any(flight.known[3:].any() for flight in hypothesis.flights):
+        return None
+    for candidate in hypothesis.free:
+        own = linear[first : first + hypothesis.columns(candidate).shape[2]]
+        if candidate.effect.lever is not None:
+            vehicle = hypothesis.flights[0].signals.vehicle
+            out[first : first + len(own)] = ~candidate.effect.lever(own, np.zeros(len(own)), vehicle) & (own != 0)
+        first += len(own)
+    return out if out.any() else None
 
 
 def weighted_residual(hypothesis: System, floor: Array, rotor_wrench: Array) -> Array:

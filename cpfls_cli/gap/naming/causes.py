@@ -26,7 +26,10 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 _MATTERS = 0.02
 """Relative error of a moment of inertia or of the thrust from which on it is told."""
 
-_LEAST_SHARE = 0.05
+_LEAST_SHARE = 0.2
+"""Share of the gap of its own channel that a refitted number of the vehicle has to take off unseen flights."""
+
+_CHANNEL = {"inertia_x": 0, "inertia_y": 1, "inertia_z": 2, "thrust_scale": 5}
 
 _PULLS = 2.0
 """Multiple of the pull of noise that an error has to exceed."""
@@ -134,7 +137,7 @@ def _remaining(
 
 
 def wrong_numbers(
-    estimates: Estimates, effects: Sequence[NamedEffect], share: float, pull: Array
+    estimates: Estimates, effects: Sequence[NamedEffect], removed: Array, pull: Array
 ) -> NamedEffect | None:
     """Name the numbers of the vehicle that are significantly wrong, relevant, and not explained by a named effect.
 
@@ -143,15 +146,22 @@ def wrong_numbers(
     estimates : Estimates
     effects : sequence of NamedEffect
         Already named.
-    share : float
-        Part of the gap of the model as given that refitting its numbers takes off.
+    removed : array, shape (6,)
+        Part of each channel's gap on unseen flights that refitting the numbers takes off.
     pull : array, shape (parameter,)
         Error of each number that noise in the motion can make: a noisy acceleration asks for less inertia.
     """
     pairs = zip(estimates.parameters, pull, strict=True)
-    wrong = [number for number, drawn in pairs if abs(number.value) > _PULLS * drawn and _is_wrong(number, effects)]
-    if not wrong or share < _LEAST_SHARE:
+    wrong = [
+        number
+        for number, drawn in pairs
+        if abs(number.value) > _PULLS * drawn
+        and _is_wrong(number, effects)
+        and removed[_CHANNEL[number.name]] >= _LEAST_SHARE
+    ]
+    if not wrong:
         return None
+    share = float(max(removed[_CHANNEL[number.name]] for number in wrong))
     p_value = min(2 * float(norm.sf(3.92 * abs(n.value) / (n.high - n.low))) if n.high > n.low else 0.0 for n in wrong)
     name, sentence = VEHICLE_NUMBERS.name, VEHICLE_NUMBERS.sentence
     return NamedEffect(name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, sentence)

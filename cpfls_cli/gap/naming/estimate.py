@@ -11,7 +11,7 @@ from scipy.stats import t as student
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free
-from cpfls_cli.gap.balance.refine import fit, free_shapes, shape_columns
+from cpfls_cli.gap.balance.refine import fit, fit_within_bounds, free_shapes, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -57,12 +57,14 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     ----------
     Efron and Tibshirani 1993, chapter 11 (delete-a-group jackknife).
     """
-    linear = fit(hypothesis, weight)
+    linear, held = fit_within_bounds(hypothesis, weight)
     shapes = [candidate.shape[name] for candidate, name in free_shapes(hypothesis)]
     values = np.concatenate([linear, shapes])
     jacobian = np.concatenate([hypothesis.base, shape_columns(hypothesis, linear)], axis=2)
     rows = (jacobian / weight[:, None], (hypothesis.residual - hypothesis.base @ linear) / weight)
-    left_out = values + _one_step(*rows, block)
+    moving = np.concatenate([~held, np.ones(len(shapes), dtype=bool)])
+    left_out = np.tile(values, (len(np.unique(block)), 1))
+    left_out[:, moving] += _one_step(rows[0][..., moving], rows[1], block)
     by_effect, linear_by_effect, first = [], [], hypothesis.columns(hypothesis.free[0]).shape[2]
     parameters = _of(hypothesis.free[0], hypothesis, values[:first], left_out[:, :first], np.zeros(0), left_out[:, :0])
     column, shape_column = first, len(linear)
@@ -101,9 +103,20 @@ def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
     """
     if effect.unit_coefficient and not effect.shapes:
         return True
+    return any(number.low > 0 or number.high < 0 for number in sized(effect, numbers))
+
+
+def sized(effect: Effect, numbers: Sequence[Estimate]) -> list[Estimate]:
+    """Keep the numbers that set the size of an effect: its coefficients, or its shapes where it has none.
+
+    Parameters
+    ----------
+    effect : Effect
+    numbers : sequence of Estimate
+        Physical coefficients, then shapes.
+    """
     shapes = {shape.name for shape in effect.shapes}
-    sized = [number for number in numbers if (number.name in shapes) == effect.unit_coefficient]
-    return any(number.low > 0 or number.high < 0 for number in sized)
+    return [number for number in numbers if (number.name in shapes) == effect.unit_coefficient]
 
 
 def _of(

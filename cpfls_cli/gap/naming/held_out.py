@@ -23,8 +23,8 @@ _MARGIN = 1.25
 _COUNTS = 0.05
 """Share of the whole gap, in squared floors, from which on the lesser of torque and force is judged on its own."""
 
-_SEEN = 0.3
-"""Root mean square in floors that wrong numbers of the vehicle have to explain of one channel."""
+SEEN = 0.3
+"""Root mean square in floors of one channel that a name has to take off flights that the fit did not see."""
 
 
 @dataclass(frozen=True)
@@ -65,28 +65,40 @@ class HeldOut:
         in_floors = ((residual / self.noise) ** 2 * self.known).sum(axis=0)
         return GapSize(value, np.sqrt(np.where(count > 0, in_floors / np.maximum(count, 1), np.nan)))
 
-    def share(self) -> float:
-        """Compute the share of the gap above the noise floor that the effects remove.
+    def shares(self) -> dict[str, float]:
+        """Compute the shares of the gap above the noise floor that the effects remove.
 
-        Of torque or force whichever is less, where each is a part of the gap that counts.
+        Returns
+        -------
+        dict
+            Of ``torque`` and of ``force``, where each is a part of the gap that counts; of the better one where neither
+            does.
         """
         before, after = self.parameters / self.noise, self.after / self.noise
         kinds = [slice(0, 3), slice(3, 6)]
         sizes = [_above(before[:, kind], self.known[:, kind]) for kind in kinds]
-        clear = [
-            share_removed(before[:, kind], after[:, kind], self.known[:, kind])
-            for kind, size in zip(kinds, sizes, strict=True)
-            if size > _COUNTS * sum(sizes) and _largest(before[:, kind]) > CLEAR
-        ]
         each = [share_removed(before[:, kind], after[:, kind], self.known[:, kind]) for kind in kinds]
-        return min(clear) if clear else max(each)
+        of_kind = dict(zip(("torque", "force"), each, strict=True))
+        clear = {
+            name: share
+            for (name, share), kind, size in zip(of_kind.items(), kinds, sizes, strict=True)
+            if size > _COUNTS * sum(sizes) and _largest(before[:, kind]) > CLEAR
+        }
+        better = max(of_kind, key=lambda name: of_kind[name])
+        return clear or {better: of_kind[better]}
 
-    def explained_by_parameters(self) -> float:
-        """Compute the share of the gap that refitted numbers of the vehicle remove; 0 below visibility."""
+    def removed_by_numbers(self) -> Array:
+        """Compute the share of each channel's gap that refitted numbers of the vehicle remove; 0 below visibility.
+
+        Returns
+        -------
+        array, shape (6,)
+        """
         before, after = self.before / self.noise, self.parameters / self.noise
         rows = np.maximum(self.known.sum(axis=0), 1)
         gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
-        return share_removed(before, after, self.known) if gone.max() > _SEEN**2 else 0.0
+        each = [share_removed(before[:, [c]], after[:, [c]], self.known[:, [c]]) for c in range(before.shape[1])]
+        return np.where(gone > SEEN**2, each, 0.0)
 
 
 def _largest(residual: Array) -> float:

@@ -12,7 +12,7 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, left_over, scatter_size, scatter_variance
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
-from cpfls_cli.gap.naming.results import NamedEffect, NotExcited, Unexplained
+from cpfls_cli.gap.naming.results import Alternative, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.residual.dependence import (
     Dependence,
     joined_states,
@@ -182,29 +182,18 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
     return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
 
 
-def look_alikes(hypothesis: System, named: Sequence[NamedEffect]) -> tuple[str, ...]:
-    """List the rivals of named effects that cannot be ruled out because the flights lack their signals.
-
-    Returns
-    -------
-    tuple of str
-        Sentences.
-    """
-    sentences = []
+def untried(hypothesis: System, named: Sequence[NamedEffect]) -> tuple[Alternative, ...]:
+    """List the rivals of named effects that the flights lack signals for: what was not tried is not beaten."""
+    rivals = []
     for effect in named:
         if CATALOGUE[effect.name].kind in ("parameter", "sensor"):
             continue
-        unseen = {}
         for name in CATALOGUE[effect.name].rivals:
             missing = [CATALOGUE[name].missing(signals) for signals in hypothesis.signals]
             if all(missing) and not {"command", "measured_rotor_speed"} & set(missing[0]):
-                unseen[name] = missing[0]
-        if unseen:
-            lacking = sorted({signal.replace("_", " ") for signals in unseen.values() for signal in signals})
-            sentences.append(
-                f"{effect.name}: {', '.join(unseen)} would look alike and cannot be ruled out; log {', '.join(lacking)}"
-            )
-    return tuple(sentences)
+                lacking = " and ".join(signal.replace("_", " ") for signal in missing[0])
+                rivals.append(Alternative(name, effect.name, np.nan, f"log {lacking}, without which it was not tried"))
+    return tuple(rivals)
 
 
 def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:

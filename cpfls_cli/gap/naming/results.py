@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 
@@ -16,9 +16,6 @@ _SECOND_CAUSE = 0.03
 """Share of the gap, in squared floors, from which on what is left is a cause of its own."""
 
 _PART = 0.05
-_STAYS = 0.7
-"""Root mean square that is left of a clear gap about an axis, as a share, from which on nothing explained it."""
-
 _LARGE = 3.0
 _REST = 0.1
 """Root mean square that is left, in floors and as a share of the gap, that no name for the gap may leave behind."""
@@ -34,6 +31,7 @@ class GapVerdict(StrEnum):
     PARTIAL = "PARTIAL"
     AMBIGUOUS = "AMBIGUOUS"
     UNEXPLAINED = "UNEXPLAINED"
+    FLIGHTS_DIFFER = "FLIGHTS_DIFFER"
     NO_GAP = "NO_GAP"
     NOT_EXCITED = "NOT_EXCITED"
 
@@ -101,9 +99,10 @@ class Alternative:
     name : str
     instead_of : str
     relative_gain : float
-        What it explains, as a share of what the named one explains.
+        What it explains, as a share of what the named one explains; NaN where it could not be tried, because the
+        flights lack a signal.
     separated_by : str
-        The flight that would tell.
+        The flight, or the signal, that would tell.
     """
 
     name: str
@@ -186,10 +185,12 @@ class Diagnosis:
         First choices of a look at the torques alone, and the share that each would explain.
     notes : tuple of str
         What a reader should know, in sentences.
-    look_alikes : tuple of str
-        Effects that look like a named one and that the flights lack signals for, in sentences.
     impossible : tuple of str
         Numbers of the vehicle that would have to be what no vehicle has, in sentences: the log is wrong.
+    differences : tuple of str
+        What differs between the flights that were learned from and those held out, in sentences.
+    shares : mapping of str to float
+        The share of ``torque`` and of ``force``, where they have a gap.
     """
 
     verdict: GapVerdict
@@ -205,20 +206,23 @@ class Diagnosis:
     floor: Array
     torque_alone: tuple[tuple[str, float], ...]
     notes: tuple[str, ...]
-    look_alikes: tuple[str, ...] = ()
     impossible: tuple[str, ...] = ()
+    differences: tuple[str, ...] = ()
+    shares: Mapping[str, float] = field(default_factory=dict)
 
 
 def verdict_of(
     effects: Sequence[NamedEffect],
     alternatives: Sequence[Alternative],
     unexplained: Sequence[Unexplained],
-    share: float,
+    shares: Sequence[float],
     stays: bool,
     excited: bool,
     settings: GapSettings,
 ) -> GapVerdict:
     """Derive the verdict from named effects, rivals and unexplained residuals.
+
+    What closes the gap of the forces and leaves that of the torques has explained a part, and the other way round.
 
     Parameters
     ----------
@@ -226,8 +230,8 @@ def verdict_of(
     alternatives : sequence of Alternative
     unexplained : sequence of Unexplained
         Where effects were found: of those, the ones that matter.
-    share : float
-        Of the gap above the floor that the effects take off flights not seen.
+    shares : sequence of float
+        Of the gap of torque or force above the floor that the effects take off flights not seen, where there is one.
     stays : bool
         Whether an axis keeps a clear gap.
     excited : bool
@@ -238,41 +242,53 @@ def verdict_of(
         if unexplained:
             return GapVerdict.UNEXPLAINED
         return GapVerdict.NO_GAP if excited else GapVerdict.NOT_EXCITED
-    if share < settings.partial_share:
+    if max(shares) < settings.partial_share:
         return GapVerdict.UNEXPLAINED
-    if share < settings.named_share or unexplained or stays:
+    if min(shares) < settings.named_share or unexplained or stays:
         return GapVerdict.PARTIAL
     main = {effect.name for effect in effects if effect.share >= _MAIN}
     return GapVerdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else GapVerdict.NAMED
 
 
-def gap_stays(before: Array, after: Array) -> bool:
+def gap_stays(before: Array, after: Array, named_share: float) -> bool:
     """Tell whether a relevant gap about or along an axis is not reduced.
 
     Parameters
     ----------
     before, after : array, shape (6,), floors
         Of the held-out flights, with the vehicle's own numbers refitted.
+    named_share : float
+        Of the gap above the floor that has to go.
     """
-    return any(_stays(before[kind], after[kind]) for kind in (slice(0, 3), slice(3, 6)))
+    return any(_stays(before[kind], after[kind], named_share) for kind in (slice(0, 3), slice(3, 6)))
 
 
-def _stays(before: Array, after: Array) -> bool:
+def _stays(before: Array, after: Array, named_share: float) -> bool:
     clear = (before > CLEAR) & (before**2 > _PART * np.nanmax(before, initial=0.0) ** 2)
     large = (after > _LARGE) & (after > _REST * before)
-    return bool((clear & ((after > _STAYS * before) | large)).any())
+    return bool((clear & (_is_left(after, before, named_share) | large)).any())
 
 
-def matters(unexplained: Unexplained, before: Array) -> bool:
-    """Tell whether an unexplained residual beside named effects shows a second cause of relevant size.
+def _is_left(after: Array, before: Array, named_share: float) -> BoolArray:
+    """Tell of each channel whether it keeps a clear gap, and more of it than a name may leave."""
+    return np.asarray((after > CLEAR) & (after**2 - 1 > (1 - named_share) * np.maximum(before**2 - 1, 0.0)))
+
+
+def matters(unexplained: Unexplained, before: Array, named_share: float) -> bool:
+    """Tell whether an unexplained residual beside named effects is of relevant size.
+
+    It is a second cause, by what it follows, or more than a name may leave.
 
     Parameters
     ----------
     unexplained : Unexplained
     before : array, shape (6,), floors
         The gap of each channel without effects.
+    named_share : float
+        Of the gap above the floor that has to go.
     """
     follows = unexplained.signal is not None or unexplained.frequency_hz is not None
     kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)
     largest = float(np.nanmax(before[kind] ** 2, initial=1.0))
-    return follows and unexplained.share * unexplained.floors**2 > _SECOND_CAUSE * largest
+    second = follows and unexplained.share * unexplained.floors**2 > _SECOND_CAUSE * largest
+    return second or bool(_is_left(np.array(unexplained.floors), np.sqrt(largest), named_share))

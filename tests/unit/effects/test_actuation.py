@@ -72,7 +72,8 @@ def test_sag_is_looked_for_in_any_rotor_speeds_with_a_voltage(flight, commanded)
 def test_what_is_applied_before_other_columns_is_what_its_column_says(columns, flight, commanded):
     """The search exchanges the actuation instead of subtracting a column; both must mean the same."""
     actuators = [entry for entry in CATALOGUE.values() if entry.kind == "actuator"]
-    assert {entry.name for entry in actuators} == {"motor_lag", "command_delay", "battery_sag", "channel_delay"}
+    others = {"motor_lag", "command_delay", "battery_sag", "channel_delay"}
+    assert {entry.name for entry in actuators} == {*others, "drag_factor_error"}
     for entry in actuators:
         known = flight if entry.name == "channel_delay" else commanded
         shape = {one.name: one.grid[-1] for one in entry.shapes}

@@ -43,13 +43,27 @@ CASES = {
 
 @pytest.mark.parametrize(("effects", "rivals", "left", "share", "excited", "expected"), CASES.values(), ids=CASES)
 def test_verdicts(effects, rivals, left, share, excited, expected):
-    assert verdict_of(effects, rivals, left, share, False, excited, GapSettings()) is expected
+    assert verdict_of(effects, rivals, left, (share,), False, excited, GapSettings()) is expected
+
+
+@pytest.mark.parametrize(
+    ("shares", "expected"),
+    [
+        ((0.98, 0.95), GapVerdict.NAMED),
+        ((0.98, 0.1), GapVerdict.PARTIAL),
+        ((0.1, 0.98), GapVerdict.PARTIAL),
+        ((0.4, 0.3), GapVerdict.UNEXPLAINED),
+    ],
+)
+def test_torque_and_force_are_judged_each(shares, expected):
+    """What closes the gap of one is part of the answer, whatever it leaves of the other."""
+    assert verdict_of([BIG], [], [], shares, False, True, GapSettings()) is expected
 
 
 def test_shares_of_the_settings_decide():
     strict = GapSettings(named_share=0.99, partial_share=0.97)
-    assert verdict_of([BIG], [], [], 0.98, False, True, strict) is GapVerdict.PARTIAL
-    assert verdict_of([BIG], [], [], 0.96, False, True, strict) is GapVerdict.UNEXPLAINED
+    assert verdict_of([BIG], [], [], (0.98,), False, True, strict) is GapVerdict.PARTIAL
+    assert verdict_of([BIG], [], [], (0.96,), False, True, strict) is GapVerdict.UNEXPLAINED
 
 
 GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
@@ -63,15 +77,16 @@ GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
         (Unexplained("torque y", 4.0, None, 0.0, None, "neither"), False),
         (Unexplained("torque y", 4.0, None, 0.8, 0.9, "feeds"), True),
         (Unexplained("torque y", 4.0, "yaw rate", 0.5, None, "neither"), False),
+        (Unexplained("torque y", 7.0, None, 0.0, None, "neither"), True),
     ],
-    ids=["3.2 % of the gap", "1.8 % of the gap", "follows nothing", "narrow band", "half of it follows"],
+    ids=["3.2 % of the gap", "1.8 % of the gap", "follows nothing", "narrow band", "half of it follows", "12 % of it"],
 )
 def test_what_is_left_matters_where_it_follows_something_and_is_not_small(left, expected):
-    assert matters(left, GAP) is expected
+    assert matters(left, GAP, 0.9) is expected
 
 
 def test_an_axis_that_keeps_its_gap_is_not_all_explained():
-    assert verdict_of([BIG], [], [], 0.99, True, True, GapSettings()) is GapVerdict.PARTIAL
+    assert verdict_of([BIG], [], [], (0.99,), True, True, GapSettings()) is GapVerdict.PARTIAL
 
 
 @pytest.mark.parametrize(
@@ -82,9 +97,10 @@ def test_an_axis_that_keeps_its_gap_is_not_all_explained():
         ([20.0, 2.0, 1.0], [1.0, 2.0, 1.0], False),
         ([1.2, 1.1, 1.0], [1.2, 1.1, 1.0], False),
         ([1500.0, 9.0, 1.0], [250.0, 2.0, 1.0], True),
+        ([4.0, 1.0, 1.0], [2.1, 1.0, 1.0], True),
     ],
-    ids=["one axis stays", "all shrink", "a small part of the whole", "no clear gap", "a large rest"],
+    ids=["one axis stays", "all shrink", "a small part of the whole", "no clear gap", "a large rest", "a clear rest"],
 )
 def test_a_gap_stays_where_an_axis_is_clear_and_counts(before, after, stays):
-    assert gap_stays(np.array(before + [1.0] * 3), np.array(after + [1.0] * 3)) == stays
-    assert gap_stays(np.array([9.0] * 3 + before), np.array([1.0] * 3 + after)) == stays
+    assert gap_stays(np.array(before + [1.0] * 3), np.array(after + [1.0] * 3), 0.9) == stays
+    assert gap_stays(np.array([9.0] * 3 + before), np.array([1.0] * 3 + after), 0.9) == stays

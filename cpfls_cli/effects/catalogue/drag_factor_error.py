@@ -1,0 +1,49 @@
+"""Wrong drag (yaw) factor of the rotors, the least known number of most vehicles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from cpfls_cli.effects.actuation import wrench_change
+from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+def _vehicle(vehicle: VehicleSettings, shape: Mapping[str, float]) -> VehicleSettings:
+    factor = 1.0 + shape["error"]
+    rotors = (replace(each, drag_factor_n_m_s2=factor * each.drag_factor_n_m_s2) for each in vehicle.rotors)
+    return replace(vehicle, rotors=tuple(rotors))
+
+
+def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
+    return replace(signals, vehicle=_vehicle(signals.vehicle, shape))
+
+
+def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    return wrench_change(signals, _apply(signals, shape))
+
+
+EFFECT = Effect(
+    name="drag_factor_error",
+    order=290,
+    title="wrong drag (yaw) factor",
+    kind="actuator",
+    formula="M_z = -e b sum(s_i w_i^2)",
+    sentence="The rotors turn the vehicle in yaw with another torque than the config says. It shows beside an effect "
+    "that also pushes the vehicle, because the force tells how large its torque is; from yaw alone only the ratio of "
+    "the drag factor to Izz is known.",
+    coefficients=(),
+    needs=frozenset({"body_rate", "rotor_speed"}),
+    excitation="turns in yaw while flying fast; or weigh and swing the vehicle, so that Izz is known",
+    rivals={
+        "linear_damping": "yaw at several rates in hover: a damping stays, a wrong factor needs air speed",
+    },
+    source="definition; the drag factor is the number that data sheets lack",
+    columns=_columns,
+    shapes=(Shape("error", "1", (-0.6, -0.4, -0.2, -0.1, 0.1, 0.2, 0.4, 0.8, 1.5), "true factor over stated, less 1"),),
+    unit_coefficient=True,
+    apply=_apply,
+    vehicle=_vehicle,
+)

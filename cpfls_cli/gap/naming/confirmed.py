@@ -1,0 +1,216 @@
+"""Whether names stand on the flights that no fit has seen, and whether those flights say the same as the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted
+from cpfls_cli.gap.naming.held_out import SEEN, HeldOut, held_out, share_removed
+from cpfls_cli.gap.naming.leftover import Leftover, leftover
+from cpfls_cli.gap.naming.search import SearchStep, block_index
+from cpfls_cli.gap.settings import CLEAR, GapSettings
+
+_WORSE = 1.1
+"""Ratio of root mean squares from which on a channel got worse."""
+
+_ERRORS = 2.0
+
+
+class Judgement(NamedTuple):
+    """Effects with what they leave of the flights that they were found in and of those held out."""
+
+    found: Fitted
+    remainder: Leftover
+    held_out: HeldOut
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Judges fits on held-out flights.
+
+    Attributes
+    ----------
+    training : sequence of WeakFlight
+    logged, repaired : sequence of WeakFlight
+        The held-out flights as logged, and after repair of the sensors.
+    floor : array, shape (6,)
+        Of the training flights.
+    settings : GapSettings
+    rng : numpy.random.Generator
+    """
+
+    training: Sequence[WeakFlight]
+    logged: Sequence[WeakFlight]
+    repaired: Sequence[WeakFlight]
+    floor: Array
+    settings: GapSettings
+    rng: np.random.Generator
+
+    def judge(self, found: Fitted) -> Judgement:
+        """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
+        hypothesis, block, estimates = found
+        remainder = leftover(hypothesis, estimates.linear, self.floor, block, self.settings, self.rng)
+        plain = system(hypothesis.flights)
+        weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
+        unseen = held_out(
+            self.logged, self.repaired, hypothesis, estimates.linear, fit(plain, weight), remainder.scatter
+        )
+        return Judgement(found, remainder, unseen)
+
+    def confirmed(self, first: Judgement) -> tuple[Judgement, list[Refusal]]:
+        """Drop effects one by one that the held-out flights do not confirm: first what harms, then what is not needed.
+
+        Nothing is chosen by these flights; names only go.
+        """
+        judgement, refusals = first, []
+        while (refusal := self._refused(judgement)) is not None:
+            refusals.append(refusal)
+            kept = [each for each in judgement.found.hypothesis.chosen if each.effect.name != refusal.name]
+            judgement = self.judge(fitted(self.training, kept, self.floor, self.settings))
+        return judgement, refusals
+
+    def _refused(self, judgement: Judgement) -> Refusal | None:
+        chosen = judgement.found.hypothesis.chosen
+        compared = {each.effect.name: self._without(judgement, each.effect.name) for each in chosen}
+        harmful = {name: one for name, one in compared.items() if one.worse(judgement.held_out).any()}
+        if harmful:
+            name = max(harmful, key=lambda each: harmful[each].ratio(judgement.held_out))
+            return Refusal(name, harmful[name].harm(judgement.held_out))
+        needless = {name: one for name, one in compared.items() if one.raised.max() < SEEN**2}
+        if needless:
+            name = min(needless, key=lambda each: needless[each].raised.max())
+            return Refusal(name, "on the flights held out the gap is as small without it")
+        return None
+
+    def _without(self, judgement: Judgement, name: str) -> Without:
+        """Leave an effect out and refit the others."""
+        kept = [each for each in judgement.found.hypothesis.chosen if each.effect.name != name]
+        linear = fitted(self.training, kept, self.floor, self.settings).estimates.linear
+        there = system(self.repaired, kept)
+        residual, unseen = there.residual - there.base @ linear, judgement.held_out
+        squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
+        count = np.maximum(unseen.known.sum(axis=0), 1)
+        difference, block = squares[0] - squares[1], block_index(there, self.settings)
+        sums = np.array([difference[block == number].sum(axis=0) for number in np.unique(block)])
+        spread = sums.std(axis=0, ddof=1) * np.sqrt(len(sums)) if len(sums) > 1 else np.zeros(6)
+        return Without(difference.sum(axis=0) / count, spread / count, np.sqrt(squares[0].sum(axis=0) / count))
+
+
+class Without(NamedTuple):
+    """Held-out flights without one of the effects, the others refitted.
+
+    Attributes
+    ----------
+    raised : array, shape (6,)
+        Mean square of each channel beyond that with the effect, in squared floors.
+    error : array, shape (6,)
+        Standard error of it over blocks.
+    left : array, shape (6,)
+        Root mean square without it, in floors.
+    """
+
+    raised: Array
+    error: Array
+    left: Array
+
+    def worse(self, unseen: HeldOut) -> Array:
+        """Mark the channels that the effect makes visibly and surely worse."""
+        after = unseen.size(unseen.after).floors
+        surely = -self.raised > _ERRORS * self.error
+        return np.asarray((after > CLEAR) & (after > _WORSE * self.left) & surely)
+
+    def ratio(self, unseen: HeldOut) -> float:
+        """Give how much worse the worst channel gets."""
+        after = unseen.size(unseen.after).floors
+        return float(np.where(self.worse(unseen), after / np.maximum(self.left, 1e-9), 0.0).max())
+
+    def harm(self, unseen: HeldOut) -> str:
+        """Say which channel gets worse."""
+        after = unseen.size(unseen.after).floors
+        channel = int(np.argmax(np.where(self.worse(unseen), after / np.maximum(self.left, 1e-9), 0.0)))
+        return (
+            f"on the flights held out it makes the {CHANNELS[channel]} worse, {self.left[channel]:.2g} floors without "
+            f"it and {after[channel]:.2g} with it"
+        )
+
+
+def differences(
+    first: Judgement, last: Judgement, start: SearchStep, judge: Judge, settings: GapSettings
+) -> tuple[str, ...]:
+    """Say what differs between the flights that were learned from and those held out, where one model cannot fit both.
+
+    Parameters
+    ----------
+    first, last : Judgement
+        Of all that was found in training, and of what the held-out flights confirm.
+    start : SearchStep
+        Without effects.
+    judge : Judge
+    settings : GapSettings
+
+    Returns
+    -------
+    tuple of str
+        Sentences; none where the flights agree, in a gap or in none.
+    """
+    seen = _size(start.hypothesis.residual - start.hypothesis.base @ fit(start.hypothesis, start.floor), start.floor)
+    unseen = last.held_out.size(last.held_out.parameters).floors
+    if last.found.hypothesis.chosen:
+        return _other_numbers(first, judge, settings)
+    there, here = _largest(seen), _largest(unseen)
+    names = [each.effect.name for each in first.found.hypothesis.chosen]
+    if seen[there] > CLEAR and not unseen[here] > CLEAR:
+        what = f" of what would be {' and '.join(names)}" if names else ""
+        return (
+            f"the flights learned from have a gap of {seen[there]:.2g} floors in the {CHANNELS[there]}{what}, and those"
+            f" held out have none ({unseen[here]:.2g} floors at most): something changed between them, or the flights"
+            " held out do not move so that it shows",
+        )
+    if unseen[here] > CLEAR and not seen[there] > CLEAR and not last.remainder.unexplained:
+        return (
+            f"the flights held out have a gap of {unseen[here]:.2g} floors in the {CHANNELS[here]}, and those learned"
+            f" from have none ({seen[there]:.2g} floors at most): something changed between them, or only the flights"
+            " held out move so that it shows; learn from one of them",
+        )
+    return _other_numbers(first, judge, settings) if names else ()
+
+
+def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tuple[str, ...]:
+    """Say that the same effects explain the held-out flights with other numbers, if they do."""
+    hypothesis, unseen = first.found.hypothesis, first.held_out
+    if min(unseen.shares().values()) >= settings.named_share:
+        return ()
+    own = fitted(judge.repaired, hypothesis.chosen, unseen.floor, settings)
+    after = own.hypothesis.residual - own.hypothesis.base @ own.estimates.linear
+    before = unseen.parameters
+    if share_removed(before / unseen.noise, after / unseen.noise, unseen.known) < settings.named_share:
+        return ()
+    if _size(after * unseen.known, unseen.floor).max() > CLEAR:
+        return ()
+    sentences = []
+    for there, here in zip(first.found.estimates.effects, own.estimates.effects, strict=True):
+        for number, other in zip(there, here, strict=False):
+            apart = number.name == other.name and (number.high < other.low or other.high < number.low)
+            if apart:
+                sentences.append(
+                    f"{number.name} is {number.value:.3g} [{number.low:.3g}, {number.high:.3g}] {number.unit} in the"
+                    f" flights learned from and {other.value:.3g} [{other.low:.3g}, {other.high:.3g}] in those held out"
+                )
+    return tuple(sentences)
+
+
+def _size(residual: Array, floor: Array) -> Array:
+    """Compute the root mean square of each channel in floors, shape (6,)."""
+    return np.asarray(np.sqrt(np.mean((residual / floor) ** 2, axis=0)))
+
+
+def _largest(floors: Array) -> int:
+    return int(np.nanargmax(np.where(np.isfinite(floors), floors, -1.0)))

@@ -1,0 +1,142 @@
+"""Which of the effects that a search chose have earned a name on the flights that they were found in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.gap.balance.balance_system import System, is_free, system
+from cpfls_cli.gap.balance.refine import refined
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, sized, weighted_estimates
+from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.gap.naming.search import block_index
+from cpfls_cli.gap.settings import GapSettings
+
+_ON_BOUND = 1e-3
+"""Share of its range that a number is from its bound at most to be on it."""
+
+_CANCEL = 0.5
+"""What two effects leave of each other, as a share of the smaller one, below which they are one."""
+
+
+class Fitted(NamedTuple):
+    """Effects that have earned their name on the training flights.
+
+    Attributes
+    ----------
+    hypothesis : System
+    block : array of int, shape (window,)
+    estimates : Estimates
+    """
+
+    hypothesis: System
+    block: IntArray
+    estimates: Estimates
+
+
+class Refusal(NamedTuple):
+    """An effect that is no name, and why, as the end of a sentence."""
+
+    name: str
+    reason: str
+
+    @property
+    def sentence(self) -> str:
+        """The whole sentence."""
+        return f"{self.name} explains part of the gap, but is not named: {self.reason}"
+
+
+def fitted(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings) -> Fitted:
+    """Fit effects together within their bounds."""
+    hypothesis = system(flights, chosen)
+    block = block_index(hypothesis, settings)
+    return Fitted(hypothesis, block, weighted_estimates(hypothesis, floor, block))
+
+
+def earned(
+    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings
+) -> tuple[Fitted, list[Refusal]]:
+    """Fit chosen effects, and refit without those that have not earned a name on the flights that they were found in.
+
+    These are effects whose size does not differ from zero, which nobody has to hear of; effects that sit on a bound;
+    and of effects that cancel each other the one that explains less.
+    """
+    found, refusals = fitted(flights, chosen, floor, settings), []
+    while found.hypothesis.chosen:
+        pairs = list(zip(found.hypothesis.chosen, found.estimates.effects, strict=True))
+        out = [candidate for candidate, numbers in pairs if not differs_from_zero(candidate.effect, numbers)]
+        if not out:
+            refused = _on_bound(found, floor) or _cancelling(found, floor)
+            if refused is None:
+                break
+            out, refusal = refused
+            refusals.append(refusal)
+        kept = [candidate for candidate in found.hypothesis.chosen if candidate not in out]
+        found = fitted(flights, refined(flights, kept, floor).chosen if kept else (), floor, settings)
+    return found, refusals
+
+
+def _on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | None:
+    for index, candidate in enumerate(found.hypothesis.chosen):
+        numbers = sized(candidate.effect, found.estimates.effects[index])
+        main = _main(found, index, numbers, floor)
+        for number in main:
+            low, high = number.plausible
+            near = _ON_BOUND * (high - low)
+            reached = [bound for bound in (low, high) if bound and abs(number.value - bound) <= near]
+            if reached:
+                says = f"its {number.name} sits on the bound of what is possible, {reached[0]:.3g} {number.unit}"
+                return [candidate], Refusal(candidate.effect.name, says)
+    return None
+
+
+def _main(found: Fitted, index: int, numbers: Sequence[Estimate], floor: Array) -> Sequence[Estimate]:
+    """Keep the coefficient that explains most; all numbers where they are no coefficients of columns."""
+    candidate = found.hypothesis.chosen[index]
+    linear = found.estimates.of_effect[index]
+    names = [coefficient.name for coefficient in candidate.effect.coefficients]
+    if candidate.effect.physical is not None or len(linear) != len(names):
+        return numbers
+    columns = found.hypothesis.columns(candidate) * linear / floor[:, None]
+    largest = names[int(np.argmax((columns**2).sum(axis=(0, 1))))]
+    return [number for number in numbers if number.name == largest]
+
+
+def _cancelling(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | None:
+    """Find two effects that leave less than half of the smaller one of each other."""
+    chosen = found.hypothesis.chosen
+    parts = [_explained(found, index) / floor for index in range(len(chosen))]
+    sizes = [float(np.linalg.norm(part)) for part in parts]
+    for first in range(len(chosen)):
+        for second in range(first):
+            left = float(np.linalg.norm(parts[first] + parts[second]))
+            if left < _CANCEL * min(sizes[first], sizes[second]):
+                return _lesser(found, floor, first, second)
+    return None
+
+
+def _explained(found: Fitted, index: int) -> Array:
+    """Compute what an effect explains, N m and N; an effect on the actuation by its own column."""
+    candidate = found.hypothesis.chosen[index]
+    columns = found.hypothesis.columns(candidate)
+    linear = found.estimates.of_effect[index] if is_free(candidate) else np.ones(columns.shape[2])
+    return np.asarray(columns @ linear)
+
+
+def _lesser(found: Fitted, floor: Array, *pair: int) -> tuple[list[Candidate], Refusal]:
+    chosen = found.hypothesis.chosen
+    left = {}
+    for index in pair:
+        others = [candidate for position, candidate in enumerate(chosen) if position != index]
+        without = system(found.hypothesis.flights, others)
+        block = found.block
+        linear = weighted_estimates(without, floor, block).linear
+        left[index] = float((((without.residual - without.base @ linear) / floor) ** 2).sum())
+    out = min(left, key=lambda index: left[index])
+    other = next(index for index in pair if index != out)
+    names = chosen[out].effect.name, chosen[other].effect.name
+    return [chosen[out]], Refusal(names[0], f"{names[0]} and {names[1]} nearly cancel, and one of them does as well")

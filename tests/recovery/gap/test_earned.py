@@ -1,0 +1,138 @@
+"""Chosen effects that have not earned their names: on a bound, cancelling, harmful, needless, without a lever."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.refine import fit_within_bounds
+from cpfls_cli.gap.naming.confirmed import Judge, differences
+from cpfls_cli.gap.naming.earned import earned, fitted
+from cpfls_cli.gap.naming.search import best_floor, rank_effects
+from cpfls_cli.gap.settings import GapSettings
+from tests.builders.gap_flights import candidate, fly, weak
+
+SETTINGS = GapSettings(shifts=99)
+ARM = 0.3
+OFFSET = (candidate("com_offset"), [0.004, -0.003])
+DRAG = (candidate("rotor_drag"), [1.5e-3])
+
+
+def flights(*effects, seeds=(1, 2), force=False, **given):
+    return [weak(fly(seed, effects, gyro=0.005, rotor=1.0, **given), force=force) for seed in seeds]
+
+
+def kept(found):
+    return [each.effect.name for each in found.hypothesis.chosen]
+
+
+def of(known, *names):
+    chosen = [candidate(name) for name in names]
+    return earned(known, chosen, best_floor(system(known, chosen)), SETTINGS)
+
+
+def test_a_damping_that_would_drive_is_held_at_zero():
+    """Noise asks for a little of it; a coefficient below its bound is no number to print."""
+    known = flights(OFFSET)
+    hypothesis = system(known, [candidate("com_offset"), candidate("linear_damping")])
+    linear, held = fit_within_bounds(hypothesis, best_floor(hypothesis))
+    assert (linear[-3:] >= 0).all()
+    assert held[-3:].any() == (linear[-3:] == 0).any()
+    found, refusals = of(known, "com_offset", "linear_damping")
+    assert kept(found) == ["com_offset"]
+    assert not refusals
+
+
+def test_a_moment_of_a_drag_needs_its_force():
+    """The nose goes up with speed, and nothing pushes: no centre of pressure lies that far away."""
+    known = flights((candidate("flapping_moment"), [-4e-5]), force=True)
+    hypothesis = system(known, [candidate("parasitic_drag")])
+    linear, _ = fit_within_bounds(hypothesis, best_floor(hypothesis))
+    assert np.abs(linear[-3:]).max() <= 2 * ARM * linear[-6:-3].max() + 1e-12
+    # Where no force is known, nothing speaks against it.
+    blind = system([flight.without_force() for flight in known], [candidate("parasitic_drag")])
+    free, _ = fit_within_bounds(blind, best_floor(blind))
+    assert np.abs(free[-3:]).max() > 5 * np.abs(linear[-3:]).max()
+
+
+def test_what_sits_on_its_bound_is_no_name():
+    known = flights((candidate("com_offset"), [0.004, 0.0]))
+    known_bounds = CATALOGUE["com_offset"].coefficients
+    narrow = replace(known_bounds[0], low=-0.001, high=0.001)
+    effect = replace(CATALOGUE["com_offset"], coefficients=(narrow, known_bounds[1]))
+    chosen = [candidate("com_offset")._replace(effect=effect)]
+    found, (refusal,) = earned(known, chosen, best_floor(system(known, chosen)), SETTINGS)
+    assert kept(found) == []
+    assert "c_x sits on the bound of what is possible" in refusal.sentence
+
+
+def test_of_two_that_cancel_one_goes():
+    """Two that differ by next to nothing, which is a damping, explain a damping by their difference."""
+    known = flights(OFFSET, (candidate("linear_damping"), [0.2, 0.2, 0.1]))
+    effect = CATALOGUE["com_offset"]
+    wide = tuple(replace(each, low=-99.0, high=99.0) for each in effect.coefficients)
+
+    def nearly(signals, shape):
+        columns = effect.columns(signals, shape)
+        moved = columns.direct.copy()
+        moved[:, :3] -= 0.1 * signals.body_rate[:, :, None]
+        return replace(columns, direct=moved)
+
+    plain = candidate("com_offset")._replace(effect=replace(effect, coefficients=wide))
+    twin = plain._replace(effect=replace(effect, name="twin", coefficients=wide, columns=nearly))
+    found, (refusal,) = earned(known, [plain, twin], best_floor(system(known, [plain])), SETTINGS)
+    assert kept(found) in (["com_offset"], ["twin"])
+    assert "nearly cancel" in refusal.sentence
+
+
+def judge(training, held):
+    floor = best_floor(system(training))
+    return Judge(training, held, held, floor, SETTINGS, np.random.default_rng(0))
+
+
+def judged(training, held, *names):
+    there = judge(training, held)
+    first = there.judge(fitted(training, [candidate(name) for name in names], there.floor, SETTINGS))
+    last, refusals = there.confirmed(first)
+    start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
+    return last, refusals, differences(first, last, start, there, SETTINGS)
+
+
+def test_what_is_there_stands_and_what_is_not_needed_goes():
+    last, refusals, differ = judged(flights(OFFSET), flights(OFFSET, seeds=(3,)), "com_offset", "rotor_drag")
+    assert kept(last.found) == ["com_offset"]
+    assert [refusal.name for refusal in refusals] == ["rotor_drag"]
+    assert not differ
+
+
+def test_what_makes_a_channel_worse_goes():
+    """Drag is in the flights learned from, and the offset in all."""
+    last, refusals, _ = judged(flights(OFFSET, DRAG), flights(OFFSET, seeds=(3,)), "com_offset", "rotor_drag")
+    assert kept(last.found) == ["com_offset"]
+    assert "worse" in refusals[0].sentence
+
+
+@pytest.mark.parametrize(
+    ("training", "held", "says"),
+    [((OFFSET,), (), "those held out have none"), ((), (OFFSET,), "those learned from have none")],
+    ids=["in training", "held out"],
+)
+def test_a_gap_in_some_flights_only_is_said(training, held, says):
+    names = ("com_offset",) if training else ()
+    _, _, (sentence,) = judged(flights(*training), flights(*held, seeds=(3,)), *names)
+    assert says in sentence
+
+
+def test_another_number_in_the_flights_held_out_is_said():
+    there, here = [(candidate("com_offset"), [size, 0.0]) for size in (0.004, 0.012)]
+    _, _, sentences = judged(flights(there), flights(here, seeds=(3,)), "com_offset")
+    assert len(sentences) == 1
+    assert sentences[0].startswith("c_x is 0.00")
+
+
+def test_nothing_hidden_differs_in_nothing():
+    for seed in range(3):
+        _, _, differ = judged(flights(seeds=(1 + seed, 2 + seed)), flights(seeds=(3 + seed,)))
+        assert not differ
