@@ -23,6 +23,7 @@ REFUSED = "refused"
 MISSED = "missed"
 UNSEEN = "not visible"
 ERROR = "error"
+CERTAIN = ("NAMED", "AMBIGUOUS")
 OUTCOMES = (RIGHT, EXTRA, PARTIAL, SOME, RIVAL, WRONG, REFUSED, MISSED, UNSEEN, ERROR)
 
 NOT_COLUMNS = frozenset({"gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay", "parameter_error"})
@@ -56,6 +57,30 @@ class Scored:
     def false_names(self):
         """Names of what is not hidden; a form close to one of the catalogue allows the nearest."""
         return set(self.names) - self.truth - set(self.key["hidden"]) - set(self.key["nearest"])
+
+    @property
+    def wrong_name(self):
+        """Whether a certain verdict rests on nothing but names of what is not there."""
+        rightly = self.outcome == RIVAL or set(self.names) - self.false_names
+        return self.verdict in CERTAIN and bool(self.names) and not rightly
+
+    @property
+    def false_name(self):
+        """Whether a certain verdict holds a name of what is not there."""
+        return self.verdict in CERTAIN and self.outcome != RIVAL and bool(self.false_names)
+
+    @property
+    def good(self):
+        """Whether the answer is the one that is asked for."""
+        if self.key["outside"]:
+            return self.verdict not in CERTAIN
+        if self.key["group"] == "none":
+            return not self.names
+        if self.key["group"] in ("hover", "no_velocity", "no_force", "form"):
+            return not self.false_name
+        if self.key["group"] == "background":
+            return self.names[:1] == (self.key["dominant"],) and not self.false_name
+        return self.outcome == RIGHT
 
     @property
     def visible(self):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,7 +19,11 @@ GROUPS = ("single", "none", "outside", "form", "pair", "triple", "background", "
 
 @dataclass(frozen=True)
 class Size:
-    """How much of a study is flown; ``none`` is the number of sets that hide nothing, all of them if None."""
+    """How much of a study is flown.
+
+    ``none`` is the number of sets that hide nothing, all of them if None; ``each`` the largest number of cases of some
+    groups, with as many different things hidden as the group has.
+    """
 
     seed: int
     draws: int = 6
@@ -26,7 +31,7 @@ class Size:
     kinds: Sequence[str] = KINDS
     groups: Sequence[str] = GROUPS
     none: int | None = None
-    limit: int | None = None
+    each: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -68,11 +73,25 @@ def sets(size):
     out = [[Set(case, level, kind, size.seed) for level, kind in noises] for case in own]
     if size.none is not None and "none" in size.groups:
         out += [[Set(_empty(place, size.seed), *noises[place % len(noises)], size.seed)] for place in range(size.none)]
-    if size.limit is None or size.limit >= len(out):
-        return out
-    # A part of a study is a sample of all of it.
-    kept = np.random.default_rng(size.seed).permutation(len(out))[: size.limit]
-    return [out[place] for place in sorted(kept)]
+    return _part(out, size)
+
+
+def _part(groups, size):
+    """Take some cases of each group: first one of everything that it hides, then a second of everything."""
+    order = np.random.default_rng(size.seed).permutation(len(groups))
+    seen, kept = Counter(), defaultdict(list)
+    ranked = []
+    for place in order:
+        case = groups[place][0].case
+        hidden = case.group, *(sorted(case.hidden) or (case.vehicle,))
+        ranked.append((seen[hidden], place))
+        seen[hidden] += 1
+    # A stable sort keeps the order of chance within a rank.
+    for _, place in sorted(ranked, key=lambda pair: pair[0]):
+        group = groups[place][0].case.group
+        if len(kept[group]) < size.each.get(group, len(groups)):
+            kept[group].append(place)
+    return [groups[place] for place in sorted(place for own in kept.values() for place in own)]
 
 
 def _empty(place, seed):

@@ -38,9 +38,35 @@ def tables(judged):
         ("Coefficients and their 95 % intervals", coefficient_table(judged)),
         ("Held-out torque gap in floors", gap_table(_of(judged, "single"))),
         ("Simpler procedures on the same columns", _simpler(judged)),
-        ("Every miss", _misses(judged)),
+        ("Every miss", misses(judged)),
     )
     return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts if text) + "\n"
+
+
+def misses(judged):
+    """Write the answers that are not those asked for, set by set.
+
+    Parameters
+    ----------
+    judged : list of Scored
+
+    Returns
+    -------
+    str
+    """
+    rows = [_miss(each) for each in judged if not each.good or each.wrong_name]
+    columns = (
+        "set",
+        "case",
+        "noise",
+        "outcome",
+        "verdict",
+        "named (share, p)",
+        "rivals",
+        "hidden, floors",
+        "gap, floors",
+    )
+    return table(columns, rows)
 
 
 def _of(judged, *groups):
@@ -58,7 +84,7 @@ def _several(judged):
 def _totals(judged):
     single, none, outside = _of(judged, "single"), _of(judged, "none"), _of(judged, "outside")
     right = [each.outcome == RIGHT for each in single]
-    named = [each.verdict in ("NAMED", "AMBIGUOUS") for each in outside]
+    named = [each.verdict in score.CERTAIN for each in outside]
     seen = [each.outcome == RIGHT for each in single if each.visible >= score.VISIBLE]
     rows = [
         ("one effect: exactly right", percent(right), "at least 96 %"),
@@ -66,7 +92,7 @@ def _totals(judged):
         ("one effect: exactly right, white noise", percent(_right(single, "white")), "95 % (earlier study)"),
         ("one effect: exactly right, coloured noise", percent(_right(single, "coloured")), "at least 96 %"),
         ("one effect: wrong name", percent([each.outcome == score.WRONG for each in single]), "0"),
-        ("any group: wrong name", percent([_wrong(each) for each in judged]), "0"),
+        ("any group: wrong name", percent([each.wrong_name for each in judged]), "0"),
         ("nothing hidden: false name", percent([bool(each.names) for each in none]), "at most 1 %"),
         ("nothing hidden: a gap without a name", percent([each.outcome == score.REFUSED for each in none]), ""),
         ("outside the catalogue: NAMED or AMBIGUOUS", percent(named), "0"),
@@ -79,13 +105,6 @@ def _totals(judged):
 
 def _right(judged, kind):
     return [each.outcome == RIGHT for each in judged if each.key["kind"] == kind]
-
-
-def _wrong(each):
-    """Tell whether a certain verdict rests on nothing but names of what is not there."""
-    certain = each.verdict in ("NAMED", "AMBIGUOUS")
-    rightly = each.outcome == score.RIVAL or set(each.names) - each.false_names
-    return certain and bool(each.names) and not rightly
 
 
 def _outcomes(judged):
@@ -191,27 +210,7 @@ def _simpler(judged):
 
 def _certain(way, each):
     # Simpler procedures have no way to say that their names are not all.
-    return way != "this" or each.verdict in ("NAMED", "AMBIGUOUS")
-
-
-def _misses(judged):
-    rows = []
-    for each in judged:
-        expected = each.key["group"] in ("single", "none", "pair", "triple") and not each.key["outside"]
-        if (expected and each.outcome != RIGHT) or _wrong(each):
-            rows.append(_miss(each))
-    columns = (
-        "set",
-        "case",
-        "noise",
-        "outcome",
-        "verdict",
-        "named (share, p)",
-        "rivals",
-        "hidden, floors",
-        "gap, floors",
-    )
-    return table(columns, rows)
+    return way != "this" or each.verdict in score.CERTAIN
 
 
 def _miss(each):
