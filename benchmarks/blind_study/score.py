@@ -23,6 +23,9 @@ REFUSED = "refused"
 MISSED = "missed"
 UNSEEN = "not visible"
 ERROR = "error"
+_CANCELS = 0.3
+"""Share of the gap beyond all of it, or below none, from which on effects work against one another."""
+
 CERTAIN = ("NAMED", "AMBIGUOUS")
 OUTCOMES = (RIGHT, EXTRA, PARTIAL, SOME, RIVAL, WRONG, REFUSED, MISSED, UNSEEN, ERROR)
 
@@ -76,11 +79,29 @@ class Scored:
             return self.verdict not in CERTAIN
         if self.key["group"] == "none":
             return not self.names
-        if self.key["group"] in ("hover", "no_velocity", "no_force", "form"):
-            return not self.false_name
+        if self.key["only"]:
+            return "DIFFER" in self.verdict
+        if self.key["group"] == "lacking":
+            return self.outcome in (RIGHT, RIVAL, UNSEEN)
+        if self.key["group"] == "attack" and not self.truth:
+            return not self.names
+        if self.key["group"] in ("hover", "no_velocity", "no_force", "form", "pybullet"):
+            return not self.false_name and not self.unphysical
         if self.key["group"] == "background":
             return self.names[:1] == (self.key["dominant"],) and not self.false_name
         return self.outcome == RIGHT
+
+    @property
+    def unphysical(self):
+        """Whether a certain verdict has numbers at or beyond their bounds, or effects that cancel one another."""
+        return self.verdict in CERTAIN and (self._at_bounds() or self._cancelling())
+
+    def _at_bounds(self):
+        numbers = [number for effect in self.said["effects"] for number in effect["coefficients"].values()]
+        return any(_at_bound(number["value"], *number["possible"]) for number in numbers)
+
+    def _cancelling(self):
+        return any(not -_CANCELS <= effect["share"] <= 1 + _CANCELS for effect in self.said["effects"])
 
     @property
     def visible(self):
@@ -114,6 +135,14 @@ class Number:
         return (self.value - self.true) / self.scale
 
 
+def _at_bound(value, low, high):
+    if value is None or None in (low, high):
+        return False
+    near = 1e-6 * (high - low)
+    # A bound at zero is where an effect ends, and a number of a group may well be zero.
+    return value < low - near or value > high - near or (low != 0 and value < low + near)
+
+
 def scored(folder):
     """Join keys and results.
 
@@ -138,7 +167,8 @@ def visible(key, said):
     """Give the hidden torque of the held-out flights in floors, on its largest axis."""
     if "floor" not in said:
         return float("nan")
-    own = [values for name, values in key["residual_rms_n_m"].items() if name.startswith("held_out")]
+    role = key["only"] or "held_out"
+    own = [values for name, values in key["residual_rms_n_m"].items() if name.startswith(role)]
     hidden = np.sqrt(np.mean(np.square(own), axis=0))
     return float(np.nanmax(hidden / np.array(said["floor"][:3], dtype=float)))
 

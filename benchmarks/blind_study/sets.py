@@ -11,10 +11,13 @@ import numpy as np
 
 from benchmarks.blind.cases import Case, cases, make
 from benchmarks.blind.measure import KINDS
-from benchmarks.blind.vehicles import VEHICLES
+from benchmarks.blind.vehicles import STUDIED
 
 LEVELS = ("low", "mid", "high")
-GROUPS = ("single", "none", "outside", "form", "pair", "triple", "background", "hover", "no_velocity", "no_force")
+GROUPS = (
+    "single", "none", "outside", "form", "pair", "triple", "background", "hover", "no_velocity", "no_force",
+    "lacking", "drag_factor", "attack", "differing", "pybullet",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,7 @@ def _part(groups, size):
     ranked = []
     for place in order:
         case = groups[place][0].case
-        hidden = case.group, *(sorted(case.hidden) or (case.vehicle,))
+        hidden = case.group, case.attack, case.only, case.left_out, *(sorted(case.hidden) or (case.vehicle,))
         ranked.append((seen[hidden], place))
         seen[hidden] += 1
     # A stable sort keeps the order of chance within a rank.
@@ -96,7 +99,7 @@ def _part(groups, size):
 
 def _empty(place, seed):
     """Make a case that hides nothing, each one another flight."""
-    plain = [(name, {}) for name in VEHICLES]
+    plain = [(name, {}) for name in STUDIED]
     vehicle, options = [*plain, ("sixkg", {"ideal_command": True})][place % (len(plain) + 1)]
     name = f"none-{vehicle}-{place}"
     return make(name, "none", vehicle, (), np.random.default_rng([seed, *name.encode()]), **options)

@@ -48,7 +48,8 @@ def _groups(judged):
                 sum(each.outcome == UNSEEN for each in own) or "",
                 sum(each.wrong_name for each in own) or "",
                 sum(each.false_name for each in own) or "",
+                sum(each.unphysical for each in own) or "",
                 ", ".join(f"{verdict} {count}" for verdict, count in said.most_common()),
             )
         )
-    return table(("group", "sets", "as asked", "not visible", "wrong name", "false name", "said"), rows)
+    return table(("group", "sets", "as asked", "not visible", "wrong name", "false name", "unphysical", "said"), rows)

@@ -54,7 +54,7 @@ def misses(judged):
     -------
     str
     """
-    rows = [_miss(each) for each in judged if not each.good or each.wrong_name]
+    rows = [_miss(each) for each in judged if not each.good or each.wrong_name or each.unphysical]
     columns = (
         "set",
         "case",

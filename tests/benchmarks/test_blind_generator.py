@@ -12,10 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.blind import generator
 from benchmarks.blind.cases import cases, make
+from benchmarks.blind.measure import places
 from benchmarks.blind.missions import mission
 from benchmarks.blind.plant import nominal
 from benchmarks.blind.simulate import DT, Fleet, FlightPlan
-from benchmarks.blind.strengths import CATALOGUE, FORMS, OUTSIDE, strength
+from benchmarks.blind.strengths import CATALOGUE, FORMS, OTHERS, OUTSIDE, strength
 from benchmarks.blind.vehicles import SIXKG, VEHICLES
 
 EFFECTS = ("com_offset", "euler_axis_torque", "ground_effect", "wind", "payload", "battery_sag", "gyro_bias")
@@ -108,7 +109,7 @@ def test_rotor_torque_alone_turns_a_craft_that_hides_nothing(flown, name):
     group = flown[f"none-{name}"]
     inertia = np.array(group.vehicle.inertia)
     for flight in group.flights:
-        time, speed, rate = flight.table[:, 0], flight.table[:, 16:20], flight.table[:, 4:7]
+        time, speed, rate = flight.table[:, 0], flight.table[:, places(flight.table)["rotor"]], flight.table[:, 4:7]
         torque = speed**2 @ group.vehicle.allocation()[1:].T - np.cross(rate, rate * inertia)
         turned_by = CubicSpline(time, torque / inertia).antiderivative()(time)
         # Rotors are told a new speed every 4 ms, so a spline through 100 Hz samples is good to about 1e-3 rad/s.
@@ -166,7 +167,7 @@ def test_study_repeats_from_its_seed_and_covers_every_effect():
     assert [case.key() for case in study] != [case.key() for case in cases(6)]
     assert len({case.name for case in study}) == len(study)
     hidden = {effect for case in study for effect in case.hidden}
-    assert hidden == {*CATALOGUE, *OUTSIDE, *FORMS}
+    assert hidden == {*CATALOGUE, *OUTSIDE, *FORMS, *OTHERS}
 
 
 def test_log_without_rotor_speeds_names_the_lag_too():

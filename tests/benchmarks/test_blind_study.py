@@ -96,7 +96,11 @@ def test_what_no_catalogue_lists_is_never_called_found(judged):
 )
 def test_answers_are_told_apart(truth, verdict, names, expected):
     torque = 1.0 if "com_offset" in truth else 0.01
-    key = {"truth": truth, "residual_rms_n_m": {"held_out_1": [torque, 0.0, 0.0], "train_1": [9.0, 9.0, 9.0]}}
+    key = {
+        "truth": truth,
+        "only": "",
+        "residual_rms_n_m": {"held_out_1": [torque, 0.0, 0.0], "train_1": [9.0, 9.0, 9.0]},
+    }
     rivals = [{"name": "com_offset", "instead_of": "inflow"}]
     said = {
         "verdict": verdict,
