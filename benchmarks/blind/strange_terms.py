@@ -160,14 +160,16 @@ class GustField(Term):
     stage = "hub"
 
     def prepare(self):
-        self.waves = np.array([rng.uniform([0.3, 0.0, 0.0], [1.0, 2 * np.pi, 2 * np.pi], (4, 3)) for rng in self.rngs])
+        # Wave number, direction and phase of four waves, shape (3, 4, rows).
+        low, high = [[0.3], [0.0], [0.0]], [[1.0], [2 * np.pi], [2 * np.pi]]
+        self.waves = np.stack([rng.uniform(low, high, (3, 4)) for rng in self.rngs], axis=2)
 
     def apply(self, now):
         r = self.rows
-        number, way, phase = np.moveaxis(self.waves, (1, 2), (1, 0))
-        along = number * (np.cos(way) * now.x[0, r, None] + np.sin(way) * now.x[1, r, None])
-        blow = np.sqrt(0.5) * self.gust * np.sin(along + phase).T
-        wind = np.stack(((blow * np.cos(way).T).sum(0), (blow * np.sin(way).T).sum(0), np.zeros(len(r))))
+        number, way, phase = self.waves
+        along = number * (np.cos(way) * now.x[0, r] + np.sin(way) * now.x[1, r])
+        blow = np.sqrt(0.5) * self.gust * np.sin(along + phase)
+        wind = np.stack(((blow * np.cos(way)).sum(0), (blow * np.sin(way)).sum(0), np.zeros(len(r))))
         air = now.hub_air[:2, :, r] - to_body(now.R[:, :, r], wind)[:2, None]
         now.side[:, :, r] -= self.drag * now.speed[:, r] * air
 

@@ -247,8 +247,8 @@ def wake_on_body(rng, s, level):
 
 
 def flexible_arm(rng, _scale, level):
-    share = between(rng, 0.08, 0.3, level)
-    return {"share": share, "frequency": rng.uniform(3.0, 7.0), "damping": rng.uniform(0.03, 0.1)}
+    share = between(rng, 0.2, 0.5, level)
+    return {"share": share, "frequency": rng.uniform(2.0, 5.0), "damping": rng.uniform(0.03, 0.1)}
 
 
 def gust_field(rng, s, level):
@@ -276,7 +276,7 @@ OUTSIDE = {
     "attitude_product": _torque(0.1, 0.4),
     "wall_effect": _torque(0.2, 0.8, place=(0.0, 12.0)),
     "sliding_battery": _torque(0.1, 0.4),
-    "cyclic_swirl": _torque(0.1, 0.4),
+    "cyclic_swirl": _torque(0.3, 1.2),
     "wake_on_body": wake_on_body,
     "flexible_arm": flexible_arm,
     "drag_over_height": rotor_drag,
@@ -321,7 +321,7 @@ def drag_factor(rng, _scale, level):
 
 
 def bullet_downwash(rng, _scale, _level):
-    return {"above": rng.uniform(1.0, 1.3), "sway": 0.15, "phase": rng.uniform(0, 2 * np.pi)}
+    return {"above": rng.uniform(1.4, 1.8), "sway": 0.15, "phase": rng.uniform(0, 2 * np.pi)}
 
 
 OTHERS = {
