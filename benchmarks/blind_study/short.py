@@ -1,4 +1,4 @@
-"""What a small study says on one page: each group, coverage of each effect, and every miss."""
+"""What a small study says on one page: totals, each group, coverage of each effect, and every miss."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
-from benchmarks.blind_study.number_tables import coverage_table, number_totals
+from benchmarks.blind_study.number_tables import coverage_table
 from benchmarks.blind_study.score import UNSEEN
-from benchmarks.blind_study.tables import misses
+from benchmarks.blind_study.tables import misses, totals
 from benchmarks.blind_study.text import table
 
 
@@ -25,9 +25,8 @@ def short(judged):
     """
     seconds = [each.said["seconds"] for each in judged]
     took = f"{len(judged)} sets, {np.median(seconds):.1f} s a set (median), {sum(seconds):.0f} s in all"
-    numbers = "\n".join(f"{name}: {found}" for name, found, _ in number_totals(judged))
-    coverage = coverage_table(judged)
-    return "\n\n".join(part for part in (took, _groups(judged), numbers, coverage, misses(judged)) if part) + "\n"
+    parts = (took, totals(judged), _groups(judged), coverage_table(judged), misses(judged))
+    return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def _groups(judged):
