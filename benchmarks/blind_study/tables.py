@@ -36,6 +36,7 @@ def tables(judged):
         ("Totals against the targets", totals(judged)),
         ("Outcomes by group and noise", _outcomes(judged)),
         ("One effect hidden: what was named", _confusion(_of(judged, "single"))),
+        ("One effect hidden: by vehicle", _vehicles(_of(judged, "single"))),
         ("Nothing hidden: false names", _false_names(_of(judged, "none"))),
         ("Outside the catalogue", _outside(_with_outside(judged))),
         ("Forms that differ from the catalogue's", _forms(_of(judged, "form"))),
@@ -199,6 +200,14 @@ def _background(judged):
         false = [bool(each.false_names) for each in own]
         rows.append((dominant, percent(first), percent(somewhere), percent(false), _often(own)))
     return table(("dominant", "named first", "named", "a name of what is not hidden", "names given most"), rows)
+
+
+def _vehicles(judged):
+    rows = []
+    for vehicle, own in _grouped(judged, lambda each: each.key["vehicle"]).items():
+        seen = [each.outcome == RIGHT for each in own if each.visible >= score.VISIBLE]
+        rows.append((vehicle, percent([each.outcome == RIGHT for each in own]), percent(seen)))
+    return table(("vehicle", "exactly right", f"with {score.VISIBLE} floors or more"), rows)
 
 
 def _as_asked(judged):
