@@ -117,6 +117,8 @@ PAIRS = (
     ("wind", "torque_bias"),
     ("gyro_bias", "linear_damping"),
     ("imu_misalignment", "rotor_drag"),
+    ("wind", "inflow"),
+    ("wind", "parasitic_drag"),
     ("com_offset", "gust_turbulence"),
     ("rotor_drag", "yaw_cogging"),
     ("linear_damping", "fuel_slosh"),

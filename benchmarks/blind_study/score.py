@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.blind.cases import LACKING
 from benchmarks.blind_study.truth import ROUGH, coefficients
 
 VISIBLE = 0.7
@@ -82,7 +83,7 @@ class Scored:
         if self.key["only"]:
             return "DIFFER" in self.verdict
         if self.key["group"] == "lacking":
-            return self.outcome in (RIGHT, RIVAL, UNSEEN)
+            return self.outcome in (RIGHT, UNSEEN) or (self.outcome == RIVAL and self._says_what_to_log())
         if self.key["group"] == "attack" and not self.truth:
             return not self.names
         if self.key["group"] in ("hover", "no_velocity", "no_force", "form", "pybullet"):
@@ -90,6 +91,12 @@ class Scored:
         if self.key["group"] == "background":
             return self.names[:1] == (self.key["dominant"],) and not self.false_name
         return self.outcome == RIGHT
+
+    def _says_what_to_log(self):
+        """Tell whether a signal that the log lacks is named where the rivals are."""
+        told = [rival["separated_by"] for rival in self.said["alternatives"] if rival["name"] in self.truth]
+        text = " ".join([*told, *self.said["look_alikes"]])
+        return any(signal in text for signal, columns in LACKING.items() if {*columns} <= {*self.key["left_out"]})
 
     @property
     def unphysical(self):

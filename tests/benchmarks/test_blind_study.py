@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from benchmarks.blind.cases import LACKING
 from benchmarks.blind_study.fly import fly
 from benchmarks.blind_study.judge import judge
 from benchmarks.blind_study.score import (
@@ -128,7 +129,7 @@ def said(verdict, *effects, rivals=()):
         {"name": name, "share": share, "coefficients": {"c": {"value": value, "possible": possible}}}
         for name, share, value, possible in effects
     ]
-    return {"verdict": verdict, "effects": told, "alternatives": list(rivals), "floor": [0.1] * 6}
+    return {"verdict": verdict, "effects": told, "alternatives": list(rivals), "look_alikes": [], "floor": [0.1] * 6}
 
 
 def answered(told, **key):
@@ -139,6 +140,8 @@ def answered(told, **key):
 
 DRAG, DAMPING = ("rotor_drag", 1.0, 1e-3, [0.0, 1.0]), ("linear_damping", 1.0, 0.1, [0.0, 1.0])
 
+RIVAL_BY = {"name": "rotor_drag", "instead_of": "linear_damping"}
+
 
 @pytest.mark.parametrize(
     ("told", "key", "good"),
@@ -146,9 +149,14 @@ DRAG, DAMPING = ("rotor_drag", 1.0, 1e-3, [0.0, 1.0]), ("linear_damping", 1.0, 0
         (said("NAMED", DRAG), {"truth": ["rotor_drag"], "group": "lacking"}, True),
         (said("NAMED", DAMPING), {"truth": ["rotor_drag"], "group": "lacking"}, False),
         (
-            said("AMBIGUOUS", DAMPING, rivals=[{"name": "rotor_drag", "instead_of": "linear_damping"}]),
-            {"truth": ["rotor_drag"], "group": "lacking"},
+            said("AMBIGUOUS", DAMPING, rivals=[RIVAL_BY | {"separated_by": "log velocity"}]),
+            {"truth": ["rotor_drag"], "group": "lacking", "left_out": LACKING["velocity"]},
             True,
+        ),
+        (
+            said("AMBIGUOUS", DAMPING, rivals=[RIVAL_BY | {"separated_by": "log velocity"}]),
+            {"truth": ["rotor_drag"], "group": "lacking", "left_out": LACKING["attitude"]},
+            False,
         ),
         (said("FLIGHTS_DIFFER"), {"only": "held_out", "hidden": {"rotor_drag": {}}, "group": "differing"}, True),
         (said("NAMED", DRAG), {"only": "held_out", "hidden": {"rotor_drag": {}}, "group": "differing"}, False),
