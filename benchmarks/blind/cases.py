@@ -94,7 +94,7 @@ NUMBERS = {"drag_factor": "parameter_error"}
 """Numbers of a vehicle, by the name that the catalogue has for a wrong one."""
 
 NEAREST = {
-    "bullet_damping": ("parasitic_drag", "linear_damping", "quadratic_damping"),
+    "bullet_damping": ("parasitic_drag", "linear_damping", "quadratic_damping", "rotor_drag", "inflow"),
     "bullet_drag": ("rotor_drag", "inflow"),
     "bullet_ground": ("ground_effect",),
 }
@@ -244,8 +244,9 @@ def _lacking(draws):
     for signal, columns in LACKING.items():
         for effect in ("rotor_drag", "inflow"):
             for draw in range(max(1, draws // 2)):
-                name = f"lacking-sixkg-{signal}-{effect}-{draw}"
-                yield name, "lacking", "sixkg", (effect,), {"left_out": columns}
+                for still in (False, True):
+                    name = f"lacking-sixkg-{'hover_' if still else ''}{signal}-{effect}-{draw}"
+                    yield name, "lacking", "sixkg", (effect,), {"left_out": columns, "hover_only": still}
 
 
 def _drag_factor(draws):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks.blind_study.fly import fly
+from benchmarks.blind.vehicles import VEHICLES
+from benchmarks.blind_study.fly import flown, fly
 from benchmarks.blind_study.run import CASES_AT_ONCE, judge_all, run
 from benchmarks.blind_study.score import scored
 from benchmarks.blind_study.sets import GROUPS, LEVELS, Size, sets
@@ -14,7 +15,7 @@ from benchmarks.blind_study.tables import tables
 
 _QUICK = {
     "single": 22, "none": 4, "outside": 18, "pair": 3, "triple": 1, "background": 1, "form": 3, "hover": 2,
-    "no_velocity": 1, "no_force": 1, "lacking": 6, "drag_factor": 4, "attack": 9, "differing": 4, "pybullet": 4,
+    "no_velocity": 1, "no_force": 1, "lacking": 8, "drag_factor": 4, "attack": 9, "differing": 4, "pybullet": 4,
 }  # fmt: skip
 """Cases of each group in a quick study: about six minutes of one core."""
 
@@ -22,7 +23,7 @@ _QUICK = {
 def main():
     """Fly, judge or score a study, or all of it."""
     told = _arguments()
-    size = Size(told.seed, told.draws, told.levels, told.kinds, told.groups, told.none, _each(told, {}))
+    size = Size(told.seed, told.draws, told.levels, told.kinds, told.groups, told.none, told.vehicles, _each(told, {}))
     if told.command == "fly":
         for own in sets(size):
             fly([own], told.out)
@@ -44,10 +45,10 @@ def _each(told, usual):
 
 def _quick(told):
     """Judge a few cases of each group with the code as it is; their flights are flown once and kept."""
-    chosen = sets(Size(told.seed, 2, ("mid",), ("white",), told.groups, None, _each(told, _QUICK)))
-    flown = [own for own in chosen if not (told.out / "flights" / own[0].name / "study.yaml").exists()]
-    for start in range(0, len(flown), CASES_AT_ONCE):
-        fly(flown[start : start + CASES_AT_ONCE], told.out)
+    chosen = sets(Size(told.seed, 2, ("mid",), ("white",), told.groups, None, told.vehicles, _each(told, _QUICK)))
+    left = [own for own in chosen if not flown(own[0], told.out)]
+    for start in range(0, len(left), CASES_AT_ONCE):
+        fly(left[start : start + CASES_AT_ONCE], told.out)
     judge_all(told.out, told.processes, [own[0].name for own in chosen])
     text = short(scored(told.out))
     (told.out / "short.md").write_text(text, encoding="utf-8")
@@ -63,6 +64,7 @@ def _arguments():
     parser.add_argument("--levels", type=_list, default=LEVELS, help="noise: low,mid,high")
     parser.add_argument("--kinds", type=_list, default=("white", "coloured"), help="noise: white,coloured")
     parser.add_argument("--groups", type=_list, default=GROUPS, help=",".join(GROUPS))
+    parser.add_argument("--vehicles", type=_list, default=tuple(VEHICLES), help=",".join(VEHICLES))
     parser.add_argument("--none", type=int, help="number of sets that hide nothing, over all vehicles and noises")
     parser.add_argument("--sets", type=int, help="largest number of cases of each group")
     parser.add_argument("--baselines", type=_list, default=("mid",), help="noise levels that simpler ways judge, too")

@@ -39,6 +39,21 @@ def fly(group, folder, duration=DURATION):
     return written
 
 
+def flown(each, folder):
+    """Tell whether the logs of a set lie in a folder, with what is hidden in it today.
+
+    Parameters
+    ----------
+    each : Set
+    folder : Path
+    """
+    key = Path(folder) / "keys" / each.name / "key.json"
+    if not key.exists() or not (Path(folder) / "flights" / each.name / "study.yaml").exists():
+        return False
+    told, wanted = json.loads(key.read_text(encoding="ascii")), json.loads(json.dumps(each.case.key()))
+    return all(told.get(name) == value for name, value in wanted.items())
+
+
 def config(vehicle_file):
     """Describe a vehicle and the columns of its logs as a config.
 

@@ -83,7 +83,7 @@ class Scored:
         if self.key["only"]:
             return "DIFFER" in self.verdict
         if self.key["group"] == "lacking":
-            return self.outcome in (RIGHT, UNSEEN) or (self.outcome == RIVAL and self._says_what_to_log())
+            return self._says_what_to_log() if self.outcome == RIVAL else not self.false_name
         if self.key["group"] == "attack" and not self.truth:
             return not self.names
         if self.key["group"] in ("hover", "no_velocity", "no_force", "form", "pybullet"):

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.blind.cases import Case, cases, make
 from benchmarks.blind.measure import KINDS
-from benchmarks.blind.vehicles import STUDIED
+from benchmarks.blind.vehicles import STUDIED, VEHICLES
 
 LEVELS = ("low", "mid", "high")
 GROUPS = (
@@ -34,6 +34,7 @@ class Size:
     kinds: Sequence[str] = KINDS
     groups: Sequence[str] = GROUPS
     none: int | None = None
+    vehicles: Sequence[str] = tuple(VEHICLES)
     each: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -69,7 +70,7 @@ def sets(size):
     list of list of Set
         One list for each case.
     """
-    own = [case for case in cases(size.seed, size.draws) if case.group in size.groups]
+    own = [case for case in cases(size.seed, size.draws) if case.group in size.groups and case.vehicle in size.vehicles]
     noises = [(level, kind) for level in size.levels for kind in size.kinds]
     if size.none is not None and "none" in size.groups:
         own = [case for case in own if case.group != "none"]
@@ -86,7 +87,14 @@ def _part(groups, size):
     ranked = []
     for place in order:
         case = groups[place][0].case
-        hidden = case.group, case.attack, case.only, case.left_out, *(sorted(case.hidden) or (case.vehicle,))
+        hidden = (
+            case.group,
+            case.attack,
+            case.only,
+            case.left_out,
+            case.hover_only,
+            *(sorted(case.hidden) or (case.vehicle,)),
+        )
         ranked.append((seen[hidden], place))
         seen[hidden] += 1
     # A stable sort keeps the order of chance within a rank.

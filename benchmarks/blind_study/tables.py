@@ -11,7 +11,7 @@ from benchmarks.blind_study.score import OUTCOMES, RIGHT
 from benchmarks.blind_study.text import NONE_TRIED, percent, table
 
 _AS_ASKED = {
-    "lacking": "log lacks a signal: AMBIGUOUS with what it hides, or right",
+    "lacking": "log lacks a signal: no false name, and a rival comes with what to log",
     "drag_factor": "drag factor 15 to 30 % off: exactly right",
     "attack": "log attacked: exactly right",
     "differing": "effect in the flights of one role: these flights differ",
