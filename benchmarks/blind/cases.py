@@ -71,7 +71,7 @@ def make(name, group, vehicle, effects, rng, level=None, **options):
     hidden = {effect: strength(effect, VEHICLES[vehicle], rng, levels.get(effect)) for effect in effects}
     if "rotor_gyroscopic" in hidden and "rotor_acceleration" in hidden:
         hidden["rotor_gyroscopic"] = hidden["rotor_acceleration"]
-    truth = [NUMBERS.get(effect, effect) for effect in effects if effect in (*CATALOGUE, *NUMBERS)]
+    truth = [NAMES.get(effect, effect) for effect in effects if effect in (*CATALOGUE, *NAMES)]
     if options.get("only"):
         truth = []
     left_out = list(options.pop("left_out", ()))
@@ -82,7 +82,7 @@ def make(name, group, vehicle, effects, rng, level=None, **options):
             truth.append("motor_lag")
     nearest = tuple(FORMS[effect][1] for effect in effects if effect in FORMS)
     nearest += tuple(name for effect in effects for name in NEAREST.get(effect, ()))
-    outside = tuple(effect for effect in effects if effect in (*OUTSIDE, "bullet_downwash"))
+    outside = tuple(effect for effect in effects if effect in (*OUTSIDE, "bullet_downwash") and effect not in NAMES)
     if options.get("ideal_command"):
         left_out += rotor_columns(VEHICLES[vehicle].count)
     return Case(
@@ -90,8 +90,8 @@ def make(name, group, vehicle, effects, rng, level=None, **options):
     )
 
 
-NUMBERS = {"drag_factor": "parameter_error"}
-"""Numbers of a vehicle, by the name that the catalogue has for a wrong one."""
+NAMES = {"drag_factor": "parameter_error"}
+"""Names that the catalogue has for what is hidden under another; what it takes in of ``OUTSIDE`` gets a line here."""
 
 NEAREST = {
     "bullet_damping": ("parasitic_drag", "linear_damping", "quadratic_damping", "rotor_drag", "inflow"),

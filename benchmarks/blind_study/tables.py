@@ -63,7 +63,8 @@ def totals(judged):
     -------
     str
     """
-    single, none, outside = _of(judged, "single"), _of(judged, "none"), _of(judged, "outside")
+    single, none = _of(judged, "single"), _of(judged, "none")
+    outside = _with_outside(_of(judged, "outside"))
     right = [each.outcome == RIGHT for each in single]
     seen = [each.outcome == RIGHT for each in single if each.visible >= score.VISIBLE]
     rows = [

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from benchmarks.blind import generator
-from benchmarks.blind.cases import cases, make
+from benchmarks.blind.cases import NAMES, cases, make
 from benchmarks.blind.drive import Notch
 from benchmarks.blind.measure import ATTACKS, attacked, places
 from benchmarks.blind.missions import mission
@@ -291,3 +291,11 @@ def test_ground_and_downwash_of_the_other_simulator(height):
     gained = 11.36859 * (2.31348e-2 / (4 * height)) ** 2 * 9.81
     pressed = 2267.18 * (2.31348e-2 / 6.0) ** 2 / 0.027
     assert rates[5, 0] == pytest.approx(gained - pressed, rel=1e-9)
+
+
+def test_what_the_catalogue_takes_in_is_no_longer_outside(monkeypatch):
+    case = make("arm", "outside", "sixkg", ("flexible_arm",), np.random.default_rng(1))
+    assert (case.truth, case.outside) == ((), ("flexible_arm",))
+    monkeypatch.setitem(NAMES, "flexible_arm", "soft_frame")
+    case = make("arm", "outside", "sixkg", ("flexible_arm",), np.random.default_rng(1))
+    assert (case.truth, case.outside) == (("soft_frame",), ())
