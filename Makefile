@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce reproduce-full quick hexarotor full-circle crazyflie gap-example replay-example test lint bench blind-study clean FORCE
+.PHONY: help reproduce reproduce-full quick hexarotor full-circle crazyflie gap-example replay-example test lint bench blind-study blind-quick clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -25,6 +25,7 @@ help:
 	@echo "  make lint        formatting, lint, types, import contracts"
 	@echo "  make bench       benchmarks, as Markdown tables"
 	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
+	@echo "  make blind-quick [SIZE=...]                          a few sets of each group in six minutes"
 	@echo "  make clean       remove what studies produced"
 
 reproduce: data/paper/report.html
@@ -305,6 +306,10 @@ DRAWS := 6
 NONE := 200
 blind-study: $(INSTALLED_DEV)
 	$(BIN)/python -m benchmarks.blind_study run --out data/blind --seed $(SEED) --draws $(DRAWS) --none $(NONE) $(SIZE)
+
+# A few sets of each group on a seed for development: what a change of the rules does. Flights are flown once and kept.
+blind-quick: $(INSTALLED_DEV)
+	$(BIN)/python -m benchmarks.blind_study quick --out data/blind-quick --seed 31 --processes 1 $(SIZE)
 
 clean:
 	rm -rf data/paper data/quick data/hexarotor data/full-circle data/crazyflie data/gap-example data/replay-example

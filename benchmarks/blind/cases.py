@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .measure import ATTACKS, rotor_columns
 from .strengths import CATALOGUE, FORMS, OUTSIDE, strength
-from .vehicles import VEHICLES
+from .vehicles import STUDIED, VEHICLES
 
-ROTOR_COLUMNS = ("om1", "om2", "om3", "om4")
 VELOCITY_COLUMNS = ("x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az")
 FORCE_COLUMNS = ("ax", "ay", "az")
-COMMAND_ONLY = frozenset({"motor_lag", "command_delay", "battery_sag", "lag_second_order", "lag_uneven"})
 LAGGED = frozenset({"motor_lag", "lag_second_order", "lag_uneven"})
+COMMAND_ONLY = LAGGED | {"notch_filter", "command_delay", "battery_sag"}
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,8 @@ class Case:
     ``hidden`` maps effects to their parameters; ``truth`` holds the catalogue names a perfect judge would give,
     ``outside`` what no catalogue lists, ``nearest`` the catalogue name of an effect whose form differs.
     ``esc_speed`` logs rotor speeds as a controller believes them, without the loss of voltage;
-    ``ideal_command`` logs a command that the rotors follow exactly.
+    ``ideal_command`` logs a command that the rotors follow exactly; ``attack`` is what the logger does to the log;
+    ``only`` the role of the flights that the effects are in, if not all.
     """
 
     name: str
@@ -38,6 +39,8 @@ class Case:
     left_out: tuple = ()
     esc_speed: bool = False
     ideal_command: bool = False
+    attack: str = ""
+    only: str = ""
 
     def key(self):
         """Give what is hidden as plain data."""
@@ -54,6 +57,8 @@ class Case:
             "left_out": list(self.left_out),
             "esc_speed": self.esc_speed,
             "ideal_command": self.ideal_command,
+            "attack": self.attack,
+            "only": self.only,
         }
 
 
@@ -66,25 +71,38 @@ def make(name, group, vehicle, effects, rng, level=None, **options):
     hidden = {effect: strength(effect, VEHICLES[vehicle], rng, levels.get(effect)) for effect in effects}
     if "rotor_gyroscopic" in hidden and "rotor_acceleration" in hidden:
         hidden["rotor_gyroscopic"] = hidden["rotor_acceleration"]
-    truth = [effect for effect in effects if effect in CATALOGUE]
+    truth = [NAMES.get(effect, effect) for effect in effects if effect in (*CATALOGUE, *NAMES)]
+    if options.get("only"):
+        truth = []
     left_out = list(options.pop("left_out", ()))
     if COMMAND_ONLY & set(effects) and not options.get("esc_speed"):
-        left_out += ROTOR_COLUMNS
+        left_out += rotor_columns(VEHICLES[vehicle].count)
         # Rotors always lag by 50 ms behind their command, so a log of commands hides that too.
         if not LAGGED & set(effects):
             truth.append("motor_lag")
     nearest = tuple(FORMS[effect][1] for effect in effects if effect in FORMS)
-    outside = tuple(effect for effect in effects if effect in OUTSIDE)
+    nearest += tuple(name for effect in effects for name in NEAREST.get(effect, ()))
+    outside = tuple(effect for effect in effects if effect in (*OUTSIDE, "bullet_downwash") and effect not in NAMES)
     if options.get("ideal_command"):
-        left_out += ROTOR_COLUMNS
+        left_out += rotor_columns(VEHICLES[vehicle].count)
     return Case(
         name, group, vehicle, hidden, tuple(truth), outside, nearest, left_out=tuple(dict.fromkeys(left_out)), **options
     )
 
 
-SUITABLE = {name: tuple(VEHICLES) for name in CATALOGUE}
+NAMES = {"drag_factor": "parameter_error"}
+"""Names that the catalogue has for what is hidden under another; what it takes in of ``OUTSIDE`` gets a line here."""
+
+NEAREST = {
+    "bullet_damping": ("parasitic_drag", "linear_damping", "quadratic_damping", "rotor_drag", "inflow"),
+    "bullet_drag": ("rotor_drag", "inflow"),
+    "bullet_ground": ("ground_effect",),
+}
+"""Names in the catalogue that come close to the physics of another simulator."""
+
+SUITABLE = {name: tuple(STUDIED) for name in CATALOGUE}
 # The hubs of the Hummingbird lie in the plane of its centre of mass: leaning thrust has no lever.
-SUITABLE["rotor_plane_damping"] = ("sixkg", "xquad", "crazyflie")
+SUITABLE["rotor_plane_damping"] = ("sixkg", "xquad", "crazyflie", "hexarotor", "coaxial")
 
 PAIRS = (
     ("rotor_drag", "com_offset"),
@@ -99,6 +117,8 @@ PAIRS = (
     ("wind", "torque_bias"),
     ("gyro_bias", "linear_damping"),
     ("imu_misalignment", "rotor_drag"),
+    ("wind", "inflow"),
+    ("wind", "parasitic_drag"),
     ("com_offset", "gust_turbulence"),
     ("rotor_drag", "yaw_cogging"),
     ("linear_damping", "fuel_slosh"),
@@ -138,6 +158,12 @@ DOMINANT = (
     "ground_effect",
     "motor_lag",
 )
+LACKING = {
+    "velocity": ("x", "y", "z", "vx", "vy", "vz"),
+    "attitude": ("phi", "theta", "psi"),
+    "acceleration": FORCE_COLUMNS,
+    "motion": VELOCITY_COLUMNS,
+}
 LIMITED = (
     "linear_damping",
     "rotor_drag",
@@ -166,7 +192,7 @@ def _singles(draws):
 
 
 def _none(draws):
-    for vehicle in VEHICLES:
+    for vehicle in STUDIED:
         for draw in range(2 * draws if vehicle == "sixkg" else draws):
             yield f"none-{vehicle}-{draw}", "none", vehicle, (), {}
     for draw in range(draws):
@@ -178,7 +204,7 @@ def _strange(draws):
     for group, effects in (("outside", OUTSIDE), ("form", FORMS)):
         for effect in effects:
             for draw in range(draws):
-                vehicle = ("sixkg", "xquad", "crazyflie", "hummingbird")[draw % 4]
+                vehicle = ("sixkg", "xquad", "crazyflie", "hummingbird", "hexarotor", "coaxial")[draw % 6]
                 yield f"{group}-{vehicle}-{effect}-{draw}", group, vehicle, (effect,), {}
 
 
@@ -213,6 +239,49 @@ def _limited(draws):
             yield f"no_force-sixkg-{effect}-{draw}", "no_force", "sixkg", (effect,), {"left_out": FORCE_COLUMNS}
 
 
+def _lacking(draws):
+    """Hide what a log without a signal cannot show: its rival is not defeated."""
+    for signal, columns in LACKING.items():
+        for effect in ("rotor_drag", "inflow"):
+            for draw in range(max(1, draws // 2)):
+                for still in (False, True):
+                    name = f"lacking-sixkg-{'hover_' if still else ''}{signal}-{effect}-{draw}"
+                    yield name, "lacking", "sixkg", (effect,), {"left_out": columns, "hover_only": still}
+
+
+def _drag_factor(draws):
+    for draw in range(draws):
+        vehicle = ("sixkg", "xquad", "hexarotor")[draw % 3]
+        yield f"drag_factor-{vehicle}-alone-{draw}", "drag_factor", vehicle, ("drag_factor",), {}
+        effects = ("rotor_drag", "drag_factor")
+        yield f"drag_factor-{vehicle}-rotor_drag-{draw}", "drag_factor", vehicle, effects, {}
+
+
+def _attacked(draws):
+    for attack in ATTACKS:
+        for effect in ("", "rotor_drag", "inflow", "com_offset", "linear_damping"):
+            for draw in range(max(1, draws // 2)):
+                effects = (effect,) if effect else ()
+                name = f"attack-sixkg-{attack}-{effect or 'none'}-{draw}"
+                yield name, "attack", "sixkg", effects, {"level": 0.4, "attack": attack}
+
+
+def _one_sided(draws):
+    """Hide an effect in the flights of one role alone, as where a propeller was changed between flights."""
+    for only in ("train", "held_out"):
+        for effect in ("rotor_mismatch", "com_offset", "rotor_drag", "linear_damping"):
+            for draw in range(max(1, draws // 2)):
+                name = f"differing-sixkg-{only}-{effect}-{draw}"
+                yield name, "differing", "sixkg", (effect,), {"level": 0.5, "only": only}
+
+
+def _pybullet(draws):
+    for physics in ("plain", "drag", "ground", "downwash"):
+        effects = ("quick_rotors", "bullet_damping", *(() if physics == "plain" else (f"bullet_{physics}",)))
+        for draw in range(draws):
+            yield f"pybullet-cf2x-{physics}-{draw}", "pybullet", "cf2x", effects, {}
+
+
 def cases(study_seed, draws=3):
     """List the whole study; the same seed gives the same cases.
 
@@ -222,7 +291,11 @@ def cases(study_seed, draws=3):
     draws : int
         Repeats of each single effect on the 6 kg craft; other groups follow.
     """
-    parts = (_singles(draws), _none(draws), _strange(draws), _several(draws), _background(draws), _limited(draws))
+    kinds = (
+        _singles, _none, _strange, _several, _background, _limited,
+        _lacking, _drag_factor, _attacked, _one_sided, _pybullet,
+    )  # fmt: skip
+    parts = [kind(draws) for kind in kinds]
     out = []
     for part in parts:
         for name, group, vehicle, effects, options in part:

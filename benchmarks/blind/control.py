@@ -18,9 +18,9 @@ class Controller:
         self.period = period
         self.mass = np.array([v.mass for v in vehicles])
         self.inertia = np.array([v.inertia for v in vehicles]).T
-        self.unmix = np.moveaxis(np.array([np.linalg.inv(v.allocation()) for v in vehicles]), 0, 2).copy()
+        self.unmix = np.moveaxis(np.array([np.linalg.pinv(v.allocation(), rcond=1e-12) for v in vehicles]), 0, 2).copy()
         self.hover = np.array([v.hover_speed for v in vehicles]) ** 2
-        self.yaw_limit = 1.6 * np.array([v.torque_factor for v in vehicles]) * self.hover
+        self.yaw_limit = 0.4 * np.array([v.count * v.torque_factor for v in vehicles]) * self.hover
         nominal = np.array([1.1, 1.9, 0.25, 20.0, 7.5, 5.0, 4.0])
         gains = np.array([nominal * rng.uniform(0.88, 1.12, nominal.size) for rng in rngs]).T
         self.position_gain, self.velocity_gain, self.integral_gain = gains[:3]
@@ -52,7 +52,7 @@ class Controller:
         return np.stack((roll_pitch[0], roll_pitch[1], np.arctan2(ahead[1], ahead[0])))
 
     def command(self, x, v, R, w, reference):
-        """Give the four rotor speeds, shape (4, flights), rad/s."""
+        """Give the rotor speeds, shape (rotor, flights), rad/s."""
         asked = self.thrust_vector(x, v, reference)
         error = self.attitude_error(R, asked, reference[9], reference[11:13])
         self.attitude_integral = np.clip(self.attitude_integral + error * self.period, -0.5, 0.5)

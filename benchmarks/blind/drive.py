@@ -7,6 +7,34 @@ import numpy as np
 LONGEST_DELAY = 0.12
 
 
+class Notch:
+    """Takes a band out of the commands of some flights: ``(s^2 + w^2) / (s^2 + 2 width w s + w^2)``."""
+
+    def __init__(self, notches, hover, rotors, dt):
+        self.rows = np.array([row for row, notch in enumerate(notches) if notch], dtype=int)
+        natural = 2 * np.pi * np.array([notch[0] for notch in notches if notch])
+        width = np.array([notch[1] for notch in notches if notch])
+        # Bilinear transform, with its frequency kept.
+        c = natural / np.tan(natural * dt / 2)
+        whole = c**2 + 2 * width * natural * c + natural**2
+        self.over = np.stack((c**2 + natural**2, 2 * (natural**2 - c**2))) / whole
+        self.last = (c**2 - 2 * width * natural * c + natural**2) / whole
+        start = np.tile(hover[self.rows], (rotors, 1))
+        self.put, self.got = [start, start], [start, start]
+
+    def passed(self, command):
+        """Filter one step of commands."""
+        if not len(self.rows):
+            return command
+        now = command[:, self.rows]
+        same, middle = self.over
+        got = same * (now + self.put[1]) + middle * (self.put[0] - self.got[0]) - self.last * self.got[1]
+        self.put, self.got = [now, self.put[0]], [got, self.got[0]]
+        out = command.copy()
+        out[:, self.rows] = got
+        return out
+
+
 class Drive:
     """Rotor speeds of a batch; exact between two steps for a held command."""
 
@@ -15,6 +43,7 @@ class Drive:
             return np.array([getattr(p, name) for p in plants])
 
         self.dt = dt
+        rotors = vehicles[0].count
         self.hover = np.array([v.hover_speed for v in vehicles])
         self.lag_up, self.lag_down = collect("lag_up"), collect("lag_down")
         self.keep_up, self.keep_down = np.exp(-dt / 2 / self.lag_up), np.exp(-dt / 2 / self.lag_down)
@@ -24,14 +53,16 @@ class Drive:
         self.second = np.array([i for i, p in enumerate(plants) if p.resonance], dtype=int)
         self.natural = np.array([p.resonance[0] for p in plants if p.resonance])
         self.ratio = np.array([p.resonance[1] for p in plants if p.resonance])
-        self.speed = np.tile(self.hover, (4, 1))
-        self.extra = np.zeros((4, len(self.second)))
-        self.past = np.tile(self.hover, (int(LONGEST_DELAY / dt) + 2, 4, 1))
+        self.notch = Notch([p.notch for p in plants], self.hover, rotors, dt)
+        self.speed = np.tile(self.hover, (rotors, 1))
+        self.extra = np.zeros((rotors, len(self.second)))
+        self.past = np.tile(self.hover, (int(LONGEST_DELAY / dt) + 2, rotors, 1))
         self.used = self.start.copy()
         self.volt = 1 - self.depth * self.start - self.load
 
     def receive(self, step, command):
         """Take a command; return what arrives at the motor controllers now."""
+        command = self.notch.passed(command)
         length = len(self.past)
         self.past[step % length] = command
         whole = self.behind.astype(int)

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from . import turning
 from .cases import Case, cases
-from .measure import COLUMNS, KINDS, NOISE, disturb, observe, save
+from .measure import KINDS, NOISE, attacked, columns, disturb, observe, save
 from .missions import MISSIONS, mission
 from .plant import ALTERATIONS, nominal
 from .rotor_terms import LEAD_IN
@@ -24,7 +24,7 @@ from .simulate import FlightPlan, simulate
 from .vehicles import VEHICLES, Vehicle
 
 __all__ = [
-    "COLUMNS", "KINDS", "NOISE", "VEHICLES", "Case", "Flight", "Flights", "Vehicle",
+    "KINDS", "NOISE", "VEHICLES", "Case", "Flight", "Flights", "Vehicle",
     "cases", "generate", "residual", "simulate_in_parts", "simulate_many", "write", "write_key",
 ]  # fmt: skip
 
@@ -55,18 +55,19 @@ def _plans(case, seed, duration):
     vehicle = VEHICLES[case.vehicle]
     plans = []
     for number in range(2 * len(MISSIONS)):
+        hidden = case.hidden if case.only in ("", ROLES[number // len(MISSIONS)]) else {}
         name = "hover" if case.hover_only else MISSIONS[number % len(MISSIONS)]
         flight_seed = (seed, number, *case.name.encode())
         plant = nominal(vehicle)
         rng = np.random.default_rng([*flight_seed, 1])
         # Each flight starts with another charge.
         charge = rng.uniform(0.0, 0.6)
-        for effect, parameters in case.hidden.items():
+        for effect, parameters in hidden.items():
             if effect in ALTERATIONS:
                 ALTERATIONS[effect](plant, **parameters)
         plant.sag_start = charge
-        wind = np.array(case.hidden.get("wind", {}).get("velocity", (0.0, 0.0, 0.0)))
-        plans.append(FlightPlan(vehicle, plant, mission(name, vehicle, duration, rng), case.hidden, wind, flight_seed))
+        wind = np.array(hidden.get("wind", {}).get("velocity", (0.0, 0.0, 0.0)))
+        plans.append(FlightPlan(vehicle, plant, mission(name, vehicle, duration, rng), hidden, wind, flight_seed))
     return plans
 
 
@@ -95,10 +96,14 @@ def simulate_many(cases, seed, duration=DURATION, lead_in=LEAD_IN):
     list of Flights
         In the order of the cases: three flights to train, then three held out.
     """
-    plans = [_plans(case, seed, duration) for case in cases]
-    record = simulate([plan for group in plans for plan in group], duration, lead_in)
-    count = 2 * len(MISSIONS)
-    return [_collect(case, group, record, i * count) for i, (case, group) in enumerate(zip(cases, plans, strict=True))]
+    flown = {}
+    for rotors in {VEHICLES[case.vehicle].count: None for case in cases}:
+        alike = [case for case in cases if VEHICLES[case.vehicle].count == rotors]
+        plans = [_plans(case, seed, duration) for case in alike]
+        record = simulate([plan for group in plans for plan in group], duration, lead_in)
+        for place, (case, group) in enumerate(zip(alike, plans, strict=True)):
+            flown[case.name] = _collect(case, group, record, place * 2 * len(MISSIONS))
+    return [flown[case.name] for case in cases]
 
 
 def simulate_in_parts(cases, seed, duration=DURATION, part=60) -> Iterator[Flights]:
@@ -120,8 +125,8 @@ def residual(flight, case):
     vehicle = VEHICLES[case.vehicle]
     inertia = np.array(vehicle.inertia)
     rate = flight.table[:, 4:7]
-    first = COLUMNS.index("omcmd1" if "om1" in case.left_out else "om1")
-    speed = flight.table[:, first : first + 4]
+    first = columns(vehicle.count).index("omcmd1" if "om1" in case.left_out else "om1")
+    speed = flight.table[:, first : first + vehicle.count]
     turn = CubicSpline(flight.table[:, 0], rate).derivative()(flight.table[:, 0])
     return turn * inertia + np.cross(rate, rate * inertia) - (speed**2) @ vehicle.allocation()[1:].T
 
@@ -133,7 +138,8 @@ def write(flights: Flights, folder, noise_level, kind, rng) -> list[Path]:
     paths = []
     for number, flight in enumerate(flights.flights):
         path = folder / f"{flight.role}_{number % len(MISSIONS) + 1}.csv"
-        save(disturb(flight.table, flights.vehicle, noise_level, kind, rng), flights.case.left_out, path)
+        noisy = disturb(flight.table, flights.vehicle, noise_level, kind, rng)
+        save(attacked(noisy, flights.case.attack), flights.case.left_out, path)
         paths.append(path)
     (folder / "vehicle.json").write_text(json.dumps(flights.vehicle.as_dict(), indent=1) + "\n", encoding="ascii")
     return paths

@@ -4,26 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import lfilter
+from scipy.signal import butter, filtfilt, lfilter, lfilter_zi
 from scipy.spatial.transform import Rotation
 
 from .missions import STEP
 from .turning import euler
-from .vehicles import SIXKG
+from .vehicles import GRAVITY, SIXKG
 
-COLUMNS = (
+MOTION = (
     "t", "phi", "theta", "psi", "wx", "wy", "wz", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az",
-    "om1", "om2", "om3", "om4", "omcmd1", "omcmd2", "omcmd3", "omcmd4", "volt",
 )  # fmt: skip
-GROUPS = {
-    "attitude": slice(1, 4),
-    "gyro": slice(4, 7),
-    "position": slice(7, 10),
-    "velocity": slice(10, 13),
-    "acceleration": slice(13, 16),
-    "rotor": slice(16, 20),
-    "volt": slice(24, 25),
-}
+GROUPS = ("attitude", "gyro", "position", "velocity", "acceleration", "rotor", "volt")
+
+
+def rotor_columns(count):
+    """Name the columns of measured rotor speeds."""
+    return tuple(f"om{number + 1}" for number in range(count))
+
+
+def columns(count):
+    """Name the columns of the log of a vehicle with so many rotors."""
+    commands = tuple(f"omcmd{number + 1}" for number in range(count))
+    return (*MOTION, *rotor_columns(count), *commands, "volt")
+
+
+def places(table):
+    """Find the groups of columns in a log, dict of str to slice; commands are no measurement."""
+    motion = {name: slice(3 * i + 1, 3 * i + 4) for i, name in enumerate(GROUPS[:5])}
+    width = table.shape[1]
+    return motion | {"rotor": slice(16, (width + 15) // 2), "volt": slice(width - 1, width)}
+
+
 _DEGREE = np.pi / 180
 NOISE = {
     "none": dict.fromkeys(GROUPS, 0.0),
@@ -65,7 +76,7 @@ def gyro(rate, hidden):
 
 
 def rotor_speed(record, case):
-    """Let the log see the rotor speeds (time, 4)."""
+    """Let the log see the rotor speeds (time, rotor)."""
     speed = record["speed"]
     if case.esc_speed:
         speed = speed / record["volt"] ** case.hidden["battery_sag"]["exponent"]
@@ -73,7 +84,7 @@ def rotor_speed(record, case):
 
 
 def observe(record, case):
-    """Give the noiseless log of one flight, shape (time, 25), columns as in ``COLUMNS``."""
+    """Give the noiseless log of one flight, its columns as in ``columns``."""
     time = np.arange(len(record["x"]))[:, None] * STEP
     command = record["speed"] if case.ideal_command else record["command"]
     return np.hstack(
@@ -88,23 +99,73 @@ def disturb(table, vehicle, level, kind, rng):
     """Add noise to a noiseless log: white, or coloured (AR(1), 0.5 to 0.9, same deviation) and quantised."""
     out = table.copy()
     scale = vehicle.hover_speed / SIXKG.hover_speed
-    for group, columns in GROUPS.items():
+    for group, own in places(table).items():
         unit = scale if group == "rotor" else 1.0
-        noise = rng.standard_normal(out[:, columns].shape)
+        noise = rng.standard_normal(out[:, own].shape)
         if kind == "coloured":
             keep = rng.uniform(0.5, 0.9)
             start = noise[:1] * keep
             noise = lfilter([np.sqrt(1 - keep**2)], [1, -keep], noise, axis=0, zi=start)[0]
-        out[:, columns] += NOISE[level][group] * unit * noise
+        out[:, own] += NOISE[level][group] * unit * noise
         if kind == "coloured" and group in _STEPS:
             step = _STEPS[group] * unit
-            out[:, columns] = np.round(out[:, columns] / step) * step
+            out[:, own] = np.round(out[:, own] / step) * step
+    return out
+
+
+def _in_g(table, own):
+    table[:, own["acceleration"]] /= GRAVITY
+
+
+def _with_gravity(table, own):
+    table[:, own["acceleration"].stop - 1] += GRAVITY
+
+
+def _low_passed(table, own):
+    # As on board: the filter does not see what is to come, so the acceleration is late, too.
+    over, under = butter(2, 5.0, fs=1 / STEP)
+    values = table[:, own["acceleration"]]
+    start = lfilter_zi(over, under)[:, None] * values[0]
+    table[:, own["acceleration"]] = lfilter(over, under, values, axis=0, zi=start)[0]
+
+
+def _late_acceleration(table, own):
+    table[:, own["acceleration"]] = delayed(table[:, own["acceleration"]], 0.03)
+
+
+def _late_attitude(table, own):
+    table[:, own["attitude"]] = delayed(table[:, own["attitude"]], 0.03)
+
+
+def _smoothed(table, own):
+    over, under = butter(4, 18.0, fs=1 / STEP)
+    for group in GROUPS[:6]:
+        table[:, own[group]] = filtfilt(over, under, table[:, own[group]], axis=0)
+
+
+ATTACKS = {
+    "acceleration_in_g": _in_g,
+    "acceleration_with_gravity": _with_gravity,
+    "acceleration_low_passed": _low_passed,
+    "acceleration_late": _late_acceleration,
+    "attitude_late": _late_attitude,
+    "log_smoothed": _smoothed,
+}
+"""What loggers do to a log, noise and all."""
+
+
+def attacked(table, attack):
+    """Give the log as such a logger writes it; no attack leaves it as it is."""
+    out = table.copy()
+    if attack:
+        ATTACKS[attack](out, places(table))
     return out
 
 
 def save(table, left_out, path):
     """Write a log as CSV without the columns left out."""
-    kept = [i for i, name in enumerate(COLUMNS) if name not in left_out]
+    names = columns((table.shape[1] - len(MOTION) - 1) // 2)
+    kept = [i for i, name in enumerate(names) if name not in left_out]
     form = ",".join(["%.2f" if i == 0 else "%.8g" for i in kept])
     lines = "\n".join(form % tuple(row) for row in table[:, kept].tolist())
-    path.write_text(",".join(COLUMNS[i] for i in kept) + "\n" + lines + "\n", encoding="ascii")
+    path.write_text(",".join(names[i] for i in kept) + "\n" + lines + "\n", encoding="ascii")

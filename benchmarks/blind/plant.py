@@ -28,6 +28,7 @@ class Plant:
     sag_depth: float = 0.03
     sag_start: float = 0.0
     sag_load: float = 0.01
+    notch: tuple[float, float] | None = None
     euler_axis: bool = False
 
 
@@ -37,8 +38,8 @@ def nominal(vehicle):
         vehicle.mass,
         np.diag(vehicle.inertia).astype(float),
         vehicle.hubs.copy(),
-        np.full(4, vehicle.thrust_factor),
-        np.full(4, vehicle.torque_factor),
+        vehicle.thrust_factors,
+        np.full(vehicle.count, vehicle.torque_factor),
         np.array(vehicle.spin, dtype=float),
     )
 
@@ -68,6 +69,21 @@ def parameter_error(plant, mass, inertia, arm, thrust, torque):
     plant.hubs = plant.hubs * np.array([[1 + arm], [1 + arm], [1.0]])
     plant.thrust_factor = plant.thrust_factor * (1 + thrust)
     plant.torque_factor = plant.torque_factor * (1 + torque)
+
+
+def drag_factor(plant, error):
+    """Let the rotors turn the craft about yaw more or less than its description says."""
+    plant.torque_factor = plant.torque_factor * (1 + error)
+
+
+def quick_rotors(plant):
+    """Let rotors follow their command at once, as in simulators that know no motors."""
+    plant.lag_up = plant.lag_down = 0.002
+
+
+def notch_filter(plant, frequency, width):
+    """Let the autopilot take a band out of the commands that it logs, before the rotors get them."""
+    plant.notch = (frequency, width)
 
 
 def motor_lag(plant, time_constant):
@@ -107,6 +123,9 @@ ALTERATIONS = {
         products_of_inertia,
         rotor_mismatch,
         parameter_error,
+        drag_factor,
+        quick_rotors,
+        notch_filter,
         motor_lag,
         lag_uneven,
         lag_second_order,

@@ -121,7 +121,7 @@ class GroundEffect(Term):
     stage = "thrust"
 
     def nearness(self, now):
-        """Give hub height over rotor radius, shape (4, rows)."""
+        """Give hub height over rotor radius, shape (rotor, rows)."""
         r = self.rows
         height = now.x[2, r] + (now.R[2][:, r][:, None] * now.hubs[:, :, r]).sum(0)
         return np.maximum(height / self.of("rotor_radius"), 0.9)
@@ -144,7 +144,7 @@ class VerticalDescent(Term):
     stage = "thrust"
 
     def prepare(self):
-        self.noise = np.stack([coloured(rng, 4, 0.05) for rng in self.rngs], axis=2)
+        self.noise = np.stack([coloured(rng, self.vehicles[0].count, 0.05) for rng in self.rngs], axis=2)
 
     def apply(self, now):
         r = self.rows

@@ -70,7 +70,7 @@ class Fleet:
         zeros = np.zeros((3, n))
         return Instant(
             time, x, v, q, w, R, speed, speed_rate, self.spin, self.hubs, self.wind, hub_air,
-            self.k * speed**2, np.zeros((2, 4, n)), zeros, zeros.copy(), self.mass, self.inverse,
+            self.k * speed**2, np.zeros((2, len(speed), n)), zeros, zeros.copy(), self.mass, self.inverse,
         )  # fmt: skip
 
     def rates(self, time, y, speed, speed_rate):
@@ -132,7 +132,7 @@ def along_euler_axes(R, torque):
 
 
 def simulate(plans, duration, lead_in=LEAD_IN):
-    """Fly all plans together.
+    """Fly all plans together; their vehicles have the same number of rotors.
 
     Returns a dict of arrays (flights, time, ...) sampled at 100 Hz: true state, accelerations, rotor speeds, commands,
     voltage. The craft fly a short lead-in that is not recorded.
@@ -143,7 +143,7 @@ def simulate(plans, duration, lead_in=LEAD_IN):
     control = Controller(vehicles, [plan.generator("gains") for plan in plans], CONTROL_EVERY * DT)
     references = np.stack([plan.mission.table() for plan in plans], axis=2)
     count = round(duration / STEP) + 1
-    log = {name: np.empty((count, rows, len(plans))) for name, rows in _RECORD.items()}
+    log = {name: np.empty((count, rows or vehicles[0].count, len(plans))) for name, rows in _RECORD.items()}
     lead = round(lead_in / DT)
     noise = [plan.generator("senses") for plan in plans]
     senses = np.stack([rng.standard_normal((count + lead // LOG_EVERY + 1, 9)).astype(np.float32) for rng in noise], 2)
@@ -162,7 +162,7 @@ def simulate(plans, duration, lead_in=LEAD_IN):
 
 
 _RECORD = {
-    "x": 3, "v": 3, "a": 3, "q": 4, "w": 3, "spin_up": 3, "speed": 4, "command": 4, "volt": 1,
+    "x": 3, "v": 3, "a": 3, "q": 4, "w": 3, "spin_up": 3, "speed": None, "command": None, "volt": 1,
 }  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from .instant import Term
 from .rotor_terms import at_time, coloured
-from .turning import to_body
+from .turning import cross, to_body
 
 
 class MagneticTorque(Term):
@@ -95,3 +95,92 @@ class SlidingBattery(Term):
         self.side = np.where(flips, np.sign(push), self.side)
         self.rate = 12.0 * (self.side - self.state)
         now.torque[:2, r] += self.torque[:2] * self.state * now.thrust[:, r].sum(0) / self.of("weight")
+
+
+class CyclicSwirl(Term):
+    """The swirl of the rotors' wakes, carried aside, meets one arm after the other as the flow turns."""
+
+    def apply(self, now):
+        r = self.rows
+        air = now.hub_air[:2, :, r].mean(1)
+        aside = np.sqrt((air**2).sum(0))
+        angle = 4 * np.arctan2(air[1], air[0])
+        carried = aside / (aside + self.of("induced_speed")) * now.thrust[:, r].sum(0) / self.of("weight")
+        now.torque[:, r] += self.torque * carried * np.stack((np.sin(angle), np.cos(angle), np.cos(angle + 1)))
+
+
+class WakeOnBody(Term):
+    """Sideways flow carries the rotors' wakes over the body, so that their download moves off the centre."""
+
+    def apply(self, now):
+        r = self.rows
+        air = now.hub_air[:2, :, r].mean(1)
+        aside = np.sqrt((air**2).sum(0))
+        force = np.zeros((3, len(r)))
+        force[2] = -self.loss * now.thrust[:, r].sum(0) * aside / (aside + self.of("induced_speed"))
+        place = np.zeros_like(force)
+        place[:2] = -self.of("arm") * air / (aside + 0.5 * self.of("induced_speed"))
+        now.force[:, r] += force
+        now.torque[:, r] += cross(place, force)
+
+
+class FlexibleArm(Term):
+    """Arms with the motors turn on springs against the body: a share of the inertia swings with its own mode."""
+
+    stage = "coupled"
+
+    def prepare(self):
+        self.state = np.zeros((6, len(self.rows)))
+
+    def apply(self, now):
+        r = self.rows
+        angle, rate = self.state[:3], self.state[3:]
+        natural = 2 * np.pi * self.frequency
+        spring = natural**2 * angle + 2 * self.damping * natural * rate
+        # The arms are part of the inertia, and swing as `angle'' = -spin_up - spring`.
+        turned = (now.spin_up[:, r] + self.share * spring) / (1 - self.share)
+        now.spin_up[:, r] = turned
+        self.rate = np.concatenate((rate, -turned - spring))
+
+
+class DragOverHeight(Term):
+    """Drag in the rotor plane that grows with the height, as in air that is stiller near the ground."""
+
+    stage = "hub"
+
+    def apply(self, now):
+        r = self.rows
+        height = np.maximum(now.x[2, r], 0.0)
+        now.side[:, :, r] -= self.drag * height / (height + 60.0) * now.speed[:, r] * now.hub_air[:2, :, r]
+
+
+class GustField(Term):
+    """Air that stands still in gusts fixed in space, felt through the drag of the rotors."""
+
+    stage = "hub"
+
+    def prepare(self):
+        # Wave number, direction and phase of four waves, shape (3, 4, rows).
+        low, high = [[0.3], [0.0], [0.0]], [[1.0], [2 * np.pi], [2 * np.pi]]
+        self.waves = np.stack([rng.uniform(low, high, (3, 4)) for rng in self.rngs], axis=2)
+
+    def apply(self, now):
+        r = self.rows
+        number, way, phase = self.waves
+        along = number * (np.cos(way) * now.x[0, r] + np.sin(way) * now.x[1, r])
+        blow = np.sqrt(0.5) * self.gust * np.sin(along + phase)
+        wind = np.stack(((blow * np.cos(way)).sum(0), (blow * np.sin(way)).sum(0), np.zeros(len(r))))
+        air = now.hub_air[:2, :, r] - to_body(now.R[:, :, r], wind)[:2, None]
+        now.side[:, :, r] -= self.drag * now.speed[:, r] * air
+
+
+class PropellerChange(Term):
+    """One propeller loses a piece in mid-flight."""
+
+    stage = "thrust"
+
+    def prepare(self):
+        self.which = self.rotor.astype(int)
+
+    def apply(self, now):
+        now.thrust[self.which, self.rows] *= 1 - self.loss * (now.time > self.when)

@@ -63,13 +63,13 @@ def _torque(low, high, **more):
 
 def _drag_rate(s):
     """Scale of the drag rate: lever times force should turn small craft nearly like the big one."""
-    height = s.vehicle.hubs[2, 0]
+    height = s.vehicle.height
     return float((s.roll / (s.mass * height / 0.05)) ** 0.9) if height else 1.0
 
 
 def rotor_drag(rng, s, level):
     rate = between(rng, 0.19, 0.55, level) * _drag_rate(s)
-    return {"drag": rate * s.vehicle.mass / (4 * s.vehicle.hover_speed)}
+    return {"drag": rate * s.vehicle.mass / (s.vehicle.count * s.vehicle.hover_speed)}
 
 
 def flapping_moment(rng, s, level):
@@ -144,8 +144,8 @@ def products_of_inertia(rng, s, level):
 
 def rotor_mismatch(rng, s, level):
     size = between(rng, 0.02, 0.15, level) * s.share
-    gain = 0.15 * size * rng.uniform(-1, 1, 4)
-    gain[rng.integers(4)] = -size
+    gain = 0.15 * size * rng.uniform(-1, 1, s.vehicle.count)
+    gain[rng.integers(s.vehicle.count)] = -size
     return {"gain": gain}
 
 
@@ -218,7 +218,7 @@ CATALOGUE = {
 def loose_arm(rng, s, level):
     drive = between(rng, 0.02, 0.08, level) * s.share
     return {
-        "rotor": int(rng.integers(4)),
+        "rotor": int(rng.integers(s.vehicle.count)),
         "drive": drive,
         "frequency": rng.uniform(0.8, 2.5),
         "damping": rng.uniform(0.05, 0.15),
@@ -242,6 +242,28 @@ def rotor_interference(rng, s, level):
     return {"loss": between(rng, 0.03, 0.2, level) * s.share}
 
 
+def wake_on_body(rng, s, level):
+    return {"loss": between(rng, 0.03, 0.15, level) * s.share}
+
+
+def flexible_arm(rng, _scale, level):
+    share = between(rng, 0.2, 0.5, level)
+    return {"share": share, "frequency": rng.uniform(2.0, 5.0), "damping": rng.uniform(0.03, 0.1)}
+
+
+def gust_field(rng, s, level):
+    return rotor_drag(rng, s, 0.5) | {"gust": between(rng, 1.0, 3.0, level)}
+
+
+def propeller_change(rng, s, level):
+    loss = between(rng, 0.03, 0.15, level) * s.share
+    return {"loss": loss, "rotor": int(rng.integers(s.vehicle.count)), "when": rng.uniform(8.0, 22.0)}
+
+
+def notch_filter(rng, _scale, level):
+    return {"frequency": between(rng, 7.0, 3.0, level), "width": rng.uniform(0.5, 0.9)}
+
+
 OUTSIDE = {
     "magnetic_torque": _torque(0.15, 0.5, length=(3.0, 8.0)),
     "fuel_slosh": fuel_slosh,
@@ -254,13 +276,20 @@ OUTSIDE = {
     "attitude_product": _torque(0.1, 0.4),
     "wall_effect": _torque(0.2, 0.8, place=(0.0, 12.0)),
     "sliding_battery": _torque(0.1, 0.4),
+    "cyclic_swirl": _torque(0.3, 1.2),
+    "wake_on_body": wake_on_body,
+    "flexible_arm": flexible_arm,
+    "drag_over_height": rotor_drag,
+    "gust_field": gust_field,
+    "propeller_change": propeller_change,
+    "notch_filter": notch_filter,
 }
 """Effects that no catalogue lists."""
 
 
 def thrust_tilt(rng, s, level):
-    lean = np.zeros((2, 4))
-    for rotor in rng.choice(4, 2, replace=False):
+    lean = np.zeros((2, s.vehicle.count))
+    for rotor in rng.choice(s.vehicle.count, 2, replace=False):
         lean[:, rotor] = between(rng, 0.005, 0.05, level) * s.share * direction(rng)
     return {"lean": lean}
 
@@ -286,7 +315,27 @@ FORMS = {
 }
 """Effects close to one of the catalogue, in another form: draw, and the nearest effect of the catalogue."""
 
-_DRAWS = CATALOGUE | OUTSIDE | {name: draw for name, (draw, _) in FORMS.items()}
+
+def drag_factor(rng, _scale, level):
+    return {"error": rng.choice([-1, 1]) * between(rng, 0.15, 0.3, level)}
+
+
+def bullet_downwash(rng, _scale, _level):
+    return {"above": rng.uniform(1.4, 1.8), "sway": 0.15, "phase": rng.uniform(0, 2 * np.pi)}
+
+
+OTHERS = {
+    "drag_factor": drag_factor,
+    "quick_rotors": euler_axis_torque,
+    "bullet_damping": lambda _rng, _scale, _level: {"damping": 0.04},
+    # Per rad/s: the simulator turns revolutions into radians before it multiplies.
+    "bullet_drag": lambda _rng, _scale, _level: {"across": 9.1785e-7, "along": 10.311e-7},
+    "bullet_ground": lambda _rng, _scale, _level: {"gain": 11.36859},
+    "bullet_downwash": bullet_downwash,
+}
+"""The least known number of a vehicle, and the physics of another simulator."""
+
+_DRAWS = CATALOGUE | OUTSIDE | OTHERS | {name: draw for name, (draw, _) in FORMS.items()}
 
 
 def strength(name, vehicle, rng, level=None):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from . import body_terms as body
+from . import pybullet_terms as pybullet
 from . import rotor_terms as rotor
 from . import strange_terms as strange
 
@@ -39,6 +40,16 @@ TERMS = {
     "attitude_product": strange.AttitudeProduct,
     "wall_effect": strange.WallEffect,
     "sliding_battery": strange.SlidingBattery,
+    "cyclic_swirl": strange.CyclicSwirl,
+    "wake_on_body": strange.WakeOnBody,
+    "flexible_arm": strange.FlexibleArm,
+    "drag_over_height": strange.DragOverHeight,
+    "gust_field": strange.GustField,
+    "propeller_change": strange.PropellerChange,
+    "bullet_damping": pybullet.BulletDamping,
+    "bullet_drag": pybullet.BulletDrag,
+    "bullet_ground": pybullet.BulletGround,
+    "bullet_downwash": pybullet.BulletDownwash,
 }
 STAGES = ("thrust", "hub", "body", "coupled")
 

@@ -39,6 +39,21 @@ def fly(group, folder, duration=DURATION):
     return written
 
 
+def flown(each, folder):
+    """Tell whether the logs of a set lie in a folder, with what is hidden in it today.
+
+    Parameters
+    ----------
+    each : Set
+    folder : Path
+    """
+    key = Path(folder) / "keys" / each.name / "key.json"
+    if not key.exists() or not (Path(folder) / "flights" / each.name / "study.yaml").exists():
+        return False
+    told, wanted = json.loads(key.read_text(encoding="ascii")), json.loads(json.dumps(each.case.key()))
+    return all(told.get(name) == value for name, value in wanted.items())
+
+
 def config(vehicle_file):
     """Describe a vehicle and the columns of its logs as a config.
 
@@ -53,24 +68,25 @@ def config(vehicle_file):
     """
     told = json.loads(vehicle_file.read_text(encoding="utf-8"))
     factors = {
-        "thrust_factor_n_s2": told["thrust_factor"],
         "drag_factor_n_m_s2": told["torque_factor"],
         "radius_m": told["rotor_radius"],
     }
-    hover = (told["mass"] * told["gravity"] / (4 * told["thrust_factor"])) ** 0.5
+    hover = (told["mass"] * told["gravity"] / sum(told["thrust_factors"])) ** 0.5
     vehicle = {
         "gravity_m_s2": told["gravity"],
         "mass_kg": told["mass"],
         "inertia_kg_m2": told["inertia"],
         "rotor_speed_max_rad_s": round(3 * hover),
         "rotors": [
-            {"position_m": place, "spin": spin, **factors}
-            for place, spin in zip(told["rotors"], told["spin"], strict=True)
+            {"position_m": place, "spin": spin, "thrust_factor_n_s2": thrust, **factors}
+            for place, spin, thrust in zip(told["rotors"], told["spin"], told["thrust_factors"], strict=True)
         ],
     }
-    columns = yaml.safe_load(_COLUMNS_OF.read_text(encoding="utf-8"))["import"]
+    logged = yaml.safe_load(_COLUMNS_OF.read_text(encoding="utf-8"))["import"]
+    for signal, prefix in (("rotor_speed", "om"), ("rotor_command", "omcmd")):
+        logged["signals"][signal]["columns"] = [f"{prefix}{number + 1}" for number in range(len(told["spin"]))]
     # PyYAML writes 1e-05, which a YAML parser of another make reads as text.
-    return json.dumps({"seed": 1, "vehicle": vehicle, "import": columns}, indent=1)
+    return json.dumps({"seed": 1, "vehicle": vehicle, "import": logged}, indent=1)
 
 
 def _write_key(flights, each, folder):

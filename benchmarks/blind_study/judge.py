@@ -51,6 +51,8 @@ def _judged(folder, compared):
         "closest": [_effect(effect) for effect in found.closest],
         "alternatives": [vars(rival) for rival in found.alternatives],
         "unexplained": [vars(left) for left in found.unexplained],
+        "look_alikes": list(found.look_alikes),
+        "impossible": list(found.impossible),
         "share": found.share,
         "gap_before": {"value": found.before.value.tolist(), "floors": found.before.floors.tolist()},
         "gap_after": {"value": found.after.value.tolist(), "floors": found.after.floors.tolist()},
@@ -60,6 +62,9 @@ def _judged(folder, compared):
 
 
 def _effect(effect):
-    numbers = {c.name: {"value": c.value, "low": c.low, "high": c.high, "unit": c.unit} for c in effect.coefficients}
+    numbers = {
+        c.name: {"value": c.value, "low": c.low, "high": c.high, "unit": c.unit, "possible": list(c.plausible)}
+        for c in effect.coefficients
+    }
     told = {"name": effect.name, "coefficients": numbers, "p_value": effect.p_value, "share": effect.share}
     return told | {"selection_frequency": effect.selection_frequency}

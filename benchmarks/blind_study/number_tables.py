@@ -10,6 +10,7 @@ from benchmarks.blind_study.score import RIGHT, exact, numbers
 from benchmarks.blind_study.text import percent, table
 
 _CLOSE = 0.05
+_NEAR = 0.15
 _LEVELS = ("low", "mid", "high")
 
 _EARLIER = {
@@ -70,6 +71,27 @@ def coefficient_table(judged):
         rows.append((told, name, *shown, percent(close), percent([n.inside for n in own])))
     heads = [f"{level}: median, largest error" for level in _LEVELS]
     return table(("effect", "coefficient", *heads, "within 5 % at mid", "in the interval"), rows)
+
+
+def coverage_table(judged):
+    """Write, effect by effect, how many coefficients lie in their intervals and within 15 %.
+
+    Parameters
+    ----------
+    judged : list of Scored
+
+    Returns
+    -------
+    str
+    """
+    by_effect = defaultdict(list)
+    for number in _numbers(judged):
+        by_effect[number.effect].append(number)
+    rows = []
+    for effect, own in sorted(by_effect.items()):
+        inside, near = [n.inside for n in own], [abs(n.error) <= _NEAR for n in own]
+        rows.append((effect, percent(inside), percent(near), _spread([n.error for n in own])))
+    return table(("effect", "in the interval", "within 15 %", "median, largest error"), rows)
 
 
 def gap_table(judged):

@@ -13,7 +13,7 @@ from pathlib import Path
 from benchmarks.blind_study.fly import fly
 from benchmarks.blind_study.judge import judge
 
-_CASES_AT_ONCE = 24
+CASES_AT_ONCE = 24
 
 
 class Progress:
@@ -53,7 +53,7 @@ def run(groups, folder, processes, compared=lambda _: False, keep=False):
     progress = Progress(sum(each.name in done for own in groups for each in own), sum(map(len, groups)))
     left = [own for own in ([each for each in own if each.name not in done] for own in groups) if own]
     with_others = {each.name for own in left for each in own if compared(each)}
-    parts = [left[start : start + _CASES_AT_ONCE] for start in range(0, len(left), _CASES_AT_ONCE)]
+    parts = [left[start : start + CASES_AT_ONCE] for start in range(0, len(left), CASES_AT_ONCE)]
     # Several threads in each of several processes would be in each other's way.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(processes) as pool, (folder / "results.jsonl").open("a", encoding="utf-8") as results:
@@ -70,12 +70,24 @@ def run(groups, folder, processes, compared=lambda _: False, keep=False):
                     shutil.rmtree(asked[future])
 
 
-def judge_all(folder, processes):
-    """Judge all flights of a folder that are not judged yet."""
+def judge_all(folder, processes, again=()):
+    """Judge all flights of a folder that are not judged yet; or those of some sets alone, and again.
+
+    Parameters
+    ----------
+    folder : Path
+    processes : int
+    again : sequence of str
+        Names of sets.
+    """
     folder = Path(folder)
+    if again:
+        (folder / "results.jsonl").unlink(missing_ok=True)
     done = judged(folder)
-    logs = [path for path in sorted((folder / "flights").iterdir()) if path.name not in done]
+    names = again or sorted(path.name for path in (folder / "flights").iterdir())
+    logs = [folder / "flights" / name for name in names if name not in done]
     progress = Progress(len(done), len(done) + len(logs))
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(processes) as pool, (folder / "results.jsonl").open("a", encoding="utf-8") as results:
         for future in as_completed([pool.submit(judge, path) for path in logs]):
             print(json.dumps(future.result()), file=results, flush=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.blind.cases import LACKING
 from benchmarks.blind_study.truth import ROUGH, coefficients
 
 VISIBLE = 0.7
@@ -23,6 +24,10 @@ REFUSED = "refused"
 MISSED = "missed"
 UNSEEN = "not visible"
 ERROR = "error"
+_CANCELS = 0.3
+"""Share of the gap beyond all of it, or below none, from which on effects work against one another."""
+
+CERTAIN = ("NAMED", "AMBIGUOUS")
 OUTCOMES = (RIGHT, EXTRA, PARTIAL, SOME, RIVAL, WRONG, REFUSED, MISSED, UNSEEN, ERROR)
 
 NOT_COLUMNS = frozenset({"gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay", "parameter_error"})
@@ -58,6 +63,54 @@ class Scored:
         return set(self.names) - self.truth - set(self.key["hidden"]) - set(self.key["nearest"])
 
     @property
+    def wrong_name(self):
+        """Whether a certain verdict rests on nothing but names of what is not there."""
+        rightly = self.outcome == RIVAL or set(self.names) - self.false_names
+        return self.verdict in CERTAIN and bool(self.names) and not rightly
+
+    @property
+    def false_name(self):
+        """Whether a certain verdict holds a name of what is not there."""
+        return self.verdict in CERTAIN and self.outcome != RIVAL and bool(self.false_names)
+
+    @property
+    def good(self):
+        """Whether the answer is the one that is asked for."""
+        if self.key["outside"]:
+            return self.verdict not in CERTAIN
+        if self.key["group"] == "none":
+            return not self.names
+        if self.key["only"]:
+            return "DIFFER" in self.verdict
+        if self.key["group"] == "lacking":
+            return self._says_what_to_log() if self.outcome == RIVAL else not self.false_name
+        if self.key["group"] == "attack" and not self.truth:
+            return not self.names
+        if self.key["group"] in ("hover", "no_velocity", "no_force", "form", "pybullet"):
+            return not self.false_name and not self.unphysical
+        if self.key["group"] == "background":
+            return self.names[:1] == (self.key["dominant"],) and not self.false_name
+        return self.outcome == RIGHT
+
+    def _says_what_to_log(self):
+        """Tell whether a signal that the log lacks is named where the rivals are."""
+        told = [rival["separated_by"] for rival in self.said["alternatives"] if rival["name"] in self.truth]
+        text = " ".join([*told, *self.said["look_alikes"]])
+        return any(signal in text for signal, columns in LACKING.items() if {*columns} <= {*self.key["left_out"]})
+
+    @property
+    def unphysical(self):
+        """Whether a certain verdict has numbers at or beyond their bounds, or effects that cancel one another."""
+        return self.verdict in CERTAIN and (self._at_bounds() or self._cancelling())
+
+    def _at_bounds(self):
+        numbers = [number for effect in self.said["effects"] for number in effect["coefficients"].values()]
+        return any(_at_bound(number["value"], *number["possible"]) for number in numbers)
+
+    def _cancelling(self):
+        return any(not -_CANCELS <= effect["share"] <= 1 + _CANCELS for effect in self.said["effects"])
+
+    @property
     def visible(self):
         """Hidden torque in floors, on the axis where it is largest."""
         return visible(self.key, self.said)
@@ -89,6 +142,14 @@ class Number:
         return (self.value - self.true) / self.scale
 
 
+def _at_bound(value, low, high):
+    if value is None or None in (low, high):
+        return False
+    near = 1e-6 * (high - low)
+    # A bound at zero is where an effect ends, and a number of a group may well be zero.
+    return value < low - near or value > high - near or (low != 0 and value < low + near)
+
+
 def scored(folder):
     """Join keys and results.
 
@@ -113,7 +174,8 @@ def visible(key, said):
     """Give the hidden torque of the held-out flights in floors, on its largest axis."""
     if "floor" not in said:
         return float("nan")
-    own = [values for name, values in key["residual_rms_n_m"].items() if name.startswith("held_out")]
+    role = key["only"] or "held_out"
+    own = [values for name, values in key["residual_rms_n_m"].items() if name.startswith(role)]
     hidden = np.sqrt(np.mean(np.square(own), axis=0))
     return float(np.nanmax(hidden / np.array(said["floor"][:3], dtype=float)))
 

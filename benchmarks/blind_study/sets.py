@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from benchmarks.blind.cases import Case, cases, make
 from benchmarks.blind.measure import KINDS
-from benchmarks.blind.vehicles import VEHICLES
+from benchmarks.blind.vehicles import STUDIED, VEHICLES
 
 LEVELS = ("low", "mid", "high")
-GROUPS = ("single", "none", "outside", "form", "pair", "triple", "background", "hover", "no_velocity", "no_force")
+GROUPS = (
+    "single", "none", "outside", "form", "pair", "triple", "background", "hover", "no_velocity", "no_force",
+    "lacking", "drag_factor", "attack", "differing", "pybullet",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Size:
-    """How much of a study is flown; ``none`` is the number of sets that hide nothing, all of them if None."""
+    """How much of a study is flown.
+
+    ``none`` is the number of sets that hide nothing, all of them if None; ``each`` the largest number of cases of some
+    groups, with as many different things hidden as the group has.
+    """
 
     seed: int
     draws: int = 6
@@ -26,7 +34,8 @@ class Size:
     kinds: Sequence[str] = KINDS
     groups: Sequence[str] = GROUPS
     none: int | None = None
-    limit: int | None = None
+    vehicles: Sequence[str] = tuple(VEHICLES)
+    each: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -61,23 +70,44 @@ def sets(size):
     list of list of Set
         One list for each case.
     """
-    own = [case for case in cases(size.seed, size.draws) if case.group in size.groups]
+    own = [case for case in cases(size.seed, size.draws) if case.group in size.groups and case.vehicle in size.vehicles]
     noises = [(level, kind) for level in size.levels for kind in size.kinds]
     if size.none is not None and "none" in size.groups:
         own = [case for case in own if case.group != "none"]
     out = [[Set(case, level, kind, size.seed) for level, kind in noises] for case in own]
     if size.none is not None and "none" in size.groups:
         out += [[Set(_empty(place, size.seed), *noises[place % len(noises)], size.seed)] for place in range(size.none)]
-    if size.limit is None or size.limit >= len(out):
-        return out
-    # A part of a study is a sample of all of it.
-    kept = np.random.default_rng(size.seed).permutation(len(out))[: size.limit]
-    return [out[place] for place in sorted(kept)]
+    return _part(out, size)
+
+
+def _part(groups, size):
+    """Take some cases of each group: first one of everything that it hides, then a second of everything."""
+    order = np.random.default_rng(size.seed).permutation(len(groups))
+    seen, kept = Counter(), defaultdict(list)
+    ranked = []
+    for place in order:
+        case = groups[place][0].case
+        hidden = (
+            case.group,
+            case.attack,
+            case.only,
+            case.left_out,
+            case.hover_only,
+            *(sorted(case.hidden) or (case.vehicle,)),
+        )
+        ranked.append((seen[hidden], place))
+        seen[hidden] += 1
+    # A stable sort keeps the order of chance within a rank.
+    for _, place in sorted(ranked, key=lambda pair: pair[0]):
+        group = groups[place][0].case.group
+        if len(kept[group]) < size.each.get(group, len(groups)):
+            kept[group].append(place)
+    return [groups[place] for place in sorted(place for own in kept.values() for place in own)]
 
 
 def _empty(place, seed):
     """Make a case that hides nothing, each one another flight."""
-    plain = [(name, {}) for name in VEHICLES]
+    plain = [(name, {}) for name in STUDIED]
     vehicle, options = [*plain, ("sixkg", {"ideal_command": True})][place % (len(plain) + 1)]
     name = f"none-{vehicle}-{place}"
     return make(name, "none", vehicle, (), np.random.default_rng([seed, *name.encode()]), **options)

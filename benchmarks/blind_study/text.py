@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+NONE_TRIED = "none tried"
+
 
 def table(heads, rows):
     """Write a table; nothing where there are no rows."""
@@ -14,4 +16,4 @@ def table(heads, rows):
 def percent(flags):
     """Write how many are true, and of how many."""
     flags = list(flags)
-    return f"{sum(flags)} of {len(flags)} ({100 * sum(flags) / len(flags):.1f} %)" if flags else "none tried"
+    return f"{sum(flags)} of {len(flags)} ({100 * sum(flags) / len(flags):.1f} %)" if flags else NONE_TRIED

@@ -48,7 +48,7 @@ def _axes(prefix, values):
 def _plane_damping(hidden, vehicle):
     # A disc that lags by 16 / (gamma w) leans the thrust k w^2, at the height of the hub.
     lean = 16 * vehicle.thrust_factor / hidden["lock_number"]
-    return {"k_F": lean, "k_w": lean * float(vehicle.hubs[2, 0])}
+    return {"k_F": lean, "k_w": lean * vehicle.height}
 
 
 def _lift(hidden, vehicle):
@@ -66,6 +66,9 @@ def _delay(hidden, _vehicle):
 
 
 def _mismatch(hidden, vehicle):
+    # The two patterns that other vehicles have are not one weak rotor.
+    if vehicle.count != 4:
+        return {}
     gain, spin = np.array(hidden["gain"]), np.array(vehicle.spin)
     # What a pair has in common looks like another inertia, so a difference is relative to the mean of its pair.
     pairs = [(gain[i] - gain[i + 2]) / (1 + (gain[i] + gain[i + 2]) / 2) for i in (0, 1)]

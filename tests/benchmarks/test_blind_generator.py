@@ -11,12 +11,14 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from benchmarks.blind import generator
-from benchmarks.blind.cases import cases, make
+from benchmarks.blind.cases import NAMES, cases, make
+from benchmarks.blind.drive import Notch
+from benchmarks.blind.measure import ATTACKS, attacked, places
 from benchmarks.blind.missions import mission
 from benchmarks.blind.plant import nominal
 from benchmarks.blind.simulate import DT, Fleet, FlightPlan
-from benchmarks.blind.strengths import CATALOGUE, FORMS, OUTSIDE, strength
-from benchmarks.blind.vehicles import SIXKG, VEHICLES
+from benchmarks.blind.strengths import CATALOGUE, FORMS, OTHERS, OUTSIDE, strength
+from benchmarks.blind.vehicles import CF2X, SIXKG, VEHICLES
 
 EFFECTS = ("com_offset", "euler_axis_torque", "ground_effect", "wind", "payload", "battery_sag", "gyro_bias")
 
@@ -43,12 +45,16 @@ def flown():
     return {group.case.name: group for group in flights}
 
 
+def alone(vehicle, plant, hidden):
+    path = mission("hover", vehicle, 1.0, np.random.default_rng(1))
+    return Fleet([FlightPlan(vehicle, plant, path, hidden, np.zeros(3), (1,))])
+
+
 def falling(hidden, seconds, inertia=None):
     """Let one tumbling craft fall without thrust; return the fleet and its energies over time."""
     plant = nominal(SIXKG)
     plant.inertia = plant.inertia if inertia is None else inertia
-    path = mission("hover", SIXKG, 1.0, np.random.default_rng(1))
-    fleet = Fleet([FlightPlan(SIXKG, plant, path, hidden, np.zeros(3), (1,))])
+    fleet = alone(SIXKG, plant, hidden)
     fleet.y[10:13] = [[1.2], [-0.7], [0.5]]
     drive = StillRotors(1)
     trail = []
@@ -108,7 +114,7 @@ def test_rotor_torque_alone_turns_a_craft_that_hides_nothing(flown, name):
     group = flown[f"none-{name}"]
     inertia = np.array(group.vehicle.inertia)
     for flight in group.flights:
-        time, speed, rate = flight.table[:, 0], flight.table[:, 16:20], flight.table[:, 4:7]
+        time, speed, rate = flight.table[:, 0], flight.table[:, places(flight.table)["rotor"]], flight.table[:, 4:7]
         torque = speed**2 @ group.vehicle.allocation()[1:].T - np.cross(rate, rate * inertia)
         turned_by = CubicSpline(time, torque / inertia).antiderivative()(time)
         # Rotors are told a new speed every 4 ms, so a spline through 100 Hz samples is good to about 1e-3 rad/s.
@@ -166,7 +172,7 @@ def test_study_repeats_from_its_seed_and_covers_every_effect():
     assert [case.key() for case in study] != [case.key() for case in cases(6)]
     assert len({case.name for case in study}) == len(study)
     hidden = {effect for case in study for effect in case.hidden}
-    assert hidden == {*CATALOGUE, *OUTSIDE, *FORMS}
+    assert hidden == {*CATALOGUE, *OUTSIDE, *FORMS, *OTHERS}
 
 
 def test_log_without_rotor_speeds_names_the_lag_too():
@@ -212,3 +218,84 @@ def test_strength_grows_with_its_level():
         return strength("linear_damping", SIXKG, np.random.default_rng(1), level)["damping"][0]
 
     assert [damping(level) for level in (0.0, 1.0)] == pytest.approx([0.03, 0.4])
+
+
+def test_arms_on_springs_keep_the_angular_momentum():
+    hidden = {"flexible_arm": {"share": 0.3, "frequency": 3.0, "damping": 0.05}}
+    fleet = alone(SIXKG, nominal(SIXKG), hidden)
+    # About one axis: the turning of the arms is written for small angles.
+    fleet.y[12], fleet.with_state[0].state[2] = 0.8, 0.1
+    drive, momentum, angle = StillRotors(1), [], []
+    for step in range(500):
+        first, _ = fleet.rates(step * DT, fleet.y, drive.speed, drive.speed)
+        swing = fleet.with_state[0].state
+        momentum.append(1.2 * (fleet.y[12, 0] + 0.3 * swing[5, 0]))
+        angle.append(swing[2, 0])
+        fleet.advance(step * DT, drive, drive.speed, first)
+    np.testing.assert_allclose(momentum, 1.2 * 0.8, rtol=1e-9)
+    assert min(angle) < -0.02
+
+
+def test_notch_takes_its_band_out_and_leaves_the_rest():
+    time = np.arange(0, 20, 0.004)
+    notch = Notch([None, (5.0, 0.7)], np.array([300.0, 300.0]), 4, 0.004)
+    waves = 300 + np.sin(2 * np.pi * 5 * time) + np.sin(2 * np.pi * 0.2 * time)
+    out = np.array([notch.passed(np.full((4, 2), value)) for value in waves])
+    np.testing.assert_array_equal(out[:, 0, 0], waves)
+    slow = 300 + np.sin(2 * np.pi * 0.2 * time)
+    np.testing.assert_allclose(out[1000:, 2, 1], slow[1000:], atol=0.07)
+
+
+@pytest.mark.parametrize(("attack", "touched"), [(name, name.split("_")[0]) for name in ATTACKS])
+def test_an_attack_touches_its_own_channel(flown, attack, touched):
+    table = generator.disturb(flown["com_offset"].flights[0].table, SIXKG, "mid", "white", np.random.default_rng(1))
+    hit = attacked(table, attack)
+    for group, own in places(table).items():
+        same = np.array_equal(hit[:, own], table[:, own])
+        assert same != (group == touched or (touched == "log" and group != "volt")), group
+    np.testing.assert_array_equal(attacked(table, ""), table)
+
+
+def test_an_effect_may_be_in_the_flights_of_one_role():
+    case = make("turned", "differing", "sixkg", ("com_offset",), np.random.default_rng(1), level=0.6, only="held_out")
+    group = generator.simulate_many([case], 3, duration=1.0, lead_in=1.0)[0]
+    torque = {role: [] for role in generator.ROLES}
+    for flight in group.flights:
+        torque[flight.role].append(np.abs(generator.residual(flight, case)[20:-20]).mean())
+    assert case.truth == ()
+    assert max(torque["train"]) < 0.02
+    assert min(torque["held_out"]) > 0.1
+
+
+def test_physics_of_the_other_simulator_follow_their_formulas():
+    case = make("drag", "pybullet", "cf2x", ("quick_rotors", "bullet_damping", "bullet_drag"), np.random.default_rng(1))
+    flight = generator.simulate_many([case], 3, duration=4.0)[0].flights[0]
+    own = places(flight.table)
+    velocity, acceleration = flight.table[:, own["velocity"]], flight.table[:, own["acceleration"]]
+    speed = flight.table[:, own["rotor"]]
+    up = Rotation.from_quat(flight.truth["q"][:, [1, 2, 3, 0]]).apply([0.0, 0.0, 1.0])
+    thrust = (speed**2).sum(axis=1, keepdims=True) * 3.16e-10 * (60 / (2 * np.pi)) ** 2
+    drag = -np.array([9.1785e-7, 9.1785e-7, 10.311e-7]) * speed.sum(axis=1, keepdims=True) * velocity
+    slowed = -0.04 * (1 + np.linalg.norm(velocity, axis=1, keepdims=True)) * velocity
+    expected = (thrust * up + drag) / 0.027 + slowed - [0.0, 0.0, 9.81]
+    assert np.abs(drag / 0.027).max() > 0.2
+    np.testing.assert_allclose(acceleration, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("height", [0.05, 0.1, 0.4])
+def test_ground_and_downwash_of_the_other_simulator(height):
+    hidden = {"bullet_ground": {"gain": 11.36859}, "bullet_downwash": {"above": 1.5, "sway": 0.0, "phase": 0.0}}
+    fleet = alone(CF2X, nominal(CF2X), hidden)
+    fleet.y[2], hover = height, np.full((4, 1), CF2X.hover_speed)
+    rates, _ = fleet.rates(0.0, fleet.y, hover, np.zeros_like(hover))
+    gained = 11.36859 * (2.31348e-2 / (4 * height)) ** 2 * 9.81
+    pressed = 2267.18 * (2.31348e-2 / 6.0) ** 2 / 0.027
+    assert rates[5, 0] == pytest.approx(gained - pressed, rel=1e-9)
+
+
+def test_what_the_catalogue_takes_in_is_no_longer_outside(monkeypatch):
+    case = make("arm", "outside", "sixkg", ("flexible_arm",), np.random.default_rng(1))
+    assert (case.truth, case.outside) == ((), ("flexible_arm",))
+    monkeypatch.setitem(NAMES, "flexible_arm", "soft_frame")
+    case = make("arm", "outside", "sixkg", ("flexible_arm",), np.random.default_rng(1))
+    assert (case.truth, case.outside) == (("soft_frame",), ())

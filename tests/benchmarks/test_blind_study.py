@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from benchmarks.blind.cases import LACKING
 from benchmarks.blind_study.fly import fly
 from benchmarks.blind_study.judge import judge
 from benchmarks.blind_study.score import (
@@ -96,7 +97,11 @@ def test_what_no_catalogue_lists_is_never_called_found(judged):
 )
 def test_answers_are_told_apart(truth, verdict, names, expected):
     torque = 1.0 if "com_offset" in truth else 0.01
-    key = {"truth": truth, "residual_rms_n_m": {"held_out_1": [torque, 0.0, 0.0], "train_1": [9.0, 9.0, 9.0]}}
+    key = {
+        "truth": truth,
+        "only": "",
+        "residual_rms_n_m": {"held_out_1": [torque, 0.0, 0.0], "train_1": [9.0, 9.0, 9.0]},
+    }
     rivals = [{"name": "com_offset", "instead_of": "inflow"}]
     said = {
         "verdict": verdict,
@@ -105,3 +110,79 @@ def test_answers_are_told_apart(truth, verdict, names, expected):
         "floor": [0.1] * 6,
     }
     assert outcome(key, said) == expected
+
+
+def test_a_part_of_a_study_holds_as_many_different_things_as_it_can():
+    each = {"single": 12, "none": 2, "outside": 5}
+    part = sets(Size(31, 2, ("mid",), ("white",), ("single", "none", "outside", "attack"), each=each))
+    found = {}
+    for own in part:
+        found.setdefault(own[0].case.group, []).append(own[0].case)
+    assert {group: len(own) for group, own in found.items()} == each | {"attack": 30}
+    assert len({tuple(case.hidden) for case in found["single"]}) == 12
+    assert len({tuple(case.hidden) for case in found["outside"]}) == 5
+    assert part == sets(Size(31, 2, ("mid",), ("white",), ("single", "none", "outside", "attack"), each=each))
+
+
+def said(verdict, *effects, rivals=()):
+    told = [
+        {"name": name, "share": share, "coefficients": {"c": {"value": value, "possible": possible}}}
+        for name, share, value, possible in effects
+    ]
+    return {"verdict": verdict, "effects": told, "alternatives": list(rivals), "look_alikes": [], "floor": [0.1] * 6}
+
+
+def answered(told, **key):
+    usual = {"truth": [], "nearest": [], "outside": [], "hidden": {}, "only": "", "group": "single", "dominant": ""}
+    key = usual | key | {"residual_rms_n_m": {"held_out_1": [1.0] * 3, "train_1": [1.0] * 3}}
+    return Scored(key, told, outcome(key, told))
+
+
+DRAG, DAMPING = ("rotor_drag", 1.0, 1e-3, [0.0, 1.0]), ("linear_damping", 1.0, 0.1, [0.0, 1.0])
+
+RIVAL_BY = {"name": "rotor_drag", "instead_of": "linear_damping"}
+
+
+@pytest.mark.parametrize(
+    ("told", "key", "good"),
+    [
+        (said("NAMED", DRAG), {"truth": ["rotor_drag"], "group": "lacking"}, True),
+        (said("NAMED", DAMPING), {"truth": ["rotor_drag"], "group": "lacking"}, False),
+        (
+            said("AMBIGUOUS", DAMPING, rivals=[RIVAL_BY | {"separated_by": "log velocity"}]),
+            {"truth": ["rotor_drag"], "group": "lacking", "left_out": LACKING["velocity"]},
+            True,
+        ),
+        (
+            said("AMBIGUOUS", DAMPING, rivals=[RIVAL_BY | {"separated_by": "log velocity"}]),
+            {"truth": ["rotor_drag"], "group": "lacking", "left_out": LACKING["attitude"]},
+            False,
+        ),
+        (said("FLIGHTS_DIFFER"), {"only": "held_out", "hidden": {"rotor_drag": {}}, "group": "differing"}, True),
+        (said("NAMED", DRAG), {"only": "held_out", "hidden": {"rotor_drag": {}}, "group": "differing"}, False),
+        (said("NO_GAP"), {"only": "train", "hidden": {"rotor_drag": {}}, "group": "differing"}, False),
+        (said("NAMED", DAMPING), {"outside": ["cyclic_swirl"], "hidden": {"cyclic_swirl": {}}}, False),
+        (said("PARTIAL", DAMPING), {"outside": ["cyclic_swirl"], "hidden": {"cyclic_swirl": {}}}, True),
+        (said("NO_GAP"), {"group": "attack"}, True),
+        (said("PARTIAL", DAMPING), {"group": "attack"}, False),
+        (said("NAMED", DRAG), {"group": "pybullet", "nearest": ["rotor_drag"]}, True),
+        (said("NAMED", DAMPING), {"group": "pybullet", "nearest": ["rotor_drag"]}, False),
+    ],
+)
+def test_what_is_asked_for_depends_on_the_group(told, key, good):
+    assert answered(told, **key).good == good
+
+
+@pytest.mark.parametrize(
+    ("effects", "unphysical"),
+    [
+        ([DRAG], False),
+        ([("linear_damping", 1.0, -1e-5, [0.0, 1.0])], True),
+        ([("linear_damping", 1.0, 0.0, [0.0, 1.0])], False),
+        ([("channel_delay", 1.0, -0.05, [-0.05, 0.05])], True),
+        ([("rotor_drag", 8.12, 0.1, [0.0, 1.0]), ("linear_damping", -7.12, 0.1, [0.0, 1.0])], True),
+    ],
+)
+def test_numbers_that_nobody_believes_are_counted(effects, unphysical):
+    assert answered(said("NAMED", *effects)).unphysical == unphysical
+    assert not answered(said("UNEXPLAINED", *effects)).unphysical

@@ -1,0 +1,67 @@
+"""Two effects hidden by a simulator of its own, found by `cpfls gap` from the logs alone, with all that it writes."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks.blind.cases import make
+from benchmarks.blind_study.fly import fly
+from benchmarks.blind_study.sets import Set
+from tests.builders.command_line import run, undrawn
+
+HIDDEN = ("com_offset", "rotor_drag")
+
+
+@pytest.fixture(scope="module")
+def answer(tmp_path_factory):
+    """The folder of `cpfls gap`, its summary, and what was hidden."""
+    place = tmp_path_factory.mktemp("pair")
+    case = make("pair", "pair", "sixkg", HIDDEN, np.random.default_rng(5), level=0.5)
+    [logs] = fly([[Set(case, "mid", "white", 11)]], place, duration=8.0)
+    flights = [*sorted(logs.glob("train_*.csv")), *sorted(logs.glob("held_out_*.csv"))]
+    folder = place / "gap"
+    held = [word for path in flights[3:] for word in ("--held-out", path)]
+    with undrawn():
+        told = run("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.shifts=39")
+    assert told.exit_code == 0, told.stderr
+    return SimpleNamespace(folder=folder, summary=json.loads(told.stdout), hidden=case.hidden, logs=logs, held=held)
+
+
+def test_both_effects_are_named_and_nothing_else(answer):
+    assert answer.summary["verdict"] == "NAMED"
+    assert {effect["name"] for effect in answer.summary["effects"]} == set(HIDDEN)
+
+
+def test_the_numbers_of_both_come_back(answer):
+    found = {effect["name"]: effect["coefficients"] for effect in answer.summary["effects"]}
+    offset, drag = answer.hidden["com_offset"]["offset"], answer.hidden["rotor_drag"]["drag"]
+    assert found["rotor_drag"]["k_d"]["value"] == pytest.approx(drag, rel=0.05)
+    for name, true in zip(("c_x", "c_y"), offset, strict=False):
+        assert found["com_offset"][name]["value"] == pytest.approx(true, abs=0.05 * np.hypot(*offset[:2]))
+
+
+def test_gap_closes_on_flights_held_out(answer):
+    before, after = answer.summary["gap_before"], answer.summary["gap_after"]
+    for channels in ("floors", "force_floors"):
+        assert max(before[channels]) > 20
+        assert max(after[channels]) < 1.5
+
+
+def test_every_artifact_is_good(answer):
+    names = {"disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json"}
+    assert {path.name for path in answer.folder.iterdir()} == names
+    for name in ("disagreement", "diagnosis", "extended"):
+        assert run("check", answer.folder / f"{name}.h5").exit_code == 0
+
+
+def test_extended_model_leaves_the_gap_that_was_promised(answer):
+    again = answer.folder.parent / "again.h5"
+    flights = answer.held[1::2]
+    model = answer.folder / "extended.h5"
+    told = run("compare", answer.logs / "study.yaml", *flights, "--model", model, "-o", again, "--json")
+    assert told.exit_code == 0, told.stderr
+    gap = json.loads(told.stdout)["gap"]
+    assert gap["torque_n_m"] == pytest.approx(answer.summary["gap_after"]["torque_n_m"], rel=1e-6)
+    assert max(gap["floors"]) < 1.5
