@@ -99,7 +99,7 @@ def _main(found: Fitted, index: int, numbers: Sequence[Estimate], floor: Array) 
     candidate = found.hypothesis.chosen[index]
     linear = found.estimates.of_effect[index]
     names = [coefficient.name for coefficient in candidate.effect.coefficients]
-    if candidate.effect.physical is not None or len(linear) != len(names):
+    if not names or candidate.effect.physical is not None or len(linear) != len(names):
         return numbers
     columns = found.hypothesis.columns(candidate) * linear / floor[:, None]
     largest = names[int(np.argmax((columns**2).sum(axis=(0, 1))))]

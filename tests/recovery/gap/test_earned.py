@@ -136,3 +136,13 @@ def test_nothing_hidden_differs_in_nothing():
     for seed in range(3):
         _, _, differ = judged(flights(seeds=(1 + seed, 2 + seed)), flights(seeds=(3 + seed,)))
         assert not differ
+
+
+def test_a_shape_at_the_end_of_what_is_tried_is_no_name():
+    """Sizes that stand in a shape alone."""
+    known = flights((candidate("ground_effect", G=16.0), [1.0]))
+    known = [weak(replace(flight.signals, position=flight.signals.position - [0.0, 0.0, 29.0])) for flight in known]
+    chosen = [candidate("ground_effect", G=16.0)]
+    found, (refusal,) = earned(known, chosen, best_floor(system(known, chosen)), SETTINGS)
+    assert kept(found) == []
+    assert "its G sits on the bound" in refusal.sentence
