@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.artifacts.gap_effects import NamedEffectsGroup
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.pages.gap import AFTER
 from cpfls_cli.report.canvas import plot
 from cpfls_cli.report.content import Plot, Table
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cpfls_cli.arrays import Array
     from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 
-_PARAMETERS = "parameter_error"
+_RELATIVE = "_error"
 _SHORT = {"inertia_x": "Ixx", "inertia_y": "Iyy", "inertia_z": "Izz", "thrust_scale": "thrust"}
 _NUMBERS = {
     "inertia": "moment of inertia about",
@@ -74,8 +74,8 @@ def closest_sentence(effect: NamedEffect) -> str:
 def _size(effect: NamedEffect) -> str:
     chance = probability(effect.p_value)
     p_value = f"p {chance}" if chance.startswith("<") else f"p = {chance}"
-    write = _relative if effect.name == _PARAMETERS else _coefficient
-    numbers = "; ".join(write(coefficient) for coefficient in effect.coefficients)
+    relative = effect.name.endswith(_RELATIVE)
+    numbers = "; ".join(_relative(effect.name, c) if relative else _coefficient(c) for c in effect.coefficients)
     return f"{numbers} ({p_value}, {share_words(effect.share)} of the gap)".lstrip()
 
 
@@ -94,21 +94,21 @@ def _common_power(numbers: Sequence[str]) -> str:
     return f"e{power}" if power else ""
 
 
-def _relative(number: Estimate) -> str:
+def _relative(effect: str, number: Estimate) -> str:
     """Write an error of a number of the vehicle as people do, `Izz +24 % [+20, +28]`."""
     value, low, high = relative_words(number.value, number.low, number.high)
-    return f"{vehicle_number(number.name)} {value} % [{low}, {high}]"
+    return f"{vehicle_number(effect, number.name)} {value} % [{low}, {high}]"
 
 
 def wrong_numbers(effects: NamedEffectsGroup) -> list[str]:
     """List the numbers of the vehicle that a verdict calls wrong, each with its error, `Izz +24 %`."""
-    numbers = [number for effect in effects.named if effect.name == _PARAMETERS for number in effect.coefficients]
-    return [f"{vehicle_number(n.name)} {relative_words(n.value, n.low, n.high)[0]} %" for n in numbers]
+    numbers = [(e.name, number) for e in effects.named if e.name == VEHICLE_NUMBERS.name for number in e.coefficients]
+    return [f"{vehicle_number(name, n.name)} {relative_words(n.value, n.low, n.high)[0]} %" for name, n in numbers]
 
 
-def vehicle_number(name: str) -> str:
+def vehicle_number(effect: str, name: str) -> str:
     """Name a number of the vehicle as people do."""
-    return _SHORT.get(name, name.replace("_", " "))
+    return _SHORT.get(name, effect.removesuffix(_RELATIVE).replace("_", " "))
 
 
 def relative_words(value: float, low: float, high: float) -> list[str]:
