@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, ReplayChangeGroup, effect_summary
+from cpfls_cli.artifacts.gap_effects import (
+    GapChangeGroup,
+    NamedEffectsGroup,
+    PlaybackChangeGroup,
+    StretchGroup,
+    above_noise,
+    effect_summary,
+)
 from cpfls_cli.artifacts.gap_flights import (
     HELD_OUT,
     TRAINING,
@@ -184,16 +191,36 @@ class RunGroup:
     @classmethod
     def of(cls, change: BeforeAfter, held: Sequence[Recording]) -> Self:
         """Arrange the stretch whose free runs went astray most."""
-        run = change.run
-        return cls(
-            flight=held[change.run_flight].name,
-            axis=run.axis,
-            time=run.time,
-            restart=run.restarts,
-            measured=run.measured,
-            before=run.before,
-            after=run.after,
-        )
+        run, recording = change.run, held[change.run.flight]
+        runs, samples, _ = run.measured.shape
+        time = recording.signals.time[run.first : run.first + runs * samples]
+        rates = {name: getattr(run, name).reshape(-1, 3) for name in ("measured", "before", "after")}
+        return cls(flight=recording.name, axis=run.axis, time=time, restart=time[::samples], **rates)
+
+
+class LargestGap(NamedTuple):
+    """Where the gap of the model as given is largest on the held-out flights.
+
+    Attributes
+    ----------
+    channels : list of str
+        With a gap above noise, largest first, in floors.
+    flight : str
+        Empty where no stretch stands out, and then the next three are not known.
+    start_s, end_s : float
+        Of the stretch in which the first channel is worst, on the clock of the flight.
+    floors : float
+        Root mean square there.
+    share_of_time : float
+        In which the first channel is above noise.
+    """
+
+    channels: list[str]
+    flight: str
+    start_s: float
+    end_s: float
+    floors: float
+    share_of_time: float
 
 
 @record
@@ -215,7 +242,8 @@ class DiagnosisRecord(Record):
     unexplained: UnexplainedGroup = group("unexplained")
     torque_alone: TorqueAloneGroup = group("torque_alone")
     gap: GapChangeGroup = group("gap")
-    replay: ReplayChangeGroup | None = group("replay", default=None)
+    playback: PlaybackChangeGroup | None = group("playback", default=None)
+    stretch: StretchGroup | None = group("stretch", default=None)
     residual: ResidualChangeGroup = group("residual")
     whiteness: WhitenessGroup | None = group("whiteness", default=None)
     picture: PictureGroup | None = group("picture", default=None)
@@ -223,6 +251,10 @@ class DiagnosisRecord(Record):
     not_excited: NotExcitedGroup = group("not_excited")
     audit: AuditGroup = group("")
     note: tuple[str, ...] = dataset("note", "what a reader should know", "note")
+    impossible: tuple[str, ...] = dataset(
+        "impossible", "numbers that no vehicle has, so that the log looks wrong", "impossible", default=()
+    )
+    warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning", default=())
     base: BaseGroup = group("base")
     flights: FlightsGroup = group("")
     difference: tuple[str, ...] | None = dataset(
@@ -245,6 +277,7 @@ class DiagnosisRecord(Record):
         training: Sequence[Recording],
         held: Sequence[Recording],
         split: str,
+        warnings: Sequence[str],
         base: BaseGroup,
     ) -> Self:
         """Arrange a diagnosis.
@@ -255,6 +288,8 @@ class DiagnosisRecord(Record):
             That it arrives at.
         split : str
             Why these flights trained and those were held out.
+        warnings : sequence of str
+            What to know about the flights.
         base : BaseGroup
             The identified model that misses something, or the vehicle.
         """
@@ -272,7 +307,8 @@ class DiagnosisRecord(Record):
                 name=tuple(name for name, _ in alone), share=np.fromiter((share for _, share in alone), float)
             ),
             gap=GapChangeGroup.of(diagnosis.before, diagnosis.after, diagnosis.floor),
-            replay=ReplayChangeGroup.of(change.before, change.after, change.held),
+            playback=PlaybackChangeGroup.of_pairs(change.played, change.playback),
+            stretch=StretchGroup.of(change.stretches),
             residual=ResidualChangeGroup.of(diagnosed.held_out, change),
             whiteness=WhitenessGroup.of(change),
             picture=PictureGroup.of(change, held),
@@ -280,6 +316,8 @@ class DiagnosisRecord(Record):
             not_excited=NotExcitedGroup.of(diagnosis.not_excited),
             audit=AuditGroup.of(diagnosed.audit),
             note=diagnosis.notes,
+            impossible=diagnosis.impossible,
+            warning=tuple(warnings),
             base=base,
             flights=FlightsGroup.of([*training, *held], [TRAINING] * len(training) + [HELD_OUT] * len(held)),
             difference=diagnosis.differences,
@@ -298,15 +336,34 @@ class DiagnosisRecord(Record):
         return bool(alone and named and self.gap.has_force and alone[0] not in named)
 
     @property
+    def largest_gap(self) -> LargestGap | None:
+        """Where the gap of the model as given is largest on the held-out flights; None where all is within noise."""
+        gap, above = self.gap, above_noise(self.gap.before_floors)
+        order = [index for index in np.argsort(-np.nan_to_num(gap.before_floors), kind="stable") if above[index]]
+        if not order:
+            return None
+        first, channels = order[0], [gap.channel[index] for index in order]
+        windows = self.residual.before[:, first] / gap.floor[first]
+        share = float(above_noise(np.abs(windows)).mean())
+        stretches = [] if self.stretch is None else self.stretch.first(len(self.stretch.channel))
+        for flight, start, end, channel, floors in stretches:
+            if channel == channels[0]:
+                return LargestGap(channels, self.flights.names(HELD_OUT)[flight], start, end, floors, share)
+        return LargestGap(channels, "", np.nan, np.nan, np.nan, share)
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Notes on the diagnosis itself, without what the sensors say about each other."""
-        return tuple(note for note in self.note if note not in (*self.audit.warning, *self.audit.note))
+        told = {*self.audit.warning, *self.audit.note, *self.impossible, *(self.difference or ())}
+        return tuple(note for note in self.note if note not in told)
 
     @property
     def summary(self) -> dict[str, Any]:
         """The diagnosis for machines."""
+        where = self.largest_gap
         return {
             "verdict": self.verdict,
+            "log_looks_wrong": list(self.impossible),
             "share": self.share,
             "share_by_kind": None if self.shares is None else dict(zip(KINDS, self.shares.tolist(), strict=True)),
             "differences": list(self.difference or ()),
@@ -315,13 +372,15 @@ class DiagnosisRecord(Record):
             "alternatives": rows_of(self.alternative),
             "unexplained": [vars(each) for each in self.unexplained.unexplained()],
             "not_excited": self.not_excited.summary,
+            "where": where and where._asdict(),
             "gap_before": self.gap.summary_before,
             "gap_after": self.gap.summary_after,
-            "replay": self.replay and self.replay.summary,
+            "playback": self.playback and self.playback.summary,
             "whiteness": self.whiteness and self.whiteness.summary,
             "torque_alone": rows_of(self.torque_alone),
             "audit": self.audit.summary,
             "parameters": self.effects.parameter.summary,
             "split": self.split,
             "notes": list(self.note),
+            "warnings": list(self.warning),
         }

@@ -9,8 +9,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.gap_effects import ReplayErrors, above_noise, gap_summary
+from cpfls_cli.artifacts.gap_effects import StretchGroup, above_noise, gap_summary
 from cpfls_cli.artifacts.gap_flights import AuditGroup, BaseGroup, FlightsGroup, NotExcitedGroup
+from cpfls_cli.artifacts.replay import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from cpfls_cli.gap.balance.windows import Recording
     from cpfls_cli.gap.compare import Disagreement, WorstChannel
     from cpfls_cli.gap.residual.dependence import Dependence
-    from cpfls_cli.gap.residual.views import Stretch
 
 _SIGNIFICANT = 0.05
 """Probability of chance below which a gap follows a signal."""
@@ -91,33 +91,6 @@ class StateGroup:
 
 
 @record
-class StretchGroup:
-    """Stretches of time with the largest gap, largest first."""
-
-    flight: Array = dataset("flight", "index of the flight; stretches of time with the largest gap, first", "stretch")
-    start: Array = dataset("start", "on the clock of the flight", "stretch", units="s")
-    end: Array = dataset("end", "on the clock of the flight", "stretch", units="s")
-    channel: tuple[str, ...] = dataset("channel", "channel of the gap", "stretch")
-    floors: Array = dataset("floors", "root mean square of the gap there, in floors", "stretch")
-
-    @classmethod
-    def of(cls, stretches: Sequence[Stretch]) -> Self:
-        """Arrange stretches of time."""
-        return cls(
-            flight=np.fromiter((stretch.flight for stretch in stretches), float),
-            start=np.fromiter((stretch.start_s for stretch in stretches), float),
-            end=np.fromiter((stretch.end_s for stretch in stretches), float),
-            channel=tuple(stretch.channel for stretch in stretches),
-            floors=np.fromiter((stretch.rms_floors for stretch in stretches), float),
-        )
-
-    def first(self, most: int) -> list[tuple[int, float, float, str, float]]:
-        """List the largest: flight, start and end in s, channel, floors."""
-        columns = (self.flight.astype(int).tolist(), self.start.tolist(), self.end.tolist(), self.channel)
-        return list(zip(*columns, self.floors.tolist(), strict=True))[:most]
-
-
-@record
 class DependenceGroup:
     """How well single signals explain the gap of a channel."""
 
@@ -174,39 +147,6 @@ class HeatMapGroup:
 
 
 @record
-class ReplayGroup(ReplayErrors):
-    """Errors of replays of the measured rotor speeds by horizon."""
-
-    horizon: IntArray = dataset("horizon", "samples over which measured rotor speeds are replayed", "horizon")
-    horizon_s: Array = dataset("horizon_s", "the same in seconds", "horizon", units="s")
-    rate_model: Array = dataset(
-        "rate_model", "rms error of body rates", "horizon", "axis", units="rad/s", frame=BODY, gaps=True
-    )
-    rate_held: Array = dataset(
-        "rate_held", "the same where the rates are held", "horizon", "axis", units="rad/s", frame=BODY, gaps=True
-    )
-    attitude_model: Array = dataset(
-        "attitude_model", "rms turn, simulated to measured", "horizon", "axis", units="rad", frame=BODY, gaps=True
-    )
-    attitude_held: Array = dataset(
-        "attitude_held", "the same where the rates are held", "horizon", "axis", units="rad", frame=BODY, gaps=True
-    )
-
-    @classmethod
-    def of(cls, disagreement: Disagreement) -> Self:
-        """Arrange the replays of a model, and of rates that stay what they are."""
-        model, held = disagreement.replayed, disagreement.held
-        return cls(
-            horizon=np.arange(1, len(held.horizon_s) + 1),
-            horizon_s=held.horizon_s,
-            rate_model=model.rate,
-            rate_held=held.rate,
-            attitude_model=model.attitude,
-            attitude_held=held.attitude,
-        )
-
-
-@record
 class DisagreementRecord(Record):
     """The artifact `cpfls/disagreement`."""
 
@@ -223,7 +163,7 @@ class DisagreementRecord(Record):
     stretch: StretchGroup = group("stretch")
     dependence: DependenceGroup = group("dependence")
     heat_map: HeatMapGroup | None = group("heat_map", default=None)
-    replay: ReplayGroup | None = group("replay", default=None)
+    playback: PlaybackGroup | None = group("playback", default=None)
     not_excited: NotExcitedGroup = group("not_excited")
     audit: AuditGroup = group("")
     warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning")
@@ -243,6 +183,8 @@ class DisagreementRecord(Record):
         base : BaseGroup
             The identified model that was compared, or the vehicle.
         """
+        from cpfls_cli.playback.replay import PREDICTIONS
+
         return cls(
             gap=GapGroup.of(disagreement),
             residual=ResidualGroup(
@@ -254,7 +196,7 @@ class DisagreementRecord(Record):
             stretch=StretchGroup.of(disagreement.stretches),
             dependence=DependenceGroup.of(disagreement.dependence),
             heat_map=None if disagreement.worst is None else HeatMapGroup.of(disagreement.worst),
-            replay=ReplayGroup.of(disagreement),
+            playback=PlaybackGroup.of(disagreement.played, disagreement.playback, PREDICTIONS[:3]),
             not_excited=NotExcitedGroup.of(disagreement.not_excited),
             audit=AuditGroup.of(disagreement.audit),
             warning=warnings,
@@ -281,7 +223,7 @@ class DisagreementRecord(Record):
             ],
             "dependence": rows_of(self.dependence),
             "heat_map": self.heat_map and {"channel": self.heat_map.channel, "signals": list(self.heat_map.signal)},
-            "replay": self.replay and self.replay.summary,
+            "playback": self.playback and self.playback.summary,
             "not_excited": self.not_excited.summary,
             "audit": self.audit.summary,
             "warnings": list(self.warning),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, ReplayChangeGroup, effect_summary
+from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, PlaybackChangeGroup, effect_summary
 from cpfls_cli.artifacts.gap_flights import AuditGroup, BaseGroup
 from cpfls_cli.artifacts.spec import BODY, Format, Record, dataset, group, record
 from cpfls_cli.artifacts.vehicle_model import VehicleGroup
@@ -38,20 +38,20 @@ class ExtendedRecord(Record):
     thrust_scale: float = dataset("thrust_scale", "thrust over that of the vehicle in /config")
     effects: NamedEffectsGroup = group("")
     gap: GapChangeGroup = group("gap")
-    replay: ReplayChangeGroup | None = group("replay", default=None)
+    playback: PlaybackChangeGroup | None = group("playback", default=None)
     audit: AuditGroup = group("")
     base: BaseGroup = group("base")
     vehicle: VehicleGroup | None = group("vehicle", default=None)
 
     @classmethod
-    def of(cls, refit: Refit, vehicle: VehicleSettings, replay: ReplayChangeGroup, base: BaseGroup) -> Self:
+    def of(cls, refit: Refit, vehicle: VehicleSettings, playback: PlaybackChangeGroup, base: BaseGroup) -> Self:
         """Arrange a refit.
 
         Parameters
         ----------
         vehicle : VehicleSettings
             As stated.
-        replay : ReplayChangeGroup
+        playback : PlaybackChangeGroup
             Of held-out flights.
         base : BaseGroup
             The identified model that is extended, or the vehicle.
@@ -66,7 +66,7 @@ class ExtendedRecord(Record):
             thrust_scale=1.0 + numbers["thrust_scale"].value if "thrust_scale" in numbers else 1.0,
             effects=NamedEffectsGroup.of(refit.effects, True, numbers, model.parameters),
             gap=GapChangeGroup.of(unseen.size(unseen.before), unseen.size(unseen.after), unseen.floor),
-            replay=replay,
+            playback=playback,
             audit=AuditGroup.of(model.audit),
             base=base,
             vehicle=_vehicle(model, vehicle, base),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.artifacts.replay import PlaybackGroup
 from cpfls_cli.artifacts.spec import BODY, columns_of, dataset, group, record, rows_of
 from cpfls_cli.gap.settings import CLEAR
 
@@ -18,10 +18,14 @@ if TYPE_CHECKING:
     from cpfls_cli.dynamics.equations_of_motion import InertiaModel
     from cpfls_cli.gap.extended import ExtendedModel
     from cpfls_cli.gap.naming.results import Estimate, GapSize, NamedEffect
-    from cpfls_cli.gap.replay import Replayed
+    from cpfls_cli.gap.residual.views import Stretch
+    from cpfls_cli.playback.replay import Played, Replay
 
 _GROWN = 1.05
 """Ratio of the gaps after and before from which on a channel is marked as worse."""
+
+BEFORE, AFTER = "before", "after"
+"""Predictions of held-out flights: by the model as given and with the effects."""
 
 _EVALUATED = ("wrench", "actuator")
 """Kinds of effects that are part of a model; faults of sensors are repaired, numbers of the vehicle refitted."""
@@ -398,6 +402,15 @@ class GapChangeGroup:
         return any(self.channel[index].startswith("force") for index in self.known)
 
     @property
+    def loud(self) -> tuple[list[int], list[int]]:
+        """Indices of the channels that are above noise before or after, or the largest; and of all other known ones."""
+        above = above_noise(self.before_floors) | above_noise(self.after_floors)
+        loud = [index for index in self.known if above[index]]
+        if not loud and self.known:
+            loud = [int(np.nanargmax(self.before_floors))]
+        return loud, [index for index in self.known if index not in loud]
+
+    @property
     def grown(self) -> BoolArray:
         """Channels whose gap is above noise and larger with the effects than without, shape (channel,)."""
         return above_noise(self.after_floors) & (self.after_floors > _GROWN * self.before_floors)
@@ -420,77 +433,85 @@ class GapChangeGroup:
         return gap_summary(self.after, self.after_floors)
 
 
-class ReplayErrors:
-    """Errors of replays by horizon, whichever models are replayed."""
+@record
+class StretchGroup:
+    """Stretches of time with the largest gap, largest first."""
 
-    horizon_s: Array
-    rate_held: Array
+    flight: Array = dataset("flight", "index of the flight; stretches of time with the largest gap, first", "stretch")
+    start: Array = dataset("start", "on the clock of the flight", "stretch", units="s")
+    end: Array = dataset("end", "on the clock of the flight", "stretch", units="s")
+    channel: tuple[str, ...] = dataset("channel", "channel of the gap", "stretch")
+    floors: Array = dataset("floors", "root mean square of the gap there, in floors", "stretch")
+
+    @classmethod
+    def of(cls, stretches: Sequence[Stretch]) -> Self:
+        """Arrange stretches of time."""
+        return cls(
+            flight=np.fromiter((stretch.flight for stretch in stretches), float),
+            start=np.fromiter((stretch.start_s for stretch in stretches), float),
+            end=np.fromiter((stretch.end_s for stretch in stretches), float),
+            channel=tuple(stretch.channel for stretch in stretches),
+            floors=np.fromiter((stretch.rms_floors for stretch in stretches), float),
+        )
+
+    def first(self, most: int) -> list[tuple[int, float, float, str, float]]:
+        """List the largest: flight, start and end in s, channel, floors."""
+        columns = (self.flight.astype(int).tolist(), self.start.tolist(), self.end.tolist(), self.channel)
+        return list(zip(*columns, self.floors.tolist(), strict=True))[:most]
+
+
+class EndError(NamedTuple):
+    """How far off a signal is at the longest horizon.
+
+    Attributes
+    ----------
+    before, after : float
+        Mean errors of the model as given and with the effects.
+    rival : str
+        What knows no model and is better over all horizons: `nothing-moves` or `rate-stays`.
+    without_model : float
+        Its mean error.
+    """
+
+    before: float
+    after: float
+    rival: str
+    without_model: float
 
     @property
-    def turns(self) -> bool:
-        """Whether the rates ever change; those of a log without rates do not."""
-        return bool(self.rate_held.any())
-
-    def errors(self, quantity: str) -> dict[str, Array]:
-        """Give the errors of ``rate`` or ``attitude`` by what is replayed, each of shape (horizon, 3)."""
-        names = [each.name for each in fields(self) if each.name.startswith(f"{quantity}_")]  # type: ignore[arg-type]  # a record
-        return {name.removeprefix(f"{quantity}_"): getattr(self, name) for name in names}
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """The replays for machines."""
-        rates = {f"rate_{name}_rad_s": error.tolist() for name, error in self.errors("rate").items()}
-        attitudes = {f"attitude_{name}_rad": error.tolist() for name, error in self.errors("attitude").items()}
-        return {"horizon_s": self.horizon_s.tolist(), **rates, **attitudes}
+    def worse(self) -> bool:
+        """Whether the model with the effects is no better than none."""
+        return self.after >= self.without_model
 
 
 @record
-class ReplayChangeGroup(ReplayErrors):
-    """Errors of replays on held-out flights by horizon, before and after."""
+class PlaybackChangeGroup(PlaybackGroup):
+    """Held-out flights played back before and after."""
 
-    horizon: IntArray = dataset("horizon", "samples over which measured rotor speeds are replayed", "horizon")
-    horizon_s: Array = dataset("horizon_s", "the same in seconds", "horizon", units="s", gaps=True)
-    rate_before: Array = dataset(
-        "rate_before",
-        "rms error of body rates, model as given",
-        "horizon",
-        "axis",
-        units="rad/s",
-        frame=BODY,
-        gaps=True,
-    )
-    rate_after: Array = dataset(
-        "rate_after", "the same with the effects", "horizon", "axis", units="rad/s", frame=BODY, gaps=True
-    )
-    rate_held: Array = dataset(
-        "rate_held", "the same where the rates are held", "horizon", "axis", units="rad/s", frame=BODY, gaps=True
-    )
-    attitude_before: Array = dataset(
-        "attitude_before",
-        "rms turn between simulated and measured",
-        "horizon",
-        "axis",
-        units="rad",
-        frame=BODY,
-        gaps=True,
-    )
-    attitude_after: Array = dataset(
-        "attitude_after", "the same with the effects", "horizon", "axis", units="rad", frame=BODY, gaps=True
-    )
-    attitude_held: Array = dataset(
-        "attitude_held", "the same where the rates are held", "horizon", "axis", units="rad", frame=BODY, gaps=True
-    )
+    @property
+    def played(self) -> str:
+        """What is played back."""
+        return "the model with the effects"
 
     @classmethod
-    def of(cls, before: Replayed, after: Replayed, held: Replayed) -> Self:
-        """Arrange replays by the model as given, with the effects, and by rates that stay what they are."""
-        return cls(
-            horizon=np.arange(1, len(held.horizon_s) + 1),
-            horizon_s=held.horizon_s,
-            rate_before=before.rate,
-            rate_after=after.rate,
-            rate_held=held.rate,
-            attitude_before=before.attitude,
-            attitude_after=after.attitude,
-            attitude_held=held.attitude,
-        )
+    def of_pairs(cls, flights: Sequence[Played], replay: Replay) -> Self:
+        """Arrange a replay of a model with effects and the model as given, without its windows."""
+        from cpfls_cli.playback.replay import NOTHING_MOVES, RATE_STAYS
+
+        return cls.of(flights, replay, (AFTER, NOTHING_MOVES, RATE_STAYS, BEFORE))
+
+    @property
+    def at_end(self) -> dict[str, EndError]:
+        """Errors at the longest horizon by signal, of those that move."""
+        known = {name: found for name, found in self.errors.items() if found is not None and found.total[1] > 0}
+        ends = {name: (found.mae[:, -1].tolist(), found.rival) for name, found in known.items()}
+        return {
+            name: EndError(error[3], error[0], self.prediction[rival], error[rival])
+            for name, (error, rival) in ends.items()
+        }
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The playback for machines."""
+        ends = {name: {**end._asdict(), "worse": end.worse} for name, end in self.at_end.items()}
+        return {"at_end": ends, **super().summary}

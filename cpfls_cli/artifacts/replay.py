@@ -37,14 +37,20 @@ class SignalErrorGroup:
     rms: Array = dataset("rms", "root mean square error by axis", "prediction", "horizon", "axis", units="SI")
 
     @classmethod
-    def of(cls, errors: SignalErrors | None) -> Self | None:
-        """Arrange errors; None where no flight knows the signal."""
-        return None if errors is None else cls(mae=errors.mae, rms=errors.rms)
+    def of(cls, errors: SignalErrors | None, rows: int | None = None) -> Self | None:
+        """Arrange the errors of the first predictions; None where no flight knows the signal."""
+        return None if errors is None else cls(mae=errors.mae[:rows], rms=errors.rms[:rows])
 
     @property
     def total(self) -> Array:
         """Sum of the mean norms over the horizon, by prediction."""
         return np.asarray(self.mae.sum(axis=1))
+
+    @property
+    def rival(self) -> int:
+        """What a model has to beat: the better over all horizons of the two predictions that know no model."""
+        nothing, stays = 1, 2
+        return stays if self.total[stays] < self.total[nothing] else nothing
 
     def summary(self, prediction: int) -> dict[str, Any]:
         """One prediction for machines."""
@@ -76,6 +82,11 @@ class ErrorsByHorizon(Protocol):
         ...
 
     @property
+    def prediction(self) -> tuple[str, ...]:
+        """What predicts: what is played back, "nothing moves", "rate stays", and what it is compared with, if any."""
+        ...
+
+    @property
     def horizon_s(self) -> Array:
         """Horizons, s."""
         ...
@@ -86,7 +97,7 @@ class ErrorsByHorizon(Protocol):
         ...
 
 
-def _by_signal(found: HeldOutGroup | ReplayRecord) -> dict[str, SignalErrorGroup | None]:
+def _by_signal(found: PlaybackGroup | ReplayRecord) -> dict[str, SignalErrorGroup | None]:
     """List errors by signal, what is asked of first first."""
     return {
         "body_rate": found.body_rate,
@@ -119,42 +130,48 @@ class RegionGroup:
 
 
 @record
-class HeldOutGroup:
-    """A model played back along flights that it was not found in, beside what it has to beat."""
+class PlaybackGroup:
+    """A model played back along flights, beside what it has to beat."""
 
-    flown: tuple[str, ...] = dataset("flight", "file names", "held_out_flight")
+    flown: tuple[str, ...] = dataset("flight", "file names", "playback_flight")
     windows: int = dataset("windows", "samples from which it was played back")
-    prediction: tuple[str, ...] = dataset("prediction", "as in cpfls/replay", "prediction")
+    prediction: tuple[str, ...] = dataset(
+        "prediction", "as in cpfls/replay; before, after: the model as given and with the effects", "prediction"
+    )
     horizon_s: Array = dataset("horizon_s", "horizons", "horizon", units="s")
     diverged: IntArray = dataset("diverged", "windows in which a prediction ran away and was stopped", "prediction")
     body_rate: SignalErrorGroup = group("body_rate")
     attitude: SignalErrorGroup | None = group("attitude", default=None)
     velocity: SignalErrorGroup | None = group("velocity", default=None)
     position: SignalErrorGroup | None = group("position", default=None)
-    better: RegionGroup | None = group("better", default=None)
+
+    @classmethod
+    def of(cls, flights: Sequence[Played], replay: Replay, prediction: Sequence[str], **more: Any) -> Self:
+        """Arrange a replay without its windows.
+
+        Parameters
+        ----------
+        prediction : sequence of str
+            What to call the predictions; those beyond are left out.
+        """
+        rows = len(prediction)
+        groups = {signal: SignalErrorGroup.of(found, rows) for signal, found in replay.errors.items()}
+        assert groups["body_rate"] is not None, "every flight has rates"
+        steps = np.arange(1, groups["body_rate"].mae.shape[1] + 1)
+        return cls(
+            flown=tuple(played.flight.name for played in flights),
+            windows=len(replay.windows.start),
+            prediction=tuple(prediction),
+            horizon_s=flights[0].flight.motion.period * steps,
+            diverged=(replay.windows.diverged[:rows] >= 0).sum(axis=1),
+            **groups,  # type: ignore[arg-type]  # only the body rate is always known
+            **more,
+        )
 
     @property
     def played(self) -> str:
         """What is played back."""
-        return "the vehicle found"
-
-    @classmethod
-    def of(cls, flights: Sequence[Played], replay: Replay) -> Self:
-        """Arrange a replay without its windows."""
-        from cpfls_cli.playback.replay import PREDICTIONS, where_better
-
-        period, better = flights[0].flight.motion.period, where_better(flights, replay.windows)
-        groups = {signal: SignalErrorGroup.of(found) for signal, found in replay.errors.items()}
-        assert groups["body_rate"] is not None, "every flight has rates"
-        return cls(
-            flown=tuple(played.flight.name for played in flights),
-            better=None if better is None else RegionGroup(**vars(better)),
-            windows=len(replay.windows.start),
-            prediction=PREDICTIONS,
-            horizon_s=period * np.arange(1, groups["body_rate"].mae.shape[1] + 1),
-            diverged=(replay.windows.diverged >= 0).sum(axis=1),
-            **groups,  # type: ignore[arg-type]  # only the body rate is always known
-        )
+        return "the model"
 
     @property
     def errors(self) -> Mapping[str, SignalErrorGroup | None]:
@@ -163,18 +180,46 @@ class HeldOutGroup:
 
     @property
     def summary(self) -> dict[str, Any]:
+        """The replay for machines: mean errors by prediction and signal."""
+        known = {name: found.mae for name, found in self.errors.items() if found is not None}
+        return {
+            "flights": list(self.flown),
+            "windows": self.windows,
+            "horizon_s": self.horizon_s.tolist(),
+            "models": {
+                prediction: {name: mae[index].tolist() for name, mae in known.items()}
+                for index, prediction in enumerate(self.prediction)
+            },
+        }
+
+
+@record
+class HeldOutGroup(PlaybackGroup):
+    """A model played back along flights that it was not found in, beside what it has to beat."""
+
+    better: RegionGroup | None = group("better", default=None)
+
+    @property
+    def played(self) -> str:
+        """What is played back."""
+        return "the vehicle found"
+
+    @classmethod
+    def judged(cls, flights: Sequence[Played], replay: Replay) -> Self:
+        """Arrange a replay without its windows, and where the model is better than what knows no model."""
+        from cpfls_cli.playback.replay import PREDICTIONS, where_better
+
+        better = where_better(flights, replay.windows)
+        return cls.of(flights, replay, PREDICTIONS, better=None if better is None else RegionGroup(**vars(better)))
+
+    @property
+    def summary(self) -> dict[str, Any]:
         """The replay for machines."""
         models = {
             name: {**_summaries(self, index), "diverged": int(self.diverged[index])}
             for index, name in enumerate(self.prediction)
         }
-        return {
-            "flights": list(self.flown),
-            "windows": self.windows,
-            "horizon_s": self.horizon_s.tolist(),
-            "models": models,
-            "better": None if self.better is None else self.better.summary,
-        }
+        return {**super().summary, "models": models, "better": None if self.better is None else self.better.summary}
 
 
 def better_to(errors: ErrorsByHorizon, signal: str) -> float:

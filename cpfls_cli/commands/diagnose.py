@@ -21,6 +21,7 @@ from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.naming.results import Diagnosis
 from cpfls_cli.pages.diagnosis import answer
 from cpfls_cli.pages.effects import closest_sentence
+from cpfls_cli.pages.first_screen import counted_notes, next_steps, verdict_box
 from cpfls_cli.pages.source import Source, source_of
 from cpfls_cli.report.content import Block, Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -48,21 +49,32 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     split = split_flights(compared.flights.recordings(job.study), held.recordings, job.study.gap)
     if job.dry_run:
         return nothing_written(job)
-    diagnosis, record = diagnosed(job.study, split, compared.base, disagreement, progress_of(job.progress))
+    warnings = (*compared.warning, *held.warnings)
+    progress = progress_of(job.progress)
+    diagnosis, record = diagnosed(job.study, split, warnings, compared.base, disagreement, progress)
     record = finish(job, record, inputs)
     learned = [file for role, file in compared.origin.inputs.items() if role.startswith("flight")]
     twice = seen_twice(learned, [file for role, file in inputs.items() if role.startswith("held-out")])
-    notes = [Text(note, "warning") for note in (*twice, *compared.warning, *held.warnings)]
-    return Outcome(whole_summary(record, diagnosis), (*notes, *whole_answer(source_of(job, record), diagnosis)))
+    notes: list[Block] = [Text(note, "warning") for note in twice]
+    notes += folded_notes(record.warning, f"`cpfls report CONFIG {job.output.name} -o report.html` lists them")
+    answered = whole_answer(source_of(job, record), diagnosis)
+    return Outcome(whole_summary(record, diagnosis), (*answered, *notes))
 
 
 def diagnosed(
-    study: Study, split: FlightSplit, base: BaseGroup, path: Path, progress: Callable[[float, str], None]
+    study: Study,
+    split: FlightSplit,
+    warnings: Sequence[str],
+    base: BaseGroup,
+    path: Path,
+    progress: Callable[[float, str], None],
 ) -> tuple[Diagnosis, DiagnosisRecord]:
     """Diagnose flights.
 
     Parameters
     ----------
+    warnings : sequence of str
+        What to know about the flights.
     base : BaseGroup
         The identified model that misses something, or the vehicle.
     path : Path
@@ -73,16 +85,20 @@ def diagnosed(
     result = diagnose(split.training, split.held_out, study.gap, rng, model=model, progress=progress)
     extended = result.model(model)
     change = before_after(split.held_out, result.held_out, extended, study.gap)
-    record = DiagnosisRecord.of(result, change, extended, split.training, split.held_out, split.sentence, base)
+    flights = (split.training, split.held_out, split.sentence)
+    record = DiagnosisRecord.of(result, change, extended, *flights, warnings, base)
     return result.diagnosis, record
 
 
 def whole_summary(record: DiagnosisRecord, diagnosis: Diagnosis) -> dict[str, Any]:
     """Give the summary of a diagnosis with what its artifact has no place for.
 
-    That is: the closest effects where faults of sensors are named, and the possible range of the vehicle's numbers.
+    That is: what to do next, the closest effects where faults of sensors are named, and the possible range of the
+    vehicle's numbers.
     """
     return record.summary | {
+        "headline": verdict_box(record).title,
+        "next": next_steps(record),
         "closest": [effect_summary(effect) for effect in diagnosis.closest],
         "parameters": {name: estimate_summary(number) for name, number in diagnosis.parameters.items()},
     }
@@ -93,3 +109,9 @@ def whole_answer(source: Source[DiagnosisRecord], diagnosis: Diagnosis) -> Itera
     yield from answer(source)
     if not source.record.effects.closest:
         yield from (Text(closest_sentence(effect)) for effect in diagnosis.closest)
+
+
+def folded_notes(notes: Sequence[str], where: str) -> Iterator[Block]:
+    """Say on one line how many notes on the flights there are, and where they stand."""
+    if notes:
+        yield Text(f"{counted_notes(notes)}: {where}.")

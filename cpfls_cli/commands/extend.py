@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.gap_effects import ReplayChangeGroup
+from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING, BaseGroup
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.config.study import Study
@@ -16,7 +16,7 @@ from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
-from cpfls_cli.gap.replay import replayed
+from cpfls_cli.gap.playback import errors_by_horizon, played_pairs
 from cpfls_cli.pages.extended import answer, warnings
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -108,6 +108,6 @@ def extended(
     """
     model = base.rebuilt(path)
     extension = extend(training, held, named_effects(diagnosis), diagnosis.audit.audit(), study.gap, model)
-    signals = [recording.signals for recording in held]
-    runs = (replayed(signals, each, study.gap.horizon) for each in (plain(model), extension.model, None))
-    return ExtendedRecord.of(extension, study.vehicle, ReplayChangeGroup.of(*runs), base)
+    played = played_pairs(held, extension.model, plain(model))
+    playback = PlaybackChangeGroup.of_pairs(played, errors_by_horizon(played, study.gap.horizon))
+    return ExtendedRecord.of(extension, study.vehicle, playback, base)

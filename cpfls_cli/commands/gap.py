@@ -16,7 +16,7 @@ from cpfls_cli.artifacts.output import check_folder, filled_folder, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands import report
 from cpfls_cli.commands.compare import check_ignored, compared, flight_roles, progress_of
-from cpfls_cli.commands.diagnose import diagnosed, whole_answer, whole_summary
+from cpfls_cli.commands.diagnose import diagnosed, folded_notes, whole_answer, whole_summary
 from cpfls_cli.commands.extend import extended
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, seen_twice, split_flights
@@ -108,7 +108,9 @@ def _answers(job: Job, given: _Given) -> _Answers:
     study, base, split = job.study, given.base, given.split
     model = without_effects(base.rebuilt(given.path))
     disagreement = compared(study, given.flights, model, base, progress_of(job.progress, 0.0, 0.15))
-    diagnosis, record = diagnosed(study, split, base, given.path, progress_of(job.progress, 0.15, 0.85))
+    diagnosis, record = diagnosed(
+        study, split, given.flights.warnings, base, given.path, progress_of(job.progress, 0.15, 0.85)
+    )
     job.progress(0.85, 1, "extend")
     try:
         extension = extended(study, split.training, split.held_out, record, base, given.path)
@@ -134,7 +136,7 @@ def _blocks(job: Job, given: _Given, answers: _Answers) -> Iterator[Block]:
     disagreement = source_of(replace(job, output=job.output / FILES[0]), answers.disagreement)
     diagnosis = source_of(replace(job, output=job.output / FILES[1]), answers.diagnosed)
     twice = seen_twice(given.inputs_of("flight").values(), given.inputs_of("held-out").values())
-    yield from (Text(note, "warning") for note in (*twice, *given.flights.warnings))
+    yield from (Text(note, "warning") for note in twice)
     yield from whole_answer(diagnosis, answers.diagnosis)
     yield from where(disagreement)
     if answers.extended is None:
@@ -142,6 +144,7 @@ def _blocks(job: Job, given: _Given, answers: _Answers) -> Iterator[Block]:
     else:
         yield from (Text(warning, "warning") for warning in warnings(answers.extended))
         yield Text(model_with(str(job.output / "extended.h5"), answers.extended))
+    yield from folded_notes(given.flights.warnings, f"{job.output / 'report.html'} lists them")
 
 
 def _quiet(done: float, total: int, note: str = "") -> None:

@@ -161,7 +161,7 @@ def _judged(found: FoundVehicle, flights: Sequence[LoggedFlight], job: Job) -> H
     errors = replay(
         played, _horizon(job, flights[0]), 1, lambda done: job.progress(done, 1, "plays back the flights held out")
     )
-    return HeldOutGroup.of(played, errors)
+    return HeldOutGroup.judged(played, errors)
 
 
 def _grouped(

@@ -1,4 +1,4 @@
-"""Rotation integrated in time: one step of Runge and Kutta's method, and the three kinds of runs that take it."""
+"""Rotation integrated in time: one step of Runge and Kutta's method, and the two kinds of runs that take it."""
 
 from __future__ import annotations
 
@@ -9,16 +9,12 @@ from typing import NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from cpfls_cli import rotations
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import (
     AccelerationLaw,
-    InertiaModel,
     RotationalPlant,
     RotationState,
-    momentum_form,
 )
-from cpfls_cli.errors import ComputationError
-from cpfls_cli.regressor.regressor import InertiaValues
 
 # The error of a step of the classic Runge-Kutta method that turns by x is of the order x^5 / 120: 1e-7 rad here.
 _TURN_PER_STEP = 0.1
@@ -33,7 +29,7 @@ Slope = TypeVar("Slope")
 class Equation(Protocol[State, Slope]):
     """An equation of motion over one step of time, with the arithmetic of its state.
 
-    The step belongs to all equations, the sum of its slopes to each: Euler angles, rotation matrices and momenta add
+    The step belongs to all equations, the sum of its slopes to each: Euler angles and rotation matrices add
     them up in different orders, the last digit of a result depends on it, and artifacts are compared byte by byte.
     """
 
@@ -196,130 +192,6 @@ class _RotationMatrices:
         return self.moved(state, mean, 1.0)
 
 
-@dataclass(frozen=True)
-class ReplayModel:
-    """Torque and inertia that a flight is replayed with.
-
-    Attributes
-    ----------
-    torque : array, shape (time, 3), N m, body frame
-        Of the rotors and of the effects of the model, evaluated along the measured motion.
-    inertia : array, shape (3, 3), kg m^2, or InertiaModel
-        A tensor, or a model in Euler coordinates.
-    """
-
-    torque: Array
-    inertia: Array | InertiaModel
-
-
-def momentum_runs(
-    model: ReplayModel, starts: IntArray, rate: Array, rotation: Array | None, period: float, horizon: int
-) -> Iterator[tuple[Array, Array | None]]:
-    """Integrate free runs in momentum form from samples of a flight, driven by a torque along the flight.
-
-    ``d/dt momentum = M - direct(attitude, rate)`` and ``dR/dt = R [rate]_x``; for a rigid body the momentum is
-    ``I omega`` and the direct term ``omega x I omega``. Between samples the torque is a straight line.
-
-    Parameters
-    ----------
-    model : ReplayModel
-    starts : array of int, shape (run,)
-        Samples of the torque.
-    rate : array, shape (run, 3), rad/s, body frame
-        At the starts.
-    rotation : array, shape (run, 3, 3), or None
-        Body to world, at the starts; None where the attitude is not known.
-    period : float, s
-        Between samples.
-    horizon : int
-        Samples.
-
-    Yields
-    ------
-    rate : array, shape (run, 3), rad/s, body frame
-    rotation : array, shape (run, 3, 3), or None
-
-    Raises
-    ------
-    ComputationError
-        If the model needs an attitude that the flight lacks, or has no inverse somewhere.
-    """
-    if rotation is None and not isinstance(model.inertia, np.ndarray):
-        raise ComputationError("a model in Euler coordinates needs the attitude, which the flight lacks")
-    equation = _Momenta(model.inertia, period)
-    state = _MomentumState(equation.momentum(rotation, rate), rotation)
-    for sample in range(horizon):
-        begin, end = model.torque[starts + sample], model.torque[starts + sample + 1]
-        state = runge_kutta_step(equation, state, (begin, 0.5 * (begin + end), end))
-        yield equation.rate(state), state.rotation
-
-
-class _MomentumState(NamedTuple):
-    """Momenta in the body frame, shape (run, 3), N m s, and rotations, or their derivatives."""
-
-    momentum: Array
-    rotation: Array | None
-
-
-class _Evaluated(NamedTuple):
-    """A model in Euler coordinates at the attitudes of the runs."""
-
-    attitude: Array
-    inertia: InertiaValues
-
-
-@dataclass(frozen=True)
-class _Momenta:
-    """Momenta and rotation matrices of a tensor, or of a model in Euler coordinates."""
-
-    inertia: Array | InertiaModel
-    step: float
-
-    def momentum(self, rotation: Array | None, rate: Array) -> Array:
-        return rotations.multiply(self._matrices(rotation, len(rate))[0], rate)
-
-    def rate(self, state: _MomentumState) -> Array:
-        return _solved(self._matrices(state.rotation, len(state.momentum))[0], state.momentum)
-
-    def slope(self, state: _MomentumState, torque: Array) -> _MomentumState:
-        matrices, model = self._matrices(state.rotation, len(torque))
-        rate = _solved(matrices, state.momentum)
-        if model is None:
-            direct = np.cross(rate, state.momentum)
-        else:
-            _, direct = momentum_form(model.attitude, rate, model.inertia)
-        return _MomentumState(torque - direct, None if state.rotation is None else _turning(state.rotation, rate))
-
-    def moved(self, state: _MomentumState, slope: _MomentumState, share: float) -> _MomentumState:
-        interval = share * self.step
-        momentum = state.momentum + interval * slope.momentum
-        if state.rotation is None or slope.rotation is None:
-            return _MomentumState(momentum, None)
-        return _MomentumState(momentum, state.rotation + interval * slope.rotation)
-
-    def joined(self, state: _MomentumState, slopes: tuple[_MomentumState, ...]) -> _MomentumState:
-        for slope, share in zip(slopes, (1 / 6, 1 / 3, 1 / 3, 1 / 6), strict=True):
-            state = self.moved(state, slope, share)
-        return state
-
-    def _matrices(self, rotation: Array | None, runs: int) -> tuple[Array, _Evaluated | None]:
-        """Compute the matrix from rate to momentum, ``W^-T J W^-1`` in Euler coordinates."""
-        if isinstance(self.inertia, np.ndarray):
-            return np.broadcast_to(self.inertia, (runs, 3, 3)), None
-        assert rotation is not None
-        attitude = rotations.euler_angles(rotation)
-        values = self.inertia.inertia(attitude)
-        inverse = np.linalg.inv(rotations.euler_rate_matrix(attitude))
-        return inverse.swapaxes(1, 2) @ values.value @ inverse, _Evaluated(attitude, values)
-
-
 def _turning(rotation: Array, rate: Array) -> Array:
     """Multiply ``R [rate]_x``: row by row a cross product with the rate."""
     return np.cross(rotation, rate[:, None])
-
-
-def _solved(matrices: Array, momentum: Array) -> Array:
-    try:
-        return np.asarray(np.linalg.solve(matrices, momentum[..., None])[..., 0])
-    except np.linalg.LinAlgError as error:
-        raise ComputationError("the inertia matrix of the model has no inverse at an attitude of the flight") from error

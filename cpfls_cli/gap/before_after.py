@@ -1,4 +1,4 @@
-"""A model before and after its effects, on held-out flights: replay errors, whiteness, and the worst stretches."""
+"""A model before and after its effects, on held-out flights: playback, whiteness, and the worst stretches."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.balance.windows import Recording, Windows, common_windows
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
-from cpfls_cli.gap.replay import Replayed, WorstStretch, replayed, worst_stretch
-from cpfls_cli.gap.residual.views import Whiteness, stretches, whiteness
+from cpfls_cli.gap.playback import PlayedPair, WorstStretch, errors_by_horizon, played_pairs, worst_stretch
+from cpfls_cli.gap.residual.views import Stretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.replay import Replay
 
 _SHORTEST_S = 4.0
 _PER_WINDOW = 16
@@ -53,28 +53,27 @@ class BeforeAfter:
     ----------
     centres : array, shape (window,), s
     flight_index : array of int, shape (window,)
-    before, after, held : Replayed
-        Of the model as given, with effects, and of rates that stay what they are.
+    played : list of PlayedPair
+    playback : Replay
+    stretches : tuple of Stretch
+        Of the model as given, largest gap first.
     white_before, white_after : Whiteness
     lag_s : float
         Between windows without common samples.
     picture : StretchCurves
-    run_flight : int
-        Number of the flight of `run`.
     run : WorstStretch
         Free runs over the stretch in which the model as given was worst.
     """
 
     centres: Array
     flight_index: IntArray
-    before: Replayed
-    after: Replayed
-    held: Replayed
+    played: list[PlayedPair]
+    playback: Replay
+    stretches: tuple[Stretch, ...]
     white_before: Whiteness
     white_after: Whiteness
     lag_s: float
     picture: StretchCurves
-    run_flight: int
     run: WorstStretch
 
 
@@ -93,49 +92,29 @@ def before_after(
     settings : GapSettings
     """
     windows = common_windows(held, settings)
-    signals = [recording.signals for recording in held]
-    centres = [windows.centres(each.time) for each in signals]
+    centres = [windows.centres(recording.signals.time) for recording in held]
     index = np.repeat(np.arange(len(held)), [len(each) for each in centres])
-    given = plain(model.base)
     stride = -(-len(windows.weight) // windows.hop)
-    runs = [_run(each, given, model) for each in signals]
-    worst = int(np.argmax([_size(run) for run in runs]))
+    played = played_pairs(held, model, plain(model.base))
+    in_floors = unseen.before * unseen.known / unseen.floor
+    found = stretches(in_floors, np.concatenate(centres), index, level=0.0)
     return BeforeAfter(
         np.concatenate(centres),
         index,
-        replayed(signals, given, settings.horizon),
-        replayed(signals, model, settings.horizon),
-        replayed(signals, None, settings.horizon),
+        played,
+        errors_by_horizon(played, settings.horizon),
+        found,
         whiteness(unseen.before * unseen.known, index, stride),
         whiteness(unseen.after * unseen.known, index, stride),
         stride * windows.hop * windows.period,
-        _picture(held, unseen, np.concatenate(centres), index, windows, model, settings),
-        worst,
-        runs[worst],
+        _picture(held, found[0], windows, model, settings),
+        worst_stretch(played),
     )
 
 
-def _run(signals: Signals, given: ExtendedModel, model: ExtendedModel) -> WorstStretch:
-    # The model as given knows of no fault of the sensors and takes the log as it is, so that a fault shows.
-    repaired = model.repaired(signals)
-    return worst_stretch(repaired, given.replay_model(signals), model.replay_model(repaired), signals)
-
-
-def _size(run: WorstStretch) -> float:
-    return float(np.mean((run.before - run.measured) ** 2))
-
-
 def _picture(
-    held: Sequence[Recording],
-    unseen: HeldOut,
-    centres: Array,
-    index: IntArray,
-    windows: Windows,
-    model: ExtendedModel,
-    settings: GapSettings,
+    held: Sequence[Recording], stretch: Stretch, windows: Windows, model: ExtendedModel, settings: GapSettings
 ) -> StretchCurves:
-    in_floors = unseen.before * unseen.known / unseen.floor
-    stretch = stretches(in_floors, centres, index, level=0.0, most=1)[0]
     channel = CHANNELS.index(stretch.channel)
     dense = replace(windows, hop=max(1, len(windows.weight) // _PER_WINDOW))
     recording = held[stretch.flight]

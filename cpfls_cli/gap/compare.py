@@ -16,11 +16,12 @@ from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.results import NotExcited
 from cpfls_cli.gap.naming.search import best_floor, block_index
-from cpfls_cli.gap.replay import Replayed, replayed
+from cpfls_cli.gap.playback import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
 from cpfls_cli.gap.residual.views import HeatMap, Stretch, heat_map, stretches
 from cpfls_cli.gap.sensors.audit import Audit, audit
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.playback.replay import Replay
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,9 @@ class Disagreement:
     worst : WorstChannel or None
         None where no two signals tell anything.
     not_excited : tuple of NotExcited
-    replayed, held : Replayed
-        Errors by horizon of the model, and of rates that stay what they are.
+    played : list of PlayedPair
+        The model alone.
+    playback : Replay
     """
 
     audit: Audit
@@ -75,8 +77,8 @@ class Disagreement:
     dependence: tuple[Dependence, ...]
     worst: WorstChannel | None
     not_excited: tuple[NotExcited, ...]
-    replayed: Replayed
-    held: Replayed
+    played: list[PlayedPair]
+    playback: Replay
 
     @property
     def floors(self) -> Array:
@@ -130,6 +132,8 @@ def compare(
     known = _known(flights)
     rms = _rms(residual, known)
     effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
+    repairing = replace(model, audit=audited)
+    played = played_pairs(recordings, repairing, repairing)
     return Disagreement(
         audited,
         rms,
@@ -143,8 +147,8 @@ def compare(
         dependence,
         _worst(residual, rms / floor, dependence, states),
         not_excited(hypothesis, effects, floor),
-        replayed([recording.signals for recording in recordings], replace(model, audit=audited), settings.horizon),
-        replayed([recording.signals for recording in recordings], None, settings.horizon),
+        played,
+        errors_by_horizon(played, settings.horizon),
     )
 
 

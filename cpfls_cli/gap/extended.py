@@ -11,9 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
-from cpfls_cli.dynamics.integration import ReplayModel
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
-from cpfls_cli.effects.catalogue.parameter_error import coupling, inertia_correction
+from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
@@ -175,18 +174,6 @@ class ExtendedModel:
         if self.base is None:
             return inertia_tensor(signals.vehicle) + correction
         return Corrected(self.base, correction)
-
-    def replay_model(self, signals: Signals) -> ReplayModel:
-        """Build the model of a replay: torque along the measured motion, and the refitted inertia.
-
-        Parameters
-        ----------
-        signals : Signals
-            With the faults of sensors taken out.
-        """
-        coupled = instantaneous(columns_of(nuisance(), signals), coupling(self.parameters), signals.time)
-        torque = signals.wrench[:, :3] + self.effect_wrench(signals)[:, :3] + coupled[:, :3]
-        return ReplayModel(torque, self.inertia(signals))
 
     def inertial_torque(self, signals: Signals) -> Array:
         """Compute the inertial torque of the motion with the refitted inertia.

@@ -1,4 +1,4 @@
-"""A model with effects made ready for playback: what is a polynomial is simulated, the rest acts along the flight."""
+"""A model with effects played back along flights: what is a polynomial is simulated, the rest acts along the flight."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
@@ -18,13 +18,27 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import is_free
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of
+from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import Corrected, ExtendedModel, FittedEffect, instantaneous
 from cpfls_cli.playback.flight import PlaybackFlight, playback_flight
 from cpfls_cli.playback.model import VehicleModel, body_of, rotor_weights
-from cpfls_cli.playback.replay import Player, rotor_terms_along, stated_along
+from cpfls_cli.playback.replay import (
+    STATED,
+    Played,
+    Player,
+    Replay,
+    Runs,
+    drawn_runs,
+    free_runs,
+    replay,
+    rotor_terms_along,
+    stated_along,
+)
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+_EVERY = 5
+_STRETCH_S, _RUN_S = 2.0, 1.0
 _ROUNDING = 1e-9
 _COUPLED = ("qr", "pr", "pq")
 _PRODUCTS = tuple(STATE_TERMS.index(name) for name in _COUPLED)
@@ -183,3 +197,110 @@ def _by_step(values: Array) -> Array:
 def _sum(first: Array | None, second: Array | None) -> Array | None:
     known = [values for values in (first, second) if values is not None]
     return np.asarray(sum(known)) if known else None
+
+
+@dataclass(frozen=True)
+class PlayedPair(Played):
+    """A flight, a model with effects, and the model as given, which takes the log as it is.
+
+    Attributes
+    ----------
+    logged : PlaybackFlight
+        With the faults of the sensors, so that a fault shows.
+    """
+
+    logged: PlaybackFlight
+
+    def runs(self, prediction: str, starts: IntArray, horizon: int) -> Runs:
+        """Predict from samples of the flight."""
+        if prediction == STATED:
+            return free_runs(self.stated, self.logged, starts, horizon)
+        return super().runs(prediction, starts, horizon)
+
+    @property
+    def as_given(self) -> Played:
+        """The flight as logged and the model as given."""
+        return Played(self.logged, self.stated, self.stated)
+
+
+def played_pairs(recordings: Sequence[Recording], model: ExtendedModel, given: ExtendedModel) -> list[PlayedPair]:
+    """Make flights, a model with effects and the model as given ready for playback.
+
+    Raises
+    ------
+    InputError
+        If a flight lacks a signal that an effect needs.
+    """
+    return [_pair(recording.name, recording.signals, model, given) for recording in recordings]
+
+
+def _pair(name: str, signals: Signals, model: ExtendedModel, given: ExtendedModel) -> PlayedPair:
+    hold: Hold = "previous" if signals.commanded else "linear"
+    flight, player = extended_player(model, name, [model.repaired(signals)], hold)
+    if given is model:
+        return PlayedPair(flight, player, player, flight)
+    logged, stated = extended_player(given, name, [given.repaired(signals)], hold)
+    return PlayedPair(flight, player, stated, logged)
+
+
+def errors_by_horizon(pairs: Sequence[PlayedPair], horizon: int) -> Replay:
+    """Play back from every fifth sample of the flights.
+
+    Parameters
+    ----------
+    pairs : sequence of PlayedPair
+        Of one rate.
+    horizon : int
+        Samples, at most.
+    """
+    longest = min(horizon, *(len(pair.flight) - 1 - _EVERY for pair in pairs))
+    return replay(pairs, longest, _EVERY)
+
+
+@dataclass(frozen=True)
+class WorstStretch:
+    """Measured and simulated body rates over the stretch of flights in which the model as given is farthest off.
+
+    Attributes
+    ----------
+    flight : int
+        Number of the flight.
+    first : int
+        Sample of the flight at which it begins.
+    measured, before, after : array, shape (run, sample, 3), rad/s, body frame
+        Each run starts from the measured rates.
+    axis : int
+        Body axis on which the model as given is worst.
+    """
+
+    flight: int
+    first: int
+    measured: Array
+    before: Array
+    after: Array
+    axis: int
+
+
+def worst_stretch(pairs: Sequence[PlayedPair]) -> WorstStretch:
+    """Find where free runs of the model as given, one second each and one after another, are farthest off.
+
+    Raises
+    ------
+    InputError
+        If a flight is shorter than one run.
+    """
+    samples = max(2, round(_RUN_S / pairs[0].flight.motion.period))
+    found = [_worst(index, pair, samples) for index, pair in enumerate(pairs)]
+    return max(found, key=lambda stretch: float(((stretch.before - stretch.measured) ** 2).mean()))
+
+
+def _worst(index: int, pair: PlayedPair, samples: int) -> WorstStretch:
+    starts = pair.flight.starts(samples - 1, samples)
+    before = drawn_runs(pair.as_given, starts, samples - 1).model
+    after = drawn_runs(pair, starts, samples - 1)
+    square = ((before - after.measured) ** 2).sum(axis=1)
+    joined = min(len(starts), round(_STRETCH_S / _RUN_S))
+    begin = int(np.convolve(square.sum(axis=1), np.ones(joined), mode="valid").argmax())
+    runs = slice(begin, begin + joined)
+    axis = int(square[runs].sum(axis=0).argmax())
+    return WorstStretch(index, int(starts[begin]), after.measured[runs], before[runs], after.model[runs], axis)

@@ -10,16 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.diagnosis import KINDS, DiagnosisRecord, PictureGroup, RunGroup
-from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
-from cpfls_cli.gap.naming.results import GapVerdict
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord, PictureGroup, RunGroup
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.pages.disagreement import flight_warnings
 from cpfls_cli.pages.disagreement import verdict_box as disagreement_box
 from cpfls_cli.pages.effects import (
-    closest_sentence,
     coefficients_table,
-    effect_sentence,
     effect_title,
     effects_table,
     intervals_figure,
@@ -28,6 +23,7 @@ from cpfls_cli.pages.effects import (
     titles,
 )
 from cpfls_cli.pages.extended import verdict_box as extended_box
+from cpfls_cli.pages.first_screen import first_screen, model_words, notes_on_flights
 from cpfls_cli.pages.gap import (
     AXES,
     BEFORE,
@@ -38,55 +34,38 @@ from cpfls_cli.pages.gap import (
     gap_table,
     keep_in_view,
     marked,
-    replay_figure,
-    replay_text,
 )
+from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import sensor_warnings, sensors_answer, unseen_answer
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import GREY, legend_over, plain_ticks, plot, stacked
-from cpfls_cli.report.content import Block, Box, Facts, Heading, Plot, Section, Text, Tone
-from cpfls_cli.report.numbers import joined, number, sentence
+from cpfls_cli.report.content import Block, Heading, Plot, Section, Text
+from cpfls_cli.report.numbers import joined, sentence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cpfls_cli.gap.naming.results import Unexplained
-
-_TONES: dict[str, Tone] = {
-    GapVerdict.NAMED: "good",
-    GapVerdict.NO_GAP: "good",
-    GapVerdict.NOT_EXCITED: "note",
-    GapVerdict.AMBIGUOUS: "note",
-    GapVerdict.PARTIAL: "note",
-    GapVerdict.UNEXPLAINED: "warning",
-    GapVerdict.FLIGHTS_DIFFER: "warning",
-}
-_ENERGY = {
-    "feeds": "; it feeds energy into the motion",
-    "drains": "; it drains energy from the motion",
-}
 _BAND = 1.96
 
 
 def answer(diagnosis: Source[DiagnosisRecord]) -> Iterator[Block]:
     """Say what a model misses, how sure that is, what the flights cannot show, and what to distrust."""
     record = diagnosis.record
-    yield from _verdict(diagnosis, 1)
+    yield from first_screen(record, 1)
     yield from _forces_decide(record)
-    yield from replay_text(record.replay)
     yield from unseen_answer(record.not_excited)
     yield from sensors_answer(record.audit)
     yield from sensor_warnings(record.audit)
 
 
 def gap_blocks(sources: Sources) -> Iterator[Block]:
-    """Say what is missing, or where the gap is if nobody asked yet."""
+    """Say what is missing, or where the gap is if nobody asked yet; notes on the flights come last, folded."""
     several = len(sources.diagnoses) > 1
     for index, diagnosis in enumerate(sources.diagnoses, start=1):
         yield from [Heading(diagnosis.label)] if several else []
-        yield from _verdict(diagnosis, index)
-        yield from _as_sentences(sensor_warnings(diagnosis.record.audit))
+        yield from first_screen(diagnosis.record, index)
+        yield from (replace(each, text=sentence(each.text)) for each in sensor_warnings(diagnosis.record.audit))
     for extended in sources.extensions:
         if sources.by_hash(extended.made_from("diagnosis")) is None:
             yield extended_box(extended)
@@ -94,118 +73,8 @@ def gap_blocks(sources: Sources) -> Iterator[Block]:
     for disagreement in sources.disagreements:
         if disagreement.sha256 not in answered:
             yield disagreement_box(disagreement)
-        yield from _as_sentences(flight_warnings(disagreement.record))
-
-
-def _as_sentences(warnings: Iterator[Text]) -> Iterator[Text]:
-    return (replace(warning, text=sentence(warning.text)) for warning in warnings)
-
-
-def _verdict(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator[Block]:
-    record = diagnosis.record
-    yield verdict_box(record)
-    yield from (Text(sentence(remark), "note") for remark in record.remarks)
-    caption = (
-        "The gap on flights held out from the fit, root mean square. A floor is what noise alone would leave; a gap of "
-        f"up to {CLEAR:g} floors is none."
-    )
-    yield gap_table(f"gap-{index}", record.gap, caption)
-    flights = ((word, record.flights.names(role)) for word, role in (("Fitted to", TRAINING), ("Held out", HELD_OUT)))
-    yield Facts([*((word, ", ".join(names)) for word, names in flights), ("Why", sentence(record.split))])
-
-
-def verdict_box(record: DiagnosisRecord) -> Box:
-    """Say what a diagnosis found."""
-    verdict = record.verdict
-    named = [effect_sentence(effect) for effect in record.effects.named]
-    named += [closest_sentence(effect) for effect in record.effects.closest]
-    rivals = list(_rivals(record))
-    # What hangs on another flight comes first.
-    effects = [*rivals, *named] if verdict == GapVerdict.AMBIGUOUS else [*named, *rivals]
-    unexplained = [_unexplained_sentence(each) for each in record.unexplained.unexplained()]
-    sentences = [*effects, *unexplained, *_shrunk(record)]
-    return Box(verdict.replace("_", " "), _headline(record), sentences, _TONES.get(verdict, "note"))
-
-
-def _headline(record: DiagnosisRecord) -> str:
-    match record.verdict:
-        case GapVerdict.NO_GAP:
-            return "Nothing is missing that these flights can show."
-        case GapVerdict.NOT_EXCITED:
-            return "These flights move too little to show whether anything is missing."
-        case GapVerdict.UNEXPLAINED:
-            return "There is a gap that nothing in the catalogue explains."
-        case GapVerdict.FLIGHTS_DIFFER:
-            return "These flights differ: what shows in some of them does not show in the others."
-        case GapVerdict.AMBIGUOUS if record.alternative.name:
-            return _ambiguous(record)
-    named = " ".join(_blame(record)) or "There is a gap without a name."
-    return f"{named} That is the closest, not all of it." if record.verdict == GapVerdict.PARTIAL else named
-
-
-def _blame(record: DiagnosisRecord) -> Iterator[str]:
-    """Say who is at fault: the model, the sensors, or the numbers of the vehicle."""
-    if record.effects_of_motion:
-        yield f"What the model misses is {joined(titles(record.effects_of_motion))}."
-    sensors = record.effects.names("sensor")
-    if sensors:
-        yield f"The sensors are at fault: {joined(titles(sensors))}."
-    if record.effects.names("parameter"):
-        yield "A number of the vehicle is wrong: its inertia or its thrust."
-
-
-def _ambiguous(record: DiagnosisRecord) -> str:
-    rivals: dict[str, list[str]] = {}
-    for name, instead_of in zip(record.alternative.name, record.alternative.instead_of, strict=True):
-        rivals.setdefault(instead_of, []).append(effect_title(name))
-    parts = [f"{effect_title(named)} from {joined(others, 'or')}" for named, others in rivals.items()]
-    certain = [name for name in record.effects.names() if name not in rivals]
-    besides = f" Besides, the model misses {joined(titles(certain))}." if certain else ""
-    return f"These flights cannot tell {joined(parts)}.{besides}"
-
-
-def _rivals(record: DiagnosisRecord) -> Iterator[str]:
-    """Say which effects look alike and which flight would tell them apart."""
-    rivals = record.alternative
-    for name, instead_of, flight in zip(rivals.name, rivals.instead_of, rivals.separated_by, strict=True):
-        yield f"It could be {effect_title(name)} instead of {effect_title(instead_of)}. To tell: {flight}."
-
-
-def _unexplained_sentence(channel: Unexplained) -> str:
-    """Say on which axis something is left, and what it follows."""
-    follows = [f"it follows {channel.signal} most"] if channel.signal else []
-    rings = [f"it rings at {number(channel.frequency_hz, 3)} Hz"] if channel.frequency_hz is not None else []
-    cause = joined([*follows, *rings]) if follows or rings else "it follows no one signal"
-    share = f" ({share_words(channel.share)} of it)" if follows or rings else ""
-    energy = _ENERGY.get(channel.energy, "")
-    return (
-        f"Left unexplained: {channel_words(channel.axis)}, {number(channel.floors, 2)} floors; {cause}{share}{energy}."
-    )
-
-
-def _shrunk(record: DiagnosisRecord) -> Iterator[str]:
-    gap = record.gap
-    if not gap.known:
-        return
-    worst, largest = int(np.nanargmax(gap.before_floors)), int(np.nanargmax(gap.after_floors))
-    before, after = number(float(gap.before_floors[worst]), 2), number(float(gap.after_floors[largest]), 2)
-    names = [channel_words(channel) for channel in gap.channel]
-    if record.verdict in (GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED) or not record.effects.names():
-        still = f"; with the closest effects {after} are left" if record.effects.closest else ""
-        yield f"On flights held out, the largest gap is {before} noise floors, in the {names[worst]}{still}."
-        return
-    yield (
-        f"On flights held out from the fit, the largest gap shrinks from {before} noise floors, in the {names[worst]}, "
-        f"to {after}, in the {names[largest]}. Of what stood above the noise, {_gone(record)}."
-    )
-
-
-def _gone(record: DiagnosisRecord) -> str:
-    """Say how much is gone: of torque and force each, where both had a gap."""
-    if record.shares is None or not np.isfinite(record.shares).all():
-        return f"{share_words(record.share)} is gone"
-    each = (f"{share_words(float(share))} of the {kind}" for kind, share in zip(KINDS, record.shares, strict=True))
-    return f"{joined(tuple(each))} is gone"
+    diagnoses = [diagnosis.record for diagnosis in sources.diagnoses]
+    yield from notes_on_flights([*diagnoses, *(disagreement.record for disagreement in sources.disagreements)])
 
 
 def _forces_decide(record: DiagnosisRecord) -> Iterator[Text]:
@@ -242,16 +111,6 @@ def _section(diagnosis: Source[DiagnosisRecord], index: int) -> Iterator[Block]:
     yield from _effects(record, index)
 
 
-def model_words(record: DiagnosisRecord) -> str:
-    """Say what the second model of a diagnosis is."""
-    if record.effects.names():
-        return f"with {joined(titles(record.effects.names()))}"
-    closest = [effect.name for effect in record.effects.closest]
-    if closest:
-        return f"with the closest effects, {joined(titles(closest))}, which are not the answer"
-    return "with nothing but the vehicle's own numbers refitted"
-
-
 def _pictures(record: DiagnosisRecord, index: int) -> Iterator[Block]:
     after, run = model_words(record), record.run
     if run is None:
@@ -265,11 +124,17 @@ def _pictures(record: DiagnosisRecord, index: int) -> Iterator[Block]:
 
 
 def _sizes(record: DiagnosisRecord, index: int) -> Iterator[Block]:
+    caption = (
+        "The gap on flights held out from the fit, root mean square. A floor is what noise alone would leave; a gap of "
+        f"up to {CLEAR:g} floors is none."
+    )
+    yield gap_table(f"gap-{index}", record.gap, caption)
     if record.gap.known:
         yield gap_sizes_figure(f"gap-sizes-{index}", record.gap)
-    yield from replay_text(record.replay)
-    drawn = record.replay and replay_figure(f"prediction-error-{index}", record.replay, "on held-out flights")
-    yield from [drawn] if drawn else []
+    if record.playback is not None:
+        yield from (Text(each) for each in beside_rivals(record.playback))
+        drawn = playback_figure(f"prediction-error-{index}", record.playback)
+        yield from [drawn] if drawn else []
     if record.whiteness is not None and len(record.whiteness.lag) > 1:
         yield whiteness_figure(f"whiteness-{index}", record)
 

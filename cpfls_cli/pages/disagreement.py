@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord, HeatMapGroup, ReplayGroup
+from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord, HeatMapGroup
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.pages.gap import channel_unit, channel_words, rates_off, replay_figure
+from cpfls_cli.pages.gap import channel_unit, channel_words
+from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.sensors import sensors_answer, unseen_answer
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import line, plain_ticks, plot, stacked
@@ -53,7 +54,7 @@ def answer(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
     record = disagreement.record
     yield verdict_box(disagreement)
     yield from where(disagreement)
-    yield from _replay_text(record.replay)
+    yield from _playback_text(record)
     yield from unseen_answer(record.not_excited)
     yield from sensors_answer(record.audit)
     yield from flight_warnings(record)
@@ -115,10 +116,10 @@ def _section(disagreement: Source[DisagreementRecord], index: int) -> Iterator[B
     yield Heading("What it follows")
     yield from _follows(record)
     yield from _signals(record, index)
-    drawn = None if record.replay is None else replay_figure(f"replay-{index}", record.replay, "on all flights")
+    drawn = None if record.playback is None else playback_figure(f"replay-{index}", record.playback)
     if drawn is not None:
         yield Heading("What a simulation makes of it")
-        yield from _replay_text(record.replay)
+        yield from _playback_text(record)
         yield drawn
 
 
@@ -175,13 +176,9 @@ def _signals(record: DisagreementRecord, index: int) -> Iterator[Block]:
         yield heat_map_figure(f"heat-map-{index}", record.heat_map)
 
 
-def _replay_text(replay: ReplayGroup | None) -> Iterator[Text]:
-    if replay is not None and replay.turns:
-        yield Text(
-            f"Simulated for {plain(float(replay.horizon_s[-1]))} s on the measured rotor speeds, the model is off by "
-            f"{rates_off(replay.rate_model)} (x, y, z); rates that stay as they are would be off by "
-            f"{rates_off(replay.rate_held)}."
-        )
+def _playback_text(record: DisagreementRecord) -> Iterator[Text]:
+    if record.playback is not None:
+        yield from (Text(each) for each in beside_rivals(record.playback))
 
 
 def residual_figure(name: str, record: DisagreementRecord) -> Plot:

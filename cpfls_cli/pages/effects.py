@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cpfls_cli.artifacts.gap_effects import NamedEffectsGroup
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.pages.gap import AFTER
 from cpfls_cli.report.canvas import plot
 from cpfls_cli.report.content import Plot, Table
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from cpfls_cli.arrays import Array
     from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 
+_RELATIVE = "_error"
+_SHORT = {"inertia_x": "Ixx", "inertia_y": "Iyy", "inertia_z": "Izz", "thrust_scale": "thrust"}
 _NUMBERS = {
     "inertia": "moment of inertia about",
     "coupling": "coupling of rates about",
@@ -55,9 +57,13 @@ def share_words(share: float) -> str:
 
 
 def effect_sentence(effect: NamedEffect) -> str:
-    """Say what a named effect is, how large, and how sure."""
-    title = effect_title(effect.name)
-    return f"{title[0].upper()}{title[1:]} ({effect.name}): {effect.sentence} {_size(effect)}."
+    """Say how large a named effect is, and how sure."""
+    return f"{capitalised(effect_title(effect.name))} ({effect.name}): {_size(effect)}."
+
+
+def capitalised(words: str) -> str:
+    """Begin with a capital."""
+    return words[0].upper() + words[1:]
 
 
 def closest_sentence(effect: NamedEffect) -> str:
@@ -68,15 +74,47 @@ def closest_sentence(effect: NamedEffect) -> str:
 def _size(effect: NamedEffect) -> str:
     chance = probability(effect.p_value)
     p_value = f"p {chance}" if chance.startswith("<") else f"p = {chance}"
-    numbers = "; ".join(_coefficient(coefficient) for coefficient in effect.coefficients)
+    relative = effect.name.endswith(_RELATIVE)
+    numbers = "; ".join(_relative(effect.name, c) if relative else _coefficient(c) for c in effect.coefficients)
     return f"{numbers} ({p_value}, {share_words(effect.share)} of the gap)".lstrip()
 
 
 def _coefficient(coefficient: Estimate) -> str:
+    """Write a value with its interval and unit; a power of ten that is that of all three stands once."""
     unit = unit_words(coefficient.unit)
-    words = (printed(text) for text in with_interval(coefficient.value, coefficient.low, coefficient.high))
-    value, low, high = words
-    return f"{coefficient.name} = {value} [{low}, {high}]{' ' if unit else ''}{unit}"
+    words = with_interval(coefficient.value, coefficient.low, coefficient.high)
+    power = _common_power(words)
+    value, low, high = (printed(text.removesuffix(power)) for text in words)
+    return f"{coefficient.name} = {value} [{low}, {high}]{printed(power)}{' ' if unit else ''}{unit}"
+
+
+def _common_power(numbers: Sequence[str]) -> str:
+    powers = {text.partition("e")[2] for text in numbers}
+    power = powers.pop() if len(powers) == 1 else ""
+    return f"e{power}" if power else ""
+
+
+def _relative(effect: str, number: Estimate) -> str:
+    """Write an error of a number of the vehicle as people do, `Izz +24 % [+20, +28]`."""
+    value, low, high = relative_words(number.value, number.low, number.high)
+    return f"{vehicle_number(effect, number.name)} {value} % [{low}, {high}]"
+
+
+def wrong_numbers(effects: NamedEffectsGroup) -> list[str]:
+    """List the numbers of the vehicle that a verdict calls wrong, each with its error, `Izz +24 %`."""
+    numbers = [(e.name, number) for e in effects.named if e.name == VEHICLE_NUMBERS.name for number in e.coefficients]
+    return [f"{vehicle_number(name, n.name)} {relative_words(n.value, n.low, n.high)[0]} %" for name, n in numbers]
+
+
+def vehicle_number(effect: str, name: str) -> str:
+    """Name a number of the vehicle as people do."""
+    return _SHORT.get(name, effect.removesuffix(_RELATIVE).replace("_", " "))
+
+
+def relative_words(value: float, low: float, high: float) -> list[str]:
+    """Write a relative error and the ends of its interval in per cent, with their signs."""
+    numbers = with_interval(*(100.0 * each for each in (value, low, high)))
+    return [printed(text if text.startswith("-") or not float(text) else f"+{text}") for text in numbers]
 
 
 def effects_table(name: str, effects: NamedEffectsGroup) -> Table:

@@ -9,7 +9,8 @@ import numpy as np
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.effects import coefficients_table, effect_sentence, intervals_figure, parameters_table, titles
-from cpfls_cli.pages.gap import gap_sizes_figure, gap_table, replay_figure, replay_text
+from cpfls_cli.pages.gap import gap_sizes_figure, gap_table
+from cpfls_cli.pages.replay import beside_rivals, playback_figure
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.content import Block, Box, Facts, Heading, Section, Table, Text
 from cpfls_cli.report.numbers import joined, number, sentence
@@ -19,7 +20,7 @@ def answer(extended: Source[ExtendedRecord]) -> Iterator[Block]:
     """Say what a model was extended by, what its gap becomes, and about which axes it gets worse."""
     yield verdict_box(extended)
     yield _gap_table(extended, 1)
-    yield from replay_text(extended.record.replay)
+    yield from _playback_text(extended.record)
     yield from (Text(warning, "warning") for warning in warnings(extended.record))
 
 
@@ -113,12 +114,17 @@ def _gap_table(extended: Source[ExtendedRecord], index: int) -> Table:
     return gap_table(f"extended-gap-{index}", extended.record.gap, caption)
 
 
+def _playback_text(record: ExtendedRecord) -> Iterator[Text]:
+    if record.playback is not None:
+        yield from (Text(each) for each in beside_rivals(record.playback))
+
+
 def _figures(record: ExtendedRecord, index: int) -> Iterator[Block]:
     if record.gap.known:
         yield gap_sizes_figure(f"extended-gap-sizes-{index}", record.gap)
-    yield from replay_text(record.replay)
+    yield from _playback_text(record)
     drawn = (
-        record.replay and replay_figure(f"extended-prediction-error-{index}", record.replay, "on held-out flights"),
+        record.playback and playback_figure(f"extended-prediction-error-{index}", record.playback),
         intervals_figure(f"extended-intervals-{index}", record.effects),
     )
     yield from (plot for plot in drawn if plot)

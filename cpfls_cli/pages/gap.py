@@ -1,17 +1,17 @@
-"""The gap on a page: channels in words, its size before and after, and how far simulations go astray."""
+"""The gap on a page: channels in words, and its size before and after."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.gap_effects import GapChangeGroup, ReplayChangeGroup, ReplayErrors
+from cpfls_cli.artifacts.gap_effects import GapChangeGroup
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.report.canvas import BASELINE, GREY, HELD, legend_over, plain_ticks, plot, style_of
-from cpfls_cli.report.content import Cell, Plot, Table, Text
+from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, plot, style_of
+from cpfls_cli.report.content import Cell, Plot, Table
 from cpfls_cli.report.numbers import number, plain
 
 if TYPE_CHECKING:
@@ -46,14 +46,6 @@ _GIVEN: dict[str, Any] = {
     "linestyle": "none",
 }
 _SHRUNK: dict[str, Any] = {"color": AFTER["color"], "marker": "o", "markersize": 7, "linestyle": "none"}
-_REPLAYS = {
-    "held": "rates stay as they are",
-    "before": "simulated before",
-    "model": "simulated",
-    "after": "simulated after",
-}
-_DEGREES = 180.0 / np.pi
-_ROWS = (("rate", "rate, rad/s", 1.0), ("attitude", "attitude, °", _DEGREES))
 
 
 def channel_words(channel: str) -> str:
@@ -152,71 +144,3 @@ def _scale(axes: Axes, largest: float) -> None:
     axes.set_xticks([], minor=True)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("gap, noise floors")
-
-
-def rates_off(error: Array) -> str:
-    """Write the error of the body rates at the longest horizon, rad/s about x, y and z.
-
-    Parameters
-    ----------
-    error : array, shape (horizon, 3), rad/s
-    """
-    return f"{', '.join(number(float(value), 2) for value in error[-1])} rad/s"
-
-
-def replay_text(replay: ReplayChangeGroup | None) -> Iterator[Text]:
-    """Say how far simulations of held-out flights are off at the longest horizon; nothing of flights without rates."""
-    if replay is not None and replay.turns:
-        before, after, held = (rates_off(each) for each in (replay.rate_before, replay.rate_after, replay.rate_held))
-        yield Text(
-            f"Simulated for {plain(float(replay.horizon_s[-1]))} s on the measured rotor speeds of held-out flights, "
-            f"the model as given is off by {before} (x, y, z), with the effects by {after}; rates that stay as they "
-            f"are would be off by {held}."
-        )
-
-
-def replay_figure(name: str, replay: ReplayErrors, where: str) -> Plot | None:
-    """Draw errors of body rates and attitude over the horizon, by axis.
-
-    Parameters
-    ----------
-    where : str
-        On which flights, for the caption.
-
-    Returns
-    -------
-    Plot or None
-        None where the rates never change, or for a single horizon.
-    """
-    horizon = replay.horizon_s
-    if len(horizon) < 2 or not replay.turns:
-        return None
-    styles = _replay_styles(len(horizon))
-    errors = {quantity: replay.errors(quantity) for quantity, _, _ in _ROWS}
-    rows = [row for row in _ROWS if np.isfinite(errors[row[0]]["held"]).any()]
-
-    def draw(figure: Figure) -> None:
-        grid = figure.subplots(len(rows), len(AXES), sharex=True, squeeze=False)
-        for panels, (quantity, label, scale) in zip(grid, rows, strict=True):
-            for key in (key for key in styles if key in errors[quantity]):
-                values = scale * errors[quantity][key]
-                for axes, column in zip(panels, values.T, strict=True):
-                    axes.plot(horizon, column, label=_REPLAYS[key], **styles[key])
-            for axes in panels:
-                axes.set_ylim(bottom=0.0)
-                plain_ticks(axes.yaxis)
-            panels[0].set_ylabel(label)
-        for axes, axis in zip(grid[0], AXES, strict=True):
-            axes.set_title(f"error about {axis}")
-        grid[-1][1].set_xlabel("horizon, s")
-        legend_over(figure, grid[0][0])
-
-    caption = (
-        f"Root mean square error after a simulation of so many seconds on the rotor speeds of the flight, from "
-        f"measured rates, {where}. A model that is worse than rates that stay as they are predicts nothing."
-    )
-    return plot(name, caption, "Error of simulated rates and attitude over the horizon", 1.0 + 1.7 * len(rows), draw)
-
-
-def _replay_styles(points: int) -> Mapping[str, dict[str, Any]]:
-    return {"held": HELD, "before": BEFORE, "model": {**BEFORE, "color": "black"}, "after": marked(points)}

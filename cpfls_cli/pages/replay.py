@@ -31,7 +31,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MODEL, _NOTHING, _RATE, _STATED = range(4)
-_WORDS = ("the model", "nothing moves", "rate stays", "stated vehicle")
+_WORDS = {
+    "model": "the model",
+    "after": "with the effects",
+    "nothing-moves": "nothing moves",
+    "rate-stays": "rate stays",
+    "stated": "stated vehicle",
+    "before": "as given",
+}
 _SIGNALS = {
     "body_rate": ("body rate", "rad/s", 1.0),
     "attitude": ("attitude", "°", 180.0 / np.pi),
@@ -101,13 +108,13 @@ def _name(record: ErrorsByHorizon) -> str:
 def _rivals(record: ErrorsByHorizon) -> dict[str, tuple[SignalErrorGroup, int]]:
     """Pair each signal with what a model has to beat in it: the better of the two that know no model."""
     known = {name: group for name, group in record.errors.items() if group is not None}
-    return {name: (g, _RATE if g.total[_RATE] < g.total[_NOTHING] else _NOTHING) for name, g in known.items()}
+    return {name: (group, group.rival) for name, group in known.items()}
 
 
 def _sentence(record: ErrorsByHorizon, name: str, group: SignalErrorGroup, rival: int) -> str:
     words, (model, other) = _SIGNALS[name][0].capitalize(), group.total[[_MODEL, rival]]
     if other == 0:
-        return f"{words}: “{_WORDS[rival]}” has no error, for the flight shows no motion."
+        return f"{words}: “{_WORDS[record.prediction[rival]]}” has no error, for the flight shows no motion."
     if model < other:
         much = f"over all horizons its errors are {whole_percent(float(1 - model / other))} smaller"
     else:
@@ -121,7 +128,7 @@ def _where(record: ErrorsByHorizon, group: SignalErrorGroup, rival: int) -> str:
     longest = sorted(sorted(runs(better), key=lambda run: run[0] - run[1])[:_SAID])
     horizon = [_seconds(value) for value in record.horizon_s]
     stretches = [f"{horizon[a]} to {horizon[b]}" if a < b else horizon[a] for a, b in longest]
-    other = f"“{_WORDS[rival]}”"
+    other = f"“{_WORDS[record.prediction[rival]]}”"
     if better.all():
         return f"better than {other} at every horizon to {horizon[-1]}"
     return f"better than {other} at {joined(stretches)}" if stretches else f"better than {other} at no horizon"
@@ -141,7 +148,8 @@ def _beside_stated(record: ReplayRecord) -> Iterator[str]:
 def _diverged(record: ReplayRecord) -> Iterator[str]:
     for index, count in enumerate(record.diverged.tolist()):
         if count and not (index == _STATED and record.played == VEHICLE):
-            who, where = (_name(record), f", first {_first_lost(record)}") if index == _MODEL else (_WORDS[index], "")
+            others = (_WORDS[record.prediction[index]], "")
+            who, where = (_name(record), f", first {_first_lost(record)}") if index == _MODEL else others
             yield (
                 f"{who}: runs away in {count} of {record.windows} windows{where}; a run is stopped there and counts as "
                 "it stood"
@@ -163,7 +171,7 @@ def _chosen_horizons(record: ErrorsByHorizon) -> list[int]:
 
 def _shown(record: ErrorsByHorizon) -> list[int]:
     """List the predictions that are shown: the stated vehicle once."""
-    return [_MODEL, _NOTHING, _RATE, *([] if record.played == VEHICLE else [_STATED])]
+    return [row for row in range(len(record.prediction)) if row != _STATED or record.played != VEHICLE]
 
 
 def errors_table(record: ErrorsByHorizon, index: int) -> Table:
@@ -179,7 +187,7 @@ def errors_table(record: ErrorsByHorizon, index: int) -> Table:
             rows.append(
                 [
                     f"{words}, {unit}" if row == 0 else "",
-                    _WORDS[row],
+                    _WORDS[record.prediction[row]],
                     *cells[:-1],
                     Cell(cells[-1], "warning" if worse else "plain"),
                 ]
@@ -265,6 +273,22 @@ def _facts(record: ReplayRecord) -> list[tuple[str, str]]:
     ]
 
 
+def prediction_words(prediction: str) -> str:
+    """Say what predicts."""
+    return _WORDS[prediction]
+
+
+def signal_scale(signal: str) -> tuple[str, str, float]:
+    """Give the name of a signal, the unit that people read, and by what errors in SI are multiplied for it."""
+    return _SIGNALS[signal]
+
+
+def playback_figure(name: str, record: ErrorsByHorizon) -> Plot | None:
+    """Draw the mean error over the horizon; None of a single one, or of flights that show no motion."""
+    moves = any(group.total[rival] > 0 for group, rival in _rivals(record).values())
+    return horizon_figure(name, record) if moves and len(record.horizon_s) > 1 else None
+
+
 def horizon_figure(name: str, record: ErrorsByHorizon) -> Plot:
     """Draw the mean error over the horizon, beside what a model has to beat."""
     groups = _rivals(record)
@@ -275,7 +299,7 @@ def horizon_figure(name: str, record: ErrorsByHorizon) -> Plot:
             words, unit, scale = _SIGNALS[signal]
             values = scale * group.mae
             for row in reversed(_shown(record)):
-                line(axes, record.horizon_s, values[row], label=_WORDS[row], **_STYLES[row])
+                line(axes, record.horizon_s, values[row], label=_WORDS[record.prediction[row]], **_STYLES[row])
             top = 1.6 * float(values[[_MODEL, _NOTHING, _RATE]].max())
             axes.set_ylim(0.0, min(top, 1.06 * float(values.max())) or 1.0)
             axes.set_title(f"{words}, {unit}")
@@ -364,8 +388,8 @@ def where_figure(name: str, record: ReplayRecord) -> Plot:
         for index, (axes, flight) in enumerate(zip(panels, record.flight.name, strict=True)):
             own = window.flight == index
             nothing, model = window.error[_NOTHING, own], window.error[_MODEL, own]
-            line(axes, window.start[own], nothing, label=_WORDS[_NOTHING], **HELD)
-            line(axes, window.start[own], model, label=_WORDS[_MODEL], **style_of(0))
+            line(axes, window.start[own], nothing, label=_WORDS[record.prediction[_NOTHING]], **HELD)
+            line(axes, window.start[own], model, label=_WORDS[record.prediction[_MODEL]], **style_of(0))
             keep_in_view(axes, [nothing], model)
             axes.set_ylim(bottom=0.0)
             plain_ticks(axes.yaxis)

@@ -125,7 +125,7 @@ def printed(text: str) -> str:
         With a minus sign, and ``× 10`` with a raised power.
     """
     mantissa, _, power = text.partition("e")
-    raised = f" × 10{power.translate(_SUPERSCRIPT)}" if power else ""
+    raised = f" × 10{str(int(power)).translate(_SUPERSCRIPT)}" if power else ""
     return mantissa.replace("-", "−") + raised
 
 

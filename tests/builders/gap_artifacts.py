@@ -21,6 +21,10 @@ EFFECT = {
     "sentence": SENTENCE,
 }
 
+OFFSET = ("c_x", "m", 0.01, 0.009, 0.0111, -0.06, 0.06)
+NUMBERS = {"parameter": ("inertia_z", "1", 0.24, 0.2, 0.281, -0.9, 3.0)}
+"""A coefficient of an effect, by the kind of the effect."""
+
 
 def texts(*values):
     return np.array(values) if values else np.array([], dtype="U1")
@@ -62,12 +66,25 @@ def flights(names=("one.csv", "two.csv"), roles=("training", "held-out")):
     }
 
 
-def replay(*names):
-    growth = np.arange(1, HORIZON + 1)[:, None] * np.ones(3)
-    data = {"replay/horizon": np.arange(1, HORIZON + 1), "replay/horizon_s": np.arange(1, HORIZON + 1) * 0.01}
-    for place, name in enumerate(names):
-        data |= {f"replay/rate_{name}": growth * 0.001 / (place + 1), f"replay/attitude_{name}": growth * 0.0001}
+def playback(*predictions, **sizes):
+    """Errors that grow with the horizon; by signal those of the predictions after the last sample."""
+    given = {"body_rate": (0.1, 1.0, 1.0, 2.0), "attitude": (0.01, 0.2, 0.1, 0.3)} | sizes
+    data = {
+        "playback/flight": texts("two.csv"),
+        "playback/windows": 60,
+        "playback/prediction": texts(*predictions),
+        "playback/horizon_s": np.arange(1, HORIZON + 1) * 0.01,
+        "playback/diverged": np.zeros(len(predictions), dtype=int),
+    }
+    growth = np.arange(1, HORIZON + 1) / HORIZON
+    for signal, ends in given.items():
+        mae = np.outer(ends[: len(predictions)], growth)
+        data |= {f"playback/{signal}/mae": mae, f"playback/{signal}/rms": np.repeat(mae[:, :, None], 3, axis=2)}
     return data
+
+
+def played_pair(**sizes):
+    return playback("after", "nothing-moves", "rate-stays", "before", **sizes)
 
 
 def disagreement(force=True, **changed):
@@ -100,7 +117,7 @@ def disagreement(force=True, **changed):
         "heat_map/second_edge": np.linspace(-3, 3, 13),
         "heat_map/mean": cells,
         "heat_map/count": np.ones((12, 12)),
-        **replay("model", "held"),
+        **playback("model", "nothing-moves", "rate-stays"),
         **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
         **audit(),
         "warning": texts("one.csv: rotor 2 looks saturated"),
@@ -113,9 +130,7 @@ def disagreement(force=True, **changed):
 def effects(*rows):
     rows = [{**EFFECT, **row} for row in rows]
     order = ("name", "kind", "named", "p_value", "share", "selection_frequency", "sentence")
-    coefficients = [
-        (row["name"], "c_x", "m", 0.01, 0.009, 0.0111, -0.06, 0.06) for row in rows if row["kind"] != "parameter"
-    ]
+    coefficients = [(row["name"], *NUMBERS.get(row["kind"], OFFSET)) for row in rows]
     return {
         **table(
             "effect",
@@ -183,10 +198,15 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
         ),
         **table("torque_alone", ("'name", "share"), alone),
         **sizes(force),
-        **replay("before", "after", "held"),
+        **played_pair(),
+        **table(
+            "stretch",
+            ("flight", "start", "end", "'channel", "floors"),
+            [(0, 5.0, 6.2, "torque x", 90.0), (0, 1.0, 2.5, "force z", 80.0)],
+        ),
         "residual/time": np.arange(WINDOWS) * 0.2,
         "residual/flight": np.zeros(WINDOWS),
-        "residual/before": np.zeros((WINDOWS, 6)),
+        "residual/before": np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, sizes(force)["gap/before"]),
         "residual/parameters": np.zeros((WINDOWS, 6)),
         "residual/after": np.zeros((WINDOWS, 6)),
         **pictures(),
@@ -205,7 +225,7 @@ def extended(diagnosis_sha256="", **changed):
         "thrust_scale": 1.0123,
         **effects({}),
         **sizes(),
-        **replay("before", "after", "held"),
+        **played_pair(),
         **audit(),
         "base/kind": np.array("rigid-body"),
     }

@@ -6,7 +6,6 @@ import shutil
 from types import SimpleNamespace
 
 import h5py
-import numpy as np
 import pytest
 
 from tests.builders.command_line import undrawn
@@ -61,6 +60,10 @@ def test_unseen_gap_shrinks_to_the_noise_where_the_offset_acts(found):
 def test_json_has_every_promised_key(found):
     promised = {"verdict", "effects", "alternatives", "unexplained", "not_excited", "gap_before", "gap_after", "audit"}
     assert promised <= set(found.summary)
+    assert {"headline", "where", "playback", "next", "log_looks_wrong", "warnings"} <= set(found.summary)
+    assert found.summary["headline"] == "What the model misses is offset of the centre of mass."
+    assert found.summary["next"] == ["Take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write."]
+    assert found.summary["where"]["channels"] == ["torque y", "torque x"]
     assert {"parameters", "split", "extended", "disagreement"} <= set(found.summary)
     assert set(found.summary["effects"][0]) == {
         "name", "coefficients", "p_value", "share", "selection_frequency", "sentence",
@@ -123,9 +126,17 @@ def test_one_flight_is_split_in_time(cpfls, gap_config, shifted, tmp_path):
 
 def test_people_read_the_verdict_first(again):
     lines = again.stdout.splitlines()
-    assert lines[0].startswith("NAMED: ")
-    assert "(com_offset): The centre of mass is not where the model has it" in lines[1]
-    assert any(re.match(r"torque about y \(pitch\) +N\sm +0\.4", line) for line in lines)
+    assert lines[0] == "NAMED: What the model misses is offset of the centre of mass."
+    assert lines[1].startswith("  Offset of the centre of mass (com_offset): c_x = 0.0079")
+    assert [line.split("  ")[0] for line in lines[2:5]] == ["How sure", "Where", "Next"]
+    assert re.fullmatch(
+        r"Where +Torque about y \(pitch\), above the noise 100 % of the time, most from [\d.]+ to [\d.]+ s of "
+        r"flight_3\.csv; also torque x\.",
+        lines[3],
+    )
+    rows = [line for line in lines[5:12] if line.startswith(("gap, ", "playback, "))]
+    assert re.match(r"gap, torque about x \(roll\) +N\sm +0\.\d+ +0\.0\d+ +0\.0\d+ +\d+ → [01]\.\d+ floors", rows[0])
+    assert re.match(r"playback, body rate +rad/s +0\.\d+ +0\.0\d+ +0\.\d+ +better than “nothing moves”", rows[2])
     assert any(line.startswith("The gap in the torque about y (pitch) follows thrust") for line in lines)
     assert lines[-1].endswith("extended.h5: the model with offset of the centre of mass.")
 
@@ -159,12 +170,25 @@ def test_extended_model_holds_the_effect_and_the_inertia(found):
         assert file["inertia"][()] == pytest.approx([0.6, 0.6, 1.2, 0, 0, 0], rel=0.01, abs=1e-12)
 
 
-def test_replay_of_measured_rotors_gets_better(found):
-    replay = found.summary["replay"]
-    before, after, held = (np.array(replay[f"rate_{name}_rad_s"]) for name in ("before", "after", "held"))
-    assert before.shape == after.shape == (50, 3)
-    assert (after[-1, :2] < 0.1 * before[-1, :2]).all()
-    assert (after[-1] < held[-1]).all()
+def test_playback_of_measured_rotors_gets_better(found):
+    # The logs hold neither attitude nor velocity.
+    assert set(found.summary["playback"]["at_end"]) == {"body_rate"}
+    rate = found.summary["playback"]["at_end"]["body_rate"]
+    assert rate["after"] < 0.1 * rate["before"]
+    assert (rate["worse"], rate["rival"]) == (False, "nothing-moves")
+    models = found.summary["playback"]["models"]
+    assert len(models["after"]["body_rate"]) == 50
+    assert rate["after"] == models["after"]["body_rate"][-1]
+    assert rate["without_model"] == models["nothing-moves"]["body_rate"][-1]
+
+
+def test_playback_is_that_of_the_command_for_it(cpfls, gap_config, found, shifted, tmp_path):
+    asked = ("replay", gap_config, found.folder / "extended.h5", shifted[2], "--every", "5", "--json")
+    played = json.loads(cpfls(*asked, "-o", tmp_path / "replay.h5").stdout)["models"]
+    ours = found.summary["playback"]["models"]
+    for name, again in {"after": "model", "before": "stated", "nothing-moves": "nothing-moves"}.items():
+        # The extended model is refitted once more.
+        assert ours[name]["body_rate"] == pytest.approx(played[again]["body_rate"]["mae"], rel=1e-3), name
 
 
 def test_dry_run_writes_nothing(cpfls, gap_config, shifted, tmp_path):

@@ -91,13 +91,13 @@ def test_the_model_that_runs_away_does_not_flatten_the_picture(full):
 
 
 def test_equal_artifacts_give_equal_pages(tmp_path):
-    given = made.without(made.diagnosis(), "run", "picture", "replay")
+    given = made.without(made.diagnosis(), "run", "picture", "playback")
     assert shown(tmp_path, given).html == shown(tmp_path, given).html
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_what_is_lacking_is_left_out_and_said(tmp_path):
-    bare = made.without(made.diagnosis(force=False), "run", "picture", "whiteness", "replay")
+    bare = made.without(made.diagnosis(force=False), "run", "picture", "whiteness", "playback")
     page = shown(tmp_path, bare)
     assert page.summary["figures"] == ["gap-sizes-1", "intervals-1"]
     assert page.summary["missing"] == ["disagreement", "extended"]
@@ -108,7 +108,7 @@ def test_what_is_lacking_is_left_out_and_said(tmp_path):
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_disagreement_alone_says_where_and_how_to_go_on(tmp_path):
-    page = shown(tmp_path, made.without(made.disagreement(force=False), "heat_map", "replay"))
+    page = shown(tmp_path, made.without(made.disagreement(force=False), "heat_map", "playback"))
     assert page.summary["figures"] == ["gap-over-time-1", "dependence-1"]
     assert "The gap is largest in the torque about x (roll): 12.0 noise floors." in page.text
     assert "It follows thrust most." in page.text

@@ -1,18 +1,22 @@
 """A model with effects played back along a flight that has them: true numbers predict it, whatever the effect."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
-from cpfls_cli.gap.playback import extended_player
+from cpfls_cli.gap.playback import errors_by_horizon, extended_player, played_pairs, worst_stretch
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, player_of, replay
 from cpfls_cli.simulation import simulated_effects
 from tests.builders.closed_loop_flights import VEHICLE, flown, signals_of
 
+BIAS = np.array([0.0, 0.01, 0.05])
 PARAMETERS = [coefficient.name for coefficient in VEHICLE_NUMBERS.coefficients]
 # By how much the true model's rates are better than those of the stated vehicle. What comes late is known to a sample
 # of the log, and what is evaluated along the motion has no state of its own.
@@ -102,3 +106,61 @@ def test_stretches_are_played_apart():
     whole, _ = played_back(model, signals)
     rates = found.errors["body_rate"].mae.sum(axis=1)
     assert rates[0] < 2 * whole["body_rate"][0]
+
+
+class Repairing(ExtendedModel):
+    """A model that takes a constant error out of the gyroscope first."""
+
+    def repaired(self, signals):
+        return replace(signals, body_rate=signals.body_rate - BIAS)
+
+
+def test_before_and_after_are_those_of_each_model_alone():
+    signals = signals_of(flown(effects={"linear_damping": {"d_x": 0.3, "d_y": 0.3, "d_z": 0.2}}))
+    model, given = model_of({"linear_damping": {"d_x": 0.3, "d_y": 0.3, "d_z": 0.2}}), model_of({})
+    pairs = played_pairs([Recording("flight", signals)], model, given)
+    found = errors_by_horizon(pairs, 30)
+    after, before = (played_back(each, signals)[0] for each in (model, given))
+    for name, errors in found.errors.items():
+        sums = errors.mae.sum(axis=1)
+        np.testing.assert_allclose(sums[:3], after[name][:3])
+        assert sums[3] == pytest.approx(before[name][0])
+        # Of noise there is none, so that without a model nothing is as good.
+        assert sums[0] < 0.1 * min(sums[1:])
+
+
+def test_the_model_as_given_takes_the_log_with_its_faults():
+    exact = signals_of(flown())
+    logged = replace(exact, body_rate=exact.body_rate + BIAS)
+    model = Repairing(None, np.zeros(len(PARAMETERS)), ())
+    pairs = played_pairs([Recording("flight", logged)], model, model_of({}))
+    after, _, _, before = errors_by_horizon(pairs, 30).errors["attitude"].mae[:, -1]
+    assert before == pytest.approx(np.linalg.norm(BIAS) * 0.3, rel=0.2)
+    assert after < 0.02 * before
+    stretch = worst_stretch(pairs)
+    np.testing.assert_allclose(stretch.measured, stretch.after, atol=1e-3)
+    np.testing.assert_allclose((stretch.before - stretch.measured)[:, 0], np.tile(BIAS, (2, 1)), atol=1e-9)
+    assert stretch.axis == 2
+
+
+def test_a_horizon_beyond_the_flight_is_cut():
+    pairs = played_pairs([Recording("flight", signals_of(flown()))], *[model_of({})] * 2)
+    errors = errors_by_horizon(pairs, 10_000).errors["body_rate"]
+    assert errors.mae.shape == (4, 295)
+    np.testing.assert_array_equal(errors.mae[0], errors.mae[3])
+
+
+def test_the_worst_stretch_is_where_the_model_as_given_is_wrong():
+    exact = signals_of(flown(duration=6.0))
+    burst = (exact.time > 3.3) & (exact.time < 4.6)
+    speed = exact.rotor_speed.copy()
+    speed[burst, 0] *= 1.02
+    signals = replace(exact, rotor_speed=speed)
+    recordings = [Recording("good", exact), Recording("wrong", signals)]
+    found = worst_stretch(played_pairs(recordings, *[model_of({})] * 2))
+    assert found.flight == 1
+    assert found.first == 300
+    assert found.measured.shape == (2, 100, 3)
+    # The thrust of the front rotor turns the vehicle about y.
+    assert found.axis == 1
+    np.testing.assert_allclose(found.measured.reshape(-1, 3), signals.body_rate[300:500])

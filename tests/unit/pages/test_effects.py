@@ -30,12 +30,30 @@ def test_every_effect_has_a_title():
 
 def test_ends_of_an_interval_can_be_told_apart_and_rounding_makes_no_certainty():
     assert effect_sentence(OFFSET) == (
-        "Offset of the centre of mass (com_offset): Off centre. c_x = 0.01000000 [0.00999950, 0.01000120] m "
-        "(p < 10⁻⁶, more than 99 % of the gap)."
+        "Offset of the centre of mass (com_offset): c_x = 0.01000000 [0.00999950, 0.01000120] m (p < 10⁻⁶, more than "
+        "99 % of the gap)."
     )
     assert "less than 1 % of" in effect_sentence(replace(OFFSET, share=-0.001))
     assert "(p = 0.012, " in effect_sentence(replace(OFFSET, p_value=0.0123))
     assert closest_sentence(OFFSET).startswith("The closest was offset of the centre of mass, and that is not it: ")
+
+
+def test_a_power_of_ten_that_all_three_have_stands_once():
+    torque = Estimate("M_x", "N m", 2e-6, -6.86e-5, 7.28e-5, (-1e-3, 1e-3))
+    assert "M_x = 0.2 [−6.9, 7.3] × 10⁻⁵ N m (p" in effect_sentence(replace(OFFSET, coefficients=(torque,)))
+    alone = Estimate("M_x", "N m", 2e-6, np.nan, np.nan, (-1e-3, 1e-3))
+    assert "M_x = 2 × 10⁻⁶ [—, —] N m (p" in effect_sentence(replace(OFFSET, coefficients=(alone,)))
+
+
+def test_errors_of_the_vehicles_numbers_are_per_cent_with_a_sign():
+    def said(name, *number, effect="parameter_error"):
+        numbers = (Estimate(name, "1", *number, (-0.9, 3.0)),)
+        return effect_sentence(replace(OFFSET, name=effect, coefficients=numbers))
+
+    assert "(parameter_error): Izz +24.0 % [+19.9, +28.1] (p" in said("inertia_z", 0.24, 0.199, 0.281)
+    assert "Ixx −8 % [−20, +4] (p" in said("inertia_x", -0.08, -0.2, 0.04)
+    assert ": drag factor +20.1 % [+18.0, +22.2] (p" in said("error", 0.201, 0.18, 0.222, effect="drag_factor_error")
+    assert "thrust −9.00 % [−9.11, −8.89] (p" in said("thrust_scale", -0.09, -0.0911, -0.0889)
 
 
 def test_an_effect_stands_once_beside_its_coefficients():

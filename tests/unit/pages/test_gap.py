@@ -4,23 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
-from cpfls_cli.artifacts.gap_effects import ReplayChangeGroup
-from cpfls_cli.pages.gap import BEFORE, MEASURED, keep_in_view, marked, replay_figure, replay_text
+from cpfls_cli.pages.gap import BEFORE, MEASURED, keep_in_view, marked
 from cpfls_cli.report.canvas import HELD
-
-
-def replays(rate):
-    attitude = np.ones_like(rate)
-    return ReplayChangeGroup(
-        horizon=np.array([1]),
-        horizon_s=np.array([0.1]),
-        rate_before=2 * rate,
-        rate_after=rate,
-        rate_held=rate,
-        attitude_before=attitude,
-        attitude_after=attitude,
-        attitude_held=attitude,
-    )
 
 
 def test_curves_are_told_apart_without_colour():
@@ -47,13 +32,3 @@ def test_only_a_curve_that_runs_away_leaves_the_picture(error, leaves):
     assert low < -1.0
     assert high > 1.1
     assert bool(bad.max() > high or bad.min() < low) is leaves
-
-
-def test_flights_without_rates_are_not_simulated():
-    still, turning = replays(np.zeros((1, 3))), replays(np.ones((1, 3)))
-    assert list(replay_text(still)) == []
-    assert list(replay_text(None)) == []
-    (text,) = replay_text(turning)
-    assert text.text.startswith("Simulated for 0.1 s on the measured rotor speeds of held-out flights, the model as ")
-    assert "is off by 2.0, 2.0, 2.0 rad/s (x, y, z), with the effects by 1.0, 1.0, 1.0 rad/s;" in text.text
-    assert replay_figure("one-horizon", turning, "anywhere") is None

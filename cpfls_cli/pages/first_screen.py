@@ -1,0 +1,280 @@
+"""The first screen of a diagnosis: what is missing, how much, how sure, where, before and after, what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cpfls_cli.artifacts.diagnosis import KINDS, DiagnosisRecord
+from cpfls_cli.artifacts.disagreement import DisagreementRecord
+from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
+from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
+from cpfls_cli.gap.naming.results import GapVerdict
+from cpfls_cli.pages.effects import (
+    capitalised,
+    closest_sentence,
+    effect_sentence,
+    effect_title,
+    share_words,
+    titles,
+    wrong_numbers,
+)
+from cpfls_cli.pages.gap import channel_unit, channel_words
+from cpfls_cli.pages.replay import prediction_words, signal_scale
+from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone
+from cpfls_cli.report.numbers import joined, number, plain, sentence
+
+if TYPE_CHECKING:
+    from cpfls_cli.gap.naming.results import Unexplained
+
+_TONES: dict[str, Tone] = {
+    GapVerdict.NAMED: "good",
+    GapVerdict.NO_GAP: "good",
+    GapVerdict.NOT_EXCITED: "note",
+    GapVerdict.AMBIGUOUS: "note",
+    GapVerdict.PARTIAL: "note",
+    GapVerdict.UNEXPLAINED: "warning",
+    GapVerdict.FLIGHTS_DIFFER: "warning",
+}
+_ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
+_USE = "take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write"
+_NEXT: dict[str, str] = {
+    GapVerdict.NAMED: _USE,
+    GapVerdict.PARTIAL: f"{_USE}; then look at what is left",
+    GapVerdict.AMBIGUOUS: f"until then {_USE}",
+    GapVerdict.UNEXPLAINED: "look at what is left: its axis, what it follows, whether it feeds or drains energy",
+    GapVerdict.FLIGHTS_DIFFER: "find out what changed between the flights; learn from flights of one state",
+    GapVerdict.NO_GAP: "nothing, unless you suspect one of the effects that these flights cannot show",
+    GapVerdict.NOT_EXCITED: "fly more: roll, pitch and yaw sweeps at two amplitudes, climbs, stops, a yaw turn",
+}
+
+
+def first_screen(record: DiagnosisRecord, index: int) -> Iterator[Block]:
+    """Say what a diagnosis found, how sure that is, where, what it becomes on held-out flights, and what to do next.
+
+    Parameters
+    ----------
+    index : int
+        Number of the diagnosis on its page.
+    """
+    yield verdict_box(record)
+    yield Facts(list(_facts(record)))
+    yield _held_out_table(record, index)
+    yield from (Text(sentence(remark), "note") for remark in record.remarks)
+    yield Facts(list(_beside(record)))
+
+
+def verdict_box(record: DiagnosisRecord) -> Box:
+    """Say what a diagnosis found, and how much of it."""
+    named = [effect_sentence(effect) for effect in record.effects.named]
+    named += [closest_sentence(effect) for effect in record.effects.closest]
+    label = record.verdict.replace("_", " ")
+    return Box(label, _headline(record), named, _TONES.get(record.verdict, "note"))
+
+
+def _headline(record: DiagnosisRecord) -> str:
+    match record.verdict:
+        case GapVerdict.NO_GAP:
+            return "Nothing is missing that these flights can show."
+        case GapVerdict.NOT_EXCITED:
+            return "These flights move too little to show whether anything is missing."
+        case _ if record.impossible:
+            return f"The log looks wrong: {sentence(record.impossible[0])}"
+        case GapVerdict.UNEXPLAINED:
+            return "There is a gap that nothing in the catalogue explains."
+        case GapVerdict.FLIGHTS_DIFFER:
+            return "These flights differ: what shows in some of them does not show in the others."
+        case GapVerdict.AMBIGUOUS if record.alternative.name:
+            return _ambiguous(record)
+    named = " ".join(_blame(record)) or "There is a gap without a name."
+    return f"{named} That is the closest, not all of it." if record.verdict == GapVerdict.PARTIAL else named
+
+
+def _blame(record: DiagnosisRecord) -> Iterator[str]:
+    """Say who is at fault: the model, the sensors, or the numbers of the vehicle."""
+    if record.effects_of_motion:
+        yield f"What the model misses is {joined(titles(record.effects_of_motion))}."
+    sensors = record.effects.names("sensor")
+    if sensors:
+        yield f"The sensors are at fault: {joined(titles(sensors))}."
+    if record.effects.names("parameter"):
+        wrong = wrong_numbers(record.effects)
+        which = ": its inertia or its thrust" if not wrong else f": {joined(wrong)} against the config"
+        yield f"{'Numbers of the vehicle are' if len(wrong) > 1 else 'A number of the vehicle is'} wrong{which}."
+
+
+def _ambiguous(record: DiagnosisRecord) -> str:
+    rivals = _by_named(record)
+    parts = [f"{effect_title(named)} from {joined(titles(others), 'or')}" for named, others in rivals.items()]
+    certain = [name for name in record.effects.names() if name not in rivals]
+    besides = f" Besides, the model misses {joined(titles(certain))}." if certain else ""
+    return f"These flights cannot tell {joined(parts)}.{besides}"
+
+
+def model_words(record: DiagnosisRecord) -> str:
+    """Say what the second model of a diagnosis is."""
+    if record.effects.names():
+        return f"with {joined(titles(record.effects.names()))}"
+    closest = [effect.name for effect in record.effects.closest]
+    if closest:
+        return f"with the closest effects, {joined(titles(closest))}, which are not the answer"
+    return "with nothing but the vehicle's own numbers refitted"
+
+
+def _facts(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
+    sure = [sentence(each) for each in (*_taken_off(record), *_rivals(record), *record.impossible[1:])]
+    if sure:
+        yield "How sure", " ".join(sure)
+    yield from (("Differs", sentence(difference)) for difference in record.difference or ())
+    yield "Where", _where(record)
+    left = [_unexplained(each) for each in record.unexplained.unexplained()]
+    if left:
+        yield "Left", sentence("; ".join(left))
+    yield "Next", " ".join(next_steps(record))
+
+
+def _beside(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
+    """Explain the effects, the flights that would tell rivals apart, and which flights were held out and why."""
+    for effect in (*record.effects.named, *record.effects.closest):
+        yield "What it is", f"{capitalised(effect_title(effect.name))}: {effect.sentence}"
+    if record.verdict != GapVerdict.AMBIGUOUS:
+        yield from (("To tell", flight) for flight in _telling_flights(record))
+    yield "Fitted to", ", ".join(record.flights.names(TRAINING))
+    yield "Held out", ", ".join(record.flights.names(HELD_OUT))
+    yield "Why", sentence(record.split)
+
+
+def _taken_off(record: DiagnosisRecord) -> Iterator[str]:
+    """Say how much of the gap is gone, and what else would do."""
+    share = _gone(record)
+    if record.effects.closest:
+        yield f"With the closest effects, of the held-out gap above the noise, {share} is gone"
+    elif record.effects_of_motion:
+        alone = "" if record.alternative.name else "; each rival that could be tried leaves more"
+        yield f"Of the held-out gap above the noise, {share} is gone{alone}"
+    if record.verdict == GapVerdict.NO_GAP and record.gap.known:
+        largest = number(float(record.gap.before_floors[record.gap.known].max()), 2)
+        unseen = f"; not ruled out, as listed below: {len(record.not_excited.name)} of the catalogue"
+        yield f"The largest gap is {largest} noise floors{unseen if record.not_excited.name else ''}"
+
+
+def _gone(record: DiagnosisRecord) -> str:
+    """Write the share that is gone: of torque and force each, where both had a gap."""
+    if record.shares is None or not np.isfinite(record.shares).all():
+        return share_words(record.share)
+    return joined(
+        f"{share_words(float(share))} of the {kind}" for kind, share in zip(KINDS, record.shares, strict=True)
+    )
+
+
+def _rivals(record: DiagnosisRecord) -> Iterator[str]:
+    """Say which effects would explain it as well; AMBIGUOUS says so in its headline."""
+    if record.verdict != GapVerdict.AMBIGUOUS:
+        for instead_of, rivals in _by_named(record).items():
+            yield f"It could be {joined(titles(rivals), 'or')} instead of {effect_title(instead_of)}"
+
+
+def _by_named(record: DiagnosisRecord) -> dict[str, list[str]]:
+    """Gather the rivals of each named effect."""
+    rivals: dict[str, list[str]] = {}
+    for name, instead_of in zip(record.alternative.name, record.alternative.instead_of, strict=True):
+        rivals.setdefault(instead_of, []).append(name)
+    return rivals
+
+
+def _where(record: DiagnosisRecord) -> str:
+    """Say in which channels the gap is, when it is largest, and how much of the time it is there."""
+    found = record.largest_gap
+    if found is None:
+        return "Nowhere above the noise."
+    first, *others = found.channels
+    when = f", most from {found.start_s:.1f} to {found.end_s:.1f} s of {found.flight}" if found.flight else ""
+    also = f"; also {joined(others)}" if others else ""
+    return sentence(
+        f"{channel_words(first)}, above the noise {share_words(found.share_of_time)} of the time{when}{also}"
+    )
+
+
+def _unexplained(channel: Unexplained) -> str:
+    """Say on which axis something is left, and what it follows."""
+    follows = [f"follows {channel.signal} most"] if channel.signal else []
+    rings = [f"rings at {number(channel.frequency_hz, 3)} Hz"] if channel.frequency_hz is not None else []
+    cause = joined([*follows, *rings]) if follows or rings else "follows no one signal"
+    share = f" ({share_words(channel.share)} of it)" if follows or rings else ""
+    energy = _ENERGY.get(channel.energy, "")
+    return f"{channel_words(channel.axis)}, {number(channel.floors, 2)} floors: {cause}{share}{energy}"
+
+
+def next_steps(record: DiagnosisRecord) -> list[str]:
+    """Say what to do next, in sentences."""
+    if record.impossible:
+        return ["Correct the section `import` of the config, and run this again."]
+    usual = _NEXT.get(record.verdict)
+    first = [f"to tell {flight}" for flight in _telling_flights(record)]
+    told = first if record.verdict == GapVerdict.AMBIGUOUS else []
+    return [sentence(step) for step in (*told, usual) if step]
+
+
+def _telling_flights(record: DiagnosisRecord) -> Iterator[str]:
+    rivals = record.alternative
+    for name, named, flight in zip(rivals.name, rivals.instead_of, rivals.separated_by, strict=True):
+        yield f"{effect_title(name)} from {effect_title(named)}: {flight}"
+
+
+def _held_out_table(record: DiagnosisRecord, index: int) -> Table:
+    """Show held-out flights before and after: the gap where there is one, and how far playback is off."""
+    loud, quiet = record.gap.loud
+    rows = [_gap_row(record, channel) for channel in loud]
+    rows += [] if record.playback is None else list(_playback_rows(record.playback))
+    within = ", ".join(record.gap.channel[channel] for channel in quiet)
+    caption = [
+        "Held-out flights, before and after. To beat: the noise floor, or no model.",
+        "" if record.playback is None else _playback_words(record.playback),
+        f"Within the noise: {within}." if within else "",
+        "" if record.effects.names() else f"After: {model_words(record)}.",
+    ]
+    header = ("Held out", "Unit", "Before", "After", "To beat", "That is")
+    return Table(f"held-out-{index}", " ".join(filter(None, caption)), header, rows, frozenset({0, 1, 5}))
+
+
+def _gap_row(record: DiagnosisRecord, channel: int) -> list[str | Cell]:
+    gap = record.gap
+    name = gap.channel[channel]
+    sizes = [number(float(values[channel]), 3) for values in (gap.before, gap.after, gap.floor)]
+    before, after = (number(float(values[channel]), 2) for values in (gap.before_floors, gap.after_floors))
+    grown = bool(gap.grown[channel])
+    said = Cell(f"{before} → {after} floors{', worse' if grown else ''}", "warning" if grown else "plain")
+    return [f"gap, {channel_words(name)}", channel_unit(name), *sizes, said]
+
+
+def _playback_rows(playback: PlaybackChangeGroup) -> Iterator[list[str | Cell]]:
+    for signal, end in playback.at_end.items():
+        words, unit, scale = signal_scale(signal)
+        values = [number(scale * value, 2) for value in (end.before, end.after, end.without_model)]
+        than = f"{'worse' if end.worse else 'better'} than “{prediction_words(end.rival)}”"
+        yield [f"playback, {words}", unit, *values, Cell(than, "warning" if end.worse else "plain")]
+
+
+def _playback_words(playback: PlaybackChangeGroup) -> str:
+    """Say what the playback is, and what of the motion it cannot judge."""
+    if not playback.at_end:
+        return "The flights show no motion that could be played back."
+    lacks = [signal_scale(name)[0] for name, found in playback.errors.items() if found is None]
+    more = f"; {joined(lacks)} cannot be played back, for lack of signals" if lacks else ""
+    return f"Playback: mean error after {plain(float(playback.horizon_s[-1]))} s{more}."
+
+
+def notes_on_flights(records: Sequence[DiagnosisRecord | DisagreementRecord]) -> Iterator[Folded]:
+    """Fold what an import and the reading of the flights had to say."""
+    notes = list(dict.fromkeys(note for each in records for note in each.warning))
+    if notes:
+        rows = [[sentence(note)] for note in notes]
+        table = Table("flight-notes", "", ("As read and imported",), rows, frozenset({0}), frozenset({0}))
+        yield Folded(counted_notes(notes), [table])
+
+
+def counted_notes(notes: Sequence[str]) -> str:
+    """Say how many notes on the flights there are."""
+    return f"{len(notes)} note{'' if len(notes) == 1 else 's'} on the flights and their import"

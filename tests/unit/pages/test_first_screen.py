@@ -1,0 +1,285 @@
+"""The first screen of a diagnosis: each sentence from the facts of a record, and nothing that its numbers deny."""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
+from cpfls_cli.pages.first_screen import counted_notes, first_screen, model_words, next_steps, notes_on_flights
+from cpfls_cli.report.content import Box, Facts, Table, Text
+from tests.builders import gap_artifacts as made
+
+RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust")]
+USE = "Take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write"
+WRONG = "the inertia about z would have to be 29 times that of the config"
+
+
+def diagnosis(*args, lacking=(), **given):
+    artifact = made.without(made.diagnosis(*args, **given), *lacking)
+    return DiagnosisRecord.of_data(artifact.header, artifact.data)
+
+
+def screen(record):
+    """The box, the facts by term, the rows of the table by what they are, its caption, and all facts below."""
+    box, facts, table, *more = first_screen(record, 1)
+    assert (type(box), type(facts), type(table)) == (Box, Facts, Table)
+    rows = {row[0].text: [cell.text for cell in row[1:]] for row in table.cells}
+    below = [row for block in more if isinstance(block, Facts) for row in block.rows]
+    return box, dict(facts.rows), rows, table, below
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"verdict": "NO_GAP", "named": ()}, "Nothing is missing that these flights can show."),
+        ({"verdict": "NOT_EXCITED", "named": ()}, "These flights move too little to show whether anything is missing."),
+        (
+            {"verdict": "PARTIAL"},
+            "What the model misses is offset of the centre of mass. That is the closest, not all of it.",
+        ),
+        (
+            {"verdict": "AMBIGUOUS", "alternatives": RIVALS},
+            "These flights cannot tell offset of the centre of mass from constant torque.",
+        ),
+        (
+            {"verdict": "UNEXPLAINED", "named": ({"named": 0},)},
+            "There is a gap that nothing in the catalogue explains.",
+        ),
+        (
+            {"verdict": "FLIGHTS_DIFFER", "named": ({"named": 0},)},
+            "These flights differ: what shows in some of them does not show in the others.",
+        ),
+        ({"named": ({"name": "gyro_bias", "kind": "sensor"},)}, "The sensors are at fault: gyro bias."),
+        (
+            {"named": ({"name": "parameter_error", "kind": "parameter"},)},
+            "A number of the vehicle is wrong: Izz +24.0 % against the config.",
+        ),
+        (
+            {"verdict": "UNEXPLAINED", "named": (), "impossible": made.texts(WRONG)},
+            f"The log looks wrong: T{WRONG[1:]}.",
+        ),
+    ],
+)
+def test_every_verdict_has_a_headline(given, words):
+    box, *_ = screen(diagnosis(**given))
+    assert box.label == given.get("verdict", "NAMED").replace("_", " ")
+    assert box.title == words
+
+
+def test_a_name_comes_with_its_size_its_interval_and_how_sure_it_is():
+    box, facts, _, _, below = screen(diagnosis())
+    assert box.sentences == [
+        "Offset of the centre of mass (com_offset): c_x = 0.0100 [0.0090, 0.0111] m (p < 10⁻⁶, 93 % of the gap)."
+    ]
+    assert facts["How sure"] == (
+        "Of the held-out gap above the noise, 97 % is gone; each rival that could be tried leaves more."
+    )
+    assert ("What it is", f"Offset of the centre of mass: {made.SENTENCE}") in below
+
+
+def test_a_wrong_number_of_the_vehicle_is_named_as_people_do():
+    box, *_ = screen(diagnosis(named=({"name": "parameter_error", "kind": "parameter"},)))
+    assert box.sentences == [
+        "Wrong inertia or thrust scale (parameter_error): Izz +24.0 % [+20.0, +28.1] (p < 10⁻⁶, 93 % of the gap)."
+    ]
+
+
+def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tells():
+    sure, below = (screen(diagnosis("PARTIAL", alternatives=RIVALS))[place] for place in (1, 4))
+    assert sure["How sure"] == (
+        "Of the held-out gap above the noise, 97 % is gone. "
+        "It could be constant torque instead of offset of the centre of mass."
+    )
+    told = "constant torque from offset of the centre of mass: change the thrust"
+    assert ("To tell", told) in below
+    _, facts, _, _, below = screen(diagnosis("AMBIGUOUS", alternatives=RIVALS))
+    assert facts["Next"].startswith(f"To tell {told}. Until then take the model with it, extended.h5,")
+    assert facts["How sure"] == "Of the held-out gap above the noise, 97 % is gone."
+    assert "To tell" not in dict(below)
+
+
+@pytest.mark.parametrize(
+    ("given", "first"),
+    [
+        ({}, f"{USE}."),
+        ({"verdict": "PARTIAL"}, f"{USE}; then look at what is left."),
+        ({"verdict": "UNEXPLAINED", "named": ()}, "Look at what is left: its axis, what it follows, "),
+        (
+            {"verdict": "FLIGHTS_DIFFER", "named": ()},
+            "Find out what changed between the flights; learn from flights of",
+        ),
+        ({"verdict": "NO_GAP", "named": ()}, "Nothing, unless you suspect one of the effects that these flights "),
+        ({"verdict": "NOT_EXCITED", "named": ()}, "Fly more: roll, pitch and yaw sweeps at two amplitudes, "),
+        (
+            {"verdict": "UNEXPLAINED", "named": (), "impossible": made.texts(WRONG)},
+            "Correct the section `import` of the config, and run this again.",
+        ),
+    ],
+)
+def test_every_verdict_says_what_to_do_next(given, first):
+    record = diagnosis(**given)
+    assert next_steps(record)[0].startswith(first)
+    assert screen(record)[1]["Next"] == " ".join(next_steps(record))
+
+
+def test_where_says_channel_time_and_how_long():
+    _, facts, *_ = screen(diagnosis())
+    assert facts["Where"] == (
+        "Force along z (up), above the noise 75 % of the time, most from 1.0 to 2.5 s of two.csv; also torque x, "
+        "force x, force y and torque y."
+    )
+    _, facts, *_ = screen(diagnosis(lacking=["stretch"], force=False))
+    assert facts["Where"] == "Torque about x (roll), above the noise 75 % of the time; also torque y."
+
+
+def test_where_nothing_is_above_the_noise_nothing_is_located():
+    quiet = np.array([0.4, 0.5, 0.6, 0.7, 1.42, 0.9])
+    record = diagnosis("NO_GAP", named=(), **{"gap/before_floors": quiet, "gap/after_floors": quiet})
+    _, facts, rows, table, _ = screen(record)
+    assert facts["Where"] == "Nowhere above the noise."
+    assert facts["How sure"] == (
+        "The largest gap is 1.4 noise floors; not ruled out, as listed below: 1 of the catalogue."
+    )
+    assert [row for row in rows if row.startswith("gap")] == ["gap, force along y (left)"]
+    assert "Within the noise: torque x, torque y, torque z, force x, force z." in table.caption
+    assert record.summary["where"] is None
+
+
+def test_the_gap_stands_before_and_after_beside_the_noise():
+    _, _, rows, table, _ = screen(diagnosis())
+    assert rows["gap, torque about x (roll)"] == [
+        "N\N{NO-BREAK SPACE}m",
+        "0.494",
+        "0.0136",
+        "0.0123",
+        "40 → 1.1 floors",
+    ]
+    assert "gap, torque about z (yaw)" not in rows
+    assert "Within the noise: torque z." in table.caption
+    grew = {"gap/after_floors": np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2])}
+    _, _, rows, table, _ = screen(diagnosis(**grew))
+    assert rows["gap, torque about x (roll)"][-1] == "40 → 60 floors, worse"
+    assert [cell.tone for cell in table.cells[0]][-1] == "warning"
+
+
+def test_playback_stands_before_and_after_beside_what_knows_no_model():
+    ends = {"velocity": (0.1, 0.5, 0.3, 0.2), "position": (0.4, 0.3, 0.5, 0.6)}
+    _, _, rows, table, _ = screen(diagnosis(**made.played_pair(**ends)))
+    assert rows["playback, body rate"] == ["rad/s", "2.0", "0.10", "1.0", "better than “nothing moves”"]
+    assert rows["playback, attitude"] == ["°", "17", "0.57", "5.7", "better than “rate stays”"]
+    assert rows["playback, velocity"] == ["m/s", "0.20", "0.10", "0.30", "better than “rate stays”"]
+    assert rows["playback, position"] == ["m", "0.60", "0.40", "0.30", "worse than “nothing moves”"]
+    assert table.cells[-1][-1].tone == "warning"
+    assert "Playback: mean error after 0.5 s." in table.caption
+
+
+def test_what_cannot_be_played_back_is_said():
+    _, _, rows, table, _ = screen(diagnosis())
+    assert "Playback: mean error after 0.5 s; velocity and position cannot be played back, " in table.caption
+    assert not {"playback, velocity", "playback, position"} & set(rows)
+    still = made.played_pair(body_rate=(0.0,) * 4, attitude=(0.0,) * 4)
+    _, _, rows, table, _ = screen(diagnosis(**still))
+    assert "The flights show no motion that could be played back." in table.caption
+    _, _, rows, table, _ = screen(diagnosis(lacking=["playback"]))
+    assert "layback" not in table.caption
+    assert not any(row.startswith("playback") for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("left", "said"),
+    [
+        (
+            ("torque z", 3.04, "speed", 0.4, np.nan, "drains"),
+            "Torque about z (yaw), 3.0 floors: follows speed most (40 % of it), drains energy from the motion.",
+        ),
+        (
+            ("torque x", 2.2, "", 0.6, 4.013, "feeds"),
+            "Torque about x (roll), 2.2 floors: rings at 4.01 Hz (60 % of it), feeds energy into the motion.",
+        ),
+        (
+            ("torque z", 14.2, "yaw", 0.82, 3.21, "neither"),
+            "Torque about z (yaw), 14 floors: follows yaw most and rings at 3.21 Hz (82 % of it).",
+        ),
+        (("force z", 2.2, "", 0.0, np.nan, "neither"), "Force along z (up), 2.2 floors: follows no one signal."),
+    ],
+)
+def test_what_is_left_has_an_axis_a_cause_and_a_way_of_energy(left, said):
+    assert screen(diagnosis("UNEXPLAINED", named=(), unexplained=[left]))[1]["Left"] == said
+    assert "Left" not in screen(diagnosis())[1]
+
+
+def test_the_closest_effects_are_not_the_answer_and_say_how_little_they_do():
+    box, facts, _, table, below = screen(diagnosis("UNEXPLAINED", named=({"named": 0},), share=0.31))
+    assert box.sentences[0].startswith("The closest was offset of the centre of mass, and that is not it: com_offset, ")
+    assert facts["How sure"] == "With the closest effects, of the held-out gap above the noise, 31 % is gone."
+    assert "After: with the closest effects, offset of the centre of mass, which are not the answer." in table.caption
+    assert "What it is" in dict(below)
+
+
+def test_flights_held_out_and_why_stand_below():
+    *_, below = screen(diagnosis())
+    assert dict(below)["Fitted to"] == "one.csv"
+    assert dict(below)["Held out"] == "two.csv"
+    assert dict(below)["Why"] == "No flight was held out by name."
+
+
+def test_remarks_are_told_but_those_that_are_told_elsewhere():
+    notes = made.texts("A note that readers need.", WRONG, "The motion follows the rotors by 12 ms.")
+    record = diagnosis("UNEXPLAINED", named=(), note=notes, impossible=made.texts(WRONG))
+    texts = [block.text for block in first_screen(record, 1) if isinstance(block, Text)]
+    assert texts == ["A note that readers need."]
+    assert record.summary["log_looks_wrong"] == [WRONG]
+    assert record.summary["notes"] == notes.tolist()
+
+
+def test_what_is_gone_is_said_of_torque_and_force_where_both_had_a_gap():
+    both, torque = (np.array([0.95, share]) for share in (0.412, np.nan))
+    assert screen(diagnosis("PARTIAL", share_by_kind=both))[1]["How sure"].startswith(
+        "Of the held-out gap above the noise, 95 % of the torque and 41 % of the force is gone"
+    )
+    assert "noise, 97 % is gone" in screen(diagnosis("PARTIAL", share_by_kind=torque))[1]["How sure"]
+
+
+def test_what_differs_between_flights_stands_above_and_not_below():
+    differ = made.texts("the gap about y is in training alone")
+    record = diagnosis("FLIGHTS_DIFFER", named=({"named": 0},), difference=differ, note=differ)
+    assert screen(record)[1]["Differs"] == "The gap about y is in training alone."
+    assert not [block for block in first_screen(record, 1) if isinstance(block, Text)]
+
+
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [
+        (({},), "with offset of the centre of mass"),
+        (({"named": 0},), "with the closest effects, offset of the centre of mass, which are not the answer"),
+        ((), "with nothing but the vehicle's own numbers refitted"),
+    ],
+)
+def test_the_second_model_is_said_to_be_what_it_is(named, words):
+    assert model_words(diagnosis(named=named)) == words
+
+
+def test_notes_on_flights_are_folded_and_each_stands_once():
+    first, second = (
+        diagnosis(warning=made.texts("a.csv: gaps", "b.csv: late")),
+        diagnosis(warning=made.texts("a.csv: gaps")),
+    )
+    (folded,) = notes_on_flights([first, second])
+    assert folded.summary == "2 notes on the flights and their import"
+    assert [row[0] for row in folded.tables[0].rows] == ["a.csv: gaps.", "b.csv: late."]
+    assert list(notes_on_flights([diagnosis()])) == []
+    assert counted_notes(["one"]) == "1 note on the flights and their import"
+
+
+def test_machines_read_what_people_read():
+    summary = diagnosis(warning=made.texts("a.csv: gaps")).summary
+    assert summary["where"] == {
+        "channels": ["force z", "torque x", "force x", "force y", "torque y"],
+        "flight": "two.csv", "start_s": 1.0, "end_s": 2.5, "floors": 80.0, "share_of_time": 0.75,
+    }  # fmt: skip
+    assert summary["playback"]["at_end"]["body_rate"] == {
+        "before": 2.0, "after": pytest.approx(0.1), "rival": "nothing-moves", "without_model": 1.0, "worse": False,
+    }  # fmt: skip
+    assert set(summary["playback"]["models"]) == {"after", "nothing-moves", "rate-stays", "before"}
+    assert summary["playback"]["models"]["before"]["attitude"][-1] == pytest.approx(0.3)
+    assert summary["warnings"] == ["a.csv: gaps"]
+    assert summary["log_looks_wrong"] == []
