@@ -15,7 +15,7 @@ from benchmarks.blind_study.tables import tables
 
 _QUICK = {
     "single": 22, "none": 4, "outside": 18, "pair": 3, "triple": 1, "background": 1, "form": 3, "hover": 2,
-    "no_velocity": 1, "no_force": 1, "lacking": 8, "drag_factor": 4, "attack": 9, "differing": 4, "pybullet": 4,
+    "no_velocity": 1, "no_force": 1, "lacking": 8, "drag_factor": 4, "attack": 12, "differing": 4, "pybullet": 4,
 }  # fmt: skip
 """Cases of each group in a quick study: about six minutes of one core."""
 

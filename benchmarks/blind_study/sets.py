@@ -81,22 +81,15 @@ def sets(size):
 
 
 def _part(groups, size):
-    """Take some cases of each group: first one of everything that it hides, then a second of everything."""
+    """Take some cases of each group: each effect, or fault of a log, once before any comes again."""
     order = np.random.default_rng(size.seed).permutation(len(groups))
-    seen, kept = Counter(), defaultdict(list)
-    ranked = []
+    seen, ranked = Counter(), []
     for place in order:
-        case = groups[place][0].case
-        hidden = (
-            case.group,
-            case.attack,
-            case.only,
-            case.left_out,
-            case.hover_only,
-            *(sorted(case.hidden) or (case.vehicle,)),
-        )
-        ranked.append((seen[hidden], place))
-        seen[hidden] += 1
+        # Names of cases are GROUP-VEHICLE-WHAT...-DRAW.
+        group, _, what, *_ = groups[place][0].case.name.split("-")
+        ranked.append((seen[group, what], place))
+        seen[group, what] += 1
+    kept = defaultdict(list)
     # A stable sort keeps the order of chance within a rank.
     for _, place in sorted(ranked, key=lambda pair: pair[0]):
         group = groups[place][0].case.group

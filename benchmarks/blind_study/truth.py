@@ -47,8 +47,8 @@ def _axes(prefix, values):
 
 def _plane_damping(hidden, vehicle):
     # A disc that lags by 16 / (gamma w) leans the thrust k w^2, at the height of the hub.
-    lean = 16 * vehicle.thrust_factor / hidden["lock_number"]
-    return {"k_F": lean, "k_w": lean * vehicle.height}
+    lean = 16 * vehicle.thrust_factors / hidden["lock_number"]
+    return {"k_F": float(lean.mean()), "k_w": float((lean * vehicle.hubs[2]).mean())}
 
 
 def _lift(hidden, vehicle):
