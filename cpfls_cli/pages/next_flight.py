@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from cpfls_cli.artifacts.trajectory import QuestionGroup
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.pages.effects import effect_title, unit_words
 from cpfls_cli.report.content import Block, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, number, whole_percent
+from cpfls_cli.report.numbers import UNKNOWN, joined, number, whole_percent
 
 _SETTLED = 0.975
 _EVEN = 0.5
@@ -39,7 +40,7 @@ def notes_blocks(notes: Sequence[str]) -> Iterator[Block]:
 def question_blocks(name: str, asked: QuestionGroup) -> Iterator[Block]:
     """Say what a flight will tell and how sure, beside other flights, and what to do with it."""
     worst = float(np.nanmin(np.minimum(asked.sure, np.where(np.isnan(asked.flown), 1.0, asked.flown))))
-    told = " and ".join(dict.fromkeys(_pair(row["true"], row["rival"]) for row in rows_of(asked)))
+    told = _told(asked)
     if worst >= _SETTLED:
         yield Text(
             f"This flight tells {told}: each outcome is right in {_percent(worst)} of such flights or more.", "good"
@@ -68,59 +69,60 @@ def _percent(share: float) -> str:
     return f"{100 * (1 - _RARE):g} %" if share > 1 - _RARE else whole_percent(share)
 
 
-def _pair(true: str, rival: str) -> str:
-    one, other = sorted((true, rival))
-    return f"{effect_title(one)} from {effect_title(other)}" if one else f"whether there is {effect_title(other)}"
+def _told(asked: QuestionGroup) -> str:
+    """Say what is told from what, each pair once, and which effects are looked for."""
+    pairs = [sorted(pair) for pair in zip(asked.true, asked.rival, strict=True)]
+    told = [f"{effect_title(one)} from {effect_title(other)}" for one, other in pairs if one]
+    sought = [effect_title(other) for one, other in pairs if not one]
+    return joined([*dict.fromkeys(told), *([f"whether there is {joined(sought, 'or')}"] if sought else [])])
 
 
 def _table(name: str, asked: QuestionGroup) -> Table:
-    header = (
-        "If it is",
-        "of",
-        "told from",
-        "log Bayes factor",
-        "named, this flight",
-        "flown in closed loop",
-        "a random flight",
-        "the same again",
-        "sure from",
-    )
+    header = ("If it is", "Told from", "Log Bayes factor", "This flight", "As flown", "Random", "Same again")
+    shares = ("sure", "flown", "random", "again")
     rows = [
         [
             row["true"],
-            row["size"],
             row["rival"] or "nothing",
             number(row["log_bayes"], 3),
-            *(UNKNOWN if np.isnan(row[key]) else _percent(row[key]) for key in ("sure", "flown", "random", "again")),
-            row["smallest"] or f"{number(row['least'], 2)} of it",
+            *(UNKNOWN if np.isnan(row[key]) else _percent(row[key]) for key in shares),
         ]
         for row in rows_of(asked)
     ]
     caption = (
-        "What this flight tells, together with the flights that are there: expected logarithm of the Bayes factor, and "
-        "the probability that the diagnosis names the effect that is there, of this flight, of the median of random "
-        "flights in the same room, and of the known flights flown once more. Sure from: the size at which it is "
-        f"named with {100 * _SETTLED:g} %."
+        "How this flight, with those that are there, tells what is true: expected logarithm of the Bayes factor, and "
+        "the probability that the diagnosis names it. Beside it the same along the path that the autopilot of "
+        "simulation.closed_loop flies, of the median of random flights in the same room, and of the known flights "
+        "flown once more."
     )
-    return Table(name, caption, header, rows, frozenset({0, 1, 2}))
+    return Table(name, caption, header, rows, frozenset({0, 1}))
+
+
+def _least(row: Mapping[str, Any]) -> str:
+    """Say from which size on an effect is told; nothing of one that is as it is."""
+    if row["smallest"] or not row["size"]:
+        return str(row["smallest"])
+    return f"{number(row['least'], 2)} of that"
 
 
 def _outcomes(asked: QuestionGroup) -> Iterator[str]:
     """Say what each outcome will mean."""
-    for row in rows_of(asked):
-        true, rival = row["true"], row["rival"]
+    rows = rows_of(asked)
+    for row in rows:
+        true, rival, least = row["true"], row["rival"], _least(row)
+        taken = f"Taken for it: {row['size']}. " if row["size"] else ""
         if not rival:
-            least = row["smallest"] or f"{number(row['least'], 2)} of {row['size']}"
-            yield f"If {true} is named, it is there; if not, it is smaller than {least}."
+            absent = f"smaller than {least}" if least else "not there"
+            yield f"If the diagnosis then names {true}, it is there; if not, it is {absent}. {taken}".rstrip()
             continue
-        chance = max(other["wrong"] for other in rows_of(asked) if {other["true"], other["rival"]} == {true, rival})
-        error = f"less than {_RARE:.1%}".replace("%", " %") if chance < _RARE else f"{100 * chance:.2g} %"
+        chance = max(other["wrong"] for other in rows if {other["true"], other["rival"]} == {true, rival})
+        error = f"less than {100 * _RARE:g} %" if chance < _RARE else f"{100 * chance:.2g} %"
         yield (
             f"If the diagnosis then names {true} alone, it is {true} and not {rival} (by chance the wrong one of the "
-            f"two is named in {error} of flights). To tell by hand: {row['advice']}."
+            f"two is named in {error} of flights). {taken}Surely told from {least} on. By hand: {row['advice']}."
         )
     if any(asked.rival):
         yield (
-            "If it is AMBIGUOUS again, the effect is smaller than the table says; if it names neither, or is "
-            "UNEXPLAINED, it is neither of them alone."
+            "If it is AMBIGUOUS again, the effect is smaller than that; if neither is named, or it is UNEXPLAINED, it "
+            "is neither of them alone."
         )

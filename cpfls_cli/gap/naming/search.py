@@ -177,7 +177,7 @@ def acceptable(step: SearchStep, settings: GapSettings) -> bool:
 
 def _enough(step: SearchStep) -> float:
     """Compute the least gain of an effect that is named, in squared floors."""
-    return max(_LEAST_SHARE * step.above_floor, _LEAST_IN_FLOORS**2 * len(step.hypothesis.residual))
+    return least_gain(step.above_floor, len(step.hypothesis.residual))
 
 
 def quiet_enough(gain: float, step: SearchStep, refitted: System) -> bool:
@@ -330,6 +330,18 @@ def _beats(chosen: Scored, other: Scored, above_floor: float) -> bool:
     spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin)))
     # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
     return bool(margin.sum() > _ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
+
+
+def least_gain(above_floor: float, windows: int) -> float:
+    """Compute what an effect has to explain to be worth a name, in squared floors.
+
+    Parameters
+    ----------
+    above_floor : float
+        The gap, in squared floors.
+    windows : int
+    """
+    return max(_LEAST_SHARE * above_floor, _LEAST_IN_FLOORS**2 * windows)
 
 
 def least_margin(above_floor: float, left: float) -> float:

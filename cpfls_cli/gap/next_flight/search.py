@@ -56,7 +56,7 @@ class Goal:
         answers = []
         for question, known in zip(self.questions, self.known, strict=True):
             fresh, columns = gathered(question, flights or [self._empty()], self.logging.floor)
-            both = Evidence(again * known.gram, again * known.rows)
+            both = known.taken(again)
             answers.append(judged(both + fresh if flights else both, columns, self.noise))
         return tuple(answers)
 
@@ -78,8 +78,7 @@ class Goal:
         seen = all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects)
         if flights and seen:
             return gathered(question, flights, self.logging.floor)[0]
-        blank = gathered(question, [self._empty()], self.logging.floor)[0]
-        return Evidence(np.zeros_like(blank.gram), 0)
+        return gathered(question, [self._empty()], self.logging.floor)[0].taken(0)
 
 
 def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Room, logging: Logging) -> Goal:

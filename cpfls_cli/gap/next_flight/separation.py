@@ -14,7 +14,7 @@ from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, nuisance
 from cpfls_cli.gap.balance.windows import Windows
 from cpfls_cli.gap.naming.scoring import candidates_of
-from cpfls_cli.gap.naming.search import least_margin
+from cpfls_cli.gap.naming.search import least_gain, least_margin
 
 SURE = 0.975
 """Probability from which a flight is said to settle a question."""
@@ -64,15 +64,21 @@ class Evidence:
     ----------
     gram : array, shape (column, column)
         In squared floors: the true effect, then base columns, then the rival at each point of its grid.
-    rows : float
+    windows : int
+    rows : int
         Windows times known channels.
     """
 
     gram: Array
-    rows: float
+    windows: int
+    rows: int
 
     def __add__(self, other: Evidence) -> Evidence:
-        return Evidence(self.gram + other.gram, self.rows + other.rows)
+        return Evidence(self.gram + other.gram, self.windows + other.windows, self.rows + other.rows)
+
+    def taken(self, times: int) -> Evidence:
+        """Take the same flights several times."""
+        return Evidence(times * self.gram, times * self.windows, times * self.rows)
 
 
 @dataclass(frozen=True)
@@ -111,10 +117,11 @@ def gathered(question: Question, flights: Sequence[WeakFlight], floor: Array) ->
     ends = np.cumsum([part.shape[2] for part in parts])
     indices = [np.arange(end - part.shape[2], end) for part, end in zip(parts, ends, strict=True)]
     matrix = (np.concatenate(parts, axis=2) / floor[:, None]).reshape(-1, int(ends[-1]))
-    known = sum(len(flight) * int(flight.known.sum()) for flight in flights)
+    rows = sum(len(flight) * int(flight.known.sum()) for flight in flights)
     rivals = tuple(indices[1 + len(free) :]) or (np.zeros(0, dtype=int),)
     unit = bool(tried) and tried[0].effect.unit_coefficient
-    return Evidence(matrix.T @ matrix, known), Columns(np.concatenate(indices[1 : 1 + len(free)]), rivals, unit)
+    evidence = Evidence(matrix.T @ matrix, sum(len(flight) for flight in flights), rows)
+    return evidence, Columns(np.concatenate(indices[1 : 1 + len(free)]), rivals, unit)
 
 
 def apart(evidence: Evidence, columns: Columns) -> float:
@@ -209,7 +216,10 @@ class Judgement:
 
 def judged(evidence: Evidence, columns: Columns, noise: float) -> Judgement:
     """Judge what flights would say on a question."""
-    least = least_margin(beyond_numbers(evidence, columns), evidence.rows)
+    seen = beyond_numbers(evidence, columns)
+    # An effect without a rival has to be worth a name.
+    alone = not len(columns.rivals[0])
+    least = least_gain(seen, evidence.windows) if alone else least_margin(seen, evidence.rows)
     return Judgement(apart(evidence, columns), least, noise)
 
 

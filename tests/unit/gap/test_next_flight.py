@@ -113,6 +113,15 @@ def test_without_a_rival_the_vehicles_own_numbers_are_all_that_imitates():
     assert told(question("torque_bias", [0.0, BIAS, 0.0], "parameter_error"), hover) == pytest.approx(seen)
 
 
+def test_an_effect_without_a_rival_has_to_be_worth_a_name():
+    """Three tenths of a floor in every window, or a twentieth of the gap."""
+    count = windows(0.02, 0.4, 0.5).count(601)
+    for size, least in ((0.1, 0.09 * count), (10.0, 0.05 * 100.0 * count)):
+        bias = question("torque_bias", [0.0, size * FLOOR[1], 0.0], None)
+        evidence, columns = gathered(bias, [LOGGING.weak(along(path_of(2, 0.0)))], FLOOR)
+        assert judged(evidence, columns, 1.0).least == pytest.approx(least, rel=1e-6)
+
+
 @pytest.mark.parametrize("least", [0.0, 25.0, 400.0])
 def test_enough_is_what_makes_the_answer_sure(least):
     enough = Judgement(1.0, least, 1.1).enough
