@@ -51,7 +51,7 @@ NOISE = {
     "acceleration": 0.1,
     "rotor_speed": 1.0,
 }
-LOGGED = frozenset({"position", "velocity", "acceleration"})
+LOGGED = frozenset({"attitude", "position", "velocity", "acceleration"})
 FIRST_S, NEXT_S, RATE_HZ = 20.0, 30.0, 200.0
 WAYS = ("planned", "random", "advice")
 # What a sentence of advice asks for: words in it, the axes to move (x, y, z, yaw), and at which frequencies in Hz.
@@ -88,7 +88,7 @@ def main(count: int) -> None:
         for seed, opened in zip(SEEDS, together, strict=True):
             outcomes = settle(opened, np.random.default_rng([seed, number, 1]))
             for way, (outcome, sure) in outcomes.items():
-                totals[way][outcome] += 1
+                totals[way][outcome.partition(":")[0]] += 1
                 expected[way].append(sure)
             told = [f"{outcome} ({sure:.2f})" for outcome, sure in outcomes.values()]
             rows.append((opened.hidden.candidate.effect.name, opened.rival, *told))
@@ -134,20 +134,24 @@ def ambiguous(name: str, rival: str, rng: np.random.Generator) -> OpenSet | None
     room = room_of(settings, vehicle, 0.0, 0.02)
     short = replace(room, settings=replace(settings, duration_s=FIRST_S))
     moved = rng.random(4) < 0.6
-    gentle = [short.drawn(rng).scaled(np.where(moved, rng.choice(SHARES), 0.02)) for _ in range(2)]
-    floor = floor_of(craft)
+
+    def gentle() -> HarmonicPath:
+        return short.drawn(rng).scaled(np.where(moved, rng.choice(SHARES), 0.02))
+
+    first, floor = gentle(), floor_of(craft)
     logging = Logging(LOGGED, False, floor, SETTINGS)
-    weak = [logging.weak(planned_signals(short.planned(path), short, logging)) for path in gentle]
+    weak = logging.weak(planned_signals(short.planned(first), short, logging))
     hidden = usual(CATALOGUE[name], vehicle)
-    evidence, columns = gathered(Question(hidden, CATALOGUE[rival]), weak[:1], floor)
+    evidence, columns = gathered(Question(hidden, CATALOGUE[rival]), [weak], floor)
     seen, told = beyond_numbers(evidence, columns), apart(evidence, columns)
     size = rng.uniform(1.5, 5.0) * np.sqrt(evidence.rows / 6 / max(seen, 1e-9))
     # Flights that cannot carry the effect, or that tell it from the rival without doubt, are no open sets.
     if size > 2.0 or told * size**2 > 60 or hidden.candidate.effect.unit_coefficient:
         return None
     hidden = replace(hidden, linear=hidden.linear * size)
+    paths = {"training": first, "held out": gentle()}
     try:
-        flights = tuple(fly(short, path, hidden, rng, f"first {n}") for n, path in enumerate(gentle))
+        flights = tuple(fly(short, path, hidden, rng, path_name) for path_name, path in paths.items())
         run = diagnose(flights[:1], flights[1:], SETTINGS, rng)
     except (CpflsError, SettingError):
         return None
@@ -210,10 +214,11 @@ def outcome(opened: OpenSet, asked, path: HarmonicPath, rng: np.random.Generator
     pairs = zip(asked.questions, answers, strict=True)
     sure = min([a.sure for q, a in pairs if q.true.candidate.effect.name == name], default=0.0)
     diagnosis = diagnose([*opened.flights[:1], more], opened.flights[1:], SETTINGS, rng).diagnosis
-    named = {effect.name for effect in diagnosis.effects}
+    names = [effect.name for effect in diagnosis.effects]
     if str(diagnosis.verdict) == "NAMED":
-        return ("right" if named == {name} else "wrong"), sure
-    return "open", sure
+        return ("right" if names == [name] else f"wrong: {' '.join(names)}"), sure
+    left = [f"or {rival.name}" for rival in diagnosis.alternatives]
+    return " ".join([f"open: {diagnosis.verdict}", *names, *left]), sure
 
 
 def advised(advice: str, room: Room) -> HarmonicPath:

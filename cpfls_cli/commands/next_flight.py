@@ -140,7 +140,7 @@ def _effects(study: Study) -> list[Effect]:
         effects = [find(name) for name in dict.fromkeys(study.trajectory.next_flight.to_tell)]
     except InputError as error:
         raise InputError(f"{key}: {error}") from None
-    require_tellable(effects, key)
+    require_tellable(effects, key, study.vehicle)
     return effects
 
 
@@ -154,7 +154,7 @@ def _named(study: Study, room: Room) -> Case:
             f"trajectory.next_flight.to_tell = [{names}]: nothing to tell; name effects with --to-tell A,B (`cpfls "
             "effects` lists them), or give a diagnosis with --for DIAGNOSIS"
         )
-    signals = needed_signals(effects) | {"position", "velocity", "acceleration"}
+    signals = needed_signals(effects) | {"attitude", "position", "velocity", "acceleration"}
     blank = Logging(signals, any("command" in each.needs for each in effects), np.ones(6), study.gap)
     rng = generator(study, "next-flight noise")
     floor = expected_floor(room, blank, study.simulation, study.trajectory.sample_time_s, rng)
@@ -179,7 +179,7 @@ def _left_open(study: Study, path: Path) -> Case:
     floor = best_floor(system(flights, [each.candidate for each in named if each.candidate is not None]))
     rivals, unseen = _open_effects(study, record, flights, path)
     questions = questions_left(named, rivals, unseen, flights, floor)
-    effects = [CATALOGUE[each.true.candidate.effect.name] for each in questions]
+    effects = [each.true.candidate.effect for each in questions]
     logged = logged_signals(flights[0].signals)
     more = needed_signals(effects) - logged
     notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight tells",)
@@ -199,6 +199,7 @@ def _open_effects(
         names = {each.name for each in asked}
         rivals = [each for each in rivals if {each.name, each.instead_of} <= names]
     if rivals:
+        require_tellable([CATALOGUE[each.name] for each in rivals], str(path), study.vehicle)
         return rivals, []
     hidden = [CATALOGUE[name] for name in record.not_excited.name if CATALOGUE[name].kind == "wrench"]
     unseen = [each for each in hidden if not all(each.missing(flight.signals) for flight in flights)]

@@ -28,14 +28,20 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 _BATTERY_USE = 0.2
 """Share of its voltage that the battery loses over the flight."""
 
-_OPTIONAL = ("position", "velocity", "acceleration", "specific_force", "voltage")
-_CARRIES = {"velocity": "velocity", "height": "position", "voltage": "voltage", "force": "acceleration"}
+_OPTIONAL = ("attitude", "position", "velocity", "acceleration", "specific_force", "voltage")
+_CARRIES = {
+    "attitude": ("attitude",),
+    "velocity": ("attitude", "velocity"),
+    "height": ("attitude", "position"),
+    "force": ("attitude", "acceleration"),
+    "voltage": ("voltage",),
+}
 """Signals that a log may lack, and those that carry what effects need."""
 
 
 def needed_signals(effects: Iterable[Effect]) -> frozenset[str]:
     """List the signals that a log may lack and that effects need."""
-    return frozenset(_CARRIES[need] for effect in effects for need in effect.needs if need in _CARRIES)
+    return frozenset(signal for effect in effects for need in effect.needs for signal in _CARRIES.get(need, ()))
 
 
 def logged_signals(signals: Signals) -> frozenset[str]:
@@ -50,7 +56,7 @@ class Logging:
     Attributes
     ----------
     signals : frozenset of str
-        Of `position`, `velocity`, `acceleration`, `specific_force`, `voltage`.
+        Of `attitude`, `position`, `velocity`, `acceleration`, `specific_force`, `voltage`.
     commanded : bool
         Whether commands are logged in place of rotor speeds.
     floor : array, shape (6,), N m and N

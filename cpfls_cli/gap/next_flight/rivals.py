@@ -21,14 +21,15 @@ from cpfls_cli.gap.next_flight.separation import Question, SizedEffect
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
-def require_tellable(effects: Sequence[Effect], source: str) -> None:
+def require_tellable(effects: Sequence[Effect], source: str, vehicle: VehicleSettings) -> None:
     """Refuse effects that no torque and no force shows.
 
     Parameters
     ----------
     effects : sequence of Effect
     source : str
-        Option or key that named them, for the message.
+        File or key that named them, for the message.
+    vehicle : VehicleSettings
 
     Raises
     ------
@@ -40,6 +41,10 @@ def require_tellable(effects: Sequence[Effect], source: str) -> None:
             raise InputError(
                 f"{source}: {effect.name} is a fault of the sensors, found on the sensors alone and not by a planned "
                 f"flight; what shows it: {effect.excitation}"
+            )
+        if "rotor_radius" in effect.needs and any(rotor.radius_m is None for rotor in vehicle.rotors):
+            raise InputError(
+                f"{source}: {effect.name} needs vehicle.rotors.radius_m of every rotor; add it to the config"
             )
     actuators = [effect.name for effect in effects if "command" in effect.needs]
     measured = [effect.name for effect in effects if "measured_rotor_speed" in effect.needs]

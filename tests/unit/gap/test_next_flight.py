@@ -36,7 +36,7 @@ from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
 FLOOR = np.array([0.02, 0.02, 0.02, 0.1, 0.1, 0.1])
-LOGGING = Logging(frozenset({"position", "velocity", "acceleration"}), False, FLOOR, GapSettings())
+LOGGING = Logging(frozenset({"attitude", "position", "velocity", "acceleration"}), False, FLOOR, GapSettings())
 FEW = NextFlightSettings(starts=4, iterations=12)
 SETTINGS = TrajectorySettings(path="next-flight", duration_s=12.0, next_flight=FEW)
 LEVER, BIAS = 0.002, 0.1
@@ -254,7 +254,38 @@ def test_a_special_case_is_not_told_from_what_holds_it():
 @pytest.mark.parametrize("names", [("gyro_bias",), ("motor_lag", "channel_delay")])
 def test_what_no_flight_tells_is_refused(names):
     with pytest.raises(InputError, match=names[0]):
-        require_tellable([CATALOGUE[name] for name in names], "--to-tell")
+        require_tellable([CATALOGUE[name] for name in names], "--to-tell", VEHICLE)
+
+
+def test_an_effect_of_the_propellers_asks_for_their_size():
+    bare = replace(VEHICLE, rotors=tuple(replace(rotor, radius_m=None) for rotor in VEHICLE.rotors))
+    require_tellable([CATALOGUE["ground_effect"]], "--to-tell", VEHICLE)
+    with pytest.raises(InputError, match=r"ground_effect needs vehicle\.rotors\.radius_m"):
+        require_tellable([CATALOGUE["ground_effect"]], "--to-tell", bare)
+
+
+def test_the_plan_counts_on_nothing_that_is_not_logged():
+    drag = Question(usual(CATALOGUE["linear_damping"], VEHICLE), None)
+    path = room().drawn(np.random.default_rng(2))
+    poor = replace(LOGGING, signals=frozenset())
+    signals = planned_signals(room().planned(path), room(), poor)
+    assert signals.attitude is signals.velocity is signals.acceleration is signals.specific_force is None
+    (evidence, _), (more, _) = (
+        gathered(drag, [logging.weak(planned_signals(room().planned(path), room(), logging))], FLOOR)
+        for logging in (poor, LOGGING)
+    )
+    assert (evidence.rows, more.rows) == (3 * evidence.windows, 6 * more.windows)
+
+
+def test_a_rival_that_could_not_be_tried_is_asked_for_at_a_usual_size():
+    named, size = candidate("linear_damping"), np.array([0.1, 0.1, 0.1])
+    silent = weak(replace(fly(1, [(named, size)]), velocity=None, specific_force=None))
+    effect = NamedEffect("linear_damping", named, size, (), 0.0, 1.0, 1.0, "")
+    rivals = [Alternative("rotor_drag", "linear_damping", np.nan, "log velocity")]
+    first, second = questions_left([effect], rivals, [], [silent], FLOOR)
+    assert second.true.linear.tolist() == usual(CATALOGUE["rotor_drag"], VEHICLE).linear.tolist()
+    known = goal([first, second], [silent], room(), LOGGING)
+    assert min(answer.apart for answer in known.judgements(along(path_of(0, 1.0, 3)))) > 0
 
 
 def test_a_rival_takes_the_size_that_imitates_the_named_effect():
