@@ -257,7 +257,8 @@ def _flown(study: Study, asked: Goal, planned: Trajectory) -> tuple[list[float],
         name = question.true.candidate.effect.name
         if name not in judged:
             try:
-                signals = flown_signals(planned, [question.true], study.vehicle, asked.logging, loop)
+                effects = [question.true, *question.besides]
+                signals = flown_signals(planned, effects, study.vehicle, asked.logging, loop)
                 judged[name] = asked.judgements(signals)
             except (ComputationError, SettingError) as error:
                 judged[name] = None

@@ -170,7 +170,7 @@ def flown_signals(
     loop = SimulationSettings(mode="closed-loop", closed_loop=replace(settings, effects={}))
     # Without noise nothing is drawn.
     rng = np.random.default_rng(0)
-    flight = measure(planned.time, vars(planned), vehicle, loop, rng, model=SimulatedModel(effects=asked))
+    flight = measure(planned.time, vars(planned), vehicle, loop, rng, model=SimulatedModel(logging.base, asked))
     logged = flight.signals
     signals = Signals(
         time=planned.time,

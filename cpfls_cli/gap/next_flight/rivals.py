@@ -103,8 +103,8 @@ def questions_left(
     questions = []
     for rival in rivals:
         one = sized[rival.instead_of]
-        besides = tuple(each.candidate for name, each in sized.items() if name not in (rival.instead_of, rival.name))
-        other = fitted_rival(flights, besides, CATALOGUE[rival.name], floor)
+        besides = tuple(each for name, each in sized.items() if name not in (rival.instead_of, rival.name))
+        other = fitted_rival(flights, [each.candidate for each in besides], CATALOGUE[rival.name], floor)
         pair = (one, other.candidate.effect), (other, one.candidate.effect)
         questions += [Question(true, effect, besides) for true, effect in pair]
     asked = tuple(question for question in questions if _is_open(question))

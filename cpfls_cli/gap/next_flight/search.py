@@ -74,7 +74,7 @@ class Goal:
     def known_from(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
         """Gather what flights that are there say; nothing where they lack a signal of an effect in question."""
         rival = [] if question.rival is None else [question.rival]
-        effects = [question.true.candidate.effect, *rival, *(each.effect for each in question.besides)]
+        effects = [question.true.candidate.effect, *rival, *(each.candidate.effect for each in question.besides)]
         seen = all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects)
         if flights and seen:
             return gathered(question, flights, self.logging.floor)[0]

@@ -47,13 +47,13 @@ class Question:
     true : SizedEffect
     rival : Effect or None
         None: whether the effect shows at all, beyond the vehicle's own numbers.
-    besides : tuple of Candidate
+    besides : tuple of SizedEffect
         Effects that are there whichever is true; their coefficients are free.
     """
 
     true: SizedEffect
     rival: Effect | None
-    besides: tuple[Candidate, ...] = ()
+    besides: tuple[SizedEffect, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def gathered(question: Question, flights: Sequence[WeakFlight], floor: Array) ->
     floor : array, shape (6,), N m and N
     """
     balance = system(flights)
-    free = [nuisance(), *(each for each in question.besides if is_free(each))]
+    free = [nuisance(), *(each.candidate for each in question.besides if is_free(each.candidate))]
     tried = [] if question.rival is None or question.rival.kind == "parameter" else candidates_of([question.rival])
     true = (balance.columns(question.true.candidate) @ question.true.linear)[..., None]
     parts = [true, *(balance.columns(each) for each in (*free, *tried))]

@@ -105,6 +105,17 @@ def test_evidence_of_flights_adds_up_to_that_of_all():
     assert apart(one[0] + two[0], one[1]) == pytest.approx(told(offset, *paths), rel=1e-9)
 
 
+def test_effects_that_are_there_besides_are_free_too():
+    """A bias that is named already takes the mean of the torque of an offset, whatever the rival."""
+    path = path_of(2, 0.15)
+    thrust = thrusts(path)
+    alone = question("com_offset", [LEVER, 0.0], None)
+    bias = SizedEffect(candidate("torque_bias"), np.array([0.0, BIAS, 0.0]))
+    assert told(alone, path) == pytest.approx(LEVER**2 * (thrust**2).sum() / FLOOR[1] ** 2, rel=1e-6)
+    both = LEVER**2 * ((thrust - thrust.mean()) ** 2).sum() / FLOOR[1] ** 2
+    assert told(replace(alone, besides=(bias,)), path) == pytest.approx(both, rel=1e-6)
+
+
 def test_without_a_rival_the_vehicles_own_numbers_are_all_that_imitates():
     hover = path_of(2, 0.0)
     count = windows(0.02, 0.4, 0.5).count(601)
