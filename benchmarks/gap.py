@@ -14,8 +14,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.blind.cases import make
-from benchmarks.blind.generator import COLUMNS, simulate_many
-from benchmarks.blind.measure import disturb
+from benchmarks.blind.generator import simulate_many
+from benchmarks.blind.measure import columns, disturb
 from benchmarks.shared.measure import table
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.windows import Recording
@@ -63,10 +63,10 @@ def fly(case, seconds: float, rng: np.random.Generator) -> list[Recording]:
 
 def signals(log: np.ndarray, vehicle: VehicleSettings) -> Signals:
     """Arrange the columns of a log."""
-    columns = dict(zip(COLUMNS, log.T, strict=True))
-    pick = lambda names: np.column_stack([columns[name] for name in names.split()])  # noqa: E731
+    named = dict(zip(columns(len(vehicle.rotors)), log.T, strict=True))
+    pick = lambda names: np.column_stack([named[name] for name in names.split()])  # noqa: E731
     return Signals(
-        time=columns["t"],
+        time=named["t"],
         body_rate=pick("wx wy wz"),
         vehicle=vehicle,
         attitude=pick("phi theta psi"),
@@ -74,7 +74,7 @@ def signals(log: np.ndarray, vehicle: VehicleSettings) -> Signals:
         position=pick("x y z"),
         acceleration=pick("ax ay az"),
         rotor_speed=pick("om1 om2 om3 om4"),
-        voltage=columns["volt"],
+        voltage=named["volt"],
     )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, Format, Record, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
     from cpfls_cli.trajectory.legs import Leg
@@ -41,6 +41,34 @@ class LegGroup:
         )
 
 
+@record
+class QuestionGroup:
+    """What the flight is to tell, and how sure it will be."""
+
+    true: tuple[str, ...] = dataset("true", "effect that is taken to be there", "question")
+    rival: tuple[str, ...] = dataset("rival", "effect that it is told from; empty: from no effect at all", "question")
+    size: tuple[str, ...] = dataset("size", "numbers of the effect that is there", "question")
+    log_bayes: Array = dataset("log_bayes", "expected logarithm of the Bayes factor for it", "question")
+    sure: Array = dataset("sure", "probability that a diagnosis with this flight names it", "question")
+    flown: Array = dataset(
+        "flown", "the same along the path that the autopilot of `simulation.closed_loop` flies", "question", gaps=True
+    )
+    wrong: Array = dataset("wrong", "probability that a diagnosis names the rival", "question")
+    again: Array = dataset("again", "`sure` where the known flights are flown again instead", "question", gaps=True)
+    random: Array = dataset("random", "`sure` of the median of random paths within the same limits", "question")
+    least: Array = dataset("least", "share of the size from which on it is named with probability 0.975", "question")
+    smallest: tuple[str, ...] = dataset(
+        "smallest", "the numbers at that share; empty where shapes alone size the effect", "question"
+    )
+    advice: tuple[str, ...] = dataset("advice", "the flight that the catalogue advises", "question")
+
+    @property
+    def summary(self) -> list[dict[str, Any]]:
+        """The questions for machines; null where nothing is known."""
+        rows = rows_of(self)
+        return [{key: None if value != value else value for key, value in row.items()} for row in rows]
+
+
 @dataclass(frozen=True)
 class FirstLeg:
     """Motion along the line of the first move.
@@ -65,7 +93,7 @@ class TrajectoryRecord(Record):
         "a planned path with all its derivatives and the attitude that flies it; "
         "without a position the vehicle is held at its centre of mass and only turns",
         "trajectory",
-        ("waypoints",),
+        ("waypoints", "diagnosis"),
     )
 
     time: Array = dataset("time", "time from the first sample", "time", units="s")
@@ -98,13 +126,14 @@ class TrajectoryRecord(Record):
     )
     body_rate: Array = dataset("body_rate", "body rates p, q, r", "time", "axis", units="rad/s", frame=BODY)
     leg: LegGroup | None = group("leg", default=None)
+    question: QuestionGroup | None = group("question", default=None)
 
     @classmethod
-    def of(cls, planned: PlannedRotation) -> Self:
-        """Arrange a plan."""
+    def of(cls, planned: PlannedRotation, question: QuestionGroup | None = None) -> Self:
+        """Arrange a plan, with what it is to tell."""
         sampled = vars(planned)
         signals = {name: sampled[name] for name in cls.__dataclass_fields__ if name in sampled}
-        return cls(**signals, leg=LegGroup.of(sampled["legs"]) if "legs" in sampled else None)
+        return cls(**signals, leg=LegGroup.of(sampled["legs"]) if sampled.get("legs") else None, question=question)
 
     @property
     def held(self) -> bool:
@@ -120,6 +149,7 @@ class TrajectoryRecord(Record):
             "max_rate_rad_s": _largest(self.attitude_rate),
             "max_body_rate_rad_s": _largest(self.body_rate),
             "max_acceleration_rad_s2": _largest(self.attitude_acceleration),
+            **({"questions": self.question.summary} if self.question else {}),
         }
 
     def derivative(self, name: str) -> Array:

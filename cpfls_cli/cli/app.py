@@ -190,19 +190,46 @@ def trajectory(
             "pause_s.",
         ),
     ] = None,
+    to_tell: Annotated[
+        str | None,
+        typer.Option(
+            "--to-tell", metavar="A,B", help="Plan the flight that tells these effects apart (`cpfls effects`)."
+        ),
+    ] = None,
+    diagnosis: Annotated[
+        Path | None,
+        typer.Option(
+            "--for", metavar="DIAGNOSIS", help="Plan the flight that settles what this diagnosis leaves open."
+        ),
+    ] = None,
+    box: Annotated[
+        str | None, typer.Option("--box", metavar="X,Y,Z", help="Space for such a flight, m; about x = y = 0.")
+    ] = None,
+    height: Annotated[
+        float | None, typer.Option("--height", metavar="M", help="Height of the middle of the box above the ground, m.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option("--duration", metavar="S", help="Duration, s, in place of that of the config.")
+    ] = None,
     plot: Annotated[
         bool, typer.Option("--plot", help="Draw the derivatives and the attitude, as SVG beside OUTPUT.")
     ] = False,
     *,
     common: Common,
 ) -> None:
-    """Plan a smooth path, or full rotations that excite a model."""
-    if waypoints is not None:
-        common = replace(common, overrides=[*(common.overrides or []), "trajectory.path=waypoints"])
+    """Plan a smooth path, full rotations that excite a model, or the flight that settles a diagnosis."""
+    with messages_for_errors():
+        from cpfls_cli.commands.trajectory import option_overrides
+
+        asked = option_overrides(waypoints, to_tell, diagnosis, box, height, duration)
+        common = replace(common, overrides=[*(common.overrides or []), *asked])
 
     def call(job: Job) -> Outcome:
+        from cpfls_cli.commands import next_flight
         from cpfls_cli.commands import trajectory as command
 
+        if job.study.trajectory.path == "next-flight":
+            return next_flight.run(job, diagnosis, plot)
         return command.run(job, waypoints, plot)
 
     _run("trajectory", config, output, common, call)

@@ -70,7 +70,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
     """
     inputs = begin(job, {"waypoints": waypoints} if waypoints else {})
     settings = _settings(job.study, waypoints)
-    figures = _figure_paths(job, figure_names(held=settings.held) if plot else ())
+    figures = figure_paths(job, figure_names(held=settings.held) if plot else ())
     for path in figures:
         check_output(path, job.force)
     # To optimise takes long; what else can go wrong shows only when it is planned.
@@ -92,6 +92,53 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
     blocks += [Text(f"drawn: {', '.join(map(str, figures))}")] if figures else []
     blocks += [Text(problem, "warning") for problem in problems]
     return Outcome(_summary(source.record, planned, demand, excitation, figures), tuple(blocks))
+
+
+def option_overrides(
+    waypoints: Path | None,
+    to_tell: str | None,
+    diagnosis: Path | None,
+    box: str | None,
+    height: float | None,
+    duration: float | None,
+) -> list[str]:
+    """Write the options as overrides of the config, so that the artifact's config has them too.
+
+    Parameters
+    ----------
+    to_tell : str or None
+        Names of effects, with commas between.
+    diagnosis : Path or None
+        Whose open questions the path settles.
+    box : str or None
+        Three lengths in m, with commas between.
+    height, duration : float or None
+        m and s.
+
+    Returns
+    -------
+    list of str
+        ``section.key=value`` each.
+
+    Raises
+    ------
+    InputError
+        If points to fly to are given for a flight that is to be planned.
+    """
+    settles = to_tell is not None or diagnosis is not None
+    if settles and waypoints is not None:
+        raise InputError(f"--waypoints {waypoints}: --to-tell and --for choose the path themselves; leave it out")
+    next_flight = {
+        "to_tell": None if to_tell is None else f"[{to_tell}]",
+        "box_m": None if box is None else f"[{box}]",
+        "height_m": None if height is None else repr(float(height)),
+    }
+    path = "next-flight" if settles else "waypoints" if waypoints is not None else None
+    return [
+        *([] if path is None else [f"trajectory.path={path}"]),
+        *(f"trajectory.next_flight.{key}={value}" for key, value in next_flight.items() if value is not None),
+        *([] if duration is None else [f"trajectory.duration_s={float(duration)!r}"]),
+    ]
 
 
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
@@ -248,8 +295,14 @@ def _still_too_much(study: Study, settings: TrajectorySettings) -> bool:
     return bool(problems)
 
 
-def _figure_paths(job: Job, names: Sequence[str]) -> tuple[Path, ...]:
-    """Name the figures of a path, beside its artifact."""
+def figure_paths(job: Job, names: Sequence[str]) -> tuple[Path, ...]:
+    """Name the figures of a path, beside its artifact.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the figures, one word each.
+    """
     return tuple(job.output.with_name(f"{job.output.stem}-{name}.svg") for name in names)
 
 

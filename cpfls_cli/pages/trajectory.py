@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.trajectory import DERIVATIVES, LegGroup, TrajectoryRecord
+from cpfls_cli.pages.next_flight import question_blocks
 from cpfls_cli.pages.printed import PRINTED_PEAKS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
@@ -48,6 +49,8 @@ def answer(
         yield Text("the vehicle is held at its centre of mass and only turns")
         yield _turns(f"turns-{index}", trajectory)
         return
+    if record.question is not None:
+        yield from question_blocks(f"questions-{index}", record.question)
     yield _peaks(f"peaks-{index}", trajectory, printed)
     if record.leg is not None and any(record.leg.limited_by):
         yield _moves(f"legs-{index}", trajectory.label, record.leg)

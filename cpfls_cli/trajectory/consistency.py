@@ -29,7 +29,7 @@ def check_consistency(settings: TrajectorySettings) -> None:
     if settings.held:
         _check_held(settings)
     _check_clock(settings)
-    if settings.held:
+    if settings.held or settings.path == "next-flight":
         return
     _check_direction(settings)
     _check_limits(settings)
@@ -47,7 +47,7 @@ def check_consistency(settings: TrajectorySettings) -> None:
 
 def _check_clock(settings: TrajectorySettings) -> None:
     if settings.duration_s is None:
-        if settings.held:
+        if settings.held or settings.path == "next-flight":
             raise SettingError("duration_s", f"is null; path {settings.path} needs a duration")
         return
     check_samples(settings.duration_s, settings.sample_time_s)

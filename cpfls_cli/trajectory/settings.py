@@ -19,7 +19,8 @@ from cpfls_cli.trajectory.profile import BaseProfile, Holds
 
 _Turns = Annotated[int, Ge(-10_000), Le(10_000)]
 _Torque = Annotated[float, Gt(0)]
-PathKind = Literal["cube-diagonal", "straight", "waypoints", "full-rotation", "optimised"]
+_Length = Annotated[float, Gt(0)]
+PathKind = Literal["cube-diagonal", "straight", "waypoints", "next-flight", "full-rotation", "optimised"]
 _USUAL_PERIOD = 1.0
 _ROTATIONS = ("full-rotation", "optimised")
 
@@ -52,6 +53,24 @@ class RotationSettings(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class NextFlightSettings(Settings):
+    """Describe the flight that tells rivals apart: what to tell, and the space that it may use."""
+
+    to_tell: Annotated[
+        tuple[str, ...],
+        Doc("effects to tell apart (`cpfls effects`); one alone: to show; none: those that the diagnosis leaves open"),
+    ] = ()
+    box_m: Annotated[
+        tuple[_Length, _Length, _Length],
+        Doc("space for the vehicle with its propellers along world x, y and z, m, about x = y = 0"),
+    ] = (10.0, 10.0, 4.0)
+    height_m: Annotated[float, Gt(0), Doc("height of the middle of the box above gap.ground_height_m, m")] = 4.0
+    frequency_max_hz: Annotated[float, Gt(0), Doc("highest frequency of the harmonics of position and yaw, Hz")] = 1.0
+    starts: Annotated[int, Ge(1), Doc("random paths, the best of which is improved")] = 40
+    iterations: Annotated[int, Ge(0), Doc("changes that are tried on it")] = 300
+
+
+@dataclass(frozen=True, kw_only=True)
 class WaypointSettings(Settings):
     """Describe a point at which the vehicle comes to rest."""
 
@@ -70,6 +89,7 @@ class TrajectorySettings(Settings):
         PathKind,
         Doc(
             "cube-diagonal: to and fro along (1, 1, 1); straight: along `direction`; waypoints: from point to point; "
+            "next-flight: what tells rivals of a diagnosis apart, harmonics from rest to rest; "
             "full-rotation, optimised: held at its centre of mass, turns through complete circles, at random or as "
             "conditions the model of `identification` best"
         ),
@@ -133,8 +153,10 @@ class TrajectorySettings(Settings):
     rotation: Annotated[RotationSettings, Doc("for paths full-rotation and optimised")] = field(
         default_factory=RotationSettings
     )
+    next_flight: Annotated[NextFlightSettings, Doc("for path next-flight")] = field(default_factory=NextFlightSettings)
     tilt_max_rad: Annotated[
-        Annotated[float, Gt(0), Le(math.pi)] | None, Doc("largest tilt of a path in space, rad; null: any")
+        Annotated[float, Gt(0), Le(math.pi)] | None,
+        Doc("largest tilt of a path in space, rad; null: any, and 35 degrees on path next-flight"),
     ] = None
     infeasible: Annotated[
         Literal["stop", "report"],

@@ -183,13 +183,13 @@ SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
     "control/controllers.py": "the laws, beside the loop that they close",
     "excitation/optimise.py": "what the room is for",
+    "gap/next_flight/search.py": "what the room is for",
     "identification/reference.py": "the slow, plain evaluation that tests hold the compiled one against",
     "pages/page.py": "the list of sections",
     "regressor/table.py": "loads without compiled loops",
     "report/json_page.py": "a form",
     "report/markdown.py": "a form",
     "report/terminal.py": "a form",
-    "trajectory/attitude.py": "the attitude that flies a path",
     "workers/compatibility.py": "loads without Dask",
 }
 FEW_LINES = 80

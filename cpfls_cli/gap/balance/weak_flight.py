@@ -131,6 +131,7 @@ def weak_flight(
     model: InertiaModel | None,
     force: bool,
     axes: Sequence[str] = _AXES,
+    floor: Array | None = None,
 ) -> WeakFlight:
     """Compute the inertial torque and force of a flight.
 
@@ -144,6 +145,8 @@ def weak_flight(
         Whether to use the force balance where the flight allows it.
     axes : sequence of str
         Body axes of which the torque balance is used.
+    floor : array, shape (6,), N m and N, or None
+        Noise of a flight that is planned; None: as its residual shows it.
     """
     with_force = force and signals.has_force
     rotation = rotation_balance(signals, model)
@@ -155,18 +158,17 @@ def weak_flight(
     )
     known = np.array([signals.torque is not None and axis in axes for axis in _AXES] + [with_force] * 3)
     hardly = WeakFlight(name, signals, windows, inertial, known, np.ones(len(nuisance().effect.coefficients)))
-    return replace(hardly, turns=_turns(hardly))
+    return replace(hardly, turns=_turns(hardly, floor))
 
 
-def _turns(flight: WeakFlight) -> Array:
+def _turns(flight: WeakFlight, known: Array | None) -> Array:
     """Mark the vehicle's own numbers that the flight can show.
 
     Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to be rid of the noise
     of the gyroscope, which is not what anybody asked.
     """
-    left = flight.residual(flight.signals)
-    floor = noise_floor(left, flight.windows)[:3]
-    moved = flight.averaged(flight.inertial)[:, :3].std(axis=0) > _TURNING * floor
+    floor = noise_floor(flight.residual(flight.signals), flight.windows) if known is None else known
+    moved = flight.averaged(flight.inertial)[:, :3].std(axis=0) > _TURNING * floor[:3]
     return shown(moved)
 
 

@@ -22,6 +22,7 @@ from cpfls_cli.gap.residual.dependence import (
 )
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 _LARGE = 1.5
 """Root mean square in floors that is a gap whatever it depends on."""
@@ -206,15 +207,29 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
         return ""
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
     columns = hypothesis.columns(Candidate(effect, shape)) / floor[:, None]
-    new = _beyond_base(hypothesis.base / floor[:, None], columns) * _usual(hypothesis, effect, columns.shape[2])
+    new = _beyond_base(hypothesis.base / floor[:, None], columns) * usual_size(
+        effect, hypothesis.flights[0].signals.vehicle, columns.shape[2]
+    )
     # The best channel of the best coefficient decides.
     if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= _VISIBLE:
         return ""
     return f"it would not show; {effect.excitation}"
 
 
-def _usual(hypothesis: System, effect: Effect, width: int) -> Array:
-    vehicle = hypothesis.flights[0].signals.vehicle
+def usual_size(effect: Effect, vehicle: VehicleSettings, width: int) -> Array:
+    """Size linear coefficients that are large but not unheard of.
+
+    Parameters
+    ----------
+    effect : Effect
+    vehicle : VehicleSettings
+    width : int
+        Number of the coefficients.
+
+    Returns
+    -------
+    array, shape (width,)
+    """
     bounds = [max(abs(bound) for bound in c.bounds(vehicle)) for c in effect.coefficients]
     if effect.unit_coefficient or not bounds:
         return np.ones(width)

@@ -177,7 +177,7 @@ def acceptable(step: SearchStep, settings: GapSettings) -> bool:
 
 def _enough(step: SearchStep) -> float:
     """Compute the least gain of an effect that is named, in squared floors."""
-    return max(_LEAST_SHARE * step.above_floor, _LEAST_IN_FLOORS**2 * len(step.hypothesis.residual))
+    return least_gain(step.above_floor, len(step.hypothesis.residual))
 
 
 def quiet_enough(gain: float, step: SearchStep, refitted: System) -> bool:
@@ -325,13 +325,38 @@ def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) 
 
 def _beats(chosen: Scored, other: Scored, above_floor: float) -> bool:
     margin = other.block_error - chosen.block_error
-    # Close is what leaves next to nothing of a large gap, or next to nothing beside what the chosen one leaves itself.
-    close = min(_CLOSE * above_floor, _VISIBLE * chosen.block_error.sum() / len(CHANNELS))
-    if margin.sum() <= close or len(margin) < 2:
+    if margin.sum() <= least_margin(above_floor, float(chosen.block_error.sum())) or len(margin) < 2:
         return False
     spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin)))
     # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
     return bool(margin.sum() > _ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
+
+
+def least_gain(above_floor: float, windows: int) -> float:
+    """Compute what an effect has to explain to be worth a name, in squared floors.
+
+    Parameters
+    ----------
+    above_floor : float
+        The gap, in squared floors.
+    windows : int
+    """
+    return max(_LEAST_SHARE * above_floor, _LEAST_IN_FLOORS**2 * windows)
+
+
+def least_margin(above_floor: float, left: float) -> float:
+    """Compute the difference of two explanations up to which they are as good as each other.
+
+    It is next to nothing of a large gap, or next to nothing beside what the better one leaves itself.
+
+    Parameters
+    ----------
+    above_floor : float
+        The gap, in squared floors.
+    left : float
+        What the better one leaves, in squared floors.
+    """
+    return min(_CLOSE * above_floor, _VISIBLE * left / len(CHANNELS))
 
 
 def _numbers(scored: Scored) -> int:

@@ -1,0 +1,1 @@
+"""The flight that settles what a diagnosis leaves open."""

@@ -1,0 +1,187 @@
+"""What would be logged of a flight, planned or flown in closed loop, and the floors that its noise makes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.balance_system import floors, system
+from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
+from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.next_flight.rivals import physical_values
+from cpfls_cli.gap.next_flight.room import Room, squared_speeds
+from cpfls_cli.gap.next_flight.separation import SizedEffect
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.simulation.measured import measure, noisy
+from cpfls_cli.simulation.model import SimulatedModel, simulated_effects
+from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
+from cpfls_cli.trajectory.planning import Trajectory
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_BATTERY_USE = 0.2
+"""Share of its voltage that the battery loses over the flight."""
+
+_OPTIONAL = ("attitude", "position", "velocity", "acceleration", "specific_force", "voltage")
+_CARRIES = {
+    "attitude": ("attitude",),
+    "velocity": ("attitude", "velocity"),
+    "height": ("attitude", "position"),
+    "force": ("attitude", "acceleration"),
+    "voltage": ("voltage",),
+}
+"""Signals that a log may lack, and those that carry what effects need."""
+
+
+def needed_signals(effects: Iterable[Effect]) -> frozenset[str]:
+    """List the signals that a log may lack and that effects need."""
+    return frozenset(signal for effect in effects for need in effect.needs for signal in _CARRIES.get(need, ()))
+
+
+def logged_signals(signals: Signals) -> frozenset[str]:
+    """List the signals of a log that another may lack."""
+    return frozenset(name for name in _OPTIONAL if getattr(signals, name) is not None)
+
+
+@dataclass(frozen=True)
+class Logging:
+    """What will be logged, with which noise, and how it is looked at.
+
+    Attributes
+    ----------
+    signals : frozenset of str
+        Of `attitude`, `position`, `velocity`, `acceleration`, `specific_force`, `voltage`.
+    commanded : bool
+        Whether commands are logged in place of rotor speeds.
+    floor : array, shape (6,), N m and N
+        What noise leaves of a window.
+    settings : GapSettings
+    base : InertiaModel or None
+        Of the model that misses something; None for the rigid body of the vehicle.
+    """
+
+    signals: frozenset[str]
+    commanded: bool
+    floor: Array
+    settings: GapSettings
+    base: InertiaModel | None = None
+
+    def weak(self, signals: Signals) -> WeakFlight:
+        """Arrange a flight for the balance."""
+        settings = self.settings
+        shared = windows(signals.period, settings.window_s, settings.overlap)
+        return weak_flight("next flight", signals, shared, self.base, settings.force, settings.axes, self.floor)
+
+
+def planned_signals(planned: Trajectory, room: Room, logging: Logging) -> Signals:
+    """Compute what would be logged along a plan by a vehicle without any effect and without noise."""
+    signals = Signals(
+        time=planned.time,
+        body_rate=planned.body_rate,
+        vehicle=room.vehicle,
+        attitude=planned.attitude,
+        position=planned.position,
+        velocity=planned.velocity,
+        acceleration=planned.acceleration,
+        rotor_speed=np.sqrt(np.maximum(squared_speeds(vars(planned), room.vehicle), 0.0)),
+        commanded=logging.commanded,
+        voltage=1 - _BATTERY_USE * planned.time / planned.duration,
+        ground_height_m=logging.settings.ground_height_m,
+    )
+    return as_logged(with_specific_force(signals), logging)
+
+
+def with_specific_force(signals: Signals) -> Signals:
+    """Add what an ideal accelerometer senses."""
+    assert signals.acceleration is not None, "a simulated flight has its acceleration"
+    upward = np.array([0.0, 0.0, signals.vehicle.gravity_m_s2])
+    felt = np.einsum("tji,tj->ti", signals.rotation, signals.acceleration + upward)
+    return replace(signals, specific_force=felt)
+
+
+def as_logged(signals: Signals, logging: Logging) -> Signals:
+    """Drop what will not be logged."""
+    dropped = {name: None for name in _OPTIONAL if name not in logging.signals}
+    return replace(signals, commanded=logging.commanded, **dropped)  # type: ignore[arg-type]  # names of fields
+
+
+def expected_floor(
+    room: Room, logging: Logging, noise: SimulationSettings, period: float, rng: np.random.Generator
+) -> Array:
+    """Estimate the floors that noise of known size will have, along a random path.
+
+    Parameters
+    ----------
+    room : Room
+    logging : Logging
+        Its floor is not used.
+    noise : SimulationSettings
+        Noise of each signal.
+    period : float
+        Of the log, s.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array, shape (6,), N m and N
+    """
+    exact = planned_signals(room.planned(room.drawn(rng), period), room, logging)
+    names = ("attitude", "body_rate", "position", "velocity", "acceleration", "rotor_speed")
+    logged: dict[str, Any] = noisy(
+        {name: values for name in names if (values := getattr(exact, name)) is not None}, noise, rng
+    )[0]
+    balance = system([logging.weak(replace(exact, specific_force=None, **logged))])
+    return floors(balance, np.zeros(balance.base.shape[2]))
+
+
+def flown_signals(
+    planned: Trajectory,
+    effects: Sequence[SizedEffect],
+    vehicle: VehicleSettings,
+    logging: Logging,
+    settings: ClosedLoopSettings,
+) -> Signals:
+    """Fly a plan in closed loop and log it without noise.
+
+    Parameters
+    ----------
+    planned : Trajectory
+    effects : sequence of SizedEffect
+        That the flown vehicle has and the autopilot does not know.
+    vehicle : VehicleSettings
+    logging : Logging
+    settings : ClosedLoopSettings
+        Their effects are not flown.
+
+    Raises
+    ------
+    SettingError
+        If an effect has values that no vehicle has.
+    ComputationError
+        If the vehicle leaves the path or overturns.
+    """
+    asked = simulated_effects({each.candidate.effect.name: physical_values(each) for each in effects}, vehicle)
+    loop = SimulationSettings(mode="closed-loop", closed_loop=replace(settings, effects={}))
+    # Without noise nothing is drawn.
+    rng = np.random.default_rng(0)
+    flight = measure(planned.time, vars(planned), vehicle, loop, rng, model=SimulatedModel(logging.base, asked))
+    logged = flight.signals
+    signals = Signals(
+        time=planned.time,
+        body_rate=logged["body_rate"],
+        vehicle=vehicle,
+        attitude=logged["attitude"],
+        position=logged["position"],
+        velocity=logged["velocity"],
+        acceleration=logged["acceleration"],
+        rotor_speed=logged["rotor_command"] if "rotor_speed" not in logged else logged["rotor_speed"],
+        voltage=logged.get("voltage"),
+        ground_height_m=logging.settings.ground_height_m,
+    )
+    return as_logged(with_specific_force(signals), logging)

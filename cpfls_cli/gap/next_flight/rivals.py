@@ -1,0 +1,181 @@
+"""The questions that a diagnosis, or a user, asks of the next flight."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.errors import InputError
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.refine import fit, refined
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.leftover import usual_size
+from cpfls_cli.gap.naming.results import Alternative, NamedEffect
+from cpfls_cli.gap.naming.scoring import candidates_of, information
+from cpfls_cli.gap.next_flight.separation import Question, SizedEffect
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+def require_tellable(effects: Sequence[Effect], source: str, vehicle: VehicleSettings) -> None:
+    """Refuse effects that no torque and no force shows.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+    source : str
+        File or key that named them, for the message.
+    vehicle : VehicleSettings
+
+    Raises
+    ------
+    InputError
+        It names the effect and what shows it.
+    """
+    for effect in effects:
+        if effect.columns is None:
+            raise InputError(
+                f"{source}: {effect.name} is a fault of the sensors, found on the sensors alone and not by a planned "
+                f"flight; what shows it: {effect.excitation}"
+            )
+        if "rotor_radius" in effect.needs and any(rotor.radius_m is None for rotor in vehicle.rotors):
+            raise InputError(
+                f"{source}: {effect.name} needs vehicle.rotors.radius_m of every rotor; add it to the config"
+            )
+    actuators = [effect.name for effect in effects if "command" in effect.needs]
+    measured = [effect.name for effect in effects if "measured_rotor_speed" in effect.needs]
+    if actuators and measured:
+        raise InputError(
+            f"{source}: {actuators[0]} shows where commands are logged in place of rotor speeds, {measured[0]} where "
+            "rotor speeds are measured; no one flight tells them apart. Log measured rotor speeds: they rule out "
+            f"{actuators[0]}"
+        )
+
+
+def questions_between(effects: Sequence[Effect], vehicle: VehicleSettings) -> tuple[Question, ...]:
+    """Ask for every two effects, either way, whether they would be told apart at a usual size.
+
+    One effect alone asks whether it shows at all.
+    """
+    sized = [usual(effect, vehicle) for effect in effects]
+    if len(sized) == 1:
+        return (Question(sized[0], None),)
+    asked = (Question(true, rival.candidate.effect) for true, rival in permutations(sized, 2))
+    return tuple(question for question in asked if _is_open(question))
+
+
+def _is_open(question: Question) -> bool:
+    """Tell whether there is anything to tell: an effect is also what holds it as a special case."""
+    effect, rival = question.true.candidate.effect, question.rival
+    return effect.kind != "parameter" and (rival is None or effect.name not in rival.holds)
+
+
+def usual(effect: Effect, vehicle: VehicleSettings) -> SizedEffect:
+    """Give an effect a size that is large but not unheard of."""
+    candidate = Candidate(effect, {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes})
+    return SizedEffect(candidate, usual_size(effect, vehicle, 1 if effect.unit_coefficient else _width(effect)))
+
+
+def questions_left(
+    named: Sequence[NamedEffect],
+    rivals: Sequence[Alternative],
+    unseen: Sequence[Effect],
+    flights: Sequence[WeakFlight],
+    floor: Array,
+) -> tuple[Question, ...]:
+    """Ask what a diagnosis left open: which of two rivals it is, and what its flights could not show.
+
+    Parameters
+    ----------
+    named : sequence of NamedEffect
+    rivals : sequence of Alternative
+    unseen : sequence of Effect
+        To show at a usual size.
+    flights : sequence of WeakFlight
+        Of the diagnosis, repaired.
+    floor : array, shape (6,), N m and N
+    """
+    sized = {each.name: _sized(each) for each in named if each.candidate is not None}
+    questions = []
+    for rival in rivals:
+        one = sized[rival.instead_of]
+        besides = tuple(each for name, each in sized.items() if name not in (rival.instead_of, rival.name))
+        other = fitted_rival(flights, [each.candidate for each in besides], CATALOGUE[rival.name], floor)
+        pair = (one, other.candidate.effect), (other, one.candidate.effect)
+        questions += [Question(true, effect, besides) for true, effect in pair]
+    asked = tuple(question for question in questions if _is_open(question))
+    return (*asked, *(Question(usual(effect, flights[0].signals.vehicle), None) for effect in unseen))
+
+
+def _sized(named: NamedEffect) -> SizedEffect:
+    assert named.candidate is not None, "an effect of the motion has its shapes"
+    return SizedEffect(named.candidate, named.linear if len(named.linear) else np.ones(1))
+
+
+def _width(effect: Effect) -> int:
+    if effect.linear is None:
+        return len(effect.coefficients)
+    return len(effect.linear(np.ones(len(effect.coefficients))))
+
+
+def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> tuple[SizedEffect, ...]:
+    """Fit effects together on flights; what the flights leave open stays small beside its bounds.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+        Their shapes are kept.
+    floor : array, shape (6,), N m and N
+    """
+    balance, vehicle = system(flights, chosen), flights[0].signals.vehicle
+    widths = [balance.columns(each).shape[2] for each in balance.free]
+    matrix = (balance.base / floor[:, None]).reshape(-1, sum(widths))
+    pairs = zip(balance.free, widths, strict=True)
+    prior = np.concatenate([information(each.effect, width, vehicle) for each, width in pairs])
+    # Rows of the prior beside those of the flights; lengths of columns differ by decades.
+    matrix = np.concatenate([matrix, np.diag(np.sqrt(prior))])
+    right = np.concatenate([(balance.residual / floor).reshape(-1), np.zeros(len(prior))])
+    length = np.linalg.norm(matrix, axis=0)
+    scale = 1.0 / np.where(length > 0, length, 1.0)
+    parts = np.split(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale, np.cumsum(widths)[:-1])
+    by_name = {each.effect.name: part for each, part in zip(balance.free, parts, strict=True)}
+    return tuple(SizedEffect(each, by_name.get(each.effect.name, np.ones(1))) for each in chosen)
+
+
+def fitted_rival(
+    flights: Sequence[WeakFlight], besides: Sequence[Candidate], rival: Effect, floor: Array
+) -> SizedEffect:
+    """Fit a rival in place of a named effect, at its best shape; at a usual size where the flights lack its signals.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    besides : sequence of Candidate
+        The other named effects.
+    rival : Effect
+    floor : array, shape (6,), N m and N
+    """
+    if all(rival.missing(flight.signals) for flight in flights):
+        return usual(rival, flights[0].signals.vehicle)
+
+    def error(candidate: Candidate) -> float:
+        balance = system(flights, [*besides, candidate])
+        return float((((balance.residual - balance.base @ fit(balance, floor)) / floor) ** 2).sum())
+
+    best = min(candidates_of([rival]), key=error)
+    return fitted_effects(flights, refined(flights, [*besides, best], floor).chosen, floor)[-1]
+
+
+def physical_values(sized: SizedEffect) -> dict[str, float]:
+    """Give the physical coefficients and shapes of an effect by name; those that are open are 0."""
+    effect, shape = sized.candidate
+    if effect.unit_coefficient:
+        return dict(shape)
+    physical = np.nan_to_num(sized.linear if effect.physical is None else effect.physical(sized.linear))
+    names = (coefficient.name for coefficient in effect.coefficients)
+    return {**dict(zip(names, physical.tolist(), strict=False)), **shape}

@@ -1,0 +1,182 @@
+"""What a path may use of space and of the vehicle, and paths that use it up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor
+from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.simulation.inverse import collective_thrust
+from cpfls_cli.trajectory.harmonics import HarmonicPath, harmonic_trajectory, random_path
+from cpfls_cli.trajectory.planning import Trajectory
+from cpfls_cli.trajectory.settings import TrajectorySettings
+from cpfls_cli.vehicle.rotors import rotor_demand
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+TILT_MAX = np.radians(35.0)
+"""Largest tilt where the settings leave it open."""
+
+_ROTOR_SHARE = 0.85
+"""Of the largest speed of a rotor, and of the way down from hovering to rest, in squares: the rest is for control."""
+_MOST_YAW = np.pi
+_SAMPLES_PER_PERIOD = 20
+_HARMONICS = 10
+_HALVINGS, _ROUGH = 7, 3
+_LEAST_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class Room:
+    """Space, limits and rotors that a path may use.
+
+    Attributes
+    ----------
+    half : array, shape (3,), m
+        Half of the box, less the vehicle's own size.
+    middle : array, shape (3,), m, world frame
+    settings : TrajectorySettings
+        Limits, tilt and duration.
+    vehicle : VehicleSettings
+    period : float
+        Between the samples that are looked at, s.
+    """
+
+    half: Array
+    middle: Array
+    settings: TrajectorySettings
+    vehicle: VehicleSettings
+    period: float
+
+    @property
+    def _seen_at(self) -> float:
+        """Time between samples at which loads are looked at, s."""
+        return 1 / (_SAMPLES_PER_PERIOD * self.settings.next_flight.frequency_max_hz)
+
+    def planned(self, path: HarmonicPath, period: float | None = None) -> Trajectory:
+        """Sample a path, about the middle of the room."""
+        there = replace(path, centre=path.centre + np.append(self.middle, 0.0))
+        return harmonic_trajectory(there, period or self.period, self.vehicle.gravity_m_s2)
+
+    def drawn(self, rng: np.random.Generator) -> HarmonicPath:
+        """Draw a path that reaches a limit, each axis with a random share of what it can do alone."""
+        settings = self.settings
+        assert settings.duration_s is not None, "settings of this path have a duration"
+        path = random_path(settings.duration_s, settings.next_flight.frequency_max_hz, _HARMONICS, rng)
+        share = 10 ** rng.uniform(np.log10(_LEAST_SHARE), 0.0, 4)
+        for axis in range(4):
+            alone = self.fitted(path.scaled(np.arange(4) == axis), _ROUGH)
+            path = replace(
+                path,
+                cosine=np.where(np.arange(4)[:, None] == axis, alone.cosine, path.cosine),
+                sine=np.where(np.arange(4)[:, None] == axis, alone.sine, path.sine),
+            )
+        return self.fitted(path.scaled(share))
+
+    def fitted(self, path: HarmonicPath, halvings: int = _HALVINGS) -> HarmonicPath:
+        """Scale a path until it reaches a limit, and put its middle into that of the room; it starts at yaw 0."""
+        at = path.sample(np.arange(0.0, path.duration, self.period))[0]
+        low, high = at.min(axis=0), at.max(axis=0)
+        reach = np.maximum(0.5 * (high - low), 1e-12)
+        centred = replace(path, centre=path.centre - np.array([*0.5 * (high + low)[:3], at[0, 3]]))
+        largest = centred.scaled(float((np.array([*self.half, _MOST_YAW]) / reach).min()))
+        return largest.scaled(self._share(largest, halvings))
+
+    def _share(self, path: HarmonicPath, halvings: int) -> float:
+        """Find the largest share of a path that keeps the limits on motion and rotors, by bisection."""
+        if self.load(path) <= 1:
+            return 1.0
+        low, high = 0.0, 1.0
+        for _ in range(halvings):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.load(path.scaled(middle)) <= 1 else (low, middle)
+        return low
+
+    def load(self, path: HarmonicPath) -> float:
+        """Compute the largest share of any limit on motion, tilt and rotors that a path takes."""
+        try:
+            planned = self.planned(path, self._seen_at)
+        except ComputationError:
+            return np.inf
+        signals = vars(planned)
+        loads = [_taken(signals[key.split("_", 1)[0]], limit) for key, limit in self.settings.limits.given.items()]
+        tilt = np.arccos(np.clip(np.prod(np.cos(planned.attitude[:, :2]), axis=1), -1, 1)).max()
+        loads.append(float(tilt) / (self.settings.tilt_max_rad or TILT_MAX))
+        squared, hover = squared_speeds(signals, self.vehicle), _hover(self.vehicle)
+        loads.append(float((squared / (_ROTOR_SHARE * self.vehicle.rotor_speed_max_rad_s**2)).max()))
+        loads.append(float(((hover - squared) / (_ROTOR_SHARE * hover)).max()))
+        return max(loads)
+
+
+def room_of(settings: TrajectorySettings, vehicle: VehicleSettings, ground: float, period: float) -> Room:
+    """Find the room that a vehicle has.
+
+    Parameters
+    ----------
+    settings : TrajectorySettings
+    vehicle : VehicleSettings
+    ground : float
+        Height of the ground, m.
+    period : float
+        Between the samples that are looked at, s.
+
+    Raises
+    ------
+    SettingError
+        If the vehicle does not fit into the box, or the box reaches into the ground.
+    """
+    asked = settings.next_flight
+    size = 2 * max(float(np.hypot(*rotor.position_m[:2])) + (rotor.radius_m or 0.0) for rotor in vehicle.rotors)
+    box = np.array(asked.box_m)
+    half = 0.5 * (box - [size, size, 0.0])
+    if (half[:2] <= 0).any():
+        given = " ".join(f"{side:g}" for side in asked.box_m)
+        message = f"is {given}, and the vehicle is {size:.3g} m across; give a box that it can move in"
+        raise SettingError("next_flight.box_m", message)
+    if asked.height_m < 0.5 * box[2]:
+        message = (
+            f"is {asked.height_m:g}, and the box {box[2]:g} m high about it would reach into the ground; raise it to "
+            f"{0.5 * box[2]:g} or more, or lower next_flight.box_m"
+        )
+        raise SettingError("next_flight.height_m", message)
+    hover = _hover(vehicle)
+    most = _ROTOR_SHARE * vehicle.rotor_speed_max_rad_s**2
+    if (hover >= most).any():
+        raise ComputationError(
+            f"vehicle.rotor_speed_max_rad_s = {vehicle.rotor_speed_max_rad_s:g}: hovering takes "
+            f"{np.sqrt(hover.max()):.4g} rad/s, which leaves the rotors no room to move the vehicle; check mass, "
+            "thrust factors and the largest rotor speed"
+        )
+    return Room(half, np.array([0.0, 0.0, ground + asked.height_m]), settings, vehicle, period)
+
+
+def squared_speeds(planned: Mapping[str, Array], vehicle: VehicleSettings) -> Array:
+    """Compute the squared rotor speeds that a planned motion asks for.
+
+    Returns
+    -------
+    array, shape (time, rotor), rad^2/s^2
+        Negative where no rotor can.
+    """
+    q, qd, qdd = (planned[name] for name in ("attitude", "attitude_rate", "attitude_acceleration"))
+    about_body = body_torque(q, qd, qdd, inertia_tensor(vehicle))
+    thrust = collective_thrust(vehicle, about_body, planned["acceleration"])
+    squared: Array = rotor_demand(vehicle, thrust, about_body).squared_speed
+    return squared
+
+
+def _hover(vehicle: VehicleSettings) -> Array:
+    """Squared rotor speeds of hovering, shape (rotor,), rad^2/s^2."""
+    weight = np.array([vehicle.mass_kg * vehicle.gravity_m_s2])
+    squared: Array = rotor_demand(vehicle, weight, np.zeros((1, 3))).squared_speed[0]
+    return squared
+
+
+def _taken(values: Array, limit: float | tuple[float, float, float]) -> float:
+    """Compute the share of a limit that is taken: three hold by component, one holds along the path."""
+    if isinstance(limit, tuple):
+        return float(np.abs(values / np.array(limit)).max())
+    return float(np.linalg.norm(values, axis=1).max() / limit)

@@ -1,0 +1,171 @@
+"""Search for the path along which rivals differ most, within the room that a vehicle has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.weak_flight import WeakFlight
+from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.next_flight.logged import Logging, planned_signals
+from cpfls_cli.gap.next_flight.room import Room
+from cpfls_cli.gap.next_flight.separation import Evidence, Judgement, Question, gathered, judged, shared_noise
+from cpfls_cli.trajectory.harmonics import HarmonicPath
+
+_FIRST_STEP, _SMALLEST_STEP = 0.3, 0.02
+_LONGER, _SHORTER = 1.5, 0.9
+"""Of the step after a success and a failure: in balance where one trial in five succeeds."""
+
+_ONE_AXIS, _ANEW = 0.5, 0.2
+"""Shares of the trials that change one axis only, and of those the ones that draw it anew."""
+
+_HOPELESS = 0.01
+"""Share of enough below which a question hardly counts any more: no path may be able to tell."""
+
+_A_LITTLE, _A_WHILE = 0.01, 2.0
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What the next flight has to tell, beside what is known from others.
+
+    Attributes
+    ----------
+    questions : tuple of Question
+    known : tuple of Evidence
+        What flights that are there say on each question; no rows where there are none.
+    room : Room
+    logging : Logging
+    noise : float
+        See `shared_noise`.
+    """
+
+    questions: tuple[Question, ...]
+    known: tuple[Evidence, ...]
+    room: Room
+    logging: Logging
+    noise: float
+
+    def judgements(self, signals: Signals | None, again: int = 1) -> tuple[Judgement, ...]:
+        """Judge what the known flights, each taken `again` times, say together with one along given signals."""
+        flights = [] if signals is None else [self.logging.weak(signals)]
+        answers = []
+        for question, known in zip(self.questions, self.known, strict=True):
+            fresh, columns = gathered(question, flights or [self._empty()], self.logging.floor)
+            both = known.taken(again)
+            answers.append(judged(both + fresh if flights else both, columns, self.noise))
+        return tuple(answers)
+
+    def score(self, path: HarmonicPath) -> float:
+        """Score a path: harmonic mean over the questions of what it tells, 1 for just enough; the worst counts most."""
+        answers = self.judgements(planned_signals(self.room.planned(path), self.room, self.logging))
+        return 1 / float(np.mean([1 / (answer.apart / answer.enough + _HOPELESS) for answer in answers]))
+
+    def _empty(self) -> WeakFlight:
+        """Give any flight that moves a little, for the places of the columns."""
+        shaken = np.full((4, 1), _A_LITTLE)
+        path = HarmonicPath(np.zeros(4), np.ones((4, 1), dtype=int), shaken, shaken, _A_WHILE)
+        return self.logging.weak(planned_signals(self.room.planned(path), self.room, self.logging))
+
+    def known_from(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
+        """Gather what flights that are there say; nothing where they lack a signal of an effect in question."""
+        rival = [] if question.rival is None else [question.rival]
+        effects = [question.true.candidate.effect, *rival, *(each.candidate.effect for each in question.besides)]
+        seen = all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects)
+        if flights and seen:
+            return gathered(question, flights, self.logging.floor)[0]
+        return gathered(question, [self._empty()], self.logging.floor)[0].taken(0)
+
+
+def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Room, logging: Logging) -> Goal:
+    """Set up what the next flight has to tell.
+
+    Parameters
+    ----------
+    questions : sequence of Question
+    flights : sequence of WeakFlight
+        That are there already.
+    room : Room
+    logging : Logging
+    """
+    shared = windows(room.period, logging.settings.window_s, logging.settings.overlap)
+    blank = Goal(tuple(questions), (), room, logging, shared_noise(shared))
+    return replace(blank, known=tuple(blank.known_from(question, flights) for question in questions))
+
+
+@dataclass(frozen=True)
+class NextFlight:
+    """The best path that was found.
+
+    Attributes
+    ----------
+    path : HarmonicPath
+    random : tuple of HarmonicPath
+        Drawn at random within the same room, from the worst to the best; the best was improved.
+    history : array, shape (iteration,)
+        Scores in the course of the search.
+    """
+
+    path: HarmonicPath
+    random: tuple[HarmonicPath, ...]
+    history: Array
+
+
+def next_flight(
+    asked: Goal,
+    rng: np.random.Generator,
+    progress: Callable[[int, int, str], None] = lambda _done, _total, _note: None,
+) -> NextFlight:
+    """Search for the path that tells most.
+
+    The best of some random paths is changed at random as long as that helps, with a step that grows with success and
+    shrinks with failure.
+
+    Parameters
+    ----------
+    asked : Goal
+    rng : numpy.random.Generator
+    progress : callable
+        Takes paths done, paths in all, and a note.
+
+    References
+    ----------
+    Atkinson and Fedorov 1975, The design of experiments for discriminating between two rival models, Biometrika 62
+    (T-optimality). Rechenberg 1973 (the one-fifth rule).
+    """
+    settings, room = asked.room.settings.next_flight, asked.room
+    total = settings.starts + settings.iterations
+    scored = []
+    for number in range(settings.starts):
+        path = room.drawn(rng)
+        scored.append((asked.score(path), path))
+        progress(number + 1, total, f"best random path {max(score for score, _ in scored):.3f}")
+    scored.sort(key=lambda pair: pair[0])
+    best, path = scored[-1]
+    history, step = [], _FIRST_STEP
+    for number in range(settings.iterations):
+        trial = room.fitted(_changed(path, step, room, rng))
+        score = asked.score(trial)
+        step = min(max(step * (_LONGER if score > best else _SHORTER), _SMALLEST_STEP), 1.0)
+        best, path = (score, trial) if score > best else (best, path)
+        history.append(best)
+        progress(settings.starts + number + 1, total, f"best path {best:.3f}")
+    return NextFlight(path, tuple(path for _, path in scored), np.array(history))
+
+
+def _changed(path: HarmonicPath, step: float, room: Room, rng: np.random.Generator) -> HarmonicPath:
+    """Change amplitudes in proportion to the velocities of their axes, of one axis or of all; or draw an axis anew."""
+    axes = np.arange(4)[:, None]
+    chosen = axes == rng.integers(4) if rng.random() < _ONE_AXIS else axes >= 0
+    if not chosen.all() and rng.random() < _ANEW:
+        other = room.drawn(rng)
+        pairs = ((getattr(other, name), getattr(path, name)) for name in ("order", "cosine", "sine"))
+        order, cosine, sine = (np.where(chosen, anew, old) for anew, old in pairs)
+        return replace(path, order=order, cosine=cosine, sine=sine)
+    speed = np.sqrt(((path.cosine**2 + path.sine**2) * path.order**2).mean(axis=1, keepdims=True))
+    cosine, sine = step * rng.standard_normal((2, *path.cosine.shape)) * speed / path.order * chosen
+    return path.moved(cosine, sine).scaled(np.exp(step * rng.standard_normal(4) * chosen[:, 0]))

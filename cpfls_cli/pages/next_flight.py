@@ -1,0 +1,128 @@
+"""What a planned flight will tell: each question, what its outcomes mean, and how sure they will be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cpfls_cli.artifacts.spec import rows_of
+from cpfls_cli.artifacts.trajectory import QuestionGroup
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.pages.effects import effect_title, unit_words
+from cpfls_cli.report.content import Block, Table, Text
+from cpfls_cli.report.numbers import UNKNOWN, joined, number, whole_percent
+
+_SETTLED = 0.975
+_EVEN = 0.5
+_RARE = 0.001
+
+
+def size_words(effect: Effect, values: Mapping[str, float]) -> str:
+    """Write the numbers of an effect that are not zero."""
+    units = {each.name: unit_words(each.unit) for each in effect.numbers}
+    return ", ".join(f"{name} = {number(value, 3)} {units[name]}".rstrip() for name, value in values.items() if value)
+
+
+def advice_words(effect: Effect, rival: Effect | None) -> str:
+    """Give the flight that the catalogue advises."""
+    if rival is None:
+        return effect.excitation
+    return effect.rivals.get(rival.name) or rival.rivals.get(effect.name) or effect.excitation
+
+
+def notes_blocks(notes: Sequence[str]) -> Iterator[Block]:
+    """Give what a user should know about the planning."""
+    yield from (Text(note, "warning") for note in dict.fromkeys(notes))
+
+
+def question_blocks(name: str, asked: QuestionGroup) -> Iterator[Block]:
+    """Say what a flight will tell and how sure, beside other flights, and what to do with it."""
+    worst = float(np.nanmin(np.minimum(asked.sure, np.where(np.isnan(asked.flown), 1.0, asked.flown))))
+    told = _told(asked)
+    if worst >= _SETTLED:
+        yield Text(
+            f"This flight tells {told}: each outcome is right in {_percent(worst)} of such flights or more.", "good"
+        )
+    elif worst >= _EVEN:
+        yield Text(
+            f"This flight probably tells {told}: right in {_percent(worst)} of such flights where it is hardest.",
+            "note",
+        )
+    else:
+        yield Text(
+            f"Within this room no flight was found that surely tells {told}: where it is hardest, {_percent(worst)} of "
+            "such flights do. Give it a larger --box, a longer --duration, or higher trajectory.limits.",
+            "warning",
+        )
+    yield _table(name, asked)
+    yield from (Text(sentence) for sentence in dict.fromkeys(_outcomes(asked)))
+    yield Text(
+        "Fly it, then diagnose it together with the flights so far, the new one among those that train: cpfls gap "
+        "CONFIG FLIGHT... NEW-FLIGHT --held-out FLIGHT -o FOLDER"
+    )
+
+
+def _percent(share: float) -> str:
+    """Write a probability in per cent; what is nearly sure is not called sure."""
+    return f"{100 * (1 - _RARE):g} %" if share > 1 - _RARE else whole_percent(share)
+
+
+def _told(asked: QuestionGroup) -> str:
+    """Say what is told from what, each pair once, and which effects are looked for."""
+    pairs = [sorted(pair) for pair in zip(asked.true, asked.rival, strict=True)]
+    told = [f"{effect_title(one)} from {effect_title(other)}" for one, other in pairs if one]
+    sought = [effect_title(other) for one, other in pairs if not one]
+    return joined([*dict.fromkeys(told), *([f"whether there is {joined(sought, 'or')}"] if sought else [])])
+
+
+def _table(name: str, asked: QuestionGroup) -> Table:
+    header = ("If it is", "Told from", "Log Bayes factor", "This flight", "As flown", "Random", "Same again")
+    shares = ("sure", "flown", "random", "again")
+    rows = [
+        [
+            row["true"],
+            row["rival"] or "nothing",
+            number(row["log_bayes"], 3),
+            *(UNKNOWN if np.isnan(row[key]) else _percent(row[key]) for key in shares),
+        ]
+        for row in rows_of(asked)
+    ]
+    caption = (
+        "How this flight, with those that are there, tells what is true: expected logarithm of the Bayes factor, and "
+        "the probability that the diagnosis names it. Beside it the same along the path that the autopilot of "
+        "simulation.closed_loop flies, of the median of random flights in the same room, and of the known flights "
+        "flown once more."
+    )
+    return Table(name, caption, header, rows, frozenset({0, 1}))
+
+
+def _least(row: Mapping[str, Any]) -> str:
+    """Say from which size on an effect is told; nothing of one that is as it is."""
+    if row["smallest"] or not row["size"]:
+        return str(row["smallest"])
+    return f"{number(row['least'], 2)} of that"
+
+
+def _outcomes(asked: QuestionGroup) -> Iterator[str]:
+    """Say what each outcome will mean."""
+    rows = rows_of(asked)
+    for row in rows:
+        true, rival, least = row["true"], row["rival"], _least(row)
+        taken = f"Taken for it: {row['size']}. " if row["size"] else ""
+        if not rival:
+            absent = f"smaller than {least}" if least else "not there"
+            yield f"If the diagnosis then names {true}, it is there; if not, it is {absent}. {taken}".rstrip()
+            continue
+        chance = max(other["wrong"] for other in rows if {other["true"], other["rival"]} == {true, rival})
+        error = f"less than {100 * _RARE:g} %" if chance < _RARE else f"{100 * chance:.2g} %"
+        yield (
+            f"If the diagnosis then names {true} alone, it is {true} and not {rival} (by chance the wrong one of the "
+            f"two is named in {error} of flights). {taken}Surely told from {least} on. By hand: {row['advice']}."
+        )
+    if any(asked.rival):
+        yield (
+            "If it is AMBIGUOUS again, the effect is smaller than that; if neither is named, or it is UNEXPLAINED, it "
+            "is neither of them alone."
+        )

@@ -1,0 +1,63 @@
+"""From an ambiguous diagnosis to the flight that settles it, and a diagnosis that leaves nothing to settle."""
+
+import json
+
+import pytest
+
+CONFIG = """
+seed: 1
+trajectory: {path: straight, displacement_m: 4.0, legs: 2, period_s: 0.4, yaw_turn_rad: 0.5, duration_s: 16.0}
+simulation:
+  mode: closed-loop
+  noise: {attitude: 0.003, body_rate: 0.005, velocity: 0.05, acceleration: 0.1, rotor_speed: 1.0}
+  closed_loop: {integration_rate_hz: 200.0, effects: {com_offset: [0.002, -0.0015]}}
+gap: {shifts: 39, ignore: [payload]}
+"""
+NEXT = ("--duration", "12", "--set", "trajectory.next_flight.starts=6", "--set", "trajectory.next_flight.iterations=10")
+
+
+@pytest.fixture(scope="module")
+def folder(cpfls, tmp_path_factory):
+    """Gentle flights of one thrust, and their diagnosis."""
+    folder = tmp_path_factory.mktemp("open")
+    (folder / "study.yaml").write_text(CONFIG)
+    for number, direction in ((1, "[1.0,0.0,0.0]"), (2, "[1.0,0.4,0.0]")):
+        path = folder / f"path-{number}.h5"
+        run(cpfls, folder, "trajectory", "-o", path, "--set", f"trajectory.direction={direction}")
+        run(cpfls, folder, "simulate", path, "-o", folder / f"flight-{number}.h5", "--seed", number)
+    diagnosed(cpfls, folder, "open", "flight-1.h5")
+    return folder
+
+
+def run(cpfls, folder, command, *options):
+    result = cpfls(command, folder / "study.yaml", *options, "--json")
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+def diagnosed(cpfls, folder, name, *training):
+    compared, diagnosis = folder / f"compared-{name}.h5", folder / f"{name}.h5"
+    run(cpfls, folder, "compare", *(folder / each for each in training), "-o", compared)
+    return run(cpfls, folder, "diagnose", compared, "--held-out", folder / "flight-2.h5", "-o", diagnosis)
+
+
+def test_the_next_flight_settles_what_the_first_left_open(cpfls, folder):
+    planned = run(cpfls, folder, "trajectory", "--for", folder / "open.h5", *NEXT, "-o", folder / "next.h5")
+    rows = [row for row in planned["questions"] if {row["true"], row["rival"]} == {"com_offset", "torque_bias"}]
+    assert len(rows) == 2
+    for row in rows:
+        assert row["sure"] > 0.9 > 0.1 > row["again"]
+    run(cpfls, folder, "simulate", folder / "next.h5", "-o", folder / "flight-3.h5", "--seed", 3)
+    settled = diagnosed(cpfls, folder, "settled", "flight-1.h5", "flight-3.h5")
+    assert (settled["verdict"], [effect["name"] for effect in settled["effects"]]) == ("NAMED", ["com_offset"])
+    result = cpfls("trajectory", folder / "study.yaml", "--for", folder / "settled.h5", "-o", folder / "none.h5")
+    assert result.exit_code != 0
+    assert "settled.h5: its verdict is NAMED, and it leaves nothing to tell apart" in result.stderr
+    assert not (folder / "none.h5").exists()
+
+
+def test_another_vehicle_is_refused(cpfls, folder):
+    options = ("--for", folder / "open.h5", "--set", "vehicle.mass_kg=5.0", "-o", folder / "none.h5")
+    result = cpfls("trajectory", folder / "study.yaml", *options)
+    assert result.exit_code != 0
+    assert "vehicle" in result.stderr

@@ -1,0 +1,347 @@
+"""The next flight: what rivals cannot imitate against formulas, how sure against draws, paths within their room."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.errors import ComputationError, InputError, SettingError
+from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.naming.results import Alternative, NamedEffect
+from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
+from cpfls_cli.gap.next_flight.rivals import (
+    physical_values,
+    questions_between,
+    questions_left,
+    require_tellable,
+    usual,
+)
+from cpfls_cli.gap.next_flight.room import room_of, squared_speeds
+from cpfls_cli.gap.next_flight.search import goal, next_flight
+from cpfls_cli.gap.next_flight.separation import (
+    Judgement,
+    Question,
+    SizedEffect,
+    apart,
+    gathered,
+    judged,
+    shared_noise,
+)
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
+from cpfls_cli.trajectory.harmonics import HarmonicPath
+from cpfls_cli.trajectory.limits import LimitSettings
+from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
+from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
+
+FLOOR = np.array([0.02, 0.02, 0.02, 0.1, 0.1, 0.1])
+LOGGING = Logging(frozenset({"attitude", "position", "velocity", "acceleration"}), False, FLOOR, GapSettings())
+FEW = NextFlightSettings(starts=4, iterations=12)
+SETTINGS = TrajectorySettings(path="next-flight", duration_s=12.0, next_flight=FEW)
+LEVER, BIAS = 0.002, 0.1
+
+
+def room(**changed):
+    return room_of(replace(SETTINGS, **changed), VEHICLE, 0.0, 0.02)
+
+
+def path_of(axis, size, order=6):
+    """One sine along one axis, at rest in nothing but the others."""
+    sine = np.zeros((4, 1))
+    sine[axis] = size
+    return HarmonicPath(np.zeros(4), np.full((4, 1), order), np.zeros((4, 1)), sine, SETTINGS.duration_s)
+
+
+def along(path):
+    return planned_signals(room().planned(path), room(), LOGGING)
+
+
+def question(true, linear, rival):
+    return Question(SizedEffect(candidate(true), np.array(linear)), CATALOGUE[rival] if rival else None)
+
+
+def told(asked, *paths):
+    return apart(*gathered(asked, [LOGGING.weak(along(path)) for path in paths], FLOOR))
+
+
+def thrusts(path):
+    """Thrust of each window of a flight straight up and down, by Newton's law."""
+    signals = along(path)
+    through = windows(signals.period, 0.4, 0.5)
+    return through.average(VEHICLE.mass_kg * (9.81 + signals.acceleration[:, 2]))
+
+
+def test_an_offset_is_told_from_a_bias_by_changes_of_thrust_alone():
+    """The bias takes the mean of the torque ``c F``, an offset of the best length the part of ``M`` along ``F``."""
+    path = path_of(2, 0.15)
+    thrust = thrusts(path)
+    assert np.ptp(thrust) > 5
+    offset = question("com_offset", [LEVER, 0.0], "torque_bias")
+    expected = LEVER**2 * ((thrust - thrust.mean()) ** 2).sum() / FLOOR[1] ** 2
+    assert told(offset, path) == pytest.approx(expected, rel=1e-6)
+    bias = question("torque_bias", [0.0, BIAS, 0.0], "com_offset")
+    expected = BIAS**2 * (len(thrust) - thrust.sum() ** 2 / (thrust**2).sum()) / FLOOR[1] ** 2
+    assert told(bias, path) == pytest.approx(expected, rel=1e-6)
+
+
+def test_hovering_tells_nothing_of_the_two_whatever_the_yaw():
+    for path in (path_of(2, 0.0), path_of(3, 0.3, 1)):
+        assert told(question("com_offset", [LEVER, LEVER], "torque_bias"), path) < 1e-6
+
+
+def test_flights_are_taken_together():
+    """Two hovers at different thrust would tell; two at the same do not: what is fitted is the same in both."""
+    hover, climb = path_of(2, 0.0), path_of(2, 0.15)
+    offset = question("com_offset", [LEVER, 0.0], "torque_bias")
+    assert told(offset, hover, hover) < 1e-6
+    assert told(offset, hover, climb) >= told(offset, climb)
+
+
+def test_evidence_of_flights_adds_up_to_that_of_all():
+    paths = path_of(2, 0.15), path_of(0, 1.0, 3)
+    offset = question("com_offset", [LEVER, LEVER], "rotor_mismatch")
+    one, two = (gathered(offset, [LOGGING.weak(along(path))], FLOOR) for path in paths)
+    assert apart(one[0] + two[0], one[1]) == pytest.approx(told(offset, *paths), rel=1e-9)
+
+
+def test_effects_that_are_there_besides_are_free_too():
+    """A bias that is named already takes the mean of the torque of an offset, whatever the rival."""
+    path = path_of(2, 0.15)
+    thrust = thrusts(path)
+    alone = question("com_offset", [LEVER, 0.0], None)
+    bias = SizedEffect(candidate("torque_bias"), np.array([0.0, BIAS, 0.0]))
+    assert told(alone, path) == pytest.approx(LEVER**2 * (thrust**2).sum() / FLOOR[1] ** 2, rel=1e-6)
+    both = LEVER**2 * ((thrust - thrust.mean()) ** 2).sum() / FLOOR[1] ** 2
+    assert told(replace(alone, besides=(bias,)), path) == pytest.approx(both, rel=1e-6)
+
+
+def test_without_a_rival_the_vehicles_own_numbers_are_all_that_imitates():
+    hover = path_of(2, 0.0)
+    count = windows(0.02, 0.4, 0.5).count(601)
+    seen = told(question("torque_bias", [0.0, BIAS, 0.0], None), hover)
+    assert seen == pytest.approx(count * (BIAS / FLOOR[1]) ** 2, rel=1e-6)
+    assert told(question("torque_bias", [0.0, BIAS, 0.0], "parameter_error"), hover) == pytest.approx(seen)
+
+
+def test_an_effect_without_a_rival_has_to_be_worth_a_name():
+    """Three tenths of a floor in every window, or a twentieth of the gap."""
+    count = windows(0.02, 0.4, 0.5).count(601)
+    for size, least in ((0.1, 0.09 * count), (10.0, 0.05 * 100.0 * count)):
+        bias = question("torque_bias", [0.0, size * FLOOR[1], 0.0], None)
+        evidence, columns = gathered(bias, [LOGGING.weak(along(path_of(2, 0.0)))], FLOOR)
+        assert judged(evidence, columns, 1.0).least == pytest.approx(least, rel=1e-6)
+
+
+@pytest.mark.parametrize("least", [0.0, 25.0, 400.0])
+def test_enough_is_what_makes_the_answer_sure(least):
+    enough = Judgement(1.0, least, 1.1).enough
+    assert Judgement(enough, least, 1.1).sure == pytest.approx(0.975)
+    assert Judgement(0.5 * enough, least, 1.1).sure < 0.9
+    assert Judgement(4 * enough, least, 1.1).least_size == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("strength", [0.35, 0.5, 0.8])
+def test_the_share_of_right_answers_is_that_of_draws(strength):
+    """Least squares with and without the true effect on rows with white noise, decided as the diagnosis decides."""
+    rng = np.random.default_rng(3)
+    base = rng.standard_normal((200, 3))
+    true, rival = rng.standard_normal((2, 200, 1))
+    both = np.hstack([base, rival])
+    rest = strength * (true - both @ np.linalg.lstsq(both, true, rcond=None)[0])
+    expected = Judgement(float((rest**2).sum()), 0.0, 1.0)
+    rows = strength * true + rng.standard_normal((200, 4000))
+    left = [
+        ((rows - own @ np.linalg.lstsq(own, rows, rcond=None)[0]) ** 2).sum(axis=0)
+        for own in (both, np.hstack([base, true]))
+    ]
+    margin = left[0] - left[1]
+    error = 2 * np.sqrt(expected.apart)
+    assert np.mean(margin > 2 * error) == pytest.approx(expected.sure, abs=0.05)
+    assert expected.sure > 0.02
+
+
+def test_neighbouring_windows_share_noise_as_draws_do():
+    through = windows(0.01, 0.4, 0.5)
+    noise = np.random.default_rng(4).standard_normal((6000, 200))
+    sums = through.average(noise)
+    single = float((through.weight**2).sum())
+    assert sums.sum(axis=0).var() / (len(sums) * single) == pytest.approx(shared_noise(through), rel=0.3)
+    assert shared_noise(windows(0.01, 0.4, 0.0)) == 1.0
+
+
+def test_a_drawn_path_rests_at_both_ends_and_its_derivatives_fit():
+    path = room().drawn(np.random.default_rng(5))
+    ends = path.sample(np.array([0.0, path.duration]))
+    largest = np.abs(path.sample(np.linspace(0, path.duration, 500))).max(axis=1)
+    assert (np.abs(ends[1:5]) <= 1e-9 * largest[1:5, None] + 1e-12).all()
+    np.testing.assert_allclose(ends[0, 0], ends[0, 1], atol=1e-9)
+    step, time = 1e-4, np.linspace(1.0, 9.0, 7)
+    values = path.sample(time)
+    slopes = (path.sample(time + step) - path.sample(time - step)) / (2 * step)
+    np.testing.assert_allclose(values[1:], slopes[:-1], rtol=1e-4, atol=1e-4 * np.abs(values[1:]).max())
+
+
+@pytest.mark.parametrize("limits", [{}, {"velocity_m_s": 1.0}, {"acceleration_m_s2": (1.0, 2.0, 0.5)}])
+def test_paths_keep_to_their_room(limits):
+    there = room(limits=LimitSettings(**limits), tilt_max_rad=0.3)
+    for seed in range(6):
+        path = there.drawn(np.random.default_rng(seed))
+        planned = there.planned(path, 0.005)
+        outside = np.abs(planned.position - there.middle) - there.half
+        assert outside.max() < 1e-2
+        assert np.abs(planned.attitude[:, :2]).max() < 0.3 * 1.02
+        squared = squared_speeds(vars(planned), VEHICLE)
+        assert squared.min() > 0
+        assert squared.max() < VEHICLE.rotor_speed_max_rad_s**2
+        for key, limit in limits.items():
+            values = getattr(planned, key.split("_")[0])
+            taken = np.abs(values) / limit if isinstance(limit, tuple) else np.linalg.norm(values, axis=1) / limit
+            assert taken.max() < 1.02
+        # A limit is reached: nothing that could be flown is left.
+        assert there.load(path) > 0.9 or np.abs(outside).min() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("asked", "key"),
+    [
+        ({"box_m": (0.9, 5.0, 2.0)}, "next_flight.box_m"),
+        ({"box_m": (5.0, 5.0, 6.0), "height_m": 2.0}, "next_flight.height_m"),
+    ],
+)
+def test_a_box_that_holds_no_flight_is_refused(asked, key):
+    with pytest.raises(SettingError) as caught:
+        room(next_flight=NextFlightSettings(**asked))
+    assert caught.value.key == key
+
+
+def test_a_vehicle_that_can_but_hover_has_no_room():
+    with pytest.raises(ComputationError, match="rotor_speed_max_rad_s = 350"):
+        room_of(SETTINGS, replace(VEHICLE, rotor_speed_max_rad_s=350.0), 0.0, 0.02)
+
+
+@pytest.fixture(scope="module")
+def asked():
+    effects = [CATALOGUE[name] for name in ("com_offset", "torque_bias")]
+    questions = [
+        replace(q, true=replace(q.true, linear=0.02 * q.true.linear)) for q in questions_between(effects, VEHICLE)
+    ]
+    return goal(questions, [], room(), LOGGING)
+
+
+def test_a_search_improves_on_random_paths_and_is_the_same_by_seed(asked):
+    found, again = (next_flight(asked, np.random.default_rng(7)) for _ in range(2))
+    assert found.path.sine.tobytes() == again.path.sine.tobytes()
+    scores = [asked.score(path) for path in found.random]
+    assert scores == sorted(scores)
+    assert (np.diff([scores[-1], *found.history]) >= 0).all()
+    assert asked.score(found.path) == found.history[-1] > scores[-1]
+
+
+def test_flights_that_are_there_count(asked):
+    gentle = LOGGING.weak(along(path_of(2, 0.05)))
+    known = goal(asked.questions, [gentle], room(), LOGGING)
+    alone = known.judgements(None)
+    assert alone[0].apart == pytest.approx(apart(*gathered(asked.questions[0], [gentle], FLOOR)))
+    assert known.judgements(None, again=2)[0].apart == pytest.approx(2 * alone[0].apart)
+    more = along(path_of(2, 0.15))
+    assert known.judgements(more)[0].apart > asked.judgements(more)[0].apart
+
+
+def test_flights_without_the_signal_of_a_rival_say_nothing():
+    effects = [CATALOGUE[name] for name in ("torque_bias", "rotor_drag")]
+    silent = weak(replace(fly(1), velocity=None, specific_force=None))
+    known = goal(questions_between(effects, VEHICLE), [silent], room(), LOGGING)
+    assert [answer.apart for answer in known.judgements(None)] == [0.0, 0.0]
+    assert known.judgements(along(path_of(0, 1.0, 3)))[1].apart > 0
+
+
+def test_a_special_case_is_not_told_from_what_holds_it():
+    drag, wind = CATALOGUE["rotor_drag"], CATALOGUE["wind"]
+    (only,) = questions_between([drag, wind], VEHICLE)
+    assert only.true.candidate.effect is wind
+
+
+@pytest.mark.parametrize("names", [("gyro_bias",), ("motor_lag", "channel_delay")])
+def test_what_no_flight_tells_is_refused(names):
+    with pytest.raises(InputError, match=names[0]):
+        require_tellable([CATALOGUE[name] for name in names], "--to-tell", VEHICLE)
+
+
+def test_an_effect_of_the_propellers_asks_for_their_size():
+    bare = replace(VEHICLE, rotors=tuple(replace(rotor, radius_m=None) for rotor in VEHICLE.rotors))
+    require_tellable([CATALOGUE["ground_effect"]], "--to-tell", VEHICLE)
+    with pytest.raises(InputError, match=r"ground_effect needs vehicle\.rotors\.radius_m"):
+        require_tellable([CATALOGUE["ground_effect"]], "--to-tell", bare)
+
+
+def test_the_plan_counts_on_nothing_that_is_not_logged():
+    drag = Question(usual(CATALOGUE["linear_damping"], VEHICLE), None)
+    path = room().drawn(np.random.default_rng(2))
+    poor = replace(LOGGING, signals=frozenset())
+    signals = planned_signals(room().planned(path), room(), poor)
+    assert signals.attitude is signals.velocity is signals.acceleration is signals.specific_force is None
+    (evidence, _), (more, _) = (
+        gathered(drag, [logging.weak(planned_signals(room().planned(path), room(), logging))], FLOOR)
+        for logging in (poor, LOGGING)
+    )
+    assert (evidence.rows, more.rows) == (3 * evidence.windows, 6 * more.windows)
+
+
+def test_a_rival_that_could_not_be_tried_is_asked_for_at_a_usual_size():
+    named, size = candidate("linear_damping"), np.array([0.1, 0.1, 0.1])
+    silent = weak(replace(fly(1, [(named, size)]), velocity=None, specific_force=None))
+    effect = NamedEffect("linear_damping", named, size, (), 0.0, 1.0, 1.0, "")
+    rivals = [Alternative("rotor_drag", "linear_damping", np.nan, "log velocity")]
+    first, second = questions_left([effect], rivals, [], [silent], FLOOR)
+    assert second.true.linear.tolist() == usual(CATALOGUE["rotor_drag"], VEHICLE).linear.tolist()
+    known = goal([first, second], [silent], room(), LOGGING)
+    assert min(answer.apart for answer in known.judgements(along(path_of(0, 1.0, 3)))) > 0
+
+
+def test_a_rival_takes_the_size_that_imitates_the_named_effect():
+    """Over flights with almost one thrust a bias is the offset times that thrust."""
+    named, size = candidate("com_offset"), np.array([0.004, 0.0])
+    flights = [weak(fly(seed, [(named, size)], speed=0.5, tilt=0.05)) for seed in (1, 2)]
+    effect = NamedEffect("com_offset", named, size, (), 0.0, 1.0, 1.0, "")
+    rivals = [Alternative("torque_bias", "com_offset", 1.0, "")]
+    first, second = questions_left([effect], rivals, [], flights, FLOOR)
+    assert (first.true.candidate.effect.name, first.rival.name) == ("com_offset", "torque_bias")
+    assert (second.true.candidate.effect.name, second.rival.name) == ("torque_bias", "com_offset")
+    bias = physical_values(second.true)
+    assert bias["M_y"] == pytest.approx(0.004 * VEHICLE.mass_kg * 9.81, rel=0.1)
+    assert abs(bias["M_x"]) < 0.05 * bias["M_y"]
+
+
+def test_noise_of_the_sensors_makes_the_floors():
+    quiet, loud = (
+        expected_floor(
+            room(),
+            LOGGING,
+            SimulationSettings(mode="closed-loop", noise={"acceleration": size, "body_rate": 0.002}),
+            0.01,
+            np.random.default_rng(1),
+        )
+        for size in (0.3, 0.6)
+    )
+    # White noise of 0.3 m/s^2 on 6 kg, averaged over a window.
+    through = windows(0.01, 0.4, 0.5)
+    expected = 0.3 * VEHICLE.mass_kg * np.sqrt((through.weight**2).sum())
+    np.testing.assert_allclose(quiet[3:], expected, rtol=0.35)
+    np.testing.assert_allclose(loud[3:] / quiet[3:], 2.0, rtol=0.15)
+
+
+def test_in_closed_loop_the_flight_tells_about_as_much(asked):
+    path = room().drawn(np.random.default_rng(11))
+    planned = room().planned(path, 0.01)
+    true = asked.questions[0].true
+    flown = flown_signals(planned, [true], VEHICLE, LOGGING, ClosedLoopSettings(integration_rate_hz=200.0))
+    expected = asked.judgements(planned_signals(planned, room(), LOGGING))[0].apart
+    assert asked.judgements(flown)[0].apart == pytest.approx(expected, rel=0.4)
+
+
+def test_judged_on_hover_is_not_sure():
+    offset = question("com_offset", [LEVER, LEVER], "torque_bias")
+    evidence, columns = gathered(offset, [LOGGING.weak(along(path_of(2, 0.0)))], FLOOR)
+    assert judged(evidence, columns, 1.0).sure < 1e-6
+    assert usual(CATALOGUE["motor_lag"], VEHICLE).linear.tolist() == [1.0]
