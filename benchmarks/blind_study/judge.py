@@ -51,7 +51,7 @@ def _judged(folder, compared):
         "closest": [_effect(effect) for effect in found.closest],
         "alternatives": [vars(rival) for rival in found.alternatives],
         "unexplained": [vars(left) for left in found.unexplained],
-        "look_alikes": list(found.look_alikes),
+        "differences": list(found.differences),
         "impossible": list(found.impossible),
         "share": found.share,
         "gap_before": {"value": found.before.value.tolist(), "floors": found.before.floors.tolist()},

@@ -131,7 +131,7 @@ def said(verdict, *effects, rivals=()):
         {"name": name, "share": share, "coefficients": {"c": {"value": value, "possible": possible}}}
         for name, share, value, possible in effects
     ]
-    return {"verdict": verdict, "effects": told, "alternatives": list(rivals), "look_alikes": [], "floor": [0.1] * 6}
+    return {"verdict": verdict, "effects": told, "alternatives": list(rivals), "floor": [0.1] * 6}
 
 
 def answered(told, **key):
