@@ -251,7 +251,8 @@ def compensation(before: Array, after: Array) -> Array:
 
     Inertia is free in every fit. Where motion follows the torque only in part, a torque half as large with half the
     inertia leaves half of the residual and explains nothing: a lag would look better the longer it is. With residuals
-    times this factor, what counts is the share of the torque that the motion does not follow.
+    times this factor, what counts is the share of the torque that the motion does not follow. A torque that grows, and
+    the inertia with it, leaves the residual as it was and explains nothing either.
 
     Parameters
     ----------
@@ -261,10 +262,10 @@ def compensation(before: Array, after: Array) -> Array:
     Returns
     -------
     array, shape (6,)
-        Ratio of the standard deviations; 1 for the forces, where weight and mass hold the scale.
+        Ratio of the standard deviations, at least 1; 1 for the forces, where weight and mass hold the scale.
     """
     factor = np.ones(before.shape[1])
     spread, shrunk = before[:, :3].std(axis=0), after[:, :3].std(axis=0)
     moving = (spread > 0) & (shrunk > 0)
-    factor[:3][moving] = spread[moving] / shrunk[moving]
+    factor[:3][moving] = np.maximum(spread[moving] / shrunk[moving], 1.0)
     return factor

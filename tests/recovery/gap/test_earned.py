@@ -146,3 +146,10 @@ def test_a_shape_at_the_end_of_what_is_tried_is_no_name():
     found, (refusal,) = earned(known, chosen, best_floor(system(known, chosen)), SETTINGS)
     assert kept(found) == []
     assert "its G sits on the bound" in refusal.sentence
+
+
+def test_a_larger_drag_factor_explains_nothing_by_being_larger():
+    """With the inertia as free as it is, the torque may grow as it likes; what is left stays what it was."""
+    known = flights((candidate("linear_damping"), [0.0, 0.0, 0.1]))
+    step = rank_effects(known, (), [CATALOGUE["drag_factor_error"]], SETTINGS, None)
+    assert step.ranking[0].gain < 0.05 * step.above_floor
