@@ -160,7 +160,7 @@ def _concluded(
     effects += [numbers] if numbers is not None else []
     removed = held_out.shares() if named else {}
     share = min(removed.values(), default=1.0)
-    rivals = (*(rival for each in judged for rival in each.alternatives), *untried(hypothesis, named))
+    rivals = (*(rival for each in judged for rival in each.alternatives), *untried(hypothesis, named, settings))
     gap = held_out.size(held_out.before).floors
     least = settings.named_share
     known = [each for each in remainder.unexplained if matters(each, gap, least)] if effects else remainder.unexplained

@@ -183,13 +183,16 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
     return tuple(NotExcited(name, reason) for name, reason in reasons if reason)
 
 
-def untried(hypothesis: System, named: Sequence[NamedEffect]) -> tuple[Alternative, ...]:
-    """List the rivals of named effects that the flights lack signals for: what was not tried is not beaten."""
+def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSettings) -> tuple[Alternative, ...]:
+    """List the rivals of named effects that the flights lack signals for: what was not tried is not beaten.
+
+    Effects that the user leaves out are none.
+    """
     rivals = []
     for effect in named:
         if CATALOGUE[effect.name].kind in ("parameter", "sensor"):
             continue
-        for name in CATALOGUE[effect.name].rivals:
+        for name in (name for name in CATALOGUE[effect.name].rivals if name not in settings.ignore):
             missing = [CATALOGUE[name].missing(signals) for signals in hypothesis.signals]
             if all(missing) and not {"command", "measured_rotor_speed"} & set(missing[0]):
                 lacking = " and ".join(signal.replace("_", " ") for signal in missing[0])

@@ -141,6 +141,14 @@ def test_people_read_the_verdict_first(again):
     assert lines[-1].endswith("extended.h5: the model with offset of the centre of mass.")
 
 
+@pytest.mark.usefixtures("undrawn")
+def test_a_rival_that_could_not_be_tried_is_told_with_the_signal_that_is_missing(cpfls, gap_config, shifted, tmp_path):
+    words = ("gap", gap_config, *shifted, "-o", tmp_path / "x", "--set", "gap.ignore=[]", "--json")
+    summary = json.loads(cpfls(*words).stdout)
+    assert summary["headline"] == "These flights cannot tell offset of the centre of mass from steady wind."
+    assert summary["next"][0].startswith("To tell steady wind from offset of the centre of mass: log velocity")
+
+
 def test_nothing_hidden_nothing_named(none):
     assert none.summary["verdict"] == "NO_GAP"
     assert none.summary["effects"] == []
