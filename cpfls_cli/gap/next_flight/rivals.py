@@ -62,9 +62,8 @@ def questions_between(effects: Sequence[Effect], vehicle: VehicleSettings) -> tu
     One effect alone asks whether it shows at all.
     """
     sized = [usual(effect, vehicle) for effect in effects]
-    if len(sized) == 1:
-        return (Question(sized[0], None),)
-    asked = (Question(true, rival.candidate.effect) for true, rival in permutations(sized, 2))
+    alone = (Question(sized[0], None),) if len(sized) == 1 else ()
+    asked = alone or (Question(true, rival.candidate.effect) for true, rival in permutations(sized, 2))
     return tuple(question for question in asked if _is_open(question))
 
 
