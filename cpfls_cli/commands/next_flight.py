@@ -144,16 +144,22 @@ def _effects(study: Study) -> list[Effect]:
     return effects
 
 
-def _named(study: Study, room: Room) -> Case:
-    """Ask for effects that the config names, at usual sizes, in logs with the noise of `simulation`."""
+def _between(study: Study) -> tuple[Question, ...]:
+    """Ask for effects that the config names, at usual sizes."""
     effects = _effects(study)
     questions = questions_between(effects, study.vehicle)
     if not questions:
-        names = ", ".join(each.name for each in effects) or "nothing"
+        names = ", ".join(each.name for each in effects)
         raise InputError(
             f"trajectory.next_flight.to_tell = [{names}]: nothing to tell; name effects with --to-tell A,B (`cpfls "
             "effects` lists them), or give a diagnosis with --for DIAGNOSIS"
         )
+    return questions
+
+
+def _named(study: Study, room: Room) -> Case:
+    """Ask for effects that the config names, at usual sizes, in logs with the noise of `simulation`."""
+    effects, questions = _effects(study), _between(study)
     signals = needed_signals(effects) | {"attitude", "position", "velocity", "acceleration"}
     blank = Logging(signals, any("command" in each.needs for each in effects), np.ones(6), study.gap)
     rng = generator(study, "next-flight noise")
@@ -178,7 +184,9 @@ def _left_open(study: Study, path: Path) -> Case:
     named = [each for each in record.effects.effects() if each.candidate is not None]
     floor = best_floor(system(flights, [each.candidate for each in named if each.candidate is not None]))
     rivals, unseen = _open_effects(study, record, flights, path)
-    questions = questions_left(named, rivals, unseen, flights, floor)
+    # What a diagnosis did not weigh is asked for at usual sizes.
+    weighed = questions_left(named, rivals, unseen, flights, floor)
+    questions = weighed or _between(study)
     effects = [each.true.candidate.effect for each in questions]
     logged = logged_signals(flights[0].signals)
     more = needed_signals(effects) - logged
@@ -191,20 +199,24 @@ def _left_open(study: Study, path: Path) -> Case:
 def _open_effects(
     study: Study, record: DiagnosisRecord, flights: Sequence[WeakFlight], path: Path
 ) -> tuple[list[Alternative], list[Effect]]:
-    """List the rivals that a diagnosis leaves, or else what its flights could not show and another could."""
+    """List the rivals that a diagnosis leaves, or else what its flights could not show and another could.
+
+    Nothing where the config names effects that the diagnosis did not weigh.
+    """
     asked = _effects(study)
     rivals = [Alternative(**row) for row in rows_of(record.alternative)]
-    rivals = [each for each in rivals if CATALOGUE[each.name].columns is not None]
+    told = [name for name, effect in CATALOGUE.items() if effect.columns is not None and effect.kind != "parameter"]
+    rivals = [each for each in rivals if each.name in told and each.instead_of in record.effects_of_motion]
     if asked:
         names = {each.name for each in asked}
         rivals = [each for each in rivals if {each.name, each.instead_of} <= names]
     if rivals:
         require_tellable([CATALOGUE[each.name] for each in rivals], str(path), study.vehicle)
         return rivals, []
-    hidden = [CATALOGUE[name] for name in record.not_excited.name if CATALOGUE[name].kind == "wrench"]
+    hidden = [CATALOGUE[name] for name in record.not_excited.name if name in told]
     unseen = [each for each in hidden if not all(each.missing(flight.signals) for flight in flights)]
     if asked:
-        return [], asked
+        return [], []
     if record.verdict not in _OPEN or not unseen:
         raise InputError(
             f"{path}: its verdict is {record.verdict}, and it leaves nothing to tell apart; to plan a flight all the "

@@ -62,9 +62,8 @@ def questions_between(effects: Sequence[Effect], vehicle: VehicleSettings) -> tu
     One effect alone asks whether it shows at all.
     """
     sized = [usual(effect, vehicle) for effect in effects]
-    if len(sized) == 1:
-        return (Question(sized[0], None),)
-    asked = (Question(true, rival.candidate.effect) for true, rival in permutations(sized, 2))
+    alone = (Question(sized[0], None),) if len(sized) == 1 else ()
+    asked = alone or (Question(true, rival.candidate.effect) for true, rival in permutations(sized, 2))
     return tuple(question for question in asked if _is_open(question))
 
 
@@ -107,8 +106,17 @@ def questions_left(
         other = fitted_rival(flights, [each.candidate for each in besides], CATALOGUE[rival.name], floor)
         pair = (one, other.candidate.effect), (other, one.candidate.effect)
         questions += [Question(true, effect, besides) for true, effect in pair]
-    asked = tuple(question for question in questions if _is_open(question))
+        questions += [Question(true, each, besides) for true, known in pair for each in _beside(true, known, flights)]
+    once = {(each.true.candidate.effect.name, each.rival and each.rival.name): each for each in questions[::-1]}
+    asked = tuple(question for question in list(once.values())[::-1] if _is_open(question))
     return (*asked, *(Question(usual(effect, flights[0].signals.vehicle), None) for effect in unseen))
+
+
+def _beside(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> list[Effect]:
+    """List what else looks like an effect by the catalogue, and must not take the place of the rival."""
+    others = (CATALOGUE[name] for name in true.candidate.effect.rivals if name != rival.name)
+    known = (each for each in others if each.columns is not None and each.kind == true.candidate.effect.kind)
+    return [each for each in known if not all(each.missing(flight.signals) for flight in flights)]
 
 
 def _sized(named: NamedEffect) -> SizedEffect:

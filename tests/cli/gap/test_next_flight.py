@@ -56,6 +56,17 @@ def test_the_next_flight_settles_what_the_first_left_open(cpfls, folder):
     assert not (folder / "none.h5").exists()
 
 
+def test_named_effects_come_before_what_the_diagnosis_leaves(cpfls, folder):
+    options = ("--for", folder / "open.h5", "--to-tell", "rotor_drag,linear_damping", *NEXT)
+    planned = run(cpfls, folder, "trajectory", *options, "-o", folder / "other.h5")
+    assert [(row["true"], row["rival"]) for row in planned["questions"]] == [
+        ("rotor_drag", "linear_damping"),
+        ("linear_damping", "rotor_drag"),
+    ]
+    # The flights that are there know something of it.
+    assert all(row["again"] is not None for row in planned["questions"])
+
+
 def test_another_vehicle_is_refused(cpfls, folder):
     options = ("--for", folder / "open.h5", "--set", "vehicle.mass_kg=5.0", "-o", folder / "none.h5")
     result = cpfls("trajectory", folder / "study.yaml", *options)

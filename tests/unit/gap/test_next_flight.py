@@ -293,7 +293,7 @@ def test_a_rival_that_could_not_be_tried_is_asked_for_at_a_usual_size():
     silent = weak(replace(fly(1, [(named, size)]), velocity=None, specific_force=None))
     effect = NamedEffect("linear_damping", named, size, (), 0.0, 1.0, 1.0, "")
     rivals = [Alternative("rotor_drag", "linear_damping", np.nan, "log velocity")]
-    first, second = questions_left([effect], rivals, [], [silent], FLOOR)
+    first, second, *_ = questions_left([effect], rivals, [], [silent], FLOOR)
     assert second.true.linear.tolist() == usual(CATALOGUE["rotor_drag"], VEHICLE).linear.tolist()
     known = goal([first, second], [silent], room(), LOGGING)
     assert min(answer.apart for answer in known.judgements(along(path_of(0, 1.0, 3)))) > 0
@@ -305,7 +305,12 @@ def test_a_rival_takes_the_size_that_imitates_the_named_effect():
     flights = [weak(fly(seed, [(named, size)], speed=0.5, tilt=0.05)) for seed in (1, 2)]
     effect = NamedEffect("com_offset", named, size, (), 0.0, 1.0, 1.0, "")
     rivals = [Alternative("torque_bias", "com_offset", 1.0, "")]
-    first, second = questions_left([effect], rivals, [], flights, FLOOR)
+    first, second, *others = questions_left([effect], rivals, [], flights, FLOOR)
+    # What else looks like either by the catalogue must not take the place of the rival.
+    asked = [(each.true.candidate.effect.name, each.rival.name) for each in others]
+    assert ("com_offset", "rotor_mismatch") in asked
+    assert ("torque_bias", "rotor_mismatch") in asked
+    assert len(set(asked)) == len(asked)
     assert (first.true.candidate.effect.name, first.rival.name) == ("com_offset", "torque_bias")
     assert (second.true.candidate.effect.name, second.rival.name) == ("torque_bias", "com_offset")
     bias = physical_values(second.true)
