@@ -30,7 +30,6 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
 }
 _EXPLAINED = 0.8
 _TURNED = np.radians(3.0)
-_DELAY_S = 0.002
 _FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
 _KEYS = {
     "velocity": "import.signals.velocity and import.world_frame",
@@ -65,9 +64,9 @@ class Settled:
 def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
     """Set right what contradicts more than it agrees with, or leave it out.
 
-    Each two channels that show the same motion are compared; a channel counts one against it for each that it
-    contradicts and one for it for each that it agrees with. The one with most against it is read in the ways that logs
-    are usually wrong (unit, gravity, axes, clock), and is mended if it then contradicts nothing.
+    Each two channels that show the same motion are compared. The one that contradicts most others, and of equals the
+    one that agrees with fewest, is read in the ways that logs are usually wrong (unit, gravity, axes, clock). It is
+    mended if it then contradicts nothing, and left out if nothing mends it and two others are against it.
 
     Parameters
     ----------
@@ -97,7 +96,8 @@ def _mended(flights: tuple[Signals, ...], checks: Sequence[PairCheck], windows: 
             return _told(*tuned, witnesses, checks)
         if tuned is not None and _nearer_the_thrust(flights, tuned[0], checks, windows):
             return _told(*tuned, [*witnesses, NAMES["thrust"]], checks)
-        if sure and tuned is None:
+        # Noise on both sides can look like one contradiction, not like two.
+        if sure and tuned is None and len(set(witnesses)) > 1:
             return (_left_out(channel, witnesses),)
     return ()
 
@@ -113,9 +113,14 @@ def _read_rightly(
         if tuned is not None:
             nearest = _clearest(checked(_repaired(flights, tuned[0], checks), windows, channel))
             rest = ((nearest.first - nearest.second) ** 2).sum(axis=1)
-            if best is None or _surely_less(rest, least):
+            if best is None or (rest.sum() < least.sum() if _simple(tuned, best) else _surely_less(rest, least)):
                 best, least = tuned, rest
     return best
+
+
+def _simple(tuned: _Tuned, other: _Tuned) -> bool:
+    """Tell whether a reading takes no more mistakes than another."""
+    return len(tuned[1]) + bool(tuned[0].delay_s) <= len(other[1]) + bool(other[0].delay_s)
 
 
 def _surely_less(after: Array, before: Array) -> bool:
@@ -214,10 +219,14 @@ def _tuned(
             break
         repair, more = step(repair, _clearest(against))
         what = (*what, *more)
+    for _ in range(_ROUNDS if repair.delay_s else 0):
+        # Noise shrinks what is left of a delay, so a second look is worth it.
+        repair, _ = _with_delay(repair, _clearest(checked(_repaired(flights, repair, checks), windows, repair.channel)))
     against = checked(_repaired(flights, repair, checks), windows, repair.channel)
     # An accelerometer hardly moves in a gentle flight; what it shows of gravity is agreement enough.
     moves = repair.channel == "specific_force" or any(check.agrees for check in against)
-    return (repair, what) if what and moves and not any(check.problems for check in against) else None
+    changed = bool(what) or repair.delay_s != 0
+    return (repair, what) if changed and moves and not any(check.problems for check in against) else None
 
 
 def _repaired(flights: Sequence[Signals], repair: ChannelRepair, checks: Sequence[PairCheck]) -> tuple[Signals, ...]:
@@ -294,10 +303,7 @@ def _with_turn(repair: ChannelRepair, check: PairCheck) -> _Tuned:
 
 def _with_delay(repair: ChannelRepair, check: PairCheck) -> _Tuned:
     late = check.delay.value * (1 if check.pair.second == repair.channel else -1)
-    if not check.pair.exact or abs(late) < _DELAY_S:
-        return repair, ()
-    way = "late" if late > 0 else "early"
-    return replace(repair, delay_s=repair.delay_s + late), (f"is {way} by {abs(1000 * late):.0f} ms",)
+    return (replace(repair, delay_s=repair.delay_s + late) if check.pair.exact else repair), ()
 
 
 def _joined(words: Sequence[str]) -> str:
@@ -309,10 +315,12 @@ def _told(
     repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str], checks: Sequence[PairCheck]
 ) -> tuple[ChannelRepair, ...]:
     first, *others = _with_position(repair, checks)
+    way = "late" if repair.delay_s > 0 else "early"
+    clock = [f"is {way} by {abs(1000 * repair.delay_s):.0f} ms"] if repair.delay_s else []
     who = f"The {NAMES[repair.channel]}" if not others else "The world of velocity and position"
     sentence = (
-        f"{who} {_joined(what)}, judged by the {_joined(witnesses)}. It is set right before the balance; mend the "
-        f"log, or {_KEYS[repair.channel]}."
+        f"{who} {_joined([*what, *clock])}, judged by the {_joined(witnesses)}. It is set right before the balance; "
+        f"mend the log, or {_KEYS[repair.channel]}."
     )
     return (replace(first, sentence=sentence), *others)
 

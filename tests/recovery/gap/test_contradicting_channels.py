@@ -191,7 +191,7 @@ def test_the_effect_is_named_in_spite_of_a_wrong_channel(flights, wrong):
 def test_a_low_passed_log_has_the_floors_of_the_raw_one_and_says_so_first(flights):
     raw, filtered = answer(*flights), answer(*(all_low_passed(signals) for signals in flights))
     assert (filtered.verdict, [effect.name for effect in filtered.effects]) == ("NAMED", ["rotor_drag"])
-    assert "low-passed before: attitude at about 1" in filtered.notes[0]
+    assert "low-passed, by import.lowpass_hz or before: attitude at about 1" in filtered.notes[0]
     assert "Feed raw logs" in filtered.notes[0]
     assert not any("low-passed" in note for note in raw.notes)
     ratio = filtered.floor / raw.floor
