@@ -199,7 +199,7 @@ class DisagreementRecord(Record):
             playback=PlaybackGroup.of(disagreement.played, disagreement.playback, PREDICTIONS[:3]),
             not_excited=NotExcitedGroup.of(disagreement.not_excited),
             audit=AuditGroup.of(disagreement.audit),
-            warning=warnings,
+            warning=(*disagreement.audit.filtered, *warnings),
             base=base,
             flights=FlightsGroup.of(recordings, ["given"] * len(recordings)),
         )

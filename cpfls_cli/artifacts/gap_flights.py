@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import NotExcited
     from cpfls_cli.gap.sensors.audit import Audit
     from cpfls_cli.gap.sensors.findings import AuditFinding, FaultNumber
+    from cpfls_cli.gap.sensors.repairs import ChannelRepair
     from cpfls_cli.identification.model import Model
     from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -83,6 +84,33 @@ class AuditCoefficientGroup:
 
 
 @record
+class AuditRepairGroup:
+    """Channels that contradict the others, and how they are set right."""
+
+    channel: tuple[str, ...] = dataset("channel", "channels that are set right or left out, in that order", "repair")
+    dropped: Array = dataset("dropped", "1 where it is left out, and nothing else counts", "repair")
+    delay_s: Array = dataset("delay", "how late it is", "repair", units="s")
+    in_body: Array = dataset("in_body", "1 where world axes were logged in body axes", "repair")
+    matrix: Array = dataset("matrix", "unit and axes, after the turn to world axes", "repair", "axis", "axis")
+    gravity_m_s2: Array = dataset("gravity", "added along the vertical, last", "repair", units="m/s^2")
+    sentence: tuple[str, ...] = dataset("sentence", "what is wrong, who says so, and what to mend", "repair")
+
+    @classmethod
+    def of(cls, repairs: Sequence[ChannelRepair]) -> Self | None:
+        """Arrange repairs; None where there are none."""
+        return columns_of(cls, repairs) if repairs else None
+
+    def repairs(self) -> tuple[ChannelRepair, ...]:
+        """Rebuild the repairs."""
+        from cpfls_cli.gap.sensors.repairs import ChannelRepair
+
+        rows = rows_of(self)
+        for row in rows:
+            row |= {name: bool(row[name]) for name in ("dropped", "in_body")} | {"matrix": np.array(row["matrix"])}
+        return tuple(ChannelRepair(**row) for row in rows)
+
+
+@record
 class AuditGroup:
     """What the sensors say about each other."""
 
@@ -98,6 +126,7 @@ class AuditGroup:
         "audit/warning", "channels that disagree or look broken; nothing is repaired for them", "audit_warning"
     )
     note: tuple[str, ...] = dataset("audit/note", "for information", "audit_note")
+    repair: AuditRepairGroup | None = group("audit_repair", default=None)
 
     @classmethod
     def of(cls, audit: Audit) -> Self:
@@ -112,13 +141,15 @@ class AuditGroup:
             untested=tuple(f"{name}: {reason}" for name, reason in audit.untested.items()),
             warning=audit.warnings,
             note=audit.notes,
+            repair=AuditRepairGroup.of(audit.repairs),
         )
 
     def audit(self) -> Audit:
         """Rebuild the audit, as far as repairs need it."""
         from cpfls_cli.gap.sensors.audit import Audit
 
-        return Audit(self.findings, self.untested_because, self.warning, self.note, None, (), None)
+        repairs = () if self.repair is None else self.repair.repairs()
+        return Audit(self.findings, self.untested_because, self.warning, self.note, None, (), None, repairs)
 
     @property
     def findings(self) -> tuple[AuditFinding, ...]:
@@ -135,6 +166,11 @@ class AuditGroup:
     def faults(self) -> tuple[str, ...]:
         """Sentences on the faults that are sure and matter."""
         return tuple(sentence for sentence, named in zip(self.sentence, self.named, strict=True) if named)
+
+    @property
+    def settled(self) -> tuple[str, ...]:
+        """Sentences on the channels that were set right or left out."""
+        return () if self.repair is None else tuple(sentence for sentence in self.repair.sentence if sentence)
 
     @property
     def untested_because(self) -> dict[str, str]:
@@ -154,6 +190,7 @@ class AuditGroup:
             "untested": self.untested_because,
             "warnings": list(self.warning),
             "notes": list(self.note),
+            "repairs": [] if self.repair is None else rows_of(self.repair),
         }
 
 

@@ -285,5 +285,6 @@ def _extended(model: ExtendedModel) -> ModelToPlay:
     def made(flight: LoggedFlight) -> tuple[PlaybackFlight, Player]:
         return extended_player(model, flight.name, [model.repaired(part) for part in flight.parts], flight.hold)
 
-    repairs = () if model.audit is None else tuple(finding.sentence for finding in model.audit.named)
+    audit = model.audit
+    repairs = () if audit is None else (*audit.settled, *(finding.sentence for finding in audit.named))
     return ModelToPlay(made, needs_attitude=model.base is not None, repairs=repairs)

@@ -193,7 +193,7 @@ def _concluded(
         held_out.size(held_out.after),
         held_out.floor,
         torque_alone,
-        (*differ, *wrong, *refusals, *audited.warnings, *audited.notes),
+        (*audited.filtered, *audited.settled, *differ, *wrong, *refusals, *audited.warnings, *audited.notes),
         wrong,
         differ,
         removed,

@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.replay import beside_rivals, playback_figure
-from cpfls_cli.pages.sensors import sensors_answer, unseen_answer
+from cpfls_cli.pages.sensors import sensors_answer, settled_channels, unseen_answer
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import line, plain_ticks, plot, stacked
 from cpfls_cli.report.content import Block, Box, Cell, Heading, Plot, Section, Table, Text
@@ -53,6 +53,7 @@ def answer(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
     """Say where a model and flights disagree, what the flights cannot show, and what to distrust."""
     record = disagreement.record
     yield verdict_box(disagreement)
+    yield from settled_channels(record.audit)
     yield from where(disagreement)
     yield from _playback_text(record)
     yield from unseen_answer(record.not_excited)

@@ -41,7 +41,8 @@ def worth_in_words(record: ExtendedRecord) -> Iterator[str]:
     yield _shrunk(record)
     yield from (f"{sentence(warning)}" for warning in warnings(record))
     yield from (
-        f"Not in the model, to be repaired in the signals that it is given: {fault}" for fault in record.audit.faults
+        f"Not in the model, to be repaired in the signals that it is given: {fault}"
+        for fault in (*record.audit.settled, *record.audit.faults)
     )
 
 

@@ -19,10 +19,15 @@ def sensors_answer(audit: AuditGroup) -> Iterator[Block]:
     yield from _faults(audit)
 
 
+def settled_channels(audit: AuditGroup) -> Iterator[Text]:
+    """Say which channels contradict the others, and what is done about them."""
+    return (Text(repair, "warning") for repair in audit.settled)
+
+
 def _faults(audit: AuditGroup) -> Iterator[Block]:
     for fault in audit.faults:
         yield Box("SENSOR FAULT", f"{fault} The diagnosis repairs it before it looks at the model.", [], "warning")
-    if audit.finding and not audit.faults:
+    if audit.finding and not audit.faults and not audit.settled:
         yield Text("The sensors agree with each other: no fault that matters.", "good")
     for reason, names in audit.untested_by_reason.items():
         yield Text(f"Not tested for {joined(titles(names))}: {reason.rstrip('.')}.")
@@ -47,13 +52,13 @@ def sensors_section(sources: Sources) -> Section | None:
     for index, source in enumerate(reversed(distinct.values()), start=1):
         audit = source.record.audit
         blocks += [Heading(source.label)] if len(distinct) > 1 else []
-        blocks += [*_faults(audit), *sensor_warnings(audit)]
+        blocks += [*settled_channels(audit), *_faults(audit), *sensor_warnings(audit)]
         blocks += [_numbers(audit, f"sensor-numbers-{index}")] if audit.coefficient.name else []
     return Section("sensors", _SENSORS, blocks) if blocks else None
 
 
 def _words(audit: AuditGroup) -> tuple[str, ...]:
-    return (*audit.sentence, *audit.untested, *audit.warning, *audit.note)
+    return (*audit.settled, *audit.sentence, *audit.untested, *audit.warning, *audit.note)
 
 
 def _numbers(audit: AuditGroup, name: str) -> Table:

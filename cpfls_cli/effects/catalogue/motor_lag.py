@@ -31,7 +31,6 @@ EFFECT = Effect(
     rivals={
         "command_delay": "sweep the torque up to 3 Hz and above: lag also weakens it, a delay does not",
         "linear_damping": "log measured rotor speeds; lag looks like damping below zero",
-        "battery_sag": "compare slow with fast torque: sag acts in both",
         "parameter_error": "compare slow with fast torque: a wrong inertia acts in both",
     },
     source="RotorS and PX4 (first-order filter, 12.5 and 25 ms); RotorPy (tau_m)",

@@ -128,7 +128,7 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
     """
     square, count = np.zeros(6), np.zeros(6)
     for number, flight in enumerate(hypothesis.flights):
-        floor = noise_floor(left_over(hypothesis, number, coefficients), flight.windows)
+        floor = noise_floor(left_over(hypothesis, number, coefficients), flight.windows, flight.cut_off)
         square += len(flight) * flight.known * floor**2
         count += len(flight) * flight.known
     noise = np.sqrt(square / np.maximum(count, 1))

@@ -7,6 +7,9 @@ from scipy.optimize import nnls
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Columns
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals
+from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.gap.balance.windows import Windows
 from cpfls_cli.gap.balance.windows import windows as make_windows
 
@@ -14,35 +17,94 @@ _FREQUENCIES = 16
 _LONGER = 2
 _LOWEST_PER_WINDOW = 2.8
 _HIGHEST_OF_RATE = 0.4
+# Share of a cut-off up to which even gentle filters pass nearly all, and the band that a fit needs.
+_PASSED = 0.6
+_BAND = 1.5
+_FILTERED = ("attitude", "body_rate", "velocity", "acceleration", "specific_force", "rotor_speed")
 _CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)
 _CLEARLY_BETTER = 1.5
 _PADDED = 8
 _MEDIAN_OF_EXPONENTIAL = float(np.log(2))
 
 
-def noise_floor(residual: Columns, windows: Windows) -> Array:
+def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = None) -> Array:
     """Estimate the standard deviation of the window averages that noise causes.
 
     The power of the residual is taken at frequencies above the motion. Spectra that noise can have are fitted to it:
     flat ones, as of rotors and angles; growing with the square, as of a gyroscope, whose derivative is taken; and both
     of noise that is correlated from sample to sample. The fit is read off at the frequencies that the windows average
     over. Longer windows tell frequencies apart better, so that the fit can start lower; the median over the windows
-    keeps bursts of motion out.
+    keeps bursts of motion out. Where a log was low-passed, noise is looked for below its cut-off only: a floor of what
+    a filter has removed is none.
 
     Parameters
     ----------
     residual : Columns
         What the model leaves, shape (time, 6).
     windows : Windows
+    cut_off : array, shape (6,), Hz, or None
+        Of the filter that each channel went through before it was logged, infinite for none.
 
     Returns
     -------
     array, shape (6,), N m and N
     """
+    limit = np.full(6, np.inf) if cut_off is None else np.asarray(cut_off)
+    floor = np.empty(6)
+    for edge in np.unique(limit):
+        channels = np.flatnonzero(limit == edge)
+        floor[channels] = _below(residual, windows, float(edge))[channels]
+    return floor
+
+
+def known_up_to(signals: Signals) -> dict[str, float]:
+    """Find the cut-offs of the low-pass filters that the signals of a flight went through before they were logged.
+
+    Returns
+    -------
+    dict from field of `Signals` to float, Hz
+        Signals without a cliff in their spectrum, and those that are updated slower than the clock, are left out.
+    """
+    logged = {name: values for name in _FILTERED if (values := getattr(signals, name)) is not None}
+    if "body_rate" not in signals.available:
+        del logged["body_rate"]
+    return cut_offs(logged, 1 / signals.period, slow_signals(SignalTable(signals.time, logged)))
+
+
+def channel_cut_offs(signals: Signals, euler: bool) -> Array:
+    """Find the lowest cut-off among the signals that each channel of the balance is made of.
+
+    Parameters
+    ----------
+    signals : Signals
+    euler : bool
+        Whether the inertial torque takes the attitude.
+
+    Returns
+    -------
+    array, shape (6,), Hz
+        Infinite where nothing was filtered.
+    """
+    found = known_up_to(signals)
+    force = next(
+        (name for name in ("specific_force", "acceleration", "velocity") if getattr(signals, name) is not None), ""
+    )
+    torque = {"body_rate", "rotor_speed", *(["attitude"] if euler else [])}
+    edges = [
+        min((edge for name, edge in found.items() if name in used), default=np.inf)
+        for used in (torque, {force, "rotor_speed", *(["attitude"] if force != "specific_force" else [])})
+    ]
+    return np.repeat(edges, 3)
+
+
+def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
+    """Estimate the floor of all channels from what lies between the motion and a cut-off."""
     length = len(windows.weight) * windows.period
-    longer = make_windows(windows.period, _LONGER * length, 0.5) if _fits(residual, windows) else windows
+    highest = min(_HIGHEST_OF_RATE / windows.period, _PASSED * cut_off)
+    wanted = max(_LONGER * length, _BAND * _LOWEST_PER_WINDOW / highest)
+    longer = make_windows(windows.period, wanted, 0.5) if _fits(residual, wanted / windows.period) else windows
     lowest = _LOWEST_PER_WINDOW / (len(longer.weight) * longer.period)
-    frequencies = np.linspace(lowest, max(_HIGHEST_OF_RATE / windows.period, 1.5 * lowest), _FREQUENCIES)
+    frequencies = np.linspace(lowest, max(highest, _BAND * lowest), _FREQUENCIES)
     power = np.array([_power(residual, longer, frequency) for frequency in frequencies]) / _energy(longer)
     terms = np.array([_terms(longer, frequency) for frequency in frequencies])
     window_terms = _terms(windows, 0.0) * _energy(windows)
@@ -63,8 +125,8 @@ def _terms(windows: Windows, centre: float) -> Array:
     return np.asarray(spectra @ share / share.sum())
 
 
-def _fits(residual: Columns, windows: Windows) -> bool:
-    return len(residual.direct) >= 4 * _LONGER * len(windows.weight)
+def _fits(residual: Columns, samples: float) -> bool:
+    return len(residual.direct) >= 4 * samples
 
 
 def _energy(windows: Windows) -> float:

@@ -16,7 +16,7 @@ from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.noise_floor import noise_floor
+from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
 from cpfls_cli.gap.balance.windows import Windows
 
 _AXES = ("x", "y", "z")
@@ -50,6 +50,8 @@ class WeakFlight:
         Channels that the flight has.
     turns : array, shape (parameter,)
         1 for numbers of the vehicle that the flight can show, 0 for the inertia about axes that hardly turn.
+    cut_off : array, shape (6,), Hz
+        Of the filters that the signals of each channel went through before they were logged; infinite for none.
     seen : dict
         Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
     """
@@ -60,6 +62,7 @@ class WeakFlight:
     inertial: Columns
     known: BoolArray
     turns: Array
+    cut_off: Array = field(default_factory=lambda: np.full(6, np.inf))
     seen: dict[tuple[str, tuple[float, ...]], Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -157,7 +160,9 @@ def weak_flight(
         np.concatenate([rotation.momentum, translation.momentum], axis=1),
     )
     known = np.array([signals.torque is not None and axis in axes for axis in _AXES] + [with_force] * 3)
-    hardly = WeakFlight(name, signals, windows, inertial, known, np.ones(len(nuisance().effect.coefficients)))
+    everything = np.ones(len(nuisance().effect.coefficients))
+    cut_off = channel_cut_offs(signals, model is not None)
+    hardly = WeakFlight(name, signals, windows, inertial, known, everything, cut_off)
     return replace(hardly, turns=_turns(hardly, floor))
 
 
@@ -167,7 +172,8 @@ def _turns(flight: WeakFlight, known: Array | None) -> Array:
     Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to be rid of the noise
     of the gyroscope, which is not what anybody asked.
     """
-    floor = noise_floor(flight.residual(flight.signals), flight.windows) if known is None else known
+    left = flight.residual(flight.signals)
+    floor = noise_floor(left, flight.windows, flight.cut_off) if known is None else known
     moved = flight.averaged(flight.inertial)[:, :3].std(axis=0) > _TURNING * floor[:3]
     return shown(moved)
 

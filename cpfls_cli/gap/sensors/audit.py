@@ -9,7 +9,6 @@ from math import comb
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
@@ -18,16 +17,13 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
 from cpfls_cli.gap.balance.windows import Recording, Windows
-from cpfls_cli.gap.sensors.channels import (
-    ActuationDelay,
-    ChannelMatch,
-    actuation_delay,
-    channel_warnings,
-    consistency,
-    frame_warnings,
-)
+from cpfls_cli.gap.sensors.channels import channel_warnings, filter_warnings, frame_warnings
+from cpfls_cli.gap.sensors.clocks import ActuationDelay, actuation_delay, attitude_on_clock
 from cpfls_cli.gap.sensors.findings import AuditFinding, CheckedFault, findings
 from cpfls_cli.gap.sensors.gyro import GyroFit, fit_gyro, kinematics, scan
+from cpfls_cli.gap.sensors.majority import settled
+from cpfls_cli.gap.sensors.motion import ChannelMatch
+from cpfls_cli.gap.sensors.repairs import ChannelRepair, shifted
 from cpfls_cli.gap.settings import GapSettings
 
 # Agreement that no independent attitude reaches, rad/s in a window; every fault of practical size is larger.
@@ -39,6 +35,8 @@ _TURNING = 0.05
 _BIAS_APART = 0.0015
 _CROSS = 0.005
 _SIGMAS_APART = 4.0
+# The fault that shifts the gyroscope against the attitude.
+_CLOCK = "channel_delay"
 
 
 @dataclass(frozen=True)
@@ -59,6 +57,10 @@ class Audit:
         All that was estimated, with the symmetric cross-axis and the differences between flights.
     matches : tuple of ChannelMatch
     actuation : ActuationDelay or None
+    repairs : tuple of ChannelRepair
+        Channels that contradict two others, in the order in which they are set right or left out.
+    filtered : tuple of str
+        Sentences on filters before the log, which noise floors depend on.
     """
 
     findings: tuple[AuditFinding, ...]
@@ -68,18 +70,32 @@ class Audit:
     gyro: GyroFit | None
     matches: tuple[ChannelMatch, ...]
     actuation: ActuationDelay | None
+    repairs: tuple[ChannelRepair, ...] = ()
+    filtered: tuple[str, ...] = ()
 
     @property
     def named(self) -> tuple[AuditFinding, ...]:
         """Faults that are significant and matter."""
         return tuple(finding for finding in self.findings if finding.named)
 
-    def repaired(self, signals: Signals) -> Signals:
-        """Remove the named faults from the sensors, ``truth = matrix^-1 (reading(t + delay) - offset)``.
+    @property
+    def settled(self) -> tuple[str, ...]:
+        """Sentences on the channels that were set right or left out."""
+        return tuple(repair.sentence for repair in self.repairs if repair.sentence)
 
-        Numbers that are not named count as 0. The length stays: the end of a flight that is shifted holds its last
-        value.
+    def consistent(self, signals: Signals) -> Signals:
+        """Set right or leave out the channels that contradict the others."""
+        for repair in self.repairs:
+            signals = repair.applied(signals)
+        return signals
+
+    def repaired(self, signals: Signals) -> Signals:
+        """Make the channels consistent and remove the named faults from the sensors.
+
+        A fault is removed by ``truth = matrix^-1 (reading(t + delay) - offset)``. Numbers that are not named count
+        as 0. The length stays: the end of a flight that is shifted holds its last value.
         """
+        signals = self.consistent(signals)
         faults = [(test, finding) for finding in self.named if (test := CATALOGUE[finding.name].test) is not None]
         truth: dict[str, Any] = {}
         for signal in dict.fromkeys(test.signal for test, _ in faults):
@@ -95,13 +111,7 @@ def _corrected(reading: Array, time: Array, errors: Sequence[ReadingError]) -> A
     delay = sum(error.delay for error in errors)
     offset = np.sum([error.offset for error in errors], axis=0)
     matrix = reduce(np.matmul, [error.matrix for error in errors])
-    return np.asarray((_shifted(reading, time, delay) - offset) @ np.linalg.inv(matrix).T)
-
-
-def _shifted(reading: Array, time: Array, delay: float) -> Array:
-    if delay == 0:
-        return reading
-    return np.asarray(CubicSpline(time, reading)(np.clip(time + delay, time[0], time[-1])))
+    return np.asarray((shifted(reading, time, delay) - offset) @ np.linalg.inv(matrix).T)
 
 
 def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
@@ -117,22 +127,36 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
     ----------
     Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
     """
-    faults, untested, fit, frames = _gyroscope(flights, windows)
-    matches, disagreements = consistency(flights, windows)
     actuation = actuation_delay(flights)
+    gyroscope = _gyroscope(flights, windows)
+    clock, doubts = _late_attitude(gyroscope[0], flights, windows)
+    if clock:
+        flights = [repair.applied(signals) for signals in flights for repair in clock]
+        gyroscope = _gyroscope(flights, windows)
+    faults, untested, fit, frames = gyroscope
+    motion = settled(flights, windows)
     delay_note = () if actuation is None else (actuation.sentence,)
     return Audit(
         findings=findings([*faults, *_others(flights)], windows.period),
         untested=untested,
-        warnings=(*frames, *disagreements, *channel_warnings(flights)),
-        notes=(*delay_note, *(_gyro_notes(fit) if fit is not None else ())),
+        warnings=(*frames, *motion.warnings, *channel_warnings(flights)),
+        notes=(*delay_note, *doubts, *(_gyro_notes(fit) if fit is not None else ())),
         gyro=fit,
-        matches=matches,
+        matches=tuple(match for check in motion.checks if check.pair.exact for match in check.matches),
         actuation=actuation,
+        repairs=(*clock, *motion.repairs),
+        filtered=filter_warnings(flights),
     )
 
 
 _Outcome = tuple[Sequence[CheckedFault], Mapping[str, str], GyroFit | None, tuple[str, ...]]
+
+
+def _late_attitude(
+    faults: Sequence[CheckedFault], flights: Sequence[Signals], windows: Windows
+) -> tuple[tuple[ChannelRepair, ...], tuple[str, ...]]:
+    late = [fault for fault in findings(faults, windows.period) if fault.name == _CLOCK and fault.named]
+    return attitude_on_clock(late[0].coefficients[0].value, flights, windows) if late else ((), ())
 
 
 def _of_gyroscope() -> dict[str, SensorTest]:
@@ -230,8 +254,8 @@ class Preparation:
     audit: Audit
 
     def logged(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
-        """Prepare flights as they were logged."""
-        return [self._weak(recording.name, recording.signals) for recording in recordings]
+        """Prepare flights with the faults of their sensors, but with channels that belong together."""
+        return [self._weak(recording.name, self.audit.consistent(recording.signals)) for recording in recordings]
 
     def repaired(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
         """Prepare flights with the named faults of their sensors repaired."""

@@ -23,7 +23,7 @@ def names_of(answer):
 def test_motors_lag_their_commands_by_about_72_ms(answer_of, coefficients_of):
     answer = answer_of("arpl", ARPL, "log15_55_90s")
     lag = coefficients_of(answer, "motor_lag")["time_constant_s"]
-    assert lag["value"] == pytest.approx(0.072, abs=0.008)
+    assert lag["value"] == pytest.approx(0.072, abs=0.012)
     assert lag["low"] < 0.072 < lag["high"]
     before, after = (answer[f"gap_{when}"]["torque_n_m"] for when in ("before", "after"))
     assert after[0] < 0.3 * before[0]
@@ -35,7 +35,17 @@ def test_motors_lag_their_commands_by_about_72_ms(answer_of, coefficients_of):
 def test_yaw_at_one_frequency_cannot_tell_the_rotors_reaction_from_damping(answer_of):
     answer = answer_of("arpl_yaw", ARPL, "log16_32_49s")
     assert answer["verdict"] not in ("NAMED", "NO_GAP")
-    assert {"rotor_acceleration", "linear_damping"} <= names_of(answer) | {a["name"] for a in answer["alternatives"]}
+    closest = {effect["name"] for effect in answer["closest"]}
+    rivals = {rival["name"] for rival in answer["alternatives"]}
+    assert {"rotor_acceleration", "linear_damping"} <= names_of(answer) | closest | rivals
+
+
+def test_a_filter_of_the_import_changes_no_floor(answer_of):
+    """The import filters at 60 Hz; without that the floor is 5.7e-5 N m."""
+    answer = answer_of("arpl_yaw", ARPL, "log16_32_49s")
+    assert "low-passed" in answer["notes"][0]
+    before, floors = (answer["gap_before"][key] for key in ("torque_n_m", "torque_floors"))
+    assert before[2] / floors[2] == pytest.approx(5.7e-5, rel=0.2)
 
 
 def test_flights_without_weight_have_no_offset(answer_of):

@@ -1,14 +1,17 @@
 """The estimated floor against the scatter of windows that see the same noise without any motion."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, filtfilt, lfilter
 
 from cpfls_cli.effects.effect import Columns
-from cpfls_cli.gap.balance.noise_floor import modulated, noise_floor
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, known_up_to, modulated, noise_floor
 from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 PERIOD, SAMPLES = 0.01, 6000
 THROUGH = windows(PERIOD, 0.4, 0.5)
@@ -85,3 +88,36 @@ def test_shifted_windows_hear_one_frequency_and_keep_integration_by_parts():
     np.testing.assert_allclose(np.abs(heard.average(tone)), 1.0)
     assert np.abs(modulated(THROUGH, 20.0).average(tone)).max() < 0.01
     np.testing.assert_allclose(heard.derivative(tone), 2j * np.pi * 12.0 * heard.average(tone), rtol=2e-3)
+
+
+@pytest.mark.parametrize("cut_off", [8.0, 12.0, 18.0, 30.0])
+@pytest.mark.parametrize("kind", ["gyro", "rotor", "gyro rotor"])
+def test_floor_of_a_low_passed_log_is_that_of_the_raw_one(kind, cut_off):
+    ratio, naive = [], []
+    through = butter(4, 2 * PERIOD * cut_off)
+    for seed in range(3):
+        given = noise(kind, seed)
+        left = Columns(filtfilt(*through, given.direct, axis=0), filtfilt(*through, given.momentum, axis=0))
+        ratio.extend(noise_floor(left, THROUGH, np.full(6, cut_off)) / scatter(kind))
+        naive.extend(noise_floor(left, THROUGH) / scatter(kind))
+    assert np.median(ratio) == pytest.approx(1, abs=0.3)
+    assert 0.5 < min(ratio) < max(ratio) < 2.5
+    assert cut_off > 20 or np.median(naive) < 0.3
+
+
+def test_only_the_channels_that_were_filtered_are_looked_at_below_the_cut_off():
+    given = noise("gyro rotor", 7)
+    edges = np.array([12.0, 12.0, 12.0, np.inf, np.inf, np.inf])
+    np.testing.assert_allclose(noise_floor(given, THROUGH, edges)[3:], noise_floor(given, THROUGH)[3:])
+
+
+def test_cut_offs_are_those_of_the_signals_that_a_channel_is_made_of():
+    rng = np.random.default_rng(3)
+    white = {name: rng.standard_normal((SAMPLES, 3)) for name in ("attitude", "body_rate", "velocity", "acceleration")}
+    filtered = {name: filtfilt(*butter(4, 0.24), white[name], axis=0) for name in ("attitude", "body_rate", "velocity")}
+    speed = 300 + rng.standard_normal((SAMPLES, 4))
+    signals = Signals(time=TIME, vehicle=VehicleSettings(), rotor_speed=speed, **(white | filtered))
+    assert known_up_to(signals).keys() == filtered.keys()
+    np.testing.assert_allclose(channel_cut_offs(signals, euler=False), 12.0, rtol=0.1)
+    sensed = replace(signals, specific_force=white["acceleration"])
+    np.testing.assert_allclose(channel_cut_offs(sensed, euler=False), [12.0] * 3 + [np.inf] * 3, rtol=0.1)

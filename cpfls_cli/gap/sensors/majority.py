@@ -1,0 +1,338 @@
+"""Which channel of the motion is wrong where two contradict each other, by majority; it is set right or left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from itertools import product
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.flightlog.agreement import fit_axes
+from cpfls_cli.gap.balance.windows import Windows
+from cpfls_cli.gap.sensors.channels import AXES
+from cpfls_cli.gap.sensors.motion import NAMES, PairCheck, checked
+from cpfls_cli.gap.sensors.repairs import ChannelRepair, is_derived
+
+_ROUNDS = 3
+_PARTS, _SIGMAS = 16, 4.0
+_TINY = 1e-100
+_MENDED = ("velocity", "acceleration", "specific_force")
+_SAME_UNIT = 0.15
+_UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
+_STANDARD_GRAVITY = 9.80665
+_UNITS: Mapping[str, Mapping[str, float]] = {
+    "velocity": {"km/h": 1 / 3.6, "ft/s": 0.3048, "cm/s": 0.01, "mm/s": 0.001},
+    "acceleration": {"g": _STANDARD_GRAVITY, "ft/s^2": 0.3048, "cm/s^2": 0.01, "mm/s^2": 0.001, "mg": 0.00980665},
+}
+_EXPLAINED = 0.8
+_TURNED = np.radians(3.0)
+_FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
+_KEYS = {
+    "velocity": "import.signals.velocity and import.world_frame",
+    "acceleration": "import.signals.acceleration and import.acceleration_frame",
+    "specific_force": "import.signals.acceleration, import.acceleration_frame and import.body_frame",
+}
+
+
+_Tuned = tuple[ChannelRepair, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What a majority of the channels decides.
+
+    Attributes
+    ----------
+    repairs : tuple of ChannelRepair
+    checks : tuple of PairCheck
+        Of the repaired flights.
+    """
+
+    repairs: tuple[ChannelRepair, ...]
+    checks: tuple[PairCheck, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Contradictions that stay; those with the thrust are what a diagnosis is about."""
+        return tuple(problem for check in self.checks if check.pair.exact for problem in check.problems)
+
+
+def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
+    """Set right what contradicts more than it agrees with, or leave it out.
+
+    Each two channels that show the same motion are compared. The one that contradicts most others, and of equals the
+    one that agrees with fewest, is read in the ways that logs are usually wrong (unit, gravity, axes, clock). It is
+    mended if it then contradicts nothing, and left out if nothing mends it and two others are against it.
+
+    Parameters
+    ----------
+    flights : sequence of Signals
+        With the sampling period of the windows, and a late attitude set right.
+    windows : Windows
+    """
+    repairs: tuple[ChannelRepair, ...] = ()
+    # What was made of the accelerometer is no second witness.
+    now = tuple(replace(signals, acceleration=None) if is_derived(signals) else signals for signals in flights)
+    checks = checked(now, windows)
+    for _ in range(_ROUNDS):
+        found = _mended(now, checks, windows)
+        if not found:
+            break
+        repairs = (*repairs, *found)
+        now = tuple(reduce(lambda s, repair: repair.applied(s), found, signals) for signals in now)
+        checks = checked(now, windows)
+    return Settled(repairs, checks)
+
+
+def _mended(flights: tuple[Signals, ...], checks: Sequence[PairCheck], windows: Windows) -> tuple[ChannelRepair, ...]:
+    for channel, sure in _suspects(checks):
+        witnesses = _witnesses(checks, channel)
+        tuned = _read_rightly(flights, channel, checks, windows)
+        if tuned is not None and (sure or tuned[0].is_mistake):
+            return _told(*tuned, witnesses, checks)
+        if tuned is not None and _nearer_the_thrust(flights, tuned[0], checks, windows):
+            return _told(*tuned, [*witnesses, NAMES["thrust"]], checks)
+        # Noise on both sides can look like one contradiction, not like two.
+        if sure and tuned is None and len(set(witnesses)) > 1:
+            return (_left_out(channel, witnesses),)
+    return ()
+
+
+def _read_rightly(
+    flights: tuple[Signals, ...], channel: str, checks: Sequence[PairCheck], windows: Windows
+) -> _Tuned | None:
+    """Find the plainest reading of a channel that contradicts nothing, unless another one surely fits better."""
+    known = all(signals.attitude is not None for signals in flights)
+    best, least = None, np.empty(0)
+    for repair, what in _readings(channel):
+        tuned = _tuned(flights, repair, what, checks, windows) if known or not repair.needs_attitude else None
+        if tuned is not None:
+            nearest = _clearest(checked(_repaired(flights, tuned[0], checks), windows, channel))
+            rest = ((nearest.first - nearest.second) ** 2).sum(axis=1)
+            if best is None or (rest.sum() < least.sum() if _simple(tuned, best) else _surely_less(rest, least)):
+                best, least = tuned, rest
+    return best
+
+
+def _simple(tuned: _Tuned, other: _Tuned) -> bool:
+    """Tell whether a reading takes no more mistakes than another."""
+    return len(tuned[1]) + bool(tuned[0].delay_s) <= len(other[1]) + bool(other[0].delay_s)
+
+
+def _surely_less(after: Array, before: Array) -> bool:
+    """Tell whether squares are less by more than their scatter along the flights."""
+    parts = np.array([part.sum() for part in np.array_split(before - after, _PARTS)])
+    return bool(parts.mean() > _SIGMAS * parts.std(ddof=1) / np.sqrt(_PARTS))
+
+
+def _suspects(checks: Sequence[PairCheck]) -> list[tuple[str, bool]]:
+    """List the channels that can be mended, and whether each alone has most against it.
+
+    That is: it contradicts more channels than any other, or as many and agrees with fewer.
+    """
+    blamed = {name for check in checks if _counts(check) for name in check.pair[:2]}
+    against = {
+        name: (
+            sum(bool(check.problems) for check in checks if name in check.pair),
+            -sum(check.agrees for check in checks if name in check.pair),
+        )
+        for name in blamed
+    }
+    ordered = sorted((name for name in _MENDED if name in blamed), key=lambda name: against[name], reverse=True)
+    return [(name, all(against[name] > against[other] for other in blamed - {name})) for name in ordered]
+
+
+def _nearer_the_thrust(
+    flights: tuple[Signals, ...], repair: ChannelRepair, checks: Sequence[PairCheck], windows: Windows
+) -> bool:
+    """Tell whether a repair surely brings a channel nearer to what the thrust does: the third clock and frame."""
+    repaired = _repaired(flights, repair, checks)
+    before, after = (_off_the_thrust(each, repair.channel, windows) for each in (flights, repaired))
+    return before is not None and after is not None and _surely_less(after, before)
+
+
+def _off_the_thrust(flights: Sequence[Signals], channel: str, windows: Windows) -> Array | None:
+    """Square what a drag leaves between thrust and a channel, shape (window,); None where there is no thrust."""
+    against = [check for check in checked(flights, windows, channel) if check.pair.first == "thrust"]
+    if not against:
+        return None
+    rest = against[0].second - against[0].first
+    rest = rest - rest.mean(axis=0)
+    velocities = [signals.velocity for signals in flights if signals.velocity is not None]
+    if len(velocities) == len(flights):
+        speed = np.concatenate([windows.average(velocity) for velocity in velocities])
+        speed = speed - speed.mean(axis=0)
+        rest = rest - speed * ((rest * speed).sum(axis=0) / np.maximum((speed**2).sum(axis=0), _TINY))
+    return np.asarray((rest**2).sum(axis=1))
+
+
+def _counts(check: PairCheck) -> bool:
+    """Tell whether a contradiction asks for a decision: one with the velocity alone may be what a model misses."""
+    return bool(check.problems) and (check.pair.exact or check.pair.second != "velocity")
+
+
+def _witnesses(checks: Sequence[PairCheck], channel: str) -> list[str]:
+    """List the channels that one contradicts."""
+    return [
+        NAMES[name]
+        for check in checks
+        if check.problems and channel in check.pair
+        for name in check.pair[:2]
+        if name != channel
+    ]
+
+
+def _readings(channel: str) -> Iterator[tuple[ChannelRepair, tuple[str, ...]]]:
+    """List the ways to read a channel, the nearest to what it is called first; as it is says nothing."""
+    gravity, plain = _STANDARD_GRAVITY, ChannelRepair(channel)
+    yield plain, ()
+    if channel == "specific_force":
+        axes = {"": np.eye(3), "has its sign reversed": -np.eye(3), "has y and z reversed": _FORWARD_LEFT_UP}
+        for (words, matrix), added in product(axes.items(), (0.0, gravity)):
+            what = (*([words] if words else []), *(["lacks gravity"] if added else []))
+            if what:
+                yield replace(plain, matrix=matrix, gravity_m_s2=added), what
+        return
+    if channel == "acceleration":
+        yield replace(plain, gravity_m_s2=-gravity), ("holds gravity",)
+        yield replace(plain, gravity_m_s2=gravity), ("holds gravity, pointing down",)
+    yield replace(plain, in_body=True), ("is in body axes",)
+    if channel == "acceleration":
+        yield replace(plain, in_body=True, gravity_m_s2=-gravity), ("is in body axes and holds gravity",)
+
+
+def _tuned(
+    flights: tuple[Signals, ...],
+    repair: ChannelRepair,
+    what: tuple[str, ...],
+    checks: Sequence[PairCheck],
+    windows: Windows,
+) -> _Tuned | None:
+    """Find axes, unit and delay with which a reading contradicts nothing; None where there are none."""
+    for step in (_with_axes, _with_unit, _with_turn, _with_delay):
+        against = checked(_repaired(flights, repair, checks), windows, repair.channel)
+        if not any(check.problems for check in against):
+            break
+        repair, more = step(repair, _clearest(against))
+        what = (*what, *more)
+    for _ in range(_ROUNDS if repair.delay_s else 0):
+        # Noise shrinks what is left of a delay, so a second look is worth it.
+        repair, _ = _with_delay(repair, _clearest(checked(_repaired(flights, repair, checks), windows, repair.channel)))
+    against = checked(_repaired(flights, repair, checks), windows, repair.channel)
+    # An accelerometer hardly moves in a gentle flight; what it shows of gravity is agreement enough.
+    moves = repair.channel == "specific_force" or any(check.agrees for check in against)
+    changed = bool(what) or repair.delay_s != 0
+    return (repair, what) if changed and moves and not any(check.problems for check in against) else None
+
+
+def _repaired(flights: Sequence[Signals], repair: ChannelRepair, checks: Sequence[PairCheck]) -> tuple[Signals, ...]:
+    repairs = _with_position(repair, checks)
+    return tuple(reduce(lambda s, each: each.applied(s), repairs, signals) for signals in flights)
+
+
+def _with_position(repair: ChannelRepair, checks: Sequence[PairCheck]) -> tuple[ChannelRepair, ...]:
+    """Take the position along where it agrees with the velocity, so that its world is as wrong."""
+    along = [check for check in checks if check.pair[:2] == ("position", "velocity") and check.agrees]
+    if repair.channel != "velocity" or not along:
+        return (repair,)
+    return (repair, replace(repair, channel="position"))
+
+
+def _clearest(checks: Sequence[PairCheck]) -> PairCheck:
+    """Choose the witness: the exact one that moves as the channel does, the thrust if there is no other."""
+    return max(checks, key=lambda check: (check.pair.exact, sum(match.r2 for match in check.matches)))
+
+
+def _sides(repair: ChannelRepair, check: PairCheck) -> tuple[Array, Array]:
+    """Give what should be and what is."""
+    return (check.first, check.second) if check.pair.second == repair.channel else (check.second, check.first)
+
+
+def _multiplied(repair: ChannelRepair, matrix: Array) -> ChannelRepair:
+    return replace(repair, matrix=matrix @ repair.matrix)
+
+
+def _with_axes(repair: ChannelRepair, check: PairCheck) -> _Tuned:
+    if repair.channel == "specific_force" or repair.in_body:
+        return repair, ()
+    fit = fit_axes(*_sides(repair, check))
+    if fit.is_as_named or fit.explained < _EXPLAINED:
+        return repair, ()
+    matrix = np.zeros((3, 3))
+    matrix[np.arange(3), fit.order] = fit.sign
+    names = ", ".join(("-" if sign < 0 else "") + AXES[axis] for axis, sign in zip(fit.order, fit.sign, strict=True))
+    return _multiplied(repair, matrix), (f"has {names} where x, y, z should be",)
+
+
+def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Tuned:
+    should, reading = _sides(repair, check)
+    if repair.channel != "specific_force":
+        should, reading = should - should.mean(axis=0), reading - reading.mean(axis=0)
+    squares = np.array([(should**2).sum(), (reading**2).sum()])
+    size = float(np.sqrt(squares[0] / max(squares[1], _TINY)))
+    # Noise on one side makes its size too large, by no more than the correlation tells.
+    error = (_UNIT_ERROR if check.pair.exact else _THRUST_ERROR) - np.log(_correlation(should, reading))
+    if abs(np.log(size)) < max(error, _SAME_UNIT):
+        return repair, ()
+    units = _UNITS["velocity" if repair.channel == "velocity" else "acceleration"]
+    unit, factor = min(units.items(), key=lambda each: abs(np.log(size / each[1])))
+    if abs(np.log(size / factor)) > error:
+        return repair, ()
+    return replace(repair, matrix=factor * repair.matrix), (f"is in {unit}",)
+
+
+def _correlation(should: Array, reading: Array) -> float:
+    both = float((should * reading).sum())
+    return float(np.clip(abs(both) / np.sqrt((should**2).sum() * (reading**2).sum() + _TINY), 0.1, 1.0))
+
+
+def _with_turn(repair: ChannelRepair, check: PairCheck) -> _Tuned:
+    if repair.channel == "specific_force" or not check.pair.exact:
+        return repair, ()
+    angle = float(np.arctan(check.turn.value)) * (1 if check.pair.second == repair.channel else -1)
+    if abs(angle) < _TURNED or check.turn.error > 0.1 * abs(angle):
+        return repair, ()
+    cos, sin = np.cos(angle), np.sin(angle)
+    matrix = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    return _multiplied(repair, matrix), (f"is turned by {np.degrees(angle):.0f} deg about the vertical",)
+
+
+def _with_delay(repair: ChannelRepair, check: PairCheck) -> _Tuned:
+    late = check.delay.value * (1 if check.pair.second == repair.channel else -1)
+    return (replace(repair, delay_s=repair.delay_s + late) if check.pair.exact else repair), ()
+
+
+def _joined(words: Sequence[str]) -> str:
+    *most, last = dict.fromkeys(words)
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def _told(
+    repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str], checks: Sequence[PairCheck]
+) -> tuple[ChannelRepair, ...]:
+    first, *others = _with_position(repair, checks)
+    way = "late" if repair.delay_s > 0 else "early"
+    clock = [f"is {way} by {abs(1000 * repair.delay_s):.0f} ms"] if repair.delay_s else []
+    who = f"The {NAMES[repair.channel]}" if not others else "The world of velocity and position"
+    sentence = (
+        f"{who} {_joined([*what, *clock])}, judged by the {_joined(witnesses)}. It is set right before the balance; "
+        f"mend the log, or {_KEYS[repair.channel]}."
+    )
+    return (replace(first, sentence=sentence), *others)
+
+
+def _left_out(channel: str, witnesses: Sequence[str]) -> ChannelRepair:
+    without = {
+        "velocity": "effects of the air are not tested",
+        "acceleration": "the force comes from other channels, if there are any",
+        "specific_force": "the force comes from other channels, if there are any",
+    }[channel]
+    sentence = (
+        f"The {NAMES[channel]} contradicts the {_joined(witnesses)}, and neither unit, gravity, axes nor delay "
+        f"explains it. It is left out: {without}. Check {_KEYS[channel]}."
+    )
+    return ChannelRepair(channel, dropped=True, sentence=sentence)

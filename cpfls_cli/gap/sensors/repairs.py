@@ -1,0 +1,109 @@
+"""A channel that contradicts the others, set right or left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.signals import Signals
+
+_UP = np.array([0.0, 0.0, 1.0])
+_ROUNDING = 1e-6
+_SCALED = 0.1
+
+
+@dataclass(frozen=True)
+class ChannelRepair:
+    """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing.
+
+    Attributes
+    ----------
+    channel : str
+        Field of `Signals`, shape (time, 3).
+    dropped : bool
+        Whether it is left out; then nothing else counts.
+    delay_s : float
+        How late it is, s.
+    in_body : bool
+        Whether what should be in world axes was logged in body axes.
+    matrix : array, shape (3, 3)
+        Unit and axes; after the turn from body to world axes.
+    gravity_m_s2 : float
+        Added along the vertical, m/s^2.
+    sentence : str
+        What is wrong, who says so, what is done and what to mend.
+    """
+
+    channel: str
+    dropped: bool = False
+    delay_s: float = 0.0
+    in_body: bool = False
+    matrix: Array = field(default_factory=lambda: np.eye(3))
+    gravity_m_s2: float = 0.0
+    sentence: str = ""
+
+    @property
+    def is_mistake(self) -> bool:
+        """Whether it mends what only this channel can have wrong: its unit, gravity in it, body for world axes."""
+        scaled = abs(np.log(abs(np.linalg.det(self.matrix)))) > _SCALED
+        reversed_ = self.channel == "specific_force" and self.matrix[2, 2] < 0
+        return self.in_body or bool(self.gravity_m_s2) or bool(scaled) or bool(reversed_)
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Whether it turns something between body and world."""
+        return self.in_body or (self.channel == "specific_force" and bool(self.gravity_m_s2))
+
+    def applied(self, signals: Signals) -> Signals:
+        """Repair the channel of a flight; the length stays, and the end of what is shifted holds its last value."""
+        reading = getattr(signals, self.channel)
+        if reading is None:
+            return signals
+        changed: dict[str, Any] = {self.channel: None if self.dropped else self._truth(reading, signals)}
+        repaired = replace(signals, **changed)
+        return replace(repaired, acceleration=accelerated(repaired)) if is_derived(signals) else repaired
+
+    def _truth(self, reading: Array, signals: Signals) -> Array:
+        truth = shifted(reading, signals.time, self.delay_s)
+        if self.in_body:
+            truth = np.einsum("tij,tj->ti", signals.rotation, truth)
+        truth = truth @ self.matrix.T
+        if self.gravity_m_s2:
+            sensed = self.channel == "specific_force"
+            truth = truth + self.gravity_m_s2 * (signals.rotation[:, 2] if sensed else _UP)
+        return np.asarray(truth)
+
+
+def accelerated(signals: Signals) -> Array | None:
+    """Turn what the accelerometer senses into acceleration, shape (time, 3), m/s^2, world frame."""
+    if signals.specific_force is None or signals.attitude is None:
+        return None
+    turned = np.einsum("tij,tj->ti", signals.rotation, signals.specific_force)
+    return np.asarray(turned - signals.vehicle.gravity_m_s2 * _UP)
+
+
+def is_derived(signals: Signals) -> bool:
+    """Tell whether the acceleration was made of what the accelerometer senses, and is no channel of its own."""
+    made = accelerated(signals)
+    if made is None or signals.acceleration is None:
+        return False
+    return bool((made - signals.acceleration).std(axis=0).max() < _ROUNDING * max(1.0, float(np.abs(made).max())))
+
+
+def shifted(reading: Array, time: Array, delay: float) -> Array:
+    """Take a reading that is late at the time it belongs to.
+
+    Parameters
+    ----------
+    reading : array, shape (time, 3)
+    time : array, shape (time,), s
+    delay : float
+        s.
+    """
+    if delay == 0:
+        return reading
+    return np.asarray(CubicSpline(time, reading)(np.clip(time + delay, time[0], time[-1])))

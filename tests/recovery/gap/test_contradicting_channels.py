@@ -1,0 +1,203 @@
+"""A channel that contradicts two others is set right or left out, that is said, and the hidden effect is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, filtfilt, lfilter
+
+from cpfls_cli.artifacts.gap_flights import AuditGroup
+from cpfls_cli.gap.balance.windows import Recording, windows
+from cpfls_cli.gap.diagnose import diagnose
+from cpfls_cli.gap.sensors.audit import audit
+from cpfls_cli.gap.settings import GapSettings
+from tests.builders.closed_loop_flights import PERIOD, flown, signals_of
+
+WINDOWS = windows(PERIOD, 0.4, 0.5)
+UP = np.array([0.0, 0.0, 9.81])
+DRAG = 2e-3
+NOISE = {
+    "attitude": 0.003,
+    "body_rate": 0.005,
+    "position": 0.02,
+    "velocity": 0.05,
+    "acceleration": 0.1,
+    "rotor_speed": 1.0,
+}
+
+
+@pytest.fixture(scope="module")
+def flights():
+    """Two noisy flights that head 60 degrees left of x, of which a drag at the rotors is hidden."""
+    logged = [signals_of(flown(20.0, seed=seed, noise=NOISE, effects={"rotor_drag": [DRAG]})) for seed in (1, 2)]
+    return [headed(signals, 60.0) for signals in logged]
+
+
+def headed(signals, degrees):
+    names = ("position", "velocity", "acceleration")
+    world = {name: getattr(signals, name) @ turned(degrees).T for name in names}
+    return replace(signals, attitude=signals.attitude + np.array([0.0, 0.0, np.radians(degrees)]), **world)
+
+
+def late(values, seconds):
+    time = PERIOD * np.arange(len(values))
+    return CubicSpline(time, values)(np.clip(time - seconds, time[0], time[-1]))
+
+
+def turned(degrees):
+    angle = np.radians(degrees)
+    return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+
+
+def to_body(signals, values):
+    return np.einsum("tji,tj->ti", signals.rotation, values)
+
+
+def sensing(signals):
+    """Exchange the acceleration for what an accelerometer senses."""
+    return replace(signals, acceleration=None, specific_force=to_body(signals, signals.acceleration + UP))
+
+
+def low_passed(values, cut_off):
+    return filtfilt(*butter(4, 2 * PERIOD * cut_off), values, axis=0)
+
+
+def all_low_passed(signals, cut_off=18.0):
+    names = ("attitude", "body_rate", "velocity", "position", "acceleration", "rotor_speed")
+    return replace(signals, **{name: low_passed(getattr(signals, name), cut_off) for name in names})
+
+
+def of_acceleration(change):
+    return lambda s: replace(s, acceleration=change(s, s.acceleration))
+
+
+def of_velocity(change):
+    return lambda s: replace(s, velocity=change(s, s.velocity))
+
+
+def of_accelerometer(change):
+    return lambda s: replace(sensing(s), specific_force=change(s, sensing(s).specific_force))
+
+
+WRONG = {
+    "in g": (of_acceleration(lambda _, a: a / 9.80665), "The acceleration is in g"),
+    "with gravity": (of_acceleration(lambda _, a: a + UP), "The acceleration holds gravity"),
+    "reversed": (of_acceleration(lambda _, a: -a), "The acceleration has -x, -y, -z"),
+    "body for world": (of_acceleration(to_body), "The acceleration is in body axes"),
+    "late": (of_acceleration(lambda _, a: late(a, 0.03)), "The acceleration is late by"),
+    "filtered at 5 Hz": (
+        of_acceleration(lambda _, a: lfilter(*butter(1, 2 * PERIOD * 5.0), a, axis=0)),
+        "The acceleration is late by",
+    ),
+    "sensed in g": (of_accelerometer(lambda _, f: f / 9.80665), "The accelerometer is in g"),
+    "sensed without gravity": (of_accelerometer(lambda s, f: f - to_body(s, 0 * f + UP)), "lacks gravity"),
+    "velocity in body axes": (of_velocity(to_body), "The velocity is in body axes"),
+    "velocity in NED": (of_velocity(lambda _, v: v[:, [1, 0, 2]] * [1, 1, -1]), "The velocity has y, x, -z"),
+    "velocity of another north": (of_velocity(lambda _, v: v @ turned(30).T), "The velocity is turned by"),
+    "velocity late": (of_velocity(lambda _, v: late(v, 0.1)), "The velocity is late by"),
+    "velocity in km/h": (of_velocity(lambda _, v: 3.6 * v), "The velocity is in km/h"),
+    "attitude late": (lambda s: replace(s, attitude=late(s.attitude, 0.03)), "The attitude is late by 30 ms"),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_channel_that_contradicts_two_others_is_set_right(flights, wrong):
+    change, words = WRONG[wrong]
+    found = audit([change(signals) for signals in flights], WINDOWS)
+    [sentence] = found.settled
+    assert words in sentence
+    assert (found.warnings, found.named) == ((), ())
+    channel = found.repairs[0].channel
+    for signals in flights:
+        given = sensing(signals) if channel == "specific_force" else signals
+        repaired = getattr(found.repaired(change(signals)), channel)
+        # What noise leaves of a shift by 30 ms is seen by windows of 400 ms.
+        true, now = (WINDOWS.average(values) for values in (getattr(given, channel), repaired))
+        logged = WINDOWS.average(getattr(change(signals), channel))
+        left, before = (np.sqrt(((values - true) ** 2).mean()) for values in (now, logged))
+        assert left < 0.3 * before
+
+
+def test_channels_that_agree_are_left_alone(flights):
+    for given in (flights, [sensing(signals) for signals in flights]):
+        for part in (given, given[:1]):
+            found = audit(part, WINDOWS)
+            assert (found.repairs, found.warnings, found.filtered) == ((), (), ())
+            assert found.repaired(part[0]) is part[0]
+
+
+def test_what_no_usual_mistake_explains_is_left_out(flights):
+    broken = [replace(signals, acceleration=signals.acceleration[::-1].copy()) for signals in flights]
+    found = audit(broken, WINDOWS)
+    [sentence] = found.settled
+    assert "The acceleration contradicts the velocity and thrust of the rotors" in sentence
+    assert found.repaired(broken[0]).acceleration is None
+
+
+def test_two_that_contradict_each_other_without_a_third_are_only_warned_of(flights):
+    alone = [replace(s, position=None, rotor_speed=None, velocity=late(s.velocity, 0.1)) for s in flights]
+    found = audit(alone, WINDOWS)
+    assert found.repairs == ()
+    assert any("velocity and acceleration" in warning and "early" in warning for warning in found.warnings)
+
+
+def test_a_late_gyroscope_is_not_taken_for_an_early_attitude(flights):
+    found = audit([replace(signals, body_rate=late(signals.body_rate, 0.03)) for signals in flights], WINDOWS)
+    assert [fault.name for fault in found.named] == ["channel_delay"]
+    assert found.repairs == ()
+
+
+def test_commands_do_not_tell_whose_clock_is_wrong(flights):
+    commanded = [replace(s, commanded=True, attitude=late(s.attitude, 0.03)) for s in flights]
+    found = audit(commanded, WINDOWS)
+    assert not any(repair.channel == "attitude" for repair in found.repairs)
+    assert any("gyroscope or attitude is late" in note for note in found.notes)
+
+
+def test_what_was_made_of_the_accelerometer_follows_its_repair(flights):
+    def logged(signals):
+        wrong = replace(sensing(signals), specific_force=sensing(signals).specific_force / 9.80665)
+        return replace(wrong, acceleration=np.einsum("tij,tj->ti", wrong.rotation, wrong.specific_force) - UP)
+
+    found = audit([logged(signals) for signals in flights], WINDOWS)
+    assert ["The accelerometer is in g" in sentence for sentence in found.settled] == [True]
+    np.testing.assert_allclose(found.repaired(logged(flights[0])).acceleration, flights[0].acceleration, atol=1e-9)
+
+
+def test_repairs_come_back_from_an_artifact(flights):
+    given = [WRONG["velocity in NED"][0](signals) for signals in flights]
+    found = audit(given, WINDOWS)
+    again = AuditGroup.of(found).audit()
+    assert again.settled == found.settled
+    np.testing.assert_array_equal(again.repaired(given[0]).velocity, found.repaired(given[0]).velocity)
+
+
+def answer(training, held):
+    recordings = [Recording("training", training)], [Recording("held out", held)]
+    return diagnose(*recordings, GapSettings(), np.random.default_rng(1)).diagnosis
+
+
+@pytest.mark.parametrize("wrong", ["in g", "with gravity", "late", "filtered at 5 Hz", "attitude late"])
+def test_the_effect_is_named_in_spite_of_a_wrong_channel(flights, wrong):
+    change, words = WRONG[wrong]
+    found = answer(*(change(signals) for signals in flights))
+    assert (found.verdict, [effect.name for effect in found.effects]) == ("NAMED", ["rotor_drag"])
+    assert found.effects[0].coefficients[0].value == pytest.approx(DRAG, rel=0.05)
+    assert words in found.notes[0]
+    assert np.nanmax(found.before.floors) < 20
+
+
+def test_a_low_passed_log_has_the_floors_of_the_raw_one_and_says_so_first(flights):
+    raw, filtered = answer(*flights), answer(*(all_low_passed(signals) for signals in flights))
+    assert (filtered.verdict, [effect.name for effect in filtered.effects]) == ("NAMED", ["rotor_drag"])
+    assert "low-passed, by import.lowpass_hz or before: attitude at about 1" in filtered.notes[0]
+    assert "Feed raw logs" in filtered.notes[0]
+    assert not any("low-passed" in note for note in raw.notes)
+    ratio = filtered.floor / raw.floor
+    assert np.all((ratio > 0.6) & (ratio < 2.0))
+
+
+def test_a_log_without_noise_has_no_floor_that_is_known():
+    found = audit([signals_of(flown(8.0))], WINDOWS)
+    assert "noise floor is not known" in found.filtered[0]
