@@ -44,7 +44,7 @@ def test_a_filter_of_the_import_changes_no_floor(answer_of):
     """The import filters at 60 Hz; without that the floor is 5.7e-5 N m."""
     answer = answer_of("arpl_yaw", ARPL, "log16_32_49s")
     assert "low-passed" in answer["notes"][0]
-    before, floors = (answer["gap_before"][key] for key in ("torque_n_m", "torque_floors"))
+    before, floors = (answer["gap_before"][key] for key in ("torque_n_m", "floors"))
     assert before[2] / floors[2] == pytest.approx(5.7e-5, rel=0.2)
 
 
