@@ -17,7 +17,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.leftover import usual_size
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.naming.scoring import candidates_of, information
-from cpfls_cli.gap.next_flight.separation import Question, SizedEffect
+from cpfls_cli.gap.next_flight.separation import SURE, Question, SizedEffect, gathered, judged, shared_noise
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -99,16 +99,17 @@ def questions_left(
     floor : array, shape (6,), N m and N
     """
     sized = {each.name: _sized(each) for each in named if each.candidate is not None}
-    questions = []
+    questions, beside = [], []
     for rival in rivals:
         one = sized[rival.instead_of]
         besides = tuple(each for name, each in sized.items() if name not in (rival.instead_of, rival.name))
         other = fitted_rival(flights, [each.candidate for each in besides], CATALOGUE[rival.name], floor)
         pair = (one, other.candidate.effect), (other, one.candidate.effect)
         questions += [Question(true, effect, besides) for true, effect in pair]
-        questions += [Question(true, each, besides) for true, known in pair for each in _beside(true, known, flights)]
-    once = {(each.true.candidate.effect.name, each.rival and each.rival.name): each for each in questions[::-1]}
-    asked = tuple(question for question in list(once.values())[::-1] if _is_open(question))
+        beside += [Question(true, each, besides) for true, known in pair for each in _beside(true, known, flights)]
+    questions += [each for each in beside if not _is_told(each, flights, floor)]
+    once = {(each.true.candidate.effect.name, each.rival and each.rival.name): each for each in questions}
+    asked = tuple(question for question in once.values() if _is_open(question))
     return (*asked, *(Question(usual(effect, flights[0].signals.vehicle), None) for effect in unseen))
 
 
@@ -117,6 +118,14 @@ def _beside(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> 
     others = (CATALOGUE[name] for name in true.candidate.effect.rivals if name != rival.name)
     known = (each for each in others if each.columns is not None and each.kind == true.candidate.effect.kind)
     return [each for each in known if not all(each.missing(flight.signals) for flight in flights)]
+
+
+def _is_told(question: Question, flights: Sequence[WeakFlight], floor: Array) -> bool:
+    """Tell whether the flights that are there answer a question."""
+    if all(question.true.candidate.effect.missing(flight.signals) for flight in flights):
+        return False
+    answer = judged(*gathered(question, flights, floor), shared_noise(flights[0].windows))
+    return answer.sure >= SURE
 
 
 def _sized(named: NamedEffect) -> SizedEffect:
