@@ -40,6 +40,7 @@ _TONES: dict[str, Tone] = {
 }
 _ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
 _USE = "take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write"
+_PLAN = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight"
 _NEXT: dict[str, str] = {
     GapVerdict.NAMED: _USE,
     GapVerdict.PARTIAL: f"{_USE}; then look at what is left",
@@ -213,7 +214,9 @@ def next_steps(record: DiagnosisRecord) -> list[str]:
         return ["Correct the section `import` of the config, and run this again."]
     usual = _NEXT.get(record.verdict)
     first = [f"to tell {flight}" for flight in _telling_flights(record)]
-    told = first if record.verdict == GapVerdict.AMBIGUOUS else []
+    # A rival that was not tried wants a signal; for the others a flight is planned.
+    plan = [_PLAN] if np.isfinite(record.alternative.relative_gain).any() else []
+    told = [*first, *plan] if record.verdict == GapVerdict.AMBIGUOUS else []
     return [sentence(step) for step in (*told, usual) if step]
 
 

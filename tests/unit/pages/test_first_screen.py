@@ -92,7 +92,11 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tell
     told = "constant torque from offset of the centre of mass: change the thrust"
     assert ("To tell", told) in below
     _, facts, _, _, below = screen(diagnosis("AMBIGUOUS", alternatives=RIVALS))
-    assert facts["Next"].startswith(f"To tell {told}. Until then take the model with it, extended.h5,")
+    planned = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight."
+    assert facts["Next"] == f"To tell {told}. {planned} Until then t{USE[1:]}."
+    untried = diagnosis("AMBIGUOUS", alternatives=[("wind", "com_offset", np.nan, "log velocity")])
+    assert planned not in next_steps(untried)
+    assert next_steps(untried)[0] == "To tell steady wind from offset of the centre of mass: log velocity."
     assert facts["How sure"] == "Of the held-out gap above the noise, 97 % is gone."
     assert "To tell" not in dict(below)
 
