@@ -97,8 +97,9 @@ NEAREST = {
     "bullet_damping": ("parasitic_drag", "linear_damping", "quadratic_damping", "rotor_drag", "inflow"),
     "bullet_drag": ("rotor_drag", "inflow"),
     "bullet_ground": ("ground_effect",),
+    "drag_factor": ("drag_factor_error",),
 }
-"""Names in the catalogue that come close to the physics of another simulator."""
+"""Names in the catalogue that come close to the physics of another simulator, or say the same in another way."""
 
 SUITABLE = {name: tuple(STUDIED) for name in CATALOGUE}
 # The hubs of the Hummingbird lie in the plane of its centre of mass: leaning thrust has no lever.

@@ -199,6 +199,9 @@ def outcome(key, said):
     truth, names = set(key["truth"]), {effect["name"] for effect in said["effects"]}
     if not names:
         return _nothing_named(key, said)
+    # Yaw alone shows the ratio of drag factor and Izz, so that either name is right, but not both.
+    if "drag_factor" in key["hidden"] and "parameter_error" not in names:
+        names = {"parameter_error" if name == "drag_factor_error" else name for name in names}
     if "wind" in truth:
         names |= {"rotor_drag"} if "wind" in names else set()
         truth |= {"rotor_drag"}

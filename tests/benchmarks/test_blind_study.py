@@ -100,6 +100,7 @@ def test_answers_are_told_apart(truth, verdict, names, expected):
     torque = 1.0 if "com_offset" in truth else 0.01
     key = {
         "truth": truth,
+        "hidden": {},
         "only": "",
         "residual_rms_n_m": {"held_out_1": [torque, 0.0, 0.0], "train_1": [9.0, 9.0, 9.0]},
     }
@@ -142,6 +143,8 @@ def answered(told, **key):
 
 DRAG, DAMPING = ("rotor_drag", 1.0, 1e-3, [0.0, 1.0]), ("linear_damping", 1.0, 0.1, [0.0, 1.0])
 
+FACTOR, IZZ = ("drag_factor_error", 1.0, 0.2, [-0.6, 1.5]), ("parameter_error", 1.0, -0.17, [-0.9, 3.0])
+OF_FACTOR = {"truth": ["parameter_error"], "hidden": {"drag_factor": {}}, "nearest": ["drag_factor_error"]}
 RIVAL_BY = {"name": "rotor_drag", "instead_of": "linear_damping"}
 
 
@@ -165,6 +168,9 @@ RIVAL_BY = {"name": "rotor_drag", "instead_of": "linear_damping"}
         (said("NO_GAP"), {"only": "train", "hidden": {"rotor_drag": {}}, "group": "differing"}, False),
         (said("NAMED", DAMPING), {"outside": ["cyclic_swirl"], "hidden": {"cyclic_swirl": {}}}, False),
         (said("PARTIAL", DAMPING), {"outside": ["cyclic_swirl"], "hidden": {"cyclic_swirl": {}}}, True),
+        (said("NAMED", FACTOR), {"group": "drag_factor", **OF_FACTOR}, True),
+        (said("NAMED", FACTOR, IZZ), {"group": "drag_factor", **OF_FACTOR}, False),
+        (said("NAMED", IZZ), {"group": "drag_factor", **OF_FACTOR}, True),
         (said("NO_GAP"), {"group": "attack"}, True),
         (said("PARTIAL", DAMPING), {"group": "attack"}, False),
         (said("NAMED", DRAG), {"group": "pybullet", "nearest": ["rotor_drag"]}, True),
