@@ -23,8 +23,10 @@ CATALOGUE: Mapping[str, Effect] = _discover()
 """Effects by identifier."""
 
 VEHICLE_NUMBERS: Effect = next(known for known in CATALOGUE.values() if known.kind == "parameter")
-CENTRE_OF_MASS: Effect = next(known for known in CATALOGUE.values() if known.of_all_forces)
 """The vehicle's own numbers, which stay free in every fit."""
+
+CENTRE_OF_MASS: Effect = next(known for known in CATALOGUE.values() if known.of_all_forces)
+"""The effect that has a lever for all forces."""
 
 
 def effect(name: str) -> Effect:

@@ -35,8 +35,6 @@ _TURNING = 0.05
 _BIAS_APART = 0.0015
 _CROSS = 0.005
 _SIGMAS_APART = 4.0
-# The fault that shifts the gyroscope against the attitude.
-_CLOCK = "channel_delay"
 
 
 @dataclass(frozen=True)
@@ -155,8 +153,15 @@ _Outcome = tuple[Sequence[CheckedFault], Mapping[str, str], GyroFit | None, tupl
 def _late_attitude(
     faults: Sequence[CheckedFault], flights: Sequence[Signals], windows: Windows
 ) -> tuple[tuple[ChannelRepair, ...], tuple[str, ...]]:
-    late = [fault for fault in findings(faults, windows.period) if fault.name == _CLOCK and fault.named]
+    # The fault that shifts the gyroscope against the attitude.
+    late = [each for each in findings(faults, windows.period) if each.named and _estimate(each.name) == "delay"]
     return attitude_on_clock(late[0].coefficients[0].value, flights, windows) if late else ((), ())
+
+
+def _estimate(name: str) -> object:
+    test = CATALOGUE[name].test
+    assert test is not None, "the audit tests what has a test"
+    return test.estimate
 
 
 def _of_gyroscope() -> dict[str, SensorTest]:

@@ -43,6 +43,7 @@ def signals(samples=60):
 def test_torque_force_and_inertia_are_those_of_the_effects():
     numbers = parameters(inertia_x=0.3, inertia_z=-0.2, coupling_y=0.4, thrust_scale=0.1, reference_x=0.2)
     effects = (fitted("com_offset", 0.004, -0.002), fitted("linear_damping", 1e-3, 2e-3, 3e-3))
+    effects += (fitted("drag_factor_error", error=0.3),)
     extended, flown = ExtendedModel(None, numbers, effects), signals()
     whole = whole_vehicle(extended, QUAD, STATED)
     assert whole.not_held == ()
