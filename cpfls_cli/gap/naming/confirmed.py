@@ -23,6 +23,9 @@ _WORSE = 1.1
 
 _ERRORS = 2.0
 
+_FILLS = 0.01
+"""Share of what the largest effect takes off, in squares, below which another may fill what its formula is off by."""
+
 
 class Judgement(NamedTuple):
     """Effects with what they leave of the flights that they were found in and of those held out."""
@@ -84,10 +87,19 @@ class Judge:
         if harmful:
             name = max(harmful, key=lambda each: harmful[each].ratio(judgement.held_out))
             return Refusal(name, harmful[name].harm(judgement.held_out))
-        needless = {name: one for name, one in compared.items() if one.raised.max() < SEEN**2}
-        if needless:
-            name = min(needless, key=lambda each: needless[each].raised.max())
-            return Refusal(name, "on the flights held out the gap is as small without it")
+        raised = {name: float(one.raised.max()) for name, one in compared.items()}
+        least = min(raised, key=lambda each: raised[each], default=None)
+        if least is None:
+            return None
+        if raised[least] < SEEN**2:
+            return Refusal(least, "on the flights held out the gap is as small without it")
+        left = float(np.nanmax(judgement.held_out.size(judgement.held_out.after).floors))
+        if left > CLEAR and raised[least] < _FILLS * max(raised.values()):
+            return Refusal(
+                least,
+                f"{left:.2g} floors are left with it, and it takes off less than a hundredth of what the largest effect"
+                " does: what the formula of that one is off by looks no different",
+            )
         return None
 
     def _without(self, judgement: Judgement, name: str) -> Without:

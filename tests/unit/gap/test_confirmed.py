@@ -1,0 +1,57 @@
+"""What the held-out flights say of each effect decides which names stand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.gap.naming.confirmed import Judge, Without
+from cpfls_cli.gap.settings import GapSettings
+
+NOTHING = np.zeros(6)
+
+
+def channel(value, of=0):
+    return np.array([value if index == of else 0.0 for index in range(6)])
+
+
+def refused(raised, after, monkeypatch):
+    """Judge effects of which each takes so much off channel 0, where `after` floors are left with all of them."""
+    chosen = [SimpleNamespace(effect=SimpleNamespace(name=name)) for name in raised]
+    floors = np.full(6, after)
+    held_out = SimpleNamespace(after=None, size=lambda _: SimpleNamespace(floors=floors))
+    judgement = SimpleNamespace(found=SimpleNamespace(hypothesis=SimpleNamespace(chosen=chosen)), held_out=held_out)
+    without = {
+        name: Without(channel(value), NOTHING, np.sqrt(np.maximum(floors**2 + channel(value), 0.0)))
+        for name, value in raised.items()
+    }
+    monkeypatch.setattr(Judge, "_without", lambda _self, _judgement, name: without[name])
+    return Judge([], [], [], np.ones(6), GapSettings(), np.random.default_rng(0))._refused(judgement)
+
+
+@pytest.mark.parametrize(
+    ("raised", "after", "name"),
+    [
+        ({"large": 2500.0, "small": 9.0}, 1.1, None),
+        ({"large": 2500.0, "small": 9.0}, 2.4, "small"),
+        ({"large": 2500.0, "small": 90.0}, 2.4, None),
+        ({"large": 2500.0, "small": 0.05}, 1.1, "small"),
+        ({"alone": 0.05}, 1.1, "alone"),
+        ({"alone": 0.5}, 2.4, None),
+        ({"large": 2500.0, "harmful": -3.0}, 2.4, "harmful"),
+        ({}, 2.4, None),
+    ],
+    ids=[
+        "small beside a formula that fits",
+        "small beside one that is off",
+        "not so small",
+        "needless",
+        "needless alone",
+        "needed",
+        "harmful",
+        "nothing named",
+    ],
+)
+def test_names_stand_that_the_unseen_flights_need(raised, after, name, monkeypatch):
+    found = refused(raised, after, monkeypatch)
+    assert (found.name if found else None) == name
