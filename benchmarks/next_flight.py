@@ -158,6 +158,9 @@ def ambiguous(name: str, rival: str, rng: np.random.Generator) -> OpenSet | None
     diagnosis = run.diagnosis
     named = {effect.name for effect in diagnosis.effects}
     rivals = [a for a in diagnosis.alternatives if name in (a.name, a.instead_of)]
+    # What was not tried for want of a signal is settled by logging it.
+    if any(np.isnan(rival.relative_gain) for rival in diagnosis.alternatives):
+        return None
     if str(diagnosis.verdict) != "AMBIGUOUS" or not rivals or not named <= {name, *(a.instead_of for a in rivals)}:
         return None
     other = rivals[0].instead_of if rivals[0].name == name else rivals[0].name
