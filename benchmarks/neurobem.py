@@ -1,6 +1,6 @@
 """Print what models predict of six fast flights of NeuroBEM, each held out once, beside BEM+NN.
 
-    python benchmarks/neurobem.py DATA [--unknown]
+    python benchmarks/neurobem.py DATA [--unknown] [--held-out NAME ...]
 
 DATA is a clone of RCL-NUS/NeuroMHE (commit 64e184c), or any folder with its files bemnn*.mat in it or below it. They
 hold test segments of NeuroBEM (Bauersfeld et al. 2021) with the torques and forces that its model BEM+NN gives.
@@ -112,6 +112,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of the segments")
     parser.add_argument("--unknown", action="store_true", help="learn from mass and geometry alone")
+    parser.add_argument("--held-out", nargs="*", metavar="NAME", help="hold out these segments alone")
     given = parser.parse_args()
     stated = constants_unknown(VEHICLE) if given.unknown else VEHICLE
     try:
@@ -119,7 +120,7 @@ def main() -> None:
     except InputError as error:
         sys.exit(f"{error}\nget them: git clone https://github.com/RCL-NUS/NeuroMHE")
     rows = []
-    for test in found:
+    for test in found if given.held_out is None else [each for each in found if each.flight.name in given.held_out]:
         rows += our_rows([other.flight for other in found if other is not test], test, stated)
     table("neurobem_unknown" if given.unknown else "neurobem", COLUMNS, rows)
 
