@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -48,6 +48,32 @@ def six_parameters(inertia: Sequence[float] | Array) -> Array:
     parameters = np.zeros(len(INERTIA_PARAMETERS))
     parameters[: len(inertia)] = inertia
     return parameters
+
+
+_WIDER = 1.25
+"""Radius of gyration, in distances of the farthest hub, beyond which is no multirotor: mass all in the hubs gives 1."""
+
+
+def beyond_any_body(mass: float, hubs: Array, moments: Mapping[str, float]) -> dict[str, float]:
+    """Find moments of inertia that no multirotor has, for what it weighs and where its rotors are.
+
+    Parameters
+    ----------
+    mass : float, kg
+    hubs : array, shape (rotor, 3), m
+        Relative to the centre of mass.
+    moments : mapping of str to float, kg m^2
+        By the names of a fit, such as ``inertia.Ixx``; others are left out of account.
+
+    Returns
+    -------
+    dict of str to float, kg m^2
+        By name, the largest that can be.
+    """
+    squares = np.asarray(hubs) ** 2
+    largest = mass * _WIDER**2 * (squares.sum(axis=1, keepdims=True) - squares).max(axis=0)
+    limits = dict(zip((f"inertia.{name}" for name in INERTIA_PARAMETERS), largest.tolist(), strict=False))
+    return {name: limit for name, limit in limits.items() if moments.get(name, 0.0) > limit}
 
 
 def symmetric_columns(vectors: Array) -> Array:

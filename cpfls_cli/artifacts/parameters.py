@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.artifacts.spec import rows_of
-from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
 
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.vehicle_model import VehicleRecord
@@ -26,6 +26,9 @@ _FOUND_AS = {
     DELAY: "delay.delay_s",
 }
 """Numbers of a fit, by the keys under which people look for them; the centre of mass is an effect (`found_as`)."""
+
+OF_TURNING = frozenset(_FOUND_AS[key] for key in (DRAG, *INERTIA))
+"""Numbers of a fit that are known only as far as the torques are that turn the vehicle."""
 
 _UNITS = {THRUST: "N s^2", DRAG: "N m s^2", LAG: "s", DELAY: "s", **dict.fromkeys(CENTRE, "m")}
 STATED = (THRUST, DRAG, *INERTIA)
@@ -102,9 +105,25 @@ def _reason(record: VehicleRecord, row: dict[str, Any]) -> str:
     ]
     if row["determined"]:
         return ""
+    if name in OF_TURNING and too_heavy(record):
+        return too_heavy(record)
     if others:
         return f"only its ratio to {' and '.join(others)} is known: they trade against each other"
     return "the flights say too little of it: its interval is too wide"
+
+
+def too_heavy(record: VehicleRecord) -> str:
+    """Say that the inertia that was found is that of no body; empty where it can be."""
+    moments = {row["name"]: row["value"] for row in rows_of(record.found)}
+    vehicle = record.vehicle
+    limits = beyond_any_body(vehicle.mass, vehicle.rotor.position, moments)
+    if not limits:
+        return ""
+    told = " and ".join(f"{name} {moments[name]:.3g} where {limit:.3g} can be" for name, limit in limits.items())
+    return (
+        f"too heavy for {vehicle.mass:.3g} kg between these rotors ({told}, kg m^2): part of the torque that the log "
+        "states turns nothing, as noise of the speeds or in answer to gusts; numbers that predict, not the body's"
+    )
 
 
 def _held(record: VehicleRecord, key: str) -> float:
@@ -134,14 +153,14 @@ def vehicle_section(record: VehicleRecord) -> dict[str, Any]:
     known = {each.key: each for each in parameters_of(record)}
     vehicle, rotors = record.vehicle, record.vehicle.rotor
 
-    def factor(key: str, held: float) -> float | None:
-        return None if _open(known[key]) else _rounded(held)
+    def relied_on(key: str, held: float) -> float | None:
+        # What the flights do not tell stays as it was stated, if it was.
+        value = known[key].stated if _open(known[key]) else held
+        return None if value is None else _rounded(value)
 
     # A product that is not known is none; a moment that is not known is to be found.
-    inertia = [
-        (0.0 if place > 2 else None) if _open(known[key]) else _rounded(vehicle.inertia[place])
-        for place, key in enumerate(INERTIA)
-    ]
+    inertia = [relied_on(key, vehicle.inertia[place]) for place, key in enumerate(INERTIA)]
+    inertia[3:] = [value or 0.0 for value in inertia[3:]]
     section: dict[str, Any] = {
         "gravity_m_s2": vehicle.gravity,
         "mass_kg": _rounded(vehicle.mass),
@@ -150,8 +169,8 @@ def vehicle_section(record: VehicleRecord) -> dict[str, Any]:
             {
                 "position_m": [_rounded(value) for value in rotors.position[place]],
                 "spin": int(rotors.spin[place]),
-                "thrust_factor_n_s2": factor(THRUST, rotors.thrust_factor[place]),
-                "drag_factor_n_m_s2": factor(DRAG, rotors.drag_factor[place]),
+                "thrust_factor_n_s2": relied_on(THRUST, rotors.thrust_factor[place]),
+                "drag_factor_n_m_s2": relied_on(DRAG, rotors.drag_factor[place]),
                 "radius_m": _rounded(rotors.radius[place]) if np.isfinite(rotors.radius[place]) else None,
             }
             for place in range(len(rotors.spin))

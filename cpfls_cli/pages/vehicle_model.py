@@ -14,10 +14,12 @@ from cpfls_cli.artifacts.parameters import (
     DRAG,
     INERTIA,
     LAG,
+    OF_TURNING,
     THRUST,
     Parameter,
     found_as,
     parameters_of,
+    too_heavy,
     vehicle_section,
 )
 from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
@@ -154,13 +156,16 @@ def warnings(record: VehicleRecord) -> list[str]:
     named = [row for row in rows_of(found) if not _is_learned(row["name"])]
     bound = [row["name"] for row in named if row["at_bound"] and row["value"] != 0]
     none = [row["name"] for row in named if row["at_bound"] and row["value"] == 0]
-    open_ = [row["name"] for row in named if not row["determined"]]
+    heavy = too_heavy(record)
+    open_ = [row["name"] for row in named if not row["determined"] and not (heavy and row["name"] in OF_TURNING)]
     if bound:
         said.append(f"{joined(bound)}: on a bound of what is tried, so the flights ask for more; not a physical number")
     if none:
         said.append(f"{joined(none)}: 0, the least that it can be; the flights show none of it")
     if open_:
         said.append(f"{joined(open_)}: not determined, the flights say too little of it")
+    if heavy:
+        said.append(f"inertia and drag factor: {heavy}")
     # Numbers of the remainder have no meaning of their own, together or apart.
     said.extend(
         f"{row['first']} and {row['second']} trade against each other (correlation {row['correlation']:.3f}): only "

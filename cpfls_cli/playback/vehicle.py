@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.inertia import beyond_any_body
 from cpfls_cli.playback.fit import AnyLayout, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointLayout
@@ -25,6 +26,9 @@ _TRADED = 0.95
 
 _KNOWN = 2.0
 """Ratio of the ends of an interval from which on a number that cannot be negative is not determined."""
+
+_OF_TURNING = ("inertia.", "products.", "drag_factor")
+"""Numbers that are known only as far as the torques are that turn the vehicle."""
 
 _AT_BOUND = 1e-6
 _STEP = 1e-5
@@ -44,7 +48,7 @@ class FoundNumber(NamedTuple):
         In the config; NaN for what no config states.
     determined : bool
         Whether the flights say more of it than what was believed before: to a factor of two where it cannot be
-        negative, else to its natural size.
+        negative, else to its natural size. What turns torque into rotation is not where it makes a body that cannot be.
     at_bound : bool
         Whether it lies on a bound, so that the interval says little.
     """
@@ -164,7 +168,7 @@ def find_vehicle(
     joint = layout if isinstance(layout, JointLayout) else None
     return FoundVehicle(
         model,
-        (*sensed, *found_numbers(fitted, spread)),
+        (*sensed, *bodily(begun, tuple(found_numbers(fitted, spread)))),
         *_shares(model, own),
         tuple(_trades(fitted, spread)),
         choice,
@@ -282,6 +286,24 @@ def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
         wide = high > _KNOWN * low if found.positive else own[place] > number.scale
         determined = spread.determined[place] and not wide
         yield FoundNumber(name, found.unit, found.value, low, high, known, bool(determined), bool(bound))
+
+
+def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator[FoundNumber]:
+    """Call inertia and drag factor not determined where a moment of inertia is larger than that of any such body.
+
+    Speeds that are partly noise state torques that turn nothing, and those that answer a gust turn nothing either: a
+    fit then makes the body heavier, however narrow its intervals. All three moments and the drag factor share that.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+        Whose mass and rotors say what can be.
+    numbers : sequence of FoundNumber
+    """
+    hubs = np.array([rotor.position_m for rotor in vehicle.rotors])
+    heavy = beyond_any_body(vehicle.mass_kg, hubs, {number.name: number.value for number in numbers})
+    for number in numbers:
+        yield number._replace(determined=False) if heavy and number.name.startswith(_OF_TURNING) else number
 
 
 def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, body_torque_columns, symmetric, symmetric_columns
+from cpfls_cli.inertia import (
+    INERTIA_ENTRIES,
+    INERTIA_PARAMETERS,
+    beyond_any_body,
+    body_torque_columns,
+    symmetric,
+    symmetric_columns,
+)
 
 PARAMETERS = np.array([1.0, 2.0, 3.0, 0.4, 0.5, 0.6])
 MATRIX = np.array([[1.0, 0.4, 0.5], [0.4, 2.0, 0.6], [0.5, 0.6, 3.0]])
@@ -53,3 +60,12 @@ def test_torque_of_a_full_tensor_is_the_change_of_its_angular_momentum(axis):
     expected = (momentum(step) - momentum(-step)) / (2 * step)
     found = body_torque_columns(rate * direction[None], acceleration * direction[None])[0] @ PARAMETERS
     np.testing.assert_allclose(found, expected, atol=1e-8)
+
+
+def test_a_body_with_all_its_mass_in_the_hubs_can_be_and_one_twice_as_heavy_cannot():
+    hubs = np.array([[0.3, 0.0, 0.02], [0.0, -0.2, 0.02], [-0.3, 0.0, 0.02], [0.0, 0.2, 0.02]])
+    in_hubs = {"inertia.Ixx": 6 * 0.0404, "inertia.Iyy": 6 * 0.0904, "inertia.Izz": 6 * 0.09, "thrust_factor": 1e9}
+    assert beyond_any_body(6.0, hubs, in_hubs) == {}
+    twice = beyond_any_body(6.0, hubs, {name: 2 * value for name, value in in_hubs.items()})
+    assert list(twice) == ["inertia.Ixx", "inertia.Iyy", "inertia.Izz"]
+    assert twice["inertia.Iyy"] == pytest.approx(1.25**2 * 6 * 0.0904)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.artifacts.parameters import parameters_of, vehicle_section
 from cpfls_cli.artifacts.vehicle_model import FoundNumbersGroup, TradesGroup
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.scales import hover_speed
@@ -64,3 +65,19 @@ def test_torque_and_force_are_drawn_where_they_were_learned(rows, panels):
     section = found_vehicle_section(Sources([source], source.vehicle, Study().report))
     (drawn,) = [block for block in section.blocks if isinstance(block, Plot) and "remainder" in block.name]
     assert len(drawn.panels) == panels
+
+
+@pytest.mark.parametrize(("moment", "told"), [(0.03, True), (0.02, False)])
+def test_an_inertia_that_no_body_has_is_no_constant_however_narrow_its_interval(moment, told):
+    record = found(whole())
+    values = np.array([moment, *record.found.value[1:]])
+    numbers = replace(
+        record.found, value=values, stated=np.full(len(values), 0.004), determined=np.array([not told] * 5)
+    )
+    record = replace(record, found=numbers)
+    (row,) = [each for each in parameters_of(record) if each.key == "inertia_kg_m2.0"]
+    assert row.determined is not told
+    assert ("too heavy for 0.9 kg between these rotors" in row.reason) is told
+    assert any("inertia.Ixx 0.03 where" in line for line in warnings(record)) is told
+    # What was stated stays where the flights do not tell better.
+    assert vehicle_section(record)["inertia_kg_m2"][0] == pytest.approx(0.004 if told else record.vehicle.inertia[0])

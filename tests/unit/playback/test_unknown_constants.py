@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.config.load import validate
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.vehicle import find_vehicle
+from cpfls_cli.playback.vehicle import FoundNumber, bodily, find_vehicle
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
 TRUE = truth()
@@ -85,3 +85,15 @@ def test_without_velocity_and_accelerometer_the_thrust_factor_stays_open():
     vehicle, by_name = found(without_velocity(flown(TRUE, noise=MIDDLING, seed=2, hold="linear"), accelerometer=False))
     assert vehicle.guessed == ("thrust_factor",)
     assert "thrust_factor" not in by_name
+
+
+@pytest.mark.parametrize(("heavier", "known"), [(1.0, True), (8.0, False)])
+def test_with_a_moment_of_inertia_that_no_body_has_nothing_that_turns_it_is_determined(heavier, known):
+    names = ("thrust_factor", "drag_factor", "inertia.Ixx", "products.Ixy", "rotor_drag.k_d")
+    moment = heavier * TRUE.vehicle.inertia_kg_m2[0]
+    values = (1e-6, 1e-8, moment, 1e-5, 1e-4)
+    numbers = [
+        FoundNumber(name, "", value, 0.0, 1.0, np.nan, True, False) for name, value in zip(names, values, strict=True)
+    ]
+    determined = [number.determined for number in bodily(TRUE.vehicle, numbers)]
+    assert determined == [True, known, known, known, True]
