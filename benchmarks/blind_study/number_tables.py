@@ -26,16 +26,7 @@ _EARLIER = {
 
 
 def number_totals(judged):
-    """Give rows on coefficients for the table of targets.
-
-    Parameters
-    ----------
-    judged : list of Scored
-
-    Returns
-    -------
-    list of tuple
-    """
+    """Give rows on coefficients for the table of targets."""
     found = [number for number in _numbers(judged) if exact(number)]
     close = [abs(number.error) <= _CLOSE for number in found if number.level == "mid"]
     inside = [number.inside for number in found]
@@ -50,14 +41,6 @@ def coefficient_table(judged):
 
     The error is relative to the largest hidden number of the same unit, so that the small component of a vector does
     not count for more than the vector.
-
-    Parameters
-    ----------
-    judged : list of Scored
-
-    Returns
-    -------
-    str
     """
     rows = []
     by_name = defaultdict(list)
@@ -74,16 +57,7 @@ def coefficient_table(judged):
 
 
 def coverage_table(judged):
-    """Write, effect by effect, how many coefficients lie in their intervals and within 15 %.
-
-    Parameters
-    ----------
-    judged : list of Scored
-
-    Returns
-    -------
-    str
-    """
+    """Write, effect by effect, how many coefficients lie in their intervals and within 15 %."""
     by_effect = defaultdict(list)
     for number in _numbers(judged):
         by_effect[number.effect].append(number)
@@ -95,16 +69,7 @@ def coverage_table(judged):
 
 
 def gap_table(judged):
-    """Write the held-out torque gap of each effect before and after, medians over draws, by noise.
-
-    Parameters
-    ----------
-    judged : list of Scored
-
-    Returns
-    -------
-    str
-    """
+    """Write the held-out torque gap of each effect before and after, medians over draws, by noise."""
     rows = []
     by_effect = defaultdict(list)
     for each in judged:

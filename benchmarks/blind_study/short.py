@@ -13,16 +13,7 @@ from benchmarks.blind_study.text import table
 
 
 def short(judged):
-    """Write one page on a study.
-
-    Parameters
-    ----------
-    judged : list of Scored
-
-    Returns
-    -------
-    str
-    """
+    """Write one page on a study."""
     seconds = [each.said["seconds"] for each in judged]
     took = f"{len(judged)} sets, {np.median(seconds):.1f} s a set (median), {sum(seconds):.0f} s in all"
     parts = (took, totals(judged), _groups(judged), coverage_table(judged), misses(judged))

@@ -22,16 +22,7 @@ _OUTSIDE = ("NAMED", "AMBIGUOUS", "PARTIAL", "UNEXPLAINED", "FLIGHTS_DIFFER", "N
 
 
 def tables(judged):
-    """Write all tables of a study.
-
-    Parameters
-    ----------
-    judged : list of Scored
-
-    Returns
-    -------
-    str
-    """
+    """Write all tables of a study."""
     parts = (
         ("Totals against the targets", totals(judged)),
         ("Outcomes by group and noise", _outcomes(judged)),
@@ -53,16 +44,7 @@ def tables(judged):
 
 
 def totals(judged):
-    """Write the figures that a study is held against.
-
-    Parameters
-    ----------
-    judged : list of Scored
-
-    Returns
-    -------
-    str
-    """
+    """Write the figures that a study is held against."""
     single, none = _of(judged, "single"), _of(judged, "none")
     outside = _with_outside(_of(judged, "outside"))
     right = [each.outcome == RIGHT for each in single]
@@ -86,16 +68,7 @@ def totals(judged):
 
 
 def misses(judged):
-    """Write the answers that are not those asked for, set by set.
-
-    Parameters
-    ----------
-    judged : list of Scored
-
-    Returns
-    -------
-    str
-    """
+    """Write the answers that are not those asked for, set by set."""
     rows = [_miss(each) for each in judged if not each.good or each.wrong_name or each.unphysical]
     columns = (
         "set",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.trajectory.legs import Leg, samples_of_legs
@@ -31,6 +32,38 @@ class FlatAttitude:
     attitude: Array
     attitude_rate: Array
     attitude_acceleration: Array
+
+
+def along(time: Array, motion: Array, heading: Array, gravity: float) -> dict[str, Array]:
+    """Arrange the samples of a path in space and the attitude that flies it, by their names in a `Trajectory`.
+
+    Parameters
+    ----------
+    time : array, shape (time,), s
+    motion : array, shape (7, time, 3), m and s, world frame
+        Position and its derivatives up to the pop.
+    heading : array, shape (3, time), rad and s
+        Yaw, its rate and its acceleration.
+    gravity : float, m/s^2
+
+    Raises
+    ------
+    ComputationError
+        If the path asks for free fall, where the attitude is not defined.
+    """
+    flat = flat_attitude(time, motion[2:5], heading, gravity)
+    names = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
+    return {
+        "time": time,
+        **dict(zip(names, motion, strict=True)),
+        "yaw": heading[0],
+        "yaw_rate": heading[1],
+        "yaw_acceleration": heading[2],
+        "attitude": flat.attitude,
+        "attitude_rate": flat.attitude_rate,
+        "attitude_acceleration": flat.attitude_acceleration,
+        "body_rate": rotations.body_rate(flat.attitude, flat.attitude_rate),
+    }
 
 
 def flat_attitude(time: Array, translation: Array, heading: Array, gravity: float) -> FlatAttitude:

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import null_space
 
-from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.trajectory.attitude import flat_attitude
+from cpfls_cli.trajectory.attitude import along
 from cpfls_cli.trajectory.planning import Trajectory, sample_times
 
 _DERIVATIVES = 7
@@ -132,27 +131,7 @@ def harmonic_trajectory(path: HarmonicPath, sample_time: float, gravity: float) 
     """
     time = sample_times(path.duration, sample_time)
     motion = path.sample(time)
-    position, velocity, acceleration, jerk, snap, crackle, pop = motion[..., :3]
-    heading = motion[:3, :, 3]
-    flat = flat_attitude(time, motion[2:5, :, :3], heading, gravity)
-    lengths = np.linalg.norm(np.concatenate([(position - position[0])[None], motion[1:, :, :3]]), axis=2).max(axis=1)
-    return Trajectory(
-        duration=path.duration,
-        time=time,
-        position=position,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=jerk,
-        snap=snap,
-        crackle=crackle,
-        pop=pop,
-        yaw=heading[0],
-        yaw_rate=heading[1],
-        yaw_acceleration=heading[2],
-        attitude=flat.attitude,
-        attitude_rate=flat.attitude_rate,
-        attitude_acceleration=flat.attitude_acceleration,
-        body_rate=rotations.body_rate(flat.attitude, flat.attitude_rate),
-        legs=(),
-        maxima=dict(zip(_NAMES, lengths.tolist(), strict=True)),
-    )
+    position, heading = motion[..., :3], motion[:3, :, 3]
+    lengths = np.linalg.norm(np.concatenate([(position[0] - position[0, 0])[None], position[1:]]), axis=2).max(axis=1)
+    maxima = dict(zip(_NAMES, lengths.tolist(), strict=True))
+    return Trajectory(duration=path.duration, legs=(), maxima=maxima, **along(time, position, heading, gravity))

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.trajectory.attitude import flat_attitude, heading_of_legs, stretched_heading, uniform_heading
+from cpfls_cli.trajectory.attitude import along, heading_of_legs, stretched_heading, uniform_heading
 from cpfls_cli.trajectory.consistency import check_duration, check_peaks, check_samples, check_waypoints
 from cpfls_cli.trajectory.legs import Leg, Shape, evaluate_legs, shape_of
 from cpfls_cli.trajectory.rotation import RotationPath
@@ -107,29 +107,8 @@ def _planned(settings: TrajectorySettings, gravity: float) -> Trajectory:
     duration = _duration_of(settings, legs)
     time = sample_times(duration, settings.sample_time_s)
     motion = evaluate_legs(legs, time)
-    heading = _heading(settings, legs, time, duration)
-    flat = flat_attitude(time, motion[2:5], heading, gravity)
-    position, velocity, acceleration, jerk, snap, crackle, pop = motion
-    return Trajectory(
-        duration=duration,
-        time=time,
-        position=position,
-        velocity=velocity,
-        acceleration=acceleration,
-        jerk=jerk,
-        snap=snap,
-        crackle=crackle,
-        pop=pop,
-        yaw=heading[0],
-        yaw_rate=heading[1],
-        yaw_acceleration=heading[2],
-        attitude=flat.attitude,
-        attitude_rate=flat.attitude_rate,
-        attitude_acceleration=flat.attitude_acceleration,
-        body_rate=rotations.body_rate(flat.attitude, flat.attitude_rate),
-        legs=legs,
-        maxima=_maxima(legs),
-    )
+    flown = along(time, motion, _heading(settings, legs, time, duration), gravity)
+    return Trajectory(duration=duration, legs=legs, maxima=_maxima(legs), **flown)
 
 
 def _heading(settings: TrajectorySettings, legs: tuple[Leg, ...], time: Array, duration: float) -> Array:
