@@ -5,17 +5,19 @@ from __future__ import annotations
 import copy
 import difflib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from cpfls_cli.config.keys import known_keys
 from cpfls_cli.config.study import SECTIONS, Study
-from cpfls_cli.config.unknown import with_guesses
+from cpfls_cli.config.unknown import KEYS, with_guesses
 from cpfls_cli.errors import SettingError
 from cpfls_cli.identification.settings import PRESETS
+from cpfls_cli.inertia import symmetric
 
 _PRESET_SECTION = "identification"
 _UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
@@ -31,6 +33,9 @@ _PLAIN_WORDS = {
     "must be a valid number": "must be a number",
     "Field required": "is missing",
 }
+_OF_A_VEHICLE = ("mass_kg", "inertia_kg_m2", "rotors", "rotor_speed_max_rad_s")
+_OF_A_ROTOR = ("position_m", "spin", "thrust_factor_n_s2", "drag_factor_n_m_s2")
+_ROUNDING = 1 + 1e-6
 Location = tuple[str, ...]
 
 
@@ -52,11 +57,45 @@ def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[st
     # A section that is named but left empty means its defaults.
     named = {key: {} if value is None and key in SECTIONS else value for key, value in data.items()}
     filled = with_guesses(_with_preset(named))
+    missing = [_missing_line(source, key) for key in _left_out(named)]
     try:
-        return Study.model_validate_json(json.dumps(filled)), []
+        study = Study.model_validate_json(json.dumps(filled))
     except ValidationError as error:
         errors = [*error.errors(), *_hidden_errors(filled, error.errors())]
-        return None, _describe_errors(errors, filled, source)
+        return None, [*missing, *_describe_errors(errors, filled, source)]
+    wrong = missing or [f"{source}: {line}" for line in _no_body(study)]
+    return (None if wrong else study), wrong
+
+
+def _no_body(study: Study) -> Iterator[str]:
+    """Refuse moments of inertia of no body: each principal moment is at most the sum of the other two.
+
+    It is a rule of configs alone: what is found in noisy flights may break it, and is told as what it is.
+    """
+    smallest, middle, largest = np.linalg.eigvalsh(symmetric(study.vehicle.inertia_kg_m2))
+    if largest > (smallest + middle) * _ROUNDING:
+        yield (
+            f"vehicle.inertia_kg_m2 = {json.dumps(study.vehicle.inertia_kg_m2)}: no body has this inertia, its largest "
+            f"principal moment {largest:.4g} is more than the other two together, {smallest + middle:.4g}; look at the "
+            "units and the order Ixx, Iyy, Izz, Ixy, Ixz, Iyz"
+        )
+
+
+def _missing_line(source: str, key: str) -> str:
+    remedy = "state it, or null if nobody knows it" if key.rsplit(".", 1)[-1] in KEYS.values() else "state it"
+    return f"{source}: {key}: is missing; a vehicle has no defaults: {remedy} (`cpfls init` writes the section)"
+
+
+def _left_out(data: dict[str, Any]) -> Iterator[str]:
+    """List the keys of a vehicle that a config lacks: the number of another vehicle is no default for it."""
+    vehicle = data.get("vehicle")
+    if not isinstance(vehicle, dict):
+        return
+    yield from (f"vehicle.{key}" for key in _OF_A_VEHICLE if key not in vehicle)
+    rotors = vehicle.get("rotors")
+    for place, rotor in enumerate(rotors if isinstance(rotors, list) else ()):
+        if isinstance(rotor, dict):
+            yield from (f"vehicle.rotors.{place}.{key}" for key in _OF_A_ROTOR if key not in rotor)
 
 
 def _hidden_errors(data: dict[str, Any], errors: list[ErrorDetails]) -> list[ErrorDetails]:

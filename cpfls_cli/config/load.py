@@ -40,6 +40,8 @@ def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = Non
         apply_override(data, override)
     if seed is not None:
         data["seed"] = seed
+    # Nobody's file is of the vehicle that a study begins with: without the section its keys are missing.
+    data.setdefault("vehicle", {})
     return validate(data, str(path), sweep=sweep)
 
 
@@ -111,9 +113,8 @@ def _refuse_asked(data: dict[str, Any], source: str) -> None:
     if keys:
         one = len(keys) == 1
         raise ConfigError(
-            f"{source}: {', '.join(keys)} = {ASK}: no log says {'it' if one else 'them'}; write"
-            f" {'the number' if one else 'numbers'} in place of {ASK} (cpfls init --mass KG --arm M fills in mass and"
-            " arm length)"
+            f"{source}: {', '.join(keys)} = {ASK}: no log says {'it' if one else 'them'}; write what is true of the"
+            f" vehicle in place of {ASK} (cpfls init --mass KG --arm M fills in mass and arm length)"
         )
 
 

@@ -44,6 +44,8 @@ def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
     """List the keys of the config that only a person can fill in."""
     keys = [] if stated.mass_kg is not None else ["vehicle.mass_kg"]
     airframe = proposal.airframe
+    if not proposal.rotors:
+        keys.append("vehicle.rotors")
     for index in range(proposal.rotors):
         if airframe is None or not airframe.in_metres:
             keys.append(f"vehicle.rotors.{index}.position_m")
@@ -104,7 +106,7 @@ def _rotors_in_words(proposal: Proposal) -> str:
     if not proposal.rotors:
         return (
             "no column is recognised as a rotor's, so nothing here drives a model of the vehicle; if some are, name"
-            " them in import.signals (rotor_speed or rotor_command) and state vehicle.rotors"
+            " them in import.signals (rotor_speed or rotor_command)"
         )
     if proposal.airframe is None:
         unknown = "neither parameters nor the motion say where they are; a livelier log beside this one may"
@@ -210,7 +212,9 @@ def _vehicle(proposal: Proposal, stated: Stated) -> Iterator[str]:
 def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
     if not proposal.rotors:
         states = "states a torque and no rotors" if proposal.states_torque else "has no columns of rotors"
-        yield from _comment(f"The log {states}: none are described here, and those of the default are of no use.", 2)
+        yield from _comment(f"The log {states}; the vehicle has some all the same, in its order, one line each:", 2)
+        yield f"  #{_rotor(None, None)[3:]}"
+        yield f"  rotors: {ASK}"
         return
     airframe = proposal.airframe
     if airframe is None:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.builders import command_line
+from tests.builders.studies import VEHICLE
 
 TINY = """\
 seed: 1
@@ -67,7 +68,7 @@ def refuse(cpfls, tmp_path):
 @pytest.fixture(scope="session")
 def study(tmp_path_factory):
     path = tmp_path_factory.mktemp("study") / "tiny.yaml"
-    path.write_text(TINY)
+    path.write_text(TINY + VEHICLE)
     return path
 
 
@@ -97,7 +98,7 @@ def pipeline(cpfls, study):
 def log_study(tmp_path):
     """A study that imports logs of attitude and torque."""
     path = tmp_path / "study.yaml"
-    path.write_text(LOG_STUDY)
+    path.write_text(LOG_STUDY + VEHICLE)
     return path
 
 

@@ -2,12 +2,16 @@
 
 import pytest
 
+from tests.builders.studies import with_vehicle
+
 
 @pytest.fixture
 def wrong(refuse, tmp_path):
-    def call(content, *words):
+    def call(content, *words, whole=False):
+        """Refuse a config: as it is, or (`whole`) with the rest of the paper's vehicle."""
         config = tmp_path / "study.yaml"
-        config.write_bytes(content if isinstance(content, bytes) else content.encode())
+        text = content if isinstance(content, bytes) else content.encode()
+        config.write_bytes(with_vehicle(content).encode() if whole else text)
         lines = refuse("trajectory", config, "-o", tmp_path / "out.h5", *words)
         return [line.replace(f"{config}", "FILE") for line in lines]
 
@@ -63,16 +67,18 @@ def test_all_unknown_keys_are_listed_with_the_nearest_valid_name(wrong):
     ],
 )
 def test_one_wrong_value(wrong, content, message):
-    assert wrong(content) == [message]
+    assert wrong(content, whole=True) == [message]
 
 
 def test_negative_inertia_names_its_key(wrong):
-    (line,) = wrong("vehicle: {inertia_kg_m2: [-0.6, 0.6, 1.2]}")
+    (line,) = wrong("vehicle: {inertia_kg_m2: [-0.6, 0.6, 1.2]}", whole=True)
     assert line == "FILE: vehicle.inertia_kg_m2.0 = -0.6: must be greater than 0"
 
 
 def test_wrong_values_of_one_section_come_together(wrong):
-    lines = wrong("vehicle: {mass_kg: -1, inertia_kg_m2: [0.6, 0.6, -1.2, 0, 0, x], rotor_speed_max_rad_s: 0}")
+    lines = wrong(
+        "vehicle: {mass_kg: -1, inertia_kg_m2: [0.6, 0.6, -1.2, 0, 0, x], rotor_speed_max_rad_s: 0}", whole=True
+    )
     assert sorted(lines) == [
         "FILE: vehicle.inertia_kg_m2.2 = -1.2: must be greater than 0",
         'FILE: vehicle.inertia_kg_m2.5 = "x": must be a number',
@@ -82,7 +88,9 @@ def test_wrong_values_of_one_section_come_together(wrong):
 
 
 def test_an_unknown_key_does_not_hide_a_rule_between_keys(wrong):
-    lines = wrong("vehicle: {mass: 3, inertia_kg_m2: [1, 1, 1, 2, 0, 0]}\nimport: {crop: 1, crop_s: [5, 2]}")
+    lines = wrong(
+        "vehicle: {mass: 3, inertia_kg_m2: [1, 1, 1, 2, 0, 0]}\nimport: {crop: 1, crop_s: [5, 2]}", whole=True
+    )
     assert [line.split(" = ")[0] for line in sorted(lines)] == [
         "FILE: import.crop",
         "FILE: import.crop_s",
@@ -94,7 +102,7 @@ def test_an_unknown_key_does_not_hide_a_rule_between_keys(wrong):
 
 
 def test_errors_of_all_sections_come_together(wrong):
-    lines = wrong("seed: x\nvehicle: {mass_kg: x}\nreduction: {size: x}\nreport: {paper: 1}\n")
+    lines = wrong("seed: x\nvehicle: {mass_kg: x}\nreduction: {size: x}\nreport: {paper: 1}\n", whole=True)
     assert [line.split(" = ")[0] for line in lines] == [
         "FILE: seed",
         "FILE: vehicle.mass_kg",
@@ -104,7 +112,7 @@ def test_errors_of_all_sections_come_together(wrong):
 
 
 def test_long_values_are_cut(wrong):
-    (line,) = wrong(f"report: {{title: [{', '.join(['1'] * 500)}]}}")
+    (line,) = wrong(f"report: {{title: [{', '.join(['1'] * 500)}]}}", whole=True)
     assert len(line) < 150
 
 
@@ -164,5 +172,26 @@ def test_missing_config_and_folder_as_config(refuse, tmp_path):
     ],
 )
 def test_wrong_override(wrong, override, message):
-    (line,) = wrong("vehicle: {mass_kg: 6}\n", "--set", override)
+    (line,) = wrong("vehicle: {mass_kg: 6}\n", "--set", override, whole=True)
     assert line.startswith(message)
+
+
+def test_what_a_vehicle_lacks_is_named_and_no_other_vehicle_stands_in_for_it(wrong):
+    lines = wrong("vehicle: {mass_kg: 0.03, rotors: [{position_m: [0.03, 0.03, 0]}]}")
+    assert [line.partition(":")[2].partition(";")[0] for line in lines] == [
+        " vehicle.inertia_kg_m2: is missing",
+        " vehicle.rotor_speed_max_rad_s: is missing",
+        " vehicle.rotors.0.spin: is missing",
+        " vehicle.rotors.0.thrust_factor_n_s2: is missing",
+        " vehicle.rotors.0.drag_factor_n_m_s2: is missing",
+    ]
+    assert "null if nobody knows it" in lines[0]
+    assert "null" not in lines[1]
+    assert len(wrong("seed: 1\n")) == 4
+
+
+@pytest.mark.parametrize("inertia", ["[0.6, 0.6, 10]", "[1, 1, 1, 0.6, 0, 0]"])
+def test_an_inertia_that_no_body_has_is_refused(wrong, inertia):
+    (line,) = wrong(f"vehicle: {{inertia_kg_m2: {inertia}}}", whole=True)
+    assert "no body has this inertia" in line
+    assert line.startswith("FILE: vehicle.inertia_kg_m2 = [")

@@ -7,6 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 NAMES = ["t", "roll", "pitch", "yaw", "mx", "my", "mz"]
 
 
@@ -140,7 +142,7 @@ def test_config_without_signals(refuse, study, write, tmp_path):
 def test_flight_without_torque_is_refused_by_identify(cpfls, refuse, log_study, write, tmp_path):
     flight = tmp_path / "flight.h5"
     without = "import:\n  signals:\n    attitude: {columns: [roll, pitch, yaw], unit: rad}\n  torque_source: null\n"
-    log_study.write_text(without)
+    log_study.write_text(without + VEHICLE)
     assert cpfls("import", log_study, write(table()), "-o", flight).exit_code == 0
     (line,) = refuse("identify", log_study, flight, "-o", tmp_path / "model.h5")
     assert line.startswith(f"{flight}: lacks torque; this stage needs time, attitude")

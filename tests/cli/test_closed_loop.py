@@ -6,6 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 SHORT = """\
 seed: 5
 trajectory: {legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, yaw_turn_rad: 0.3}
@@ -24,7 +26,7 @@ identification:
 def short(tmp_path_factory, cpfls):
     folder = tmp_path_factory.mktemp("closed_loop")
     config, path = folder / "short.yaml", folder / "trajectory.h5"
-    config.write_text(SHORT.replace("simulation:", "simulation:\n  mode: closed-loop"))
+    config.write_text(SHORT.replace("simulation:", "simulation:\n  mode: closed-loop") + VEHICLE)
     assert cpfls("trajectory", config, "-o", path).exit_code == 0
     return config, path
 
@@ -97,7 +99,7 @@ def test_mode_of_the_command_line_goes_before_that_of_the_config(fly, short, cpf
     with h5py.File(path) as file:
         assert "rotor_command" not in file
     plain = tmp_path / "plain.yaml"
-    plain.write_text("seed: 5\n")
+    plain.write_text("seed: 5\n" + VEHICLE)
     closed = cpfls("simulate", plain, short[1], "--mode", "closed-loop", "-o", tmp_path / "closed.h5")
     assert "off the path" in closed.stdout
 
@@ -130,7 +132,7 @@ def test_impossible_effects_are_refused(short, refuse, tmp_path, options, messag
 
 def test_effects_without_closed_loop_are_refused(short, refuse, tmp_path):
     plain = tmp_path / "plain.yaml"
-    plain.write_text("seed: 5\n")
+    plain.write_text("seed: 5\n" + VEHICLE)
     (line,) = refuse("simulate", plain, short[1], "--effect", "rotor_drag=0.001", "-o", tmp_path / "flight.h5")
     assert "effects are flown in closed loop only; add --mode closed-loop" in line
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog.smoothing import low_pass
+from tests.builders.studies import VEHICLE
 
 TIME = np.arange(0.0, 4.0, 0.02)
 SIGNALS = {
@@ -30,7 +31,7 @@ def imported(cpfls, tmp_path):
         log, config, flight = (tmp_path / name for name in ("log.csv", "study.yaml", "flight.h5"))
         np.savetxt(log, rows, delimiter=",", header=",".join(names), comments="")
         mapped = ", ".join(SIGNALS[signal] for signal in signals)
-        config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: {source}}}")
+        config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: {source}}}\n{VEHICLE}")
         result = cpfls("import", config, log, "-o", flight, "--force")
         assert result.exit_code == 0, result.stderr
         notes = [line.removeprefix("cpfls: note: ") for line in result.stderr.splitlines()]
@@ -102,7 +103,7 @@ def notes_of(cpfls, tmp_path):
         table = np.column_stack(list(columns.values()))
         np.savetxt(log, table, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
         mapped = ", ".join(SIGNALS[signal] for signal in signals)
-        config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: rotor-command}}")
+        config.write_text(f"import: {{signals: {{{mapped}}}, torque_source: rotor-command}}\n{VEHICLE}")
         result = cpfls("import", config, log, "-o", flight, "--force", *words)
         assert result.exit_code == 0, result.stderr
         return result.stderr.splitlines(), flight

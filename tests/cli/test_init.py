@@ -75,8 +75,8 @@ def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls
     assert f"to be filled in by hand, marked ASK in {tmp_path / 'study.yaml'}: {asked}" in result.stderr
     study = tmp_path / "study.yaml"
     sentence = (
-        f"{study}: {asked} = ASK: no log says them; write numbers in place of ASK (cpfls init --mass KG --arm M fills"
-        " in mass and arm length)"
+        f"{study}: {asked} = ASK: no log says them; write what is true of the vehicle in place of ASK (cpfls init"
+        " --mass KG --arm M fills in mass and arm length)"
     )
     for words in (
         ("import", study, log, "-o", tmp_path / "flight.h5"),
@@ -90,8 +90,8 @@ def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls
     assert cpfls("config", study).exit_code == 0
     study.write_text(filled.replace("mass_kg: 0.8", "mass_kg: ASK"))
     assert refuse("config", study) == [
-        f"{study}: vehicle.mass_kg = ASK: no log says it; write the number in place of ASK (cpfls init --mass KG"
-        " --arm M fills in mass and arm length)"
+        f"{study}: vehicle.mass_kg = ASK: no log says it; write what is true of the vehicle in place of ASK"
+        " (cpfls init --mass KG --arm M fills in mass and arm length)"
     ]
     assert cpfls("config", study, "--set", "vehicle.mass_kg=0.8").exit_code == 0
 
@@ -211,9 +211,14 @@ def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tm
     result, text, data = proposed(path, "--mass", MASS)
     said = " ".join(result.stdout.split())
     assert "no column is recognised as a rotor's, so nothing here drives a model of the vehicle; if some are" in said
-    assert "name them in import.signals (rotor_speed or rotor_command) and state vehicle.rotors" in said
+    assert "name them in import.signals (rotor_speed or rotor_command)" in said
     assert "then: cpfls vehicle" not in result.stdout
-    assert "rotors" not in data["vehicle"]
+    assert data["vehicle"]["rotors"] == "ASK"
+    stated = [
+        {"position_m": [0.1, y, 0.0], "spin": 1, "thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+        for y in (0.1, -0.1)
+    ]
+    (tmp_path / "study.yaml").write_text(text.replace("rotors: ASK", f"rotors: {json.dumps(stated)}"))
     assert cpfls("import", tmp_path / "study.yaml", path, "-o", tmp_path / "flight.h5").exit_code == 0
     assert "The log has no columns of rotors" in text
 

@@ -12,6 +12,7 @@ from cpfls_cli.config.load import load_study
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.logs import formats
 from tests.builders.ros_bags import BEGIN_NS, imu, write_bag
+from tests.builders.studies import VEHICLE
 
 NAMES = ("t", "roll", "pitch", "yaw", "mx", "my", "mz")
 MAGIC = b"FAKE\x00"
@@ -92,7 +93,7 @@ def test_a_flight_from_hdf5_with_stamps_in_milliseconds(cpfls, tmp_path):
     (tmp_path / "study.yaml").write_text(
         "import:\n  time_column: t\n  signals:\n"
         '    attitude: {columns: ["pose[0]", "pose[1]", "pose[2]"], unit: rad}\n'
-        '    body_torque: {columns: ["moment[0]", "moment[1]", "moment[2]"], unit: N m}\n'
+        '    body_torque: {columns: ["moment[0]", "moment[1]", "moment[2]"], unit: N m}\n' + VEHICLE
     )
     result = cpfls("import", tmp_path / "study.yaml", tmp_path / "log.h5", "-o", tmp_path / "flight.h5", "--json")
     assert result.exit_code == 0, result.stderr
@@ -117,7 +118,7 @@ def test_a_bag_is_imported_on_the_clock_of_its_fastest_topic(kind, cpfls, tmp_pa
         "import:\n  time_column: null\n  signals:\n"
         f"    body_rate: {{columns: [{columns}], unit: rad/s}}\n    body_torque: {{columns: [{torque}], unit: N m}}\n"
         '    quaternion: {columns: ["/imu.orientation.w", "/imu.orientation.x", "/imu.orientation.y",'
-        ' "/imu.orientation.z"], unit: "1"}\n'
+        ' "/imu.orientation.z"], unit: "1"}\n' + VEHICLE
     )
     result = cpfls("import", tmp_path / "study.yaml", bag, "-o", tmp_path / "flight.h5", "--json")
     assert result.exit_code == 0, result.stderr

@@ -13,6 +13,7 @@ from pyarrow import parquet
 from cpfls_cli.logs.formats import LOG_FORMATS
 from tests.builders import ros_bags, ulogs
 from tests.builders.dataflash_logs import dataflash
+from tests.builders.studies import VEHICLE
 from tests.builders.usd_logs import usd
 
 STEPS_US = 5_000 * np.arange(400)
@@ -115,7 +116,9 @@ def test_the_same_flight_comes_back(cpfls, tmp_path, name):
     write, time, columns = WRITERS[name]
     write(tmp_path / name)
     signals = {signal: {"columns": own, "unit": UNITS[signal]} for signal, own in columns.items()}
-    (tmp_path / "study.yaml").write_text(yaml.safe_dump({"import": {"time_column": time, "signals": signals}}))
+    (tmp_path / "study.yaml").write_text(
+        VEHICLE + yaml.safe_dump({"import": {"time_column": time, "signals": signals}})
+    )
     result = cpfls("import", tmp_path / "study.yaml", tmp_path / name, "-o", tmp_path / "flight.h5")
     assert result.exit_code == 0, result.stderr
     with h5py.File(tmp_path / "flight.h5") as file:

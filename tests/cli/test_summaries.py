@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 KEYS = {
     "trajectory": {"samples", "duration_s", "dt_s", "max"},
     "flight": {"samples", "max_torque"},
@@ -102,7 +104,7 @@ def test_an_import_tells_in_json_and_in_lines_what_it_read_and_what_it_did_about
     log, config = tmp_path / "log.csv", tmp_path / "study.yaml"
     np.savetxt(log, np.column_stack([time, *angles]), delimiter=",", header="t,roll,pitch,yaw", comments="")
     signals = "signals: {attitude: {columns: [roll, pitch, yaw], unit: rad}}"
-    config.write_text(f"import: {{{signals}, torque_source: null, crop_s: [0, 3.5]}}")
+    config.write_text(f"import: {{{signals}, torque_source: null, crop_s: [0, 3.5]}}\n{VEHICLE}")
     result = cpfls("import", config, log, "-o", tmp_path / "flight.h5", "--json")
     assert (result.exit_code, result.stdout.count("\n")) == (0, 1)
     summary = json.loads(result.stdout)

@@ -7,6 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 CONFIG = """\
 seed: 5
 trajectory: {legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, sample_time_s: 0.02, yaw_turn_rad: 0.3}
@@ -27,7 +29,7 @@ def made(tmp_path_factory, cpfls):
     """A config, its trajectory, and a model of a flight along it."""
     folder = tmp_path_factory.mktemp("tracking")
     config, path, flight, model = (folder / name for name in ("study.yaml", "trajectory.h5", "flight.h5", "model.h5"))
-    config.write_text(CONFIG)
+    config.write_text(CONFIG + VEHICLE)
     for words in (
         ("trajectory", config, "-o", path),
         ("simulate", config, path, "-o", flight),

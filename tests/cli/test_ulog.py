@@ -13,6 +13,7 @@ from cpfls_cli.config.load import load_study
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.rotations import rotation_matrix
 from tests.builders import ulogs
+from tests.builders.studies import VEHICLE
 from tests.builders.ulogs import data, definitions, header, message
 
 EXAMPLE = Path(__file__).parents[2] / "configs" / "px4.yaml"
@@ -67,7 +68,7 @@ def ulog(sent=None, fields=FIELDS):
 @pytest.fixture
 def config(tmp_path):
     path = tmp_path / "study.yaml"
-    path.write_text(CONFIG)
+    path.write_text(CONFIG + VEHICLE)
     return path
 
 
@@ -169,14 +170,16 @@ def test_other_topics_are_not_in_the_way(flown):
 
 
 def test_a_topic_that_is_not_there_is_named_with_those_that_are(wrong, config):
-    config.write_text(CONFIG.replace("vehicle_attitude.q[2]", "vehicle_atitude.q[2]").replace(".xyz[1]", ".rates[1]"))
+    config.write_text(
+        CONFIG.replace("vehicle_attitude.q[2]", "vehicle_atitude.q[2]").replace(".xyz[1]", ".rates[1]") + VEHICLE
+    )
     lines = wrong(ulog())
     assert lines[0].startswith(
         "LOG: import.signals.quaternion.columns: the log has no column 'vehicle_atitude.q[2]'"
         " (nearest: vehicle_attitude.q[2], "
     )
     assert "no column 'vehicle_angular_velocity.rates[1]' (nearest: vehicle_angular_velocity.xyz[1]" in lines[1]
-    config.write_text(CONFIG.replace('"vehicle_torque_setpoint.xyz[0]"', '"?!"'))
+    config.write_text(CONFIG.replace('"vehicle_torque_setpoint.xyz[0]"', '"?!"') + VEHICLE)
     topics = "vehicle_angular_velocity, vehicle_attitude, vehicle_torque_setpoint"
     assert wrong(ulog()) == [
         "LOG: import.signals.body_torque.columns: the log has no column '?!'",

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.builders.studies import VEHICLE
+
 INERTIA = np.array([0.6, 0.6, 1.2])
 ARM, THRUST, DRAG = 0.3, 121.5e-6, 2.7e-6
 OFFSET = (0.008, -0.005)
@@ -14,10 +16,6 @@ HEADER = "t,wx,wy,wz,om1,om2,om3,om4"
 
 CONFIG = """
 seed: 1
-vehicle:
-  mass_kg: 6.0
-  inertia_kg_m2: [0.6, 0.6, 1.2]
-  rotor_speed_max_rad_s: 1000.0
 import:
   time_column: t
   signals:
@@ -86,7 +84,7 @@ def save(path, table, header=HEADER):
 @pytest.fixture(scope="session")
 def gap_config(tmp_path_factory):
     path = tmp_path_factory.mktemp("gap-config") / "study.yaml"
-    path.write_text(CONFIG)
+    path.write_text(CONFIG + VEHICLE)
     return path
 
 

@@ -69,7 +69,7 @@ def test_log_without_actuation(refuse, gap_config, shifted, tmp_path):
 @pytest.fixture(scope="module")
 def other_config(gap_config, tmp_path_factory):
     path = tmp_path_factory.mktemp("other") / "study.yaml"
-    path.write_text(gap_config.read_text().replace("mass_kg: 6.0", "mass_kg: 7.0"))
+    path.write_text(gap_config.read_text().replace('"mass_kg": 6.0', '"mass_kg": 7.0'))
     return path
 
 

@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 CONFIG = """
 seed: 1
 trajectory: {path: straight, displacement_m: 4.0, legs: 2, period_s: 0.4, yaw_turn_rad: 0.5, duration_s: 16.0}
@@ -20,7 +22,7 @@ NEXT = ("--duration", "12", "--set", "trajectory.next_flight.starts=6", "--set",
 def folder(cpfls, tmp_path_factory):
     """Gentle flights of one thrust, and their diagnosis."""
     folder = tmp_path_factory.mktemp("open")
-    (folder / "study.yaml").write_text(CONFIG)
+    (folder / "study.yaml").write_text(CONFIG + VEHICLE)
     for number, direction in ((1, "[1.0,0.0,0.0]"), (2, "[1.0,0.4,0.0]")):
         path = folder / f"path-{number}.h5"
         run(cpfls, folder, "trajectory", "-o", path, "--set", f"trajectory.direction={direction}")

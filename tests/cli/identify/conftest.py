@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 GENERATIONS = 6
 SEARCH = """\
 seed: 1
@@ -22,7 +24,7 @@ identification:
 @pytest.fixture(scope="session")
 def search(tmp_path_factory):
     path = tmp_path_factory.mktemp("search") / "search.yaml"
-    path.write_text(SEARCH)
+    path.write_text(SEARCH + VEHICLE)
     return path
 
 

@@ -6,6 +6,7 @@ import pytest
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.excitation import swings
 from cpfls_cli.regressor.motion import Motion
+from tests.builders.studies import VEHICLE
 
 STUDY = """\
 seed: 1
@@ -42,7 +43,7 @@ def notes(cpfls, tmp_path):
         rows = np.column_stack([time, attitude, rate + 0.01 * rng.standard_normal(rate.shape), torque])
         log, config, flight = (tmp_path / name for name in ("log.csv", "study.yaml", "flight.h5"))
         np.savetxt(log, rows, delimiter=",", header="t,roll,pitch,yaw,p,q,r,mx,my,mz", comments="")
-        config.write_text(STUDY)
+        config.write_text(STUDY + VEHICLE)
         for words in (("import", config, log, "-o", flight), ("identify", config, flight, "-o", tmp_path / "m.h5")):
             result = cpfls(*words, "--force")
             assert result.exit_code == 0, result.stderr

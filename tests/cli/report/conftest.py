@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 TWO_SETTINGS = """\
 seed: 4
 trajectory: {sample_time_s: 0.2}
@@ -27,7 +29,7 @@ def swept(cpfls, tmp_path_factory):
     """The folder of a study, its trajectory, its flight and its sweep."""
     folder = tmp_path_factory.mktemp("swept")
     config = folder / "study.yaml"
-    config.write_text(TWO_SETTINGS)
+    config.write_text(TWO_SETTINGS + VEHICLE)
     made = [
         cpfls("trajectory", config, "-o", folder / "trajectory.h5"),
         cpfls("simulate", config, folder / "trajectory.h5", "-o", folder / "flight.h5"),

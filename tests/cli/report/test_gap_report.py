@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.check import check_artifact
 from cpfls_cli.artifacts.store import file_sha256, write_artifact
 from tests.builders import gap_artifacts as made
 from tests.builders.command_line import run
+from tests.builders.studies import VEHICLE
 
 FIGURES = [
     "free-runs-1", "gap-picture-1", "gap-sizes-1", "prediction-error-1", "whiteness-1", "intervals-1",
@@ -23,7 +24,7 @@ FIGURES = [
 def shown(folder, *artifacts, options=()):
     """Write artifacts and a report about them; give its summary, its HTML and its text."""
     config, output = folder / "study.yaml", folder / "report.html"
-    config.write_text("seed: 1\n")
+    config.write_text("seed: 1\n" + VEHICLE)
     paths = [folder / f"{number}-{each.spec.format.split('/')[1]}.h5" for number, each in enumerate(artifacts)]
     for path, artifact in zip(paths, artifacts, strict=True):
         assert check_artifact(artifact) == []

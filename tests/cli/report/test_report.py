@@ -12,6 +12,7 @@ import pytest
 
 from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from tests.builders.command_line import run
+from tests.builders.studies import VEHICLE
 
 CONFIG = """
 seed: 3
@@ -77,7 +78,7 @@ def cpfls(*arguments, code=0):
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     config = folder / "study.yaml"
-    config.write_text(CONFIG)
+    config.write_text(CONFIG + VEHICLE)
     names = ("trajectory", "flight", "selection", "model", "ridge", "prediction", "noisy", "sweep")
     files = SimpleNamespace(folder=folder, config=config, **{name: folder / f"{name}.h5" for name in names})
     cpfls("trajectory", config, "-o", files.trajectory)

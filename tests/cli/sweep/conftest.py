@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 SWEEP = """\
 seed: 5
 trajectory: {sample_time_s: 0.2}
@@ -28,7 +30,7 @@ sweep:
 @pytest.fixture(scope="session")
 def sweep(tmp_path_factory):
     path = tmp_path_factory.mktemp("sweep") / "sweep.yaml"
-    path.write_text(SWEEP)
+    path.write_text(SWEEP + VEHICLE)
     return path
 
 

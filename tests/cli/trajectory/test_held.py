@@ -6,9 +6,10 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 HELD = """\
 seed: {seed}
-vehicle: {{inertia_kg_m2: [0.06, 0.05, 0.08]}}
 trajectory: {{path: {path}, duration_s: 12.0, sample_time_s: 0.05, rotation: {{starts: 2, iterations: 3}}}}
 reduction: {{size: 60}}
 identification:
@@ -25,7 +26,7 @@ identification:
 def study(tmp_path):
     def write(path="full-rotation", seed=1):
         config = tmp_path / f"{path}-{seed}.yaml"
-        config.write_text(HELD.format(path=path, seed=seed))
+        config.write_text(HELD.format(path=path, seed=seed) + VEHICLE.replace("[0.6, 0.6, 1.2]", "[0.06, 0.05, 0.08]"))
         return config
 
     return write

@@ -8,6 +8,7 @@ import pytest
 
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
+from tests.builders.studies import VEHICLE
 
 SMALL = ("--duration", "10", "--box", "5,4,3", "--height", "3")
 FEW = ("--set", "trajectory.next_flight.starts=2", "--set", "trajectory.next_flight.iterations=3")
@@ -23,7 +24,7 @@ def config(tmp_path_factory):
         "simulation:\n"
         "  mode: closed-loop\n"
         "  noise: {attitude: 0.003, body_rate: 0.005, acceleration: 0.1, rotor_speed: 1.0}\n"
-        "  closed_loop: {integration_rate_hz: 200.0}\n"
+        "  closed_loop: {integration_rate_hz: 200.0}\n" + VEHICLE
     )
     return path
 

@@ -7,6 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.builders.studies import VEHICLE
+
 LIMITED = ("--set", "trajectory.limits={velocity_m_s: 4, acceleration_m_s2: 3, jerk_m_s3: 6, pop_m_s6: 300}")
 FREE = ("--set", "trajectory.duration_s=null")
 
@@ -14,7 +16,7 @@ FREE = ("--set", "trajectory.duration_s=null")
 @pytest.fixture
 def config(tmp_path):
     path = tmp_path / "study.yaml"
-    path.write_text("trajectory: {sample_time_s: 0.05, yaw_turn_rad: 1.0}\n")
+    path.write_text("trajectory: {sample_time_s: 0.05, yaw_turn_rad: 1.0}\n" + VEHICLE)
     return path
 
 

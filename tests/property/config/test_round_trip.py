@@ -2,6 +2,7 @@
 
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.builders.studies import VEHICLE
 
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import resolved_yaml
@@ -33,7 +34,8 @@ def test_text_like_numbers(text):
     sections=st.sets(st.sampled_from(["vehicle", "reduction", "import", "identification"])),
 )
 def test_study(title, mass, seed, sections):
-    data = {"seed": seed, "vehicle": {"mass_kg": mass}, "report": {"title": title}}
+    vehicle = parse_yaml(VEHICLE, "usual")["vehicle"] | {"mass_kg": mass}
+    data = {"seed": seed, "vehicle": vehicle, "report": {"title": title}}
     study = validate(data | dict.fromkeys(sections - {"vehicle"}), "file")
     again = validate(parse_config(resolved_yaml(study), "file"), "file")
     assert again == study

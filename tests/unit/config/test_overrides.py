@@ -6,6 +6,7 @@ from cpfls_cli.config.load import load_study, validate
 from cpfls_cli.config.overrides import apply_override, variants
 from cpfls_cli.config.study import resolved
 from cpfls_cli.errors import ConfigError
+from tests.builders.studies import VEHICLE
 
 
 @pytest.mark.parametrize(
@@ -55,7 +56,7 @@ def errors(data):
 def test_a_setting_is_the_study_that_its_overrides_make(tmp_path):
     settings = [{"name": "a", "set": {"reduction.size": 99, "identification.local_search.enabled": False}}]
     config = tmp_path / "study.yaml"
-    config.write_text("identification: {population: 20}\n")
+    config.write_text("identification: {population: 20}\n" + VEHICLE)
     (variant,) = variants(
         validate(swept(settings, set={"identification.structure": "fls", "identification.consequents": "seesaw"}), "x")
     )
