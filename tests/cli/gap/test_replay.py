@@ -200,7 +200,7 @@ def test_unknown_samples_part_a_flight_too(cpfls, replayed, gap_config, with_att
 
 
 def test_a_model_that_runs_away_is_counted_bounded_and_named(cpfls, gap_config, with_attitude, tmp_path):
-    words = ("--set", "vehicle.inertia_kg_m2=[0.0006, 0.0006, 1.2]", *FAST)
+    words = ("--set", "vehicle.inertia_kg_m2=[0.0006, 0.0006, 0.0012]", *FAST)
     result = cpfls("replay", gap_config, "vehicle", with_attitude[0], "-o", tmp_path / "r.h5", "--json", *words)
     model = json.loads(result.stdout)["models"]["model"]
     assert model["diverged"] > 100
