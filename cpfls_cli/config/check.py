@@ -236,5 +236,7 @@ def _nearest(location: Location) -> str:
     elsewhere = [path for path in known_keys([], deep=True) if path.rsplit(".", 1)[-1] == location[-1]]
     near = difflib.get_close_matches(location[-1], keys, n=1, cutoff=0.5)
     if elsewhere or near:
-        return f" (did you mean '{[*elsewhere, *near][0]}'?)"
+        meant = [*elsewhere, *near][0]
+        # Who leaves the unit out of the name may mean another one, such as samples.
+        return f" (did you mean '{meant}'{', which is in seconds' if meant == f'{location[-1]}_s' else ''}?)"
     return f" (valid here: {', '.join(keys)})" if keys else ""

@@ -102,7 +102,7 @@ def before_after(
         np.concatenate(centres),
         index,
         played,
-        errors_by_horizon(played, settings.horizon),
+        errors_by_horizon(played, settings.horizon_s),
         found,
         whiteness(unseen.before * unseen.known, index, stride),
         whiteness(unseen.after * unseen.known, index, stride),

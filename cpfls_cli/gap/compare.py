@@ -148,7 +148,7 @@ def compare(
         _worst(residual, rms / floor, dependence, states),
         not_excited(hypothesis, effects, floor),
         played,
-        errors_by_horizon(played, settings.horizon),
+        errors_by_horizon(played, settings.horizon_s),
     )
 
 

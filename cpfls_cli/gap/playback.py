@@ -243,17 +243,18 @@ def _pair(name: str, signals: Signals, model: ExtendedModel, given: ExtendedMode
     return PlayedPair(flight, player, stated, logged)
 
 
-def errors_by_horizon(pairs: Sequence[PlayedPair], horizon: int) -> Replay:
+def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float) -> Replay:
     """Play back from every fifth sample of the flights.
 
     Parameters
     ----------
     pairs : sequence of PlayedPair
         Of one rate.
-    horizon : int
-        Samples, at most.
+    horizon_s : float, s
+        At most; one sample at least.
     """
-    longest = min(horizon, *(len(pair.flight) - 1 - _EVERY for pair in pairs))
+    asked = max(1, round(horizon_s / pairs[0].flight.motion.period))
+    longest = min(asked, *(len(pair.flight) - 1 - _EVERY for pair in pairs))
     return replay(pairs, longest, _EVERY)
 
 

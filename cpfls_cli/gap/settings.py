@@ -44,7 +44,7 @@ class GapSettings(Settings):
         MinLen(1),
         Doc("body axes whose torque is compared; the others are left out"),
     ] = ("x", "y", "z")
-    horizon: Annotated[int, Ge(1), Doc("longest replay of measured rotor speeds, samples")] = 50
+    horizon_s: Annotated[float, Gt(0), Doc("how far free runs go, s")] = 0.5
 
     def __post_init__(self) -> None:
         """Check the shares against each other.

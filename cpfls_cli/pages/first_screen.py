@@ -266,7 +266,7 @@ def _playback_words(playback: PlaybackChangeGroup) -> str:
         return "The flights show no motion that could be played back."
     lacks = [signal_scale(name)[0] for name, found in playback.errors.items() if found is None]
     more = f"; {joined(lacks)} cannot be played back, for lack of signals" if lacks else ""
-    return f"Playback: mean error after {plain(float(playback.horizon_s[-1]))} s{more}."
+    return f"Playback: mean error after {plain(round(float(playback.horizon_s[-1]), 3))} s{more}."
 
 
 def notes_on_flights(records: Sequence[DiagnosisRecord | DisagreementRecord]) -> Iterator[Folded]:

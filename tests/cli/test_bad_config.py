@@ -22,12 +22,13 @@ def test_all_unknown_keys_are_listed_with_the_nearest_valid_name(wrong):
     lines = wrong(
         "vehicle:\n  mass: 3\n  rotors:\n  - {position_m: [1, 0, 0], spin: 1, spinn: 1}\n"
         "trajectory: {mass_kg: 3}\nidentificaton: {}\nimport: {signals: {attitude: {columns: [a, b, c], units: rad}}}\n"
-        "reduction: {xyzzy: 1}\n"
+        "reduction: {xyzzy: 1}\ngap: {horizon: 50}\n"
     )
     assert {line.split(" (")[0] + " (" + line.split(" (")[1] for line in lines if "unknown" in line} == {
         "FILE: vehicle.mass = 3: unknown key (did you mean 'mass_kg'?)",
         "FILE: vehicle.rotors.0.spinn = 1: unknown key (did you mean 'spin'?)",
         "FILE: trajectory.mass_kg = 3: unknown key (did you mean 'vehicle.mass_kg'?)",
+        "FILE: gap.horizon = 50: unknown key (did you mean 'horizon_s', which is in seconds?)",
         "FILE: identificaton: unknown key (did you mean 'identification'?)",
         "FILE: import.signals.attitude.units = \"rad\": unknown key (did you mean 'unit'?)",
         "FILE: reduction.xyzzy = 1: unknown key (valid here: size, condition_number, criterion, rank_tolerance, pool)",

@@ -119,7 +119,7 @@ def test_before_and_after_are_those_of_each_model_alone():
     signals = signals_of(flown(effects={"linear_damping": {"d_x": 0.3, "d_y": 0.3, "d_z": 0.2}}))
     model, given = model_of({"linear_damping": {"d_x": 0.3, "d_y": 0.3, "d_z": 0.2}}), model_of({})
     pairs = played_pairs([Recording("flight", signals)], model, given)
-    found = errors_by_horizon(pairs, 30)
+    found = errors_by_horizon(pairs, 0.3)
     after, before = (played_back(each, signals)[0] for each in (model, given))
     for name, errors in found.errors.items():
         sums = errors.mae.sum(axis=1)
@@ -134,7 +134,7 @@ def test_the_model_as_given_takes_the_log_with_its_faults():
     logged = replace(exact, body_rate=exact.body_rate + BIAS)
     model = Repairing(None, np.zeros(len(PARAMETERS)), ())
     pairs = played_pairs([Recording("flight", logged)], model, model_of({}))
-    after, _, _, before = errors_by_horizon(pairs, 30).errors["attitude"].mae[:, -1]
+    after, _, _, before = errors_by_horizon(pairs, 0.3).errors["attitude"].mae[:, -1]
     assert before == pytest.approx(np.linalg.norm(BIAS) * 0.3, rel=0.2)
     assert after < 0.02 * before
     stretch = worst_stretch(pairs)
@@ -143,10 +143,11 @@ def test_the_model_as_given_takes_the_log_with_its_faults():
     assert stretch.axis == 2
 
 
-def test_a_horizon_beyond_the_flight_is_cut():
+@pytest.mark.parametrize(("horizon_s", "samples"), [(100.0, 295), (0.3, 30), (0.001, 1)])
+def test_a_horizon_is_in_seconds_and_within_the_flight(horizon_s, samples):
     pairs = played_pairs([Recording("flight", signals_of(flown()))], *[model_of({})] * 2)
-    errors = errors_by_horizon(pairs, 10_000).errors["body_rate"]
-    assert errors.mae.shape == (4, 295)
+    errors = errors_by_horizon(pairs, horizon_s).errors["body_rate"]
+    assert errors.mae.shape == (4, samples)
     np.testing.assert_array_equal(errors.mae[0], errors.mae[3])
 
 
