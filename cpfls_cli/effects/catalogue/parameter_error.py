@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _COUPLING = slice(3, 6)
+_BOUNDS = (-0.9, 3.0)
 _MEASURING_POINT = ("reference_x", "reference_y", "reference_z")
 
 NUMBERS = {
@@ -74,6 +76,61 @@ def shown(turns: BoolArray) -> Array:
     return np.concatenate([turns, turns, np.ones(4)]).astype(float)
 
 
+class Change(NamedTuple):
+    """Coefficients as ``offset + matrix @ u``, with bounds of u that hold for every vehicle.
+
+    Attributes
+    ----------
+    offset : array, shape (10,)
+    matrix : array, shape (10, 10)
+        Columns of numbers that stay as they are, are zero.
+    low, high : array, shape (10,)
+    """
+
+    offset: Array
+    matrix: Array
+    low: Array
+    high: Array
+
+
+def physical(vehicle: VehicleSettings, shown: BoolArray, least: BoolArray) -> Change:
+    """Write the coefficients by numbers whose bounds no vehicle exceeds.
+
+    Two moments of inertia differ by no more than the third, so a coupling C by axis, of moments of inertia M, has
+    ``M + C`` and ``M - C``, both of which are above zero. Rates show either by the scale of the rotor torque about this
+    axis alone, so the bounds hold axis by axis.
+
+    Parameters
+    ----------
+    vehicle : VehicleSettings
+    shown : array of bool, shape (3,)
+        Axes whose inertia the flights show.
+    least : array of bool, shape (3,)
+        Axes that are held at the least inertia, without coupling.
+    """
+    moments = np.array(vehicle.inertia_kg_m2[:3])
+    moved = shown & ~least
+    offset, matrix = np.zeros(10), np.zeros((10, 10))
+    offset[:3] = np.where(moved, -1.0, np.where(shown, _BOUNDS[0], 0.0))
+    matrix[:3, :6] = 0.5 * moved[:, None] * np.tile(np.eye(3), 2)
+    for axis in np.flatnonzero(shown):
+        after, later = (axis + 1) % 3, (axis + 2) % 3
+        mean = 0.5 * (moments[after] + moments[later])
+        offset[3 + axis] = (moments[after] * (1 + offset[after]) - moments[later] * (1 + offset[later])) / mean
+        matrix[3 + axis] = (moments[after] * matrix[after] - moments[later] * matrix[later]) / mean
+        if moved[axis]:
+            matrix[3 + axis, [axis, 3 + axis]] += np.array([0.5, -0.5]) * moments[axis] / mean
+    matrix[6:, 6:] = np.eye(4)
+    bounds = np.array([known.bounds(vehicle) for known in EFFECT.coefficients])
+    bounds[:6] = 0.0, 1 + _BOUNDS[1]
+    return Change(offset, matrix, *bounds.T)
+
+
+def too_light(values: Array) -> BoolArray:
+    """Mark axes whose inertia is below the least, shape (3,)."""
+    return np.asarray(values[:3] < _BOUNDS[0])
+
+
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     moments = np.array(signals.vehicle.inertia_kg_m2[:3])
     turning = (moments * signals.body_rate)[:, :, None] * np.eye(3)
@@ -116,7 +173,7 @@ EFFECT = Effect(
     "inertia to rotor torque; the force balance shows the scale of the thrust.",
     coefficients=(
         *(
-            Coefficient(f"inertia_{axis}", "1", -0.9, 3.0, f"true I{axis}{axis} over that of the model, less 1")
+            Coefficient(f"inertia_{axis}", "1", *_BOUNDS, f"true I{axis}{axis} over that of the model, less 1")
             for axis in "xyz"
         ),
         *(

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares, lsq_linear, minimize_scalar
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.effects.catalogue.parameter_error import Change, physical, too_light
 from cpfls_cli.effects.effect import Shape
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
@@ -60,7 +61,7 @@ def fit(hypothesis: System, floor: Array) -> Array:
     return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale)
 
 
-def fit_within_bounds(hypothesis: System, weight: Array) -> tuple[Array, BoolArray]:
+def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = False) -> tuple[Array, BoolArray]:
     """Fit all free columns by weighted least squares under the bounds of their coefficients.
 
     Parameters
@@ -68,6 +69,8 @@ def fit_within_bounds(hypothesis: System, weight: Array) -> tuple[Array, BoolArr
     hypothesis : System
     weight : array, shape (6,), N m and N
         Standard deviation of each channel.
+    of_vehicle : bool
+        Whether the vehicle's own numbers are bounded too; else one that no vehicle has says that the log is wrong.
 
     Returns
     -------
@@ -76,41 +79,71 @@ def fit_within_bounds(hypothesis: System, weight: Array) -> tuple[Array, BoolArr
         Coefficients on a bound.
     """
     linear = fit(hypothesis, weight)
-    low, high = _bounds(hypothesis)
-    if ((linear >= low) & (linear <= high)).all() and _without_lever(hypothesis, linear) is None:
-        return linear, np.zeros(len(linear), dtype=bool)
     matrix = (hypothesis.base / weight[:, None]).reshape(-1, len(linear))
     length = np.linalg.norm(matrix, axis=0)
-    shown = length > 0
-    scale = np.where(shown, length, 1.0)
+    least = np.zeros(3, dtype=bool)
+    change = _change(hypothesis, length > 0, least if of_vehicle else None)
+    at = np.linalg.lstsq(change.matrix, linear - change.offset, rcond=None)[0]
+    if ((at >= change.low) & (at <= change.high)).all() and _without_lever(hypothesis, linear) is None:
+        return linear, np.zeros(len(linear), dtype=bool)
+    scale = np.where(length > 0, length, 1.0)
     orthogonal, triangle = np.linalg.qr(matrix / scale)
     right = orthogonal.T @ (hypothesis.residual / weight).reshape(-1)
+    triangle = triangle * scale
     out = np.zeros(len(linear), dtype=bool)
     while True:
-        free = shown & ~out
-        bounds = (low[free] * scale[free], high[free] * scale[free])
-        linear = np.zeros(len(linear))
-        linear[free] = lsq_linear(triangle[:, free], right, bounds=bounds, method="bvls").x / scale[free]
+        at, linear = _bounded(triangle, right, change, out)
         leverless = _without_lever(hypothesis, linear)
-        if leverless is None:
-            break
-        out |= leverless
-    near = _ON_BOUND * np.where(np.isfinite(high - low), high - low, 0.0)
-    return linear, out | (free & ((linear <= low + near) | (linear >= high - near)))
+        light = too_light(linear) & ~least if of_vehicle else least
+        if leverless is None and not light.any():
+            return linear, out | _held(change, at, least if of_vehicle else None)
+        out |= leverless if leverless is not None else False
+        least = least | light
+        change = _change(hypothesis, length > 0, least if of_vehicle else None)
 
 
-def _bounds(hypothesis: System) -> tuple[Array, Array]:
-    """Bound the coefficients of the base; those whose physical numbers are others are free."""
+def _bounded(triangle: Array, right: Array, change: Change, out: BoolArray) -> tuple[Array, Array]:
+    """Fit the numbers behind the coefficients within their bounds; give both."""
+    columns = triangle @ change.matrix
+    length = np.linalg.norm(columns, axis=0)
+    free = (length > 0) & ~out
+    bounds = (change.low[free] * length[free], change.high[free] * length[free])
+    at = np.zeros(len(out))
+    behind = right - triangle @ change.offset
+    at[free] = lsq_linear(columns[:, free] / length[free], behind, bounds=bounds, method="bvls").x / length[free]
+    return at, np.asarray(change.offset + change.matrix @ at)
+
+
+def _held(change: Change, at: Array, least: BoolArray | None) -> BoolArray:
+    """Mark coefficients on a bound; on one of an axis' two bounds it is its coupling that gives way."""
+    near = _ON_BOUND * np.where(np.isfinite(change.high - change.low), change.high - change.low, 0.0)
+    held = change.matrix.any(axis=0) & ((at <= change.low + near) | (at >= change.high - near))
+    if least is not None:
+        both, either = held[:3] & held[3:6], held[:3] | held[3:6]
+        held[:6] = np.concatenate([both | least, either | least])
+    return held
+
+
+def _change(hypothesis: System, shown: BoolArray, least: BoolArray | None) -> Change:
+    """Give the bounds of the coefficients; those whose physical numbers are others are free.
+
+    The vehicle's own numbers are free where `least` is None.
+    """
     vehicle = hypothesis.flights[0].signals.vehicle
     pairs: list[tuple[float, float]] = []
     for candidate in hypothesis.free:
         width = hypothesis.columns(candidate).shape[2]
         known = candidate.effect.coefficients
-        # The vehicle's own numbers are free: one that no vehicle has says that the log is wrong.
         bounded = is_free(candidate) and candidate.effect.physical is None and len(known) == width
         pairs += [each.bounds(vehicle) for each in known] if bounded else [(-np.inf, np.inf)] * width
     low, high = np.array(pairs).T
-    return low, high
+    change = Change(np.zeros(len(low)), np.eye(len(low)), low, high)
+    if least is not None:
+        own = physical(vehicle, shown[:3], least)
+        width = len(own.offset)
+        change.offset[:width], change.matrix[:width, :width] = own.offset, own.matrix
+        change.low[:width], change.high[:width] = own.low, own.high
+    return change
 
 
 def _without_lever(hypothesis: System, linear: Array) -> BoolArray | None:

@@ -187,11 +187,7 @@ def impossible(numbers: Sequence[Estimate]) -> tuple[str, ...]:
     tuple of str
         Sentences.
     """
-    off = {
-        number.name: 1 + number.value
-        for number in numbers
-        if number.name in NUMBERS and (number.high < number.plausible[0] or number.low > number.plausible[1])
-    }
+    off = {number.name: 1 + number.value for number in numbers if number.name in NUMBERS and number.impossible}
     return tuple(
         f"{NUMBERS[name]} would have to be {ratio:.3g} times that of the config, which no vehicle has: {_suspect(off)}"
         for name, ratio in off.items()

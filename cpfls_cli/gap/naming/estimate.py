@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free
 from cpfls_cli.gap.balance.refine import fit, fit_within_bounds, free_shapes, shape_columns
@@ -43,7 +44,8 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     """Fit a hypothesis and compute confidence intervals of its numbers by the jackknife.
 
     The jackknife leaves out one block after another, so it holds for residuals that are correlated within blocks and
-    for noise of unequal size. Shapes take part by their derivatives.
+    for noise of unequal size. Shapes take part by their derivatives. The numbers of the vehicle are within what a
+    vehicle can have; only where free ones are surely beyond it, they are told, because the log is wrong then.
 
     Parameters
     ----------
@@ -57,7 +59,17 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     ----------
     Efron and Tibshirani 1993, chapter 11 (delete-a-group jackknife).
     """
-    linear, held = fit_within_bounds(hypothesis, weight)
+    free = _estimated(hypothesis, weight, block, *fit_within_bounds(hypothesis, weight))
+    linear, held = fit_within_bounds(hypothesis, weight, of_vehicle=True)
+    if np.array_equal(linear, free.linear):
+        return free
+    bounded = _estimated(hypothesis, weight, block, linear, held)
+    wrong = any(number.impossible for number in free.parameters if number.name in NUMBERS)
+    return replace(bounded, parameters=free.parameters) if wrong else bounded
+
+
+def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array, held: BoolArray) -> Estimates:
+    """Add confidence intervals to a fit."""
     shapes = [candidate.shape[name] for candidate, name in free_shapes(hypothesis)]
     values = np.concatenate([linear, shapes])
     jacobian = np.concatenate([hypothesis.base, shape_columns(hypothesis, linear)], axis=2)

@@ -57,6 +57,11 @@ class Estimate:
     high: float
     plausible: tuple[float, float]
 
+    @property
+    def impossible(self) -> bool:
+        """Whether it is surely beyond what is possible."""
+        return self.high < self.plausible[0] or self.low > self.plausible[1]
+
 
 @dataclass(frozen=True)
 class NamedEffect:

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.naming.estimate import estimates
 from cpfls_cli.gap.naming.search import block_index
 from cpfls_cli.gap.settings import GapSettings
-from tests.builders.gap_flights import candidate, fly, weak
+from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
 SETTINGS = GapSettings()
 WEIGHT = np.ones(6)
@@ -90,3 +92,47 @@ def test_wind_is_told_as_wind_with_an_interval_of_its_own():
     assert y.low < -3.0 < y.high
     assert x.high - x.low < 4
     np.testing.assert_allclose(x.value, found.of_effect[0][1] / found.of_effect[0][0])
+
+
+def moments_and_coupling(linear):
+    """Moments of inertia that rates show about each axis, and how strongly the two other rates couple into it."""
+    stated = np.array(VEHICLE.inertia_kg_m2[:3])
+    moments = stated * (1 + linear[:3])
+    after, later = [1, 2, 0], [2, 0, 1]
+    return moments, moments[later] - moments[after] + linear[3:6] * (stated[after] + stated[later]) / 2
+
+
+def of_vehicle(values):
+    known = [coefficient.name for coefficient in CATALOGUE["parameter_error"].coefficients]
+    return (candidate("parameter_error"), [values.get(name, 0.0) for name in known])
+
+
+def test_what_a_vehicle_can_have_is_found_as_it_is():
+    hypothesis = system([weak(fly(seed, [of_vehicle({"inertia_x": 0.3, "coupling_y": -0.2})])) for seed in (1, 2)])
+    linear = estimates(hypothesis, WEIGHT, block_index(hypothesis, SETTINGS)).linear
+    np.testing.assert_array_equal(linear, fit(hypothesis, WEIGHT))
+    np.testing.assert_allclose(linear[[0, 4]], [0.3, -0.2], atol=1e-3)
+
+
+@pytest.mark.parametrize(("axis", "name"), [*enumerate("xyz")])
+def test_no_coupling_is_larger_than_three_moments_of_inertia_allow(axis, name):
+    """Two moments differ by no more than the third; what couples more has no name among the vehicle's numbers."""
+    flights = [fly(seed, [of_vehicle({f"coupling_{name}": 4.0})]) for seed in (1, 2)]
+    hypothesis = system([weak(each) for each in flights])
+    free, bounded = fit(hypothesis, WEIGHT), estimated(flights, []).linear
+    moments, coupling = moments_and_coupling(free)
+    assert coupling[axis] > 2 * moments[axis]
+    moments, coupling = moments_and_coupling(bounded)
+    assert (moments >= 0.1 * np.array(VEHICLE.inertia_kg_m2[:3])).all()
+    assert (np.abs(coupling) <= moments * (1 + 1e-9)).all()
+    assert coupling[axis] == pytest.approx(moments[axis])
+
+
+def test_a_log_with_reversed_yaw_is_told_and_not_built_into_the_model():
+    rotors = tuple(replace(rotor, spin=-rotor.spin) for rotor in VEHICLE.rotors)
+    reversed_yaw = replace(VEHICLE, rotors=rotors)
+    found = estimated([replace(fly(seed), vehicle=reversed_yaw) for seed in (1, 2)], [])
+    numbers = {number.name: number for number in found.parameters}
+    assert numbers["inertia_z"].impossible
+    assert not numbers["inertia_x"].impossible
+    assert found.linear[2] == pytest.approx(-0.9)
