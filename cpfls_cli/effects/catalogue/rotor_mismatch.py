@@ -15,7 +15,9 @@ _SAME_PLACE = 1e-6
 
 
 def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
-    """Find the pairs of rotors that face each other across the centre of mass and spin the same way.
+    """Find the pairs of rotors that face each other across the middle of all and spin the same way.
+
+    The centre of mass may lie beside the middle, as that of a vehicle out of trim does.
 
     Returns
     -------
@@ -23,6 +25,7 @@ def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
         Indices from 0, in the order of the first rotor of each pair.
     """
     hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
+    hubs = hubs - hubs.mean(axis=0)
     spins = np.array([rotor.spin for rotor in vehicle.rotors])
     apart = np.linalg.norm(hubs[:, None] + hubs[None], axis=2)
     facing = (apart <= _SAME_PLACE * np.abs(hubs).max()) & (spins[:, None] == spins)
@@ -119,8 +122,8 @@ EFFECT = Effect(
     formula="dT_i = kappa_i T_i,  M = sum r_i x dT_i z;  M_z += delta sum b_i w_i^2",
     sentence="One rotor pulls less than its opposite: a worn propeller, a weak motor.",
     coefficients=(
-        Coefficient("difference_1", "1", -0.25, 0.25, "kappa of the first opposite pair, first rotor less second"),
-        Coefficient("difference_2", "1", -0.25, 0.25, "kappa of the second opposite pair, first rotor less second"),
+        Coefficient("difference_1", "1", -0.5, 0.5, "kappa of the first opposite pair, first rotor less second"),
+        Coefficient("difference_2", "1", -0.5, 0.5, "kappa of the second opposite pair, first rotor less second"),
         Coefficient(
             "drag_imbalance", "1", -0.5, 0.5, "clockwise rotors drag this much more than modelled, the others less"
         ),
