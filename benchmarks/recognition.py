@@ -59,7 +59,8 @@ class LogSet:
     names : tuple of str
         Patterns of the files' names.
     signals : mapping from signal to (columns, unit, factor) or columns
-        Columns with spaces between them, the name of the file as ``@``; alone they are in SI.
+        Columns with spaces between them, a minus before a reversed one, the name of the file as ``@``; alone they are
+        in SI.
     rotors : tuple
         Corner and way to turn of each; empty where the set does not say.
     """
@@ -74,6 +75,7 @@ def columns(pattern: str, places: Iterable[object]) -> str:
     return " ".join(pattern.replace("*", str(place)) for place in places)
 
 
+NOSE_UP = (("", "roll"), ("-", "pitch"), ("", "yaw"))
 XYZ, WXYZ, ONE_TO_FOUR, ZERO_TO_THREE = "xyz", "wxyz", range(1, 5), range(4)
 NANODRONE = {
     "quaternion": columns("q*", WXYZ),
@@ -139,7 +141,8 @@ SETS = {
         ("*__E8_log??",),
         {
             "position": columns("fixedFrequency.stateEstimate.*", XYZ),
-            "body_rate": columns("fixedFrequency.controller.r_*", ("roll", "pitch", "yaw")),
+            # Its pitch is that of the nose up.
+            "body_rate": " ".join(f"{sign}fixedFrequency.controller.r_{axis}" for sign, axis in NOSE_UP),
         },
         FLU,
     ),
@@ -320,7 +323,9 @@ def judge_signal(path: Path, signal: str, truth: str | Truth, guess: Guess | Non
         return
     own = guess.columns
     same = isclose(known_unit(own.unit).factor * own.scale, known_unit(unit).factor * factor, rel_tol=1e-6)
-    right = own.columns == tuple(names.split()) and same and own.sign is None
+    sign = own.sign or (1.0,) * len(own.columns)
+    found = [f"{'-' * (way < 0)}{column}" for way, column in zip(sign, own.columns, strict=True)]
+    right = found == names.split() and same
     count.right += right
     count.guessed += right and guess.sure == "guess"
     if not right:

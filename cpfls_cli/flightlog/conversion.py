@@ -129,7 +129,12 @@ def _in_si(columns: Mapping[str, Array], signal: SignalMap) -> Array:
     values = np.column_stack([np.asarray(columns[name], dtype=float) for name in signal.columns])
     sign = np.ones(len(signal.columns)) if signal.sign is None else np.array(signal.sign)
     values[~np.isfinite(values)] = np.nan
-    return to_si(sign * (signal.scale * values + signal.offset), signal.unit)
+    values = sign * (signal.scale * values + signal.offset)
+    if signal.mixer is not None:
+        mixed = values @ np.array(signal.mixer).T
+        # A motor gives no more than all it has and no less than nothing, whatever the mixer adds up to.
+        values = np.clip(mixed, 0.0, 1.0) if signal.unit == "1" else mixed
+    return to_si(values, signal.unit)
 
 
 def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> None:

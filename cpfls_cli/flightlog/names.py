@@ -56,6 +56,8 @@ class Named:
         Factor on the logged numbers, which makes them this unit.
     frame : {"FLU", "FRD", "ENU", "NED"} or None
         Axes that the kind of log is known for.
+    sign : tuple of float or None
+        Of each column in that frame; None for +1 everywhere.
     known : str
         The kind of log whose documentation says so; empty where only words of the name do.
     """
@@ -67,6 +69,7 @@ class Named:
     scale: float = 1.0
     frame: str | None = None
     known: str = ""
+    sign: tuple[float, ...] | None = None
 
 
 _ANGLES: Final = (
@@ -151,6 +154,7 @@ class _Known:
     unit: UnitName | None
     frame: str | None = None
     scale: float = 1.0
+    sign: tuple[float, ...] | None = None
 
 
 _PX4, _ARDUPILOT, _BETAFLIGHT, _CRAZYFLIE = "PX4", "ArduPilot", "Betaflight", "Crazyflie"
@@ -189,7 +193,8 @@ _KNOWN: Final = (
     _Known(_CRAZYFLIE, "attitude", "stabilizer.*", "deg", "FLU"),
     _Known(_CRAZYFLIE, "attitude", "stateEstimate.*", "deg", "FLU"),
     _Known(_CRAZYFLIE, "body_rate", "gyro.*", "deg/s", "FLU"),
-    _Known(_CRAZYFLIE, "body_rate", "controller.r_*", None, "FLU"),
+    # The controller takes a pitch for positive with the nose up: r_pitch = -gyro.y in the firmware.
+    _Known(_CRAZYFLIE, "body_rate", "controller.r_*", None, "FLU", sign=(1.0, -1.0, 1.0)),
     _Known(_CRAZYFLIE, "acceleration", "acc.*", "g", "FLU"),
     _Known(_CRAZYFLIE, "acceleration", "stateEstimate.a*", "g", "ENU"),
     _Known(_CRAZYFLIE, "position", "stateEstimate.*", "m", "ENU"),
@@ -329,7 +334,9 @@ def _known(group: ColumnGroup, system: str) -> Iterator[Named]:
         # On its card a Crazyflie puts the name of an event before that of a variable.
         patterns = (group.pattern, group.pattern.partition(".")[2] if system.startswith(_CRAZYFLIE) else "")
         if not of_other and angles and known.pattern in patterns and _suits(known.signal, group):
-            yield Named(known.signal, group, float(rank), known.unit, known.scale, known.frame, known.system)
+            yield Named(
+                known.signal, group, float(rank), known.unit, known.scale, known.frame, known.system, known.sign
+            )
 
 
 def _suits(signal: SignalName, group: ColumnGroup) -> bool:

@@ -110,7 +110,7 @@ def _by_column(
         column: count(values)
         for name, signal in settings.signals.items()
         if name in signals
-        for column, values in zip(signal.columns, signals[name].T, strict=True)
+        for column, values in zip(signal.names, signals[name].T, strict=True)
     }
     return {column: number for column, number in counts.items() if number}
 

@@ -365,11 +365,12 @@ class _Recogniser:
             guess = ("rad/s", "guess", (rival,))
         unit, sure, rivals = guess
         size = f"a spread of {spread:.2g} in flight" if stated is None else f"which is in {stated}"
+        turned = "" if named.sign is None else "; signs as that log has them"
         none = "; no attitude that turns is there to hold it against"
         self.guesses["body_rate"] = Guess(
             signal="body_rate",
-            columns=SignalMap(columns=named.group.columns, unit=unit, scale=named.scale),
-            reason=f"{_called(named)}, {size}{none}",
+            columns=SignalMap(columns=named.group.columns, unit=unit, scale=named.scale, sign=named.sign),
+            reason=f"{_called(named)}, {size}{turned}{none}",
             sure=sure,
             rivals=rivals,
         )

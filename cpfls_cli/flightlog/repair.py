@@ -91,7 +91,7 @@ def _require_values(table: SignalTable, settings: ImportSettings) -> None:
         f"import.signals.{name}.columns: {column!r} has fewer than two values ({count}) in the"
         f" {len(table.time)} rows that are read"
         for name, signal in settings.signals.items()
-        for column, count in zip(signal.columns, np.isfinite(table.signals[name]).sum(axis=0).tolist(), strict=True)
+        for column, count in zip(signal.names, np.isfinite(table.signals[name]).sum(axis=0).tolist(), strict=True)
         if count < 2
     ]
     if problems:

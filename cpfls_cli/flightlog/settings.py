@@ -53,13 +53,17 @@ _COLUMNS_OF_VECTOR = 3
 
 @dataclass(frozen=True, kw_only=True)
 class ColumnMap(Settings):
-    """Columns of a log and their unit: ``signal = sign * (scale * column + offset)`` in `unit`."""
+    """Columns of a log and their unit: ``signal = mixer @ (sign * (scale * column + offset))`` in `unit`."""
 
     columns: Annotated[tuple[str, ...], MinLen(1), Doc("names of the columns, in the order of the axes")]
     unit: Annotated[UnitName, Doc("unit of the columns after scale and offset")]
     sign: Annotated[tuple[float, ...] | None, Doc("+1 or -1 for each column; null: all +1")] = None
     scale: Annotated[float, Doc("factor on the logged numbers")] = 1.0
     offset: Annotated[float, Doc("added after the factor, in the unit above")] = 0.0
+    mixer: Annotated[
+        tuple[tuple[float, ...], ...] | None,
+        Doc("where the columns are not rotors but what is mixed for them: for each rotor a factor of each column"),
+    ] = None
 
     def __post_init__(self) -> None:
         """Check the signs against the columns."""
@@ -69,6 +73,14 @@ class ColumnMap(Settings):
             raise SettingError("scale", "must not be 0")
         if self.sign is not None and (len(self.sign) != len(self.columns) or {abs(s) for s in self.sign} != {1}):
             raise SettingError("sign", f"needs {len(self.columns)} numbers, one for each column, each +1 or -1")
+        for row, factors in enumerate(self.mixer or ()):
+            if len(factors) != len(self.columns):
+                raise SettingError(f"mixer.{row}", f"needs {len(self.columns)} numbers, one for each column")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the numbers of a sample are called: columns, or rotors of a mixer."""
+        return self.columns if self.mixer is None else tuple(f"rotor {1 + row}" for row in range(len(self.mixer)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,14 +107,16 @@ def _check_signal(name: SignalName, signal: SignalMap) -> None:
         Naming the key below the section `import`.
     """
     fixed = None if name in _ANY_NUMBER else _COLUMNS_OF_SIGNAL.get(name, _COLUMNS_OF_VECTOR)
-    expected = fixed or len(signal.columns)
+    expected = fixed or len(signal.names)
     # A flight keeps one unit of a signal, whichever columns it came from.
     kinds = UNITS_OF_SIGNAL[name]
     for number, choice in enumerate(signal.choices):
         key = f"signals.{name}.otherwise.{number - 1}" if number else f"signals.{name}"
-        if len(choice.columns) != expected:
+        if choice.mixer is not None and name not in _ANY_NUMBER:
+            raise SettingError(f"{key}.mixer", "mixes for rotors: it belongs to rotor_speed or rotor_command")
+        if len(choice.names) != expected:
             words = f"{expected} columns" if expected > 1 else "1 column"
-            raise SettingError(f"{key}.columns", f"needs {words}, got {len(choice.columns)}")
+            raise SettingError(f"{key}.columns", f"needs {words}, got {len(choice.names)}")
         if KNOWN_UNITS[choice.unit].si not in kinds:
             wanted = [unit for unit, entry in KNOWN_UNITS.items() if entry.si in kinds]
             raise SettingError(f"{key}.unit", f"{choice.unit!r} does not measure it; one of {', '.join(wanted)}")

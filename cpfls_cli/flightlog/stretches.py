@@ -92,7 +92,7 @@ def _warn_of_rest(name: str, signal: SignalMap, table: SignalTable, rest: BoolAr
     backward = (values < -_UNDERSHOOT * np.nanmax(np.abs(values))).any(axis=1)
     if backward.any():
         lowest = np.nanmin(values, axis=0)
-        column = signal.columns[int(np.argmin(lowest))]
+        column = signal.names[int(np.argmin(lowest))]
         yield (
             f"{name} is below zero in {backward.sum()} of {len(backward)} rows, down to"
             f" {_shown(float(lowest.min()), signal)} in column {column}, and no rotor turns backward: where it rests,"
@@ -134,7 +134,7 @@ def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSetti
     """
     for name, signal in settings.signals.items():
         values = table.signals[name]
-        by_column = dict(zip(signal.columns, values.T, strict=True))
+        by_column = dict(zip(signal.names, values.T, strict=True))
         constant = [column for column, of in by_column.items() if _spread(of) == 0]
         if constant:
             yield _constant(name, constant, len(values))

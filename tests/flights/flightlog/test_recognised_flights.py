@@ -84,7 +84,8 @@ def test_a_card_of_a_crazyflie_is_read_without_a_word_of_config():
         pytest.skip(f"{path} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
     recognition = seen(path)
     assert maps(recognition) == {
-        "body_rate": ("fixedFrequency.controller.r_roll", "rad/s", None),
+        # The pitch rate of the controller is that of the nose up: x accelerates against its integral in all 15 logs.
+        "body_rate": ("fixedFrequency.controller.r_roll", "rad/s", (1.0, -1.0, 1.0)),
         "position": ("fixedFrequency.stateEstimate.x", "m", None),
     }
 

@@ -157,3 +157,13 @@ def test_commands_alone_are_a_flight():
     flight = imported(log("rotor_command", "position"), mapped("rotor_command", "position", "body_rate"))
     assert (flight.attitude, flight.body_rate) == (None, None)
     assert flight.rotor_command.shape == (200, 2)
+
+
+def test_what_goes_into_a_mixer_becomes_the_share_of_each_rotor():
+    """Three motors from a thrust and a roll: none gives more than all it has, or less than nothing."""
+    thrust, roll = np.array([0.5, 0.9, 0.1] * 10), np.array([0.0, 0.4, -0.4] * 10)
+    mixed = SignalMap(columns=("T", "l"), unit="1", scale=0.01, mixer=((1.0, -0.5), (1.0, 0.5), (0.5, 0.0)))
+    settings = ImportSettings(signals={"rotor_command": mixed}, torque_source=None)
+    flight = import_log({"t": 0.01 * np.arange(30), "T": 100 * thrust, "l": 100 * roll}, settings)
+    expected = [[0.5, 0.5, 0.25], [0.7, 1.0, 0.45], [0.3, 0.0, 0.05]] * 10
+    np.testing.assert_allclose(flight.rotor_command, expected, atol=1e-12)

@@ -44,6 +44,19 @@ def test_signs_must_be_plus_or_minus_one_for_each_column(sign):
     assert caught.value.key == "sign"
 
 
+@pytest.mark.parametrize(
+    ("key", "name", "mixer"),
+    [
+        ("mixer.1", "rotor_command", ((1.0, 0.5, 0.5), (1.0, 0.5))),
+        ("signals.body_rate.mixer", "body_rate", ((1.0, 0.0, 0.0),) * 3),
+    ],
+)
+def test_a_mixer_is_for_rotors_and_has_a_factor_for_each_column(key, name, mixer):
+    with pytest.raises(SettingError) as caught:
+        ImportSettings(signals={name: SignalMap(columns=("a", "b", "c"), unit="1", mixer=mixer)}, torque_source=None)
+    assert caught.value.key == key
+
+
 def test_a_config_in_json_validates_strictly():
     text = '{"signals": {"attitude": {"columns": ["a", "b", "c"], "unit": "deg", "sign": [1, -1, 1]}},'
     text += ' "torque_source": null}'
