@@ -17,7 +17,7 @@ from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
 from cpfls_cli.gap.naming.causes import JudgedEffect, impossible, judge_effect, sensor_fault, shares, wrong_numbers
 from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
-from cpfls_cli.gap.naming.earned import earned
+from cpfls_cli.gap.naming.earned import Fitted, Refusal, earned
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.leftover import Leftover, not_excited, untried
@@ -96,11 +96,9 @@ def diagnose(
     audited = audit([recording.signals for recording in training], windows)
     prepared = Preparation(windows, model, settings, audited)
     weak = prepared.repaired(training)
-    effects = considered(settings)
-    chosen, steps = forward_selection(weak, effects, settings, rng, lambda n: progress(0.1 + 0.1 * min(n, 5), "search"))
+    effects, steps, found, refusals = _searched(weak, settings, rng, progress)
     progress(0.65, "estimates")
     floor = steps[-1].floor
-    found, refusals = earned(weak, chosen, floor, settings)
     judge = Judge(weak, prepared.logged(held), prepared.repaired(held), floor, settings, rng)
     first = judge.judge(found)
     judgement, unconfirmed = judge.confirmed(first)
@@ -120,6 +118,26 @@ def diagnose(
     notes = () if differ else tuple(refused.sentence for refused in refusals)
     diagnosis = _concluded(judged, faults, judgement, differ, notes, steps, settings, torque_alone, audited)
     return DiagnosisRun(diagnosis, audited, hypothesis, estimates, judgement.remainder, judgement.held_out)
+
+
+def _searched(
+    weak: Sequence[WeakFlight], settings: GapSettings, rng: np.random.Generator, progress: Callable[[float, str], None]
+) -> tuple[list[Effect], list[SearchStep], Fitted, list[Refusal]]:
+    """Search for effects that earn their names; once more without those that would have to be impossible.
+
+    Such an effect takes up what others would explain, and has to go before they can be seen.
+    """
+    effects, refusals = considered(settings), list[Refusal]()
+    while True:
+        chosen, steps = forward_selection(
+            weak, effects, settings, rng, lambda n: progress(0.1 + 0.1 * min(n, 5), "search")
+        )
+        found, refused = earned(weak, chosen, steps[-1].floor, settings)
+        refusals += refused
+        out = {each.name for each in refused if each.impossible}
+        if not out:
+            return effects, steps, found, refusals
+        effects = [effect for effect in effects if effect.name not in out]
 
 
 def considered(settings: GapSettings) -> list[Effect]:
@@ -158,7 +176,10 @@ def _concluded(
     effects = [*faults, *named]
     numbers = wrong_numbers(estimates, effects, held_out.removed_by_numbers(), _pull(hypothesis, steps[-1].floor))
     effects += [numbers] if numbers is not None else []
-    removed = held_out.shares() if named else {}
+    removed = held_out.shares()
+    if not named:
+        # Faults and wrong numbers alone: of all the gap, where one is left.
+        removed = held_out.shares(as_given=True) if effects and remainder.unexplained else {}
     share = min(removed.values(), default=1.0)
     rivals = (*(rival for each in judged for rival in each.alternatives), *untried(hypothesis, named, settings))
     gap = held_out.size(held_out.before).floors

@@ -11,6 +11,7 @@ from cpfls_cli.artifacts.diagnosis import KINDS, DiagnosisRecord
 from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.pages.effects import (
     capitalised,
@@ -95,9 +96,11 @@ def _headline(record: DiagnosisRecord) -> str:
 
 def _blame(record: DiagnosisRecord) -> Iterator[str]:
     """Say who is at fault: the model, the sensors, or the numbers of the vehicle."""
-    if record.effects_of_motion:
-        yield f"What the model misses is {joined(titles(record.effects_of_motion))}."
-    sensors = record.effects.names("sensor")
+    # What the audit tests is a fault of the log, clocks among it, whatever it is in a model.
+    sensors = [name for name in record.effects.names() if CATALOGUE[name].test is not None]
+    missed = [name for name in record.effects_of_motion if name not in sensors]
+    if missed:
+        yield f"What the model misses is {joined(titles(missed))}."
     if sensors:
         yield f"The sensors are at fault: {joined(titles(sensors))}."
     if record.effects.names("parameter"):

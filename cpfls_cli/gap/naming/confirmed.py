@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
-from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted
+from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted, on_bound
 from cpfls_cli.gap.naming.held_out import SEEN, HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.search import SearchStep, block_index
@@ -82,6 +82,10 @@ class Judge:
 
     def _refused(self, judgement: Judgement) -> Refusal | None:
         chosen = judgement.found.hypothesis.chosen
+        # What was dropped may have held another effect within what is possible.
+        beyond = on_bound(judgement.found, self.floor)
+        if beyond is not None:
+            return beyond[1]
         compared = {each.effect.name: self._without(judgement, each.effect.name) for each in chosen}
         harmful = {name: one for name, one in compared.items() if one.worse(judgement.held_out).any()}
         if harmful:

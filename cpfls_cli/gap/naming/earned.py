@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, sized, weighted_estimates
+from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, free_estimates, sized, weighted_estimates
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.naming.search import block_index
 from cpfls_cli.gap.settings import GapSettings
@@ -39,10 +39,18 @@ class Fitted(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """An effect that is no name, and why, as the end of a sentence."""
+    """An effect that is no name, and why, as the end of a sentence.
+
+    Attributes
+    ----------
+    name, reason : str
+    impossible : bool
+        Whether the flights surely ask for a number of it that is beyond what is possible.
+    """
 
     name: str
     reason: str
+    impossible: bool = False
 
     @property
     def sentence(self) -> str:
@@ -70,7 +78,7 @@ def earned(
         pairs = list(zip(found.hypothesis.chosen, found.estimates.effects, strict=True))
         out = [candidate for candidate, numbers in pairs if not differs_from_zero(candidate.effect, numbers)]
         if not out:
-            refused = _on_bound(found, floor) or _cancelling(found, floor)
+            refused = on_bound(found, floor) or _cancelling(found, floor)
             if refused is None:
                 break
             out, refusal = refused
@@ -80,18 +88,49 @@ def earned(
     return found, refusals
 
 
-def _on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | None:
-    for index, candidate in enumerate(found.hypothesis.chosen):
-        numbers = sized(candidate.effect, found.estimates.effects[index])
-        main = _main(found, index, numbers, floor)
-        for number in main:
-            low, high = number.plausible
-            near = _ON_BOUND * (high - low)
-            reached = [bound for bound in (low, high) if bound and abs(number.value - bound) <= near]
-            if reached:
-                says = f"its {number.name} sits on the bound of what is possible, {reached[0]:.3g} {number.unit}"
-                return [candidate], Refusal(candidate.effect.name, says)
+def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | None:
+    """Find an effect whose main number sits on a bound, or any number that is surely asked for beyond one.
+
+    Zero is no such bound: a coefficient that is there is zero at the least.
+
+    Parameters
+    ----------
+    found : Fitted
+    floor : array, shape (6,)
+    """
+    chosen = found.hypothesis.chosen
+    reached = {
+        index: numbers
+        for index, candidate in enumerate(chosen)
+        if (numbers := _reached(sized(candidate.effect, found.estimates.effects[index])))
+    }
+    if not reached:
+        return None
+    free = free_estimates(found.hypothesis, floor, found.block)
+    for index, bounds in reached.items():
+        name = chosen[index].effect.name
+        beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
+        if beyond:
+            says = f"its {beyond[0]} would surely be beyond what is possible, {bounds[beyond[0]]}"
+            return [chosen[index]], Refusal(name, says, True)
+        numbers = sized(chosen[index].effect, found.estimates.effects[index])
+        main = [number.name for number in _main(found, index, numbers, floor) if number.name in bounds]
+        if main:
+            says = f"its {main[0]} sits on the bound of what is possible, {bounds[main[0]]}"
+            return [chosen[index]], Refusal(name, says)
     return None
+
+
+def _reached(numbers: Sequence[Estimate]) -> dict[str, str]:
+    """Name the numbers that sit on a bound other than zero, and the bound."""
+    found = {}
+    for number in numbers:
+        low, high = number.plausible
+        near = _ON_BOUND * (high - low)
+        for bound in (low, high):
+            if bound and abs(number.value - bound) <= near:
+                found[number.name] = f"{bound:.3g} {number.unit}"
+    return found
 
 
 def _main(found: Fitted, index: int, numbers: Sequence[Estimate], floor: Array) -> Sequence[Estimate]:

@@ -100,8 +100,26 @@ def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Est
     floor : array, shape (6,)
     block : array of int, shape (window,)
     """
+    return estimates(hypothesis, _weight(hypothesis, floor), block)
+
+
+def free_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
+    """Fit alike without any bounds, which says what the flights ask for.
+
+    Parameters
+    ----------
+    hypothesis : System
+    floor : array, shape (6,)
+    block : array of int, shape (window,)
+    """
+    weight = _weight(hypothesis, floor)
+    linear = fit(hypothesis, weight)
+    return _estimated(hypothesis, weight, block, linear, np.zeros(len(linear), dtype=bool))
+
+
+def _weight(hypothesis: System, floor: Array) -> Array:
     residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-    return estimates(hypothesis, np.maximum(floor, np.sqrt(np.mean(residual**2, axis=0))), block)
+    return np.asarray(np.maximum(floor, np.sqrt(np.mean(residual**2, axis=0))))
 
 
 def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:

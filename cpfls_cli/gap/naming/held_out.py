@@ -65,8 +65,13 @@ class HeldOut:
         in_floors = ((residual / self.noise) ** 2 * self.known).sum(axis=0)
         return GapSize(value, np.sqrt(np.where(count > 0, in_floors / np.maximum(count, 1), np.nan)))
 
-    def shares(self) -> dict[str, float]:
+    def shares(self, *, as_given: bool = False) -> dict[str, float]:
         """Compute the shares of the gap above the noise floor that the effects remove.
+
+        Parameters
+        ----------
+        as_given : bool
+            Of the gap of the model as given, on signals as logged; else of what its own numbers leave.
 
         Returns
         -------
@@ -74,7 +79,7 @@ class HeldOut:
             Of ``torque`` and of ``force``, where each is a part of the gap that counts; of the better one where neither
             does.
         """
-        before, after = self.parameters / self.noise, self.after / self.noise
+        before, after = (self.before if as_given else self.parameters) / self.noise, self.after / self.noise
         kinds = [slice(0, 3), slice(3, 6)]
         sizes = [_above(before[:, kind], self.known[:, kind]) for kind in kinds]
         each = [share_removed(before[:, kind], after[:, kind], self.known[:, kind]) for kind in kinds]

@@ -1,13 +1,16 @@
 """Chosen effects that have not earned their names: on a bound, cancelling, harmful, needless, without a lever."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap import diagnose
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit_within_bounds
+from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.confirmed import Judge, differences
 from cpfls_cli.gap.naming.earned import earned, fitted
 from cpfls_cli.gap.naming.search import best_floor, rank_effects
@@ -57,15 +60,38 @@ def test_a_moment_of_a_drag_needs_its_force():
     assert np.abs(free[-3:]).max() > 5 * np.abs(linear[-3:]).max()
 
 
-def test_what_sits_on_its_bound_is_no_name():
-    known = flights((candidate("com_offset"), [0.004, 0.0]))
-    known_bounds = CATALOGUE["com_offset"].coefficients
-    narrow = replace(known_bounds[0], low=-0.001, high=0.001)
-    effect = replace(CATALOGUE["com_offset"], coefficients=(narrow, known_bounds[1]))
-    chosen = [candidate("com_offset")._replace(effect=effect)]
+def test_what_is_impossible_takes_nothing_from_what_is_possible(monkeypatch):
+    """The search goes on without it, and finds what it took the place of."""
+    narrow = replace(CATALOGUE["rotor_drag"].coefficients[0], high=1e-4, scale=None)
+    known = flights(DRAG, force=True)
+    step = SimpleNamespace(floor=best_floor(system(known, [])))
+    offered = [replace(CATALOGUE["rotor_drag"], coefficients=(narrow,)), CATALOGUE["flapping_moment"]]
+    monkeypatch.setattr(diagnose, "considered", lambda _: offered)
+    # As where other effects, which go afterwards, held it within its bounds while it was chosen.
+    monkeypatch.setattr(diagnose, "forward_selection", lambda _, effects, *__: ([Candidate(effects[0], {})], [step]))
+    effects, _, found, (refusal,) = diagnose._searched(known, SETTINGS, np.random.default_rng(0), lambda *_: None)
+    assert [effect.name for effect in effects] == kept(found) == ["flapping_moment"]
+    assert (refusal.name, refusal.impossible) == ("rotor_drag", True)
+
+
+@pytest.mark.parametrize(
+    ("truth", "bounded", "says"),
+    [
+        ([0.000325, 0.0], 0, "c_x sits on the bound of what is possible, 0.0003 m"),
+        ([0.004, 0.0], 0, "c_x would surely be beyond what is possible, 0.0003 m"),
+        ([0.02, 0.004], 1, "c_y would surely be beyond what is possible, 0.0003 m"),
+    ],
+    ids=["on it", "beyond", "the lesser number beyond"],
+)
+def test_what_would_have_to_be_impossible_is_no_name(truth, bounded, says):
+    known = flights((candidate("com_offset"), truth))
+    coefficients = list(CATALOGUE["com_offset"].coefficients)
+    coefficients[bounded] = replace(coefficients[bounded], low=-0.001, high=0.001)
+    chosen = [candidate("com_offset")._replace(effect=replace(CATALOGUE["com_offset"], coefficients=coefficients))]
     found, (refusal,) = earned(known, chosen, best_floor(system(known, chosen)), SETTINGS)
     assert kept(found) == []
-    assert "c_x sits on the bound of what is possible" in refusal.sentence
+    assert says in refusal.sentence
+    assert refusal.impossible == ("surely" in says)
 
 
 def test_of_two_that_cancel_one_goes():

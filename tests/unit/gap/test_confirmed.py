@@ -5,7 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cpfls_cli.gap.naming import confirmed
 from cpfls_cli.gap.naming.confirmed import Judge, Without
+from cpfls_cli.gap.naming.earned import Refusal
 from cpfls_cli.gap.settings import GapSettings
 
 NOTHING = np.zeros(6)
@@ -15,11 +17,12 @@ def channel(value, of=0):
     return np.array([value if index == of else 0.0 for index in range(6)])
 
 
-def refused(raised, after, monkeypatch):
+def refused(raised, after, monkeypatch, beyond=None):
     """Judge effects of which each takes so much off channel 0, where `after` floors are left with all of them."""
     chosen = [SimpleNamespace(effect=SimpleNamespace(name=name)) for name in raised]
     floors = np.full(6, after)
     held_out = SimpleNamespace(after=None, size=lambda _: SimpleNamespace(floors=floors))
+    monkeypatch.setattr(confirmed, "on_bound", lambda _found, _floor: beyond)
     judgement = SimpleNamespace(found=SimpleNamespace(hypothesis=SimpleNamespace(chosen=chosen)), held_out=held_out)
     without = {
         name: Without(channel(value), NOTHING, np.sqrt(np.maximum(floors**2 + channel(value), 0.0)))
@@ -55,3 +58,10 @@ def refused(raised, after, monkeypatch):
 def test_names_stand_that_the_unseen_flights_need(raised, after, name, monkeypatch):
     found = refused(raised, after, monkeypatch)
     assert (found.name if found else None) == name
+
+
+def test_what_the_others_held_within_bounds_goes_without_them(monkeypatch):
+    """However much of the gap it takes off: beside those that are left its number is impossible."""
+    impossible = ([], Refusal("large", "its c_z would surely be beyond what is possible", True))
+    found = refused({"large": 2500.0, "small": 90.0}, 1.1, monkeypatch, beyond=impossible)
+    assert found.name == "large"

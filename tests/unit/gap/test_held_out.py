@@ -62,6 +62,14 @@ def test_an_effect_that_is_not_there_does_not():
     assert max(unseen([candidate("linear_damping")]).shares().values()) < 0.1
 
 
+def test_faults_alone_take_their_share_off_the_model_as_given():
+    """Without a named effect the model after them is the one with its numbers refitted."""
+    found = unseen([candidate("com_offset")])
+    alone = replace(found, parameters=found.after)
+    assert alone.shares() == {"torque": 0.0}
+    assert alone.shares(as_given=True)["torque"] > 0.97
+
+
 def test_size_is_the_root_mean_square():
     found = unseen([candidate("com_offset")])
     np.testing.assert_allclose(found.size(found.after).value[:3], np.sqrt(np.mean(found.after[:, :3] ** 2, axis=0)))

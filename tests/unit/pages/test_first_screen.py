@@ -50,6 +50,10 @@ def screen(record):
         ),
         ({"named": ({"name": "gyro_bias", "kind": "sensor"},)}, "The sensors are at fault: gyro bias."),
         (
+            {"named": ({"name": "channel_delay", "kind": "actuator"},)},
+            "The sensors are at fault: time shift between rotor and gyro channels.",
+        ),
+        (
             {"named": ({"name": "parameter_error", "kind": "parameter"},)},
             "A number of the vehicle is wrong: Izz +24.0 % against the config.",
         ),
