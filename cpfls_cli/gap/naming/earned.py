@@ -100,9 +100,9 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
     """
     chosen = found.hypothesis.chosen
     reached = {
-        index: numbers
+        index: own
         for index, candidate in enumerate(chosen)
-        if (numbers := _reached(sized(candidate.effect, found.estimates.effects[index])))
+        if (own := _reached(sized(candidate.effect, found.estimates.effects[index])))
     }
     if not reached:
         return None
