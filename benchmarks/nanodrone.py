@@ -1,6 +1,7 @@
 """Print what models predict of the nano-drone benchmark's test flights, beside the models that are published.
 
     python benchmarks/nanodrone.py DATA [--unknown]
+    python benchmarks/nanodrone.py DATA --write FOLDER        the prepared flights as CSV, and nothing else
 
 DATA is a clone of idsia-robotics/nanodrone-sysid-benchmark, branch model_export (commit ac439db), which has the raw
 flights; a folder that holds the files of `data/real/raw/parquets`, `data/real/processed/train`, `data/sim` and
@@ -33,6 +34,7 @@ pin_threads()
 
 import numpy as np
 
+from benchmarks.shared.flight_csv import write_flight
 from benchmarks.shared.found_vehicles import constants_unknown, learned
 from benchmarks.shared.nanodrone_files import STATED, TEST, TRAINING, VEHICLE, flights
 from benchmarks.shared.playback_scores import (
@@ -129,6 +131,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of the benchmark's files")
     parser.add_argument("--unknown", action="store_true", help="learn from mass and geometry alone")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the prepared flights as CSV, and stop")
     given = parser.parse_args()
     folder, stated = given.data, constants_unknown(VEHICLE) if given.unknown else VEHICLE
     start = perf_counter()
@@ -138,6 +141,10 @@ def main() -> None:
         sys.exit(
             f"{error}\nget it: git clone -b model_export https://github.com/idsia-robotics/nanodrone-sysid-benchmark"
         )
+    if given.write is not None:
+        for flight in (*training, *test):
+            write_flight(given.write, flight)
+        return
     print(f"{len(training)} training flights, {len(test)} test flights read in {perf_counter() - start:.1f} s\n")
     published = [[name, *np.ravel(values), 19347, ""] for name, values in PUBLISHED.items()]
     name = "nanodrone_unknown" if given.unknown else "nanodrone"

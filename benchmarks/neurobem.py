@@ -1,6 +1,7 @@
 """Print what models predict of six fast flights of NeuroBEM, each held out once, beside BEM+NN.
 
     python benchmarks/neurobem.py DATA [--unknown] [--held-out NAME ...]
+    python benchmarks/neurobem.py DATA --write FOLDER         the segments as CSV, and nothing else
 
 DATA is a clone of RCL-NUS/NeuroMHE (commit 64e184c), or any folder with its files bemnn*.mat in it or below it. They
 hold test segments of NeuroBEM (Bauersfeld et al. 2021) with the torques and forces that its model BEM+NN gives.
@@ -29,6 +30,7 @@ pin_threads()
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from benchmarks.shared.flight_csv import write_flight
 from benchmarks.shared.found_vehicles import constants_unknown, learned
 from benchmarks.shared.neurobem_files import INERTIA, MASS, VEHICLE, Segment, segments
 from benchmarks.shared.playback_scores import HORIZON, Runs, free_runs, nothing_moves, rate_stays, score
@@ -113,12 +115,17 @@ def main() -> None:
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of the segments")
     parser.add_argument("--unknown", action="store_true", help="learn from mass and geometry alone")
     parser.add_argument("--held-out", nargs="*", metavar="NAME", help="hold out these segments alone")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the segments as CSV, and stop")
     given = parser.parse_args()
     stated = constants_unknown(VEHICLE) if given.unknown else VEHICLE
     try:
         found = segments(given.data)
     except InputError as error:
         sys.exit(f"{error}\nget them: git clone https://github.com/RCL-NUS/NeuroMHE")
+    if given.write is not None:
+        for each in found:
+            write_flight(given.write, each.flight, each.wrench[:, 3:] / MASS)
+        return
     rows = []
     for test in found if given.held_out is None else [each for each in found if each.flight.name in given.held_out]:
         rows += our_rows([other.flight for other in found if other is not test], test, stated)

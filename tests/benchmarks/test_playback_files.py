@@ -11,8 +11,12 @@ from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from benchmarks.shared import nanodrone_files, neurobem_files
+from benchmarks.shared.flight_csv import write_flight
 from benchmarks.shared.playback_scores import HORIZON, Runs, as_published, nothing_moves, rate_stays, score
+from cpfls_cli.config.load import load_study
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog import import_log
+from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Motion
 
@@ -152,6 +156,20 @@ def test_a_segment_is_thinned_to_100_hz_with_velocity_in_the_world(segment):
     assert flight.speed[7].tolist() == [900.0, 901.0, 902.0, 903.0]
     assert found.wrench[3] == pytest.approx([10 * 2.5e-3, 0.0, 0.0, 0.0, 0.0, 0.772 * 9.81])
     assert found.hybrid[3].tolist() == [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]
+
+
+def test_a_segment_as_csv_is_imported_as_it_was(segment, tmp_path):
+    found = neurobem_files.segment(segment, "Melon_1")
+    write_flight(tmp_path / "csv", found.flight, found.wrench[:, 3:] / neurobem_files.MASS)
+    study = load_study(Path(__file__).parents[2] / "configs" / "gap" / "neurobem.yaml")
+    columns = log_contents(tmp_path / "csv" / "Melon_1.csv").topics[""]
+    flight = import_log(columns, study.import_, rotor_torque=lambda signals: 0 * signals.body_rate)
+    for name, logged in (("position", "position"), ("velocity", "velocity"), ("body_rate", "rate")):
+        np.testing.assert_allclose(getattr(flight, name), getattr(found.flight.motion, logged), atol=1e-6)
+    turned = Rotation.from_euler("ZYX", flight.attitude[:, ::-1]).as_matrix()
+    np.testing.assert_allclose(turned, found.flight.motion.rotation, atol=1e-6)
+    np.testing.assert_allclose(flight.rotor_speed, found.flight.speed)
+    np.testing.assert_allclose(flight.specific_force[:, 2], 9.81)
 
 
 def test_missing_and_foreign_segments_are_named(segment):

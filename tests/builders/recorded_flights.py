@@ -12,7 +12,9 @@ FLIGHTS = Path(os.environ.get("CPFLS_FLIGHTS", "../shared/data"))
 
 def path_of_log(folder, name):
     """Give the path of a log, or skip the test."""
-    path = FLIGHTS / folder / f"{name}.csv"
+    # What a Crazyflie writes on its card has no ending.
+    path = FLIGHTS / folder / name
+    path = path if path.is_file() else path.with_name(f"{name}.csv")
     if not path.exists():
         pytest.skip(f"{path} is absent; set CPFLS_FLIGHTS to the folder of other people's flights")
     return path

@@ -73,9 +73,20 @@ def test_level_flight_cannot_tell_an_offset_from_a_constant_torque(heavy):
     assert "torque_bias" in {entry["name"] for entry in heavy["alternatives"]}
 
 
-@pytest.mark.parametrize(("name", "held_out"), [("log149", ()), ("log119", ("log45",))])
+@pytest.mark.parametrize(("name", "held_out"), [("log149", ()), ("log45", ("log119",))])
 def test_commanded_torque_acts_late_and_something_is_left(answer_of, coefficients_of, name, held_out):
     answer = answer_of("crazyswarm2", CRAZYSWARM, name, held_out=held_out)
     assert coefficients_of(answer, "command_delay")["delay_s"]["value"] == pytest.approx(0.07, abs=0.015)
     assert answer["verdict"] == "PARTIAL"
     assert answer["unexplained"]
+    before, after = (answer[f"gap_{when}"]["torque_n_m"][:2] for when in ("before", "after"))
+    assert all(late < 0.5 * given for late, given in zip(after, before, strict=True))
+
+
+def test_the_most_cut_propeller_is_named(answer_of, coefficients_of):
+    """M3 is back left and faces M1; with 4 mm less on both blades its commands reach their limit."""
+    flights = [f"cut_propeller_M3_4mm_4mm_39mm__E8_log0{number}" for number in (1, 0)]
+    answer = answer_of("crazypad_usd", "real/crazypad_usd", *flights[:1], held_out=flights[1:])
+    loss = coefficients_of(answer, "rotor_mismatch")["difference_1"]
+    assert loss["value"] == pytest.approx(0.31, abs=0.05)
+    assert answer["verdict"] == "PARTIAL"
