@@ -335,11 +335,13 @@ class NamedEffectsGroup:
 
         rows, name = self.effect, self.effect.name[index]
         entry, shape = CATALOGUE.get(name), self.shape.of_effect(name)
+        linear = self.linear.of_effect(name)
+        entry = None if entry is None else entry.form(len(linear), shape)
         known = entry is not None and entry.kind in _EVALUATED and len(shape) == len(entry.shapes)
         return NamedEffect(
             name,
             Candidate(entry, shape) if entry and known else None,
-            self.linear.of_effect(name),
+            linear,
             self.coefficient.of_effect(name),
             float(rows.p_value[index]),
             float(rows.share[index]),

@@ -13,9 +13,14 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Columns, stack
 from cpfls_cli.effects.signals import Signals
 
+_NODES = 8
+"""Of the quadrature over a sample, exact for any lag that is not much shorter than one."""
+
 
 def lagged(values: Array, period: float, time_constant: float) -> Array:
-    """Filter signals by a first-order lag, ``tau y' + y = u``, exactly for u linear between samples.
+    """Filter signals by a first-order lag, ``tau y' + y = u``, exactly for u cubic between samples.
+
+    Straight lines between samples would weaken 3 Hz at 100 Hz by as much as half a millisecond of lag does.
 
     Parameters
     ----------
@@ -31,18 +36,26 @@ def lagged(values: Array, period: float, time_constant: float) -> Array:
         y.
     """
     decay = exp(-period / time_constant)
-    held = (1 - decay) * time_constant / period
-    new, old = 1 - held, held - decay
-    return np.asarray(signal.lfilter([new, old], [1.0, -decay], values, axis=0, zi=(1 - new) * values[:1])[0])
+    nodes, lengths = np.polynomial.legendre.leggauss(_NODES)
+    place = 0.5 * (nodes + 1)
+    weight = 0.5 * lengths * period / time_constant * np.exp(-(1 - place) * period / time_constant)
+    taps = weight @ _cubic(place)
+    # A constant stays what it is, however short the lag is beside a sample.
+    taps *= (1 - decay) / taps.sum()
+    extended = _extended(values)
+    driven = np.sum([tap * extended[first : len(values) - 1 + first] for first, tap in enumerate(taps)], axis=0)
+    rest = signal.lfilter([1.0], [1.0, -decay], driven, axis=0, zi=decay * values[:1])[0]
+    return np.concatenate([values[:1], rest])
 
 
 def delayed(values: Array, time: Array, delay: float) -> Array:
-    """Shift signals in time by linear interpolation; beyond the ends the last known value is held.
+    """Shift signals in time by cubic interpolation; beyond the ends the last known value is held.
 
     Parameters
     ----------
     values : array, shape (time,) or (time, channel)
     time : array, shape (time,), s
+        Evenly spaced.
     delay : float, s
         Below 0 brings them forward.
 
@@ -50,9 +63,36 @@ def delayed(values: Array, time: Array, delay: float) -> Array:
     -------
     array, shape of `values`
     """
-    channels = values.reshape(len(time), -1).T
-    moved = [np.interp(time - delay, time, channel) for channel in channels]
-    return np.column_stack(moved).reshape(values.shape)
+    if len(time) < 2:
+        return values
+    last, period = len(time) - 1, float(time[1] - time[0])
+    place = np.arange(len(time)) - delay / period
+    rows = np.clip(np.floor(place).astype(int), 0, last - 1)
+    # All samples lie at the same place between two; those beyond the ends at an end.
+    weights = _cubic(np.clip(place - rows, 0.0, 1.0))
+    extended = _extended(values)
+    across = (-1, *[1] * (values.ndim - 1))
+    moved = [extended[rows + first] * weight.reshape(across) for first, weight in enumerate(weights.T)]
+    return np.asarray(np.sum(moved, axis=0))
+
+
+def _extended(values: Array) -> Array:
+    """Continue signals by one sample at either end, in a straight line."""
+    return np.concatenate([2 * values[:1] - values[1:2], values, 2 * values[-1:] - values[-2:-1]])
+
+
+def _cubic(place: Array) -> Array:
+    """Weigh the samples at -1, 0, 1 and 2 for places between 0 and 1 on a cubic, shape (place, 4)."""
+    before, first, second, after = place + 1, place, place - 1, place - 2
+    return np.stack(
+        [
+            -first * second * after / 6,
+            before * second * after / 2,
+            -before * first * after / 2,
+            before * first * second / 6,
+        ],
+        axis=1,
+    )
 
 
 def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signals:

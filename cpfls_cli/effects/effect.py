@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -29,8 +29,6 @@ class Coefficient:
     meaning : str
     scale : callable or None
         Natural size on a vehicle, in `unit`; None for 1.
-    secondary : bool
-        Whether it comes in only once the effect is chosen, because another effect would do as well for it alone.
     of_log : bool
         Whether it tells how the motion is logged, and leaves the motion itself as it is.
     """
@@ -41,7 +39,6 @@ class Coefficient:
     high: float
     meaning: str
     scale: Callable[[VehicleSettings], float] | None = None
-    secondary: bool = False
     of_log: bool = False
 
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
@@ -147,8 +144,8 @@ class Effect:
     linear : callable or None
         The reverse.
     apply : callable or None
-        For actuator and sensor effects: ``apply(signals, shape) -> Signals`` as they would be without the effect's
-        error, so that all other columns can be computed from them.
+        For effects that change what the others meet: ``apply(signals, shape) -> Signals`` as they would be without the
+        effect's error, or with its air, so that all other columns can be computed from them.
     describe : callable or None
         ``describe(vehicle, values) -> str``: what the coefficients that are surely not zero say in words, by name.
     rate_derivative : bool
@@ -178,6 +175,9 @@ class Effect:
         so that the number is not called wrong.
     vehicle : callable or None
         ``vehicle(stated, shape) -> VehicleSettings``: for effects that are a wrong number of the vehicle.
+    exact : Effect or None
+        What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
+        would do as well, or with those that others depend on as shapes, under the same names.
     lever : callable or None
         ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
         possible, a torque being no larger than its force on a lever as long as the body.
@@ -212,7 +212,14 @@ class Effect:
     inertia: Callable[[Array], Array] | None = None
     accounts: Callable[[str, Mapping[str, float]], float] | None = None
     vehicle: Callable[[VehicleSettings, Mapping[str, float]], VehicleSettings] | None = None
+    exact: Effect | None = None
     lever: Callable[[Array, Array, VehicleSettings], BoolArray] | None = None
+
+    def form(self, coefficients: int, shapes: Collection[str]) -> Effect:
+        """Tell by the numbers that were fitted whether it is this effect or what took its place."""
+        other = self.exact or self
+        names = {shape.name for shape in other.shapes}
+        return other if (len(other.coefficients), names) == (coefficients, {*shapes}) else self
 
     @property
     def numbers(self) -> tuple[Coefficient | Shape, ...]:

@@ -330,9 +330,9 @@ def extend(
     prepared = Preparation(common_windows([*training, *held], settings), base, settings, audit)
     flights = prepared.repaired(training)
     chosen = [effect.candidate for effect in effects if effect.candidate is not None]
-    hypothesis = refined(flights, chosen, best_floor(system(flights, chosen)))
-    floor = best_floor(hypothesis)
-    estimates = weighted_estimates(hypothesis, floor, block_index(hypothesis, settings))
+    start = refined(flights, chosen, best_floor(system(flights, chosen)))
+    floor = best_floor(start)
+    hypothesis, estimates = weighted_estimates(start, floor, block_index(start, settings))
     residual = hypothesis.residual - hypothesis.base @ estimates.linear
     scatter = scatter_size(scatter_variance(hypothesis), residual, floor)
     held_out = judged_unseen(held, prepared, hypothesis, estimates.linear, scatter)

@@ -91,7 +91,7 @@ def extended_player(
     late = any(now is not part for now, part in zip(moved, parts, strict=True))
     flight = playback_flight(name, moved, "linear" if late else hold)
     vehicle, response = moved[0].vehicle, RotorResponse()
-    by_kind = _sorted(model, vehicle, speeds=flight.wrench is None)
+    by_kind = _sorted(model, vehicle, speeds=flight.wrench is None, windy=moved[0].wind is not None)
     along = _along(by_kind.along, moved)
     stated = stated_along(flight, response)
     if stated is not None:
@@ -125,7 +125,7 @@ def _number(model: ExtendedModel, name: str) -> float:
     return float(model.parameters[names.index(name)])
 
 
-def _sorted(model: ExtendedModel, vehicle: VehicleSettings, *, speeds: bool) -> _Parts:
+def _sorted(model: ExtendedModel, vehicle: VehicleSettings, *, speeds: bool, windy: bool) -> _Parts:
     table = VehicleModel(vehicle=vehicle).weights.copy()
     table[5, 0] += _number(model, "thrust_scale") * rotor_weights(vehicle, 0.0, RotorResponse())[5]
     moments = np.array(vehicle.inertia_kg_m2[:3])
@@ -139,7 +139,7 @@ def _sorted(model: ExtendedModel, vehicle: VehicleSettings, *, speeds: bool) -> 
         if effect.kind != "wrench":
             continue
         added = _as_inertia(fitted, probe)
-        weights = polynomial(effect, probe, shape)
+        weights = None if windy and "velocity" in effect.needs else polynomial(effect, probe, shape)
         # Without rotor speeds the terms of the rotors are 0, and the thrust is what the log states.
         if weights is not None and (speeds or not weights[..., 1:].any()):
             width = weights.shape[3]

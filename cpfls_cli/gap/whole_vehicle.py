@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.catalogue.parameter_error import coupling, inertia_correction
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.polynomial import Probe, polynomial
-from cpfls_cli.effects.registry import VEHICLE_NUMBERS
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
@@ -62,7 +62,8 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Ar
             times |= {"lag_s": hooks.lag(shape)} if hooks.lag else {}
             times |= {"delay_s": hooks.delay(shape)} if hooks.delay else {}
         elif known.carried is None and polynomial(known, probe, shape) is not None:
-            effects.append(ModelEffect(known.name, dict(shape), linear))
+            # Of the thrust alone an effect knows no more than before it was chosen.
+            effects.append(ModelEffect(known.name, dict(shape), linear[: len(CATALOGUE[known.name].coefficients)]))
         else:
             not_held.append(known.name)
     xx, yy, zz, xy, xz, yz = (float(corrected[entry]) for entry in INERTIA_ENTRIES)

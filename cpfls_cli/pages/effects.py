@@ -197,8 +197,7 @@ def _meaning(effect: str, coefficient: str) -> str:
     if effect not in CATALOGUE:
         return coefficient
     known = CATALOGUE[effect]
-    meanings = {entry.name: entry.meaning for entry in known.coefficients}
-    meaning = (meanings | {entry.name: entry.meaning for entry in known.shapes}).get(coefficient)
+    meaning = {entry.name: entry.meaning for entry in (known.exact or known).numbers}.get(coefficient)
     return f"{coefficient}: {meaning}" if meaning else coefficient
 
 

@@ -205,24 +205,26 @@ def _checked(name: str, given: Sequence[float] | Mapping[str, float], vehicle: V
     effect = find(name)
     if "rotor_radius" in effect.needs and any(rotor.radius_m is None for rotor in vehicle.rotors):
         raise SettingError(_key(name), "needs vehicle.rotors.radius_m of every rotor")
-    values = _by_name(effect, given)
-    for number in effect.numbers:
+    values, flown = _by_name(effect, given), effect.exact or effect
+    for number in flown.numbers:
         _refuse_outside(effect, number, values[number.name], number.bounds(vehicle))
-    return SimulatedEffect(effect, values)
+    return SimulatedEffect(flown, values)
 
 
 def _by_name(effect: Effect, given: Sequence[float] | Mapping[str, float]) -> dict[str, float]:
     names = [number.name for number in effect.numbers]
+    # What only a chosen effect has can be given by its name.
+    every = [number.name for number in (effect.exact or effect).numbers]
     if not isinstance(given, Mapping):
         if len(given) != len(names):
             raise SettingError(_key(effect.name), f"takes {_wanted(effect)}; {len(given)} given")
-        return dict(zip(names, given, strict=True))
-    unknown = [name for name in given if name not in names]
+        given = dict(zip(names, given, strict=True))
+    unknown = [name for name in given if name not in every]
     unset = [shape.name for shape in effect.shapes if shape.name not in given]
     if unknown or unset:
         problem = f"has no {', '.join(unknown)}" if unknown else f"needs {', '.join(unset)}"
         raise SettingError(_key(effect.name), f"{problem}; takes {_wanted(effect)}")
-    return {name: given.get(name, 0.0) for name in names}
+    return {name: given.get(name, 0.0) for name in every}
 
 
 def _wanted(effect: Effect) -> str:

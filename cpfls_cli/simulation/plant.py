@@ -56,6 +56,9 @@ class EffectWrench:
         array, shape (6,), N m and N, body frame
         """
         total = np.zeros(6)
+        for one in self.effects:
+            if one.effect.kind == "wrench" and one.effect.apply is not None:
+                signals = one.effect.apply(signals, one.shape)
         # What has a lever for all forces comes last.
         for one in sorted(self.effects, key=lambda each: each.effect.of_all_forces):
             felt = _with_force(signals, total[3:]) if one.effect.of_all_forces else signals

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,13 +11,13 @@ from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
 
 
-def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    direct = np.zeros((len(signals), 6, 2))
-    direct[:, :3] = -np.cross(np.eye(3)[None, :2], signals.force[:, None]).swapaxes(1, 2)
+def _levers(signals: Signals, axes: int) -> Columns:
+    direct = np.zeros((len(signals), 6, axes))
+    direct[:, :3] = -np.cross(np.eye(3)[None, :axes], signals.force[:, None]).swapaxes(1, 2)
     return Columns(direct)
 
 
-EFFECT = Effect(
+_EFFECT = Effect(
     name="com_offset",
     order=180,
     title="offset of the centre of mass",
@@ -36,7 +36,20 @@ EFFECT = Effect(
         "wind": "turn in yaw, and change the thrust",
     },
     source="geometry; RotorPy (hub positions relative to the centre of mass)",
-    columns=_columns,
+    columns=lambda signals, _shape: _levers(signals, 2),
     of_all_forces=True,
     accounts=lambda _number, _values: 0.05,
+)
+
+# Height alone is the moment of a flapping disc; beside the other two it is the third number of one cause.
+_HEIGHT = Coefficient(
+    "c_z", "m", -0.4, 0.4, "true centre of mass, above that of the model; shown by forces across the rotors", scales.arm
+)
+EFFECT = replace(
+    _EFFECT,
+    exact=replace(
+        _EFFECT,
+        coefficients=(*_EFFECT.coefficients, _HEIGHT),
+        columns=lambda signals, _shape: _levers(signals, 3),
+    ),
 )

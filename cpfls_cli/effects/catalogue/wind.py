@@ -1,22 +1,27 @@
-"""Steady wind: the rotor drag of a vehicle that does not move over the ground."""
+"""Steady wind: the rotor drag of a vehicle that does not move over the ground, and the air that all others meet."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Columns, Effect, hub_wrench, stack
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, hub_wrench, stack
 from cpfls_cli.effects.signals import Signals
 
 _IN_PLANE = np.array([1.0, 1.0, 0.0])
 
 
+_STRONGEST = 15.0
+
+
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
+    still = signals if signals.wind is None else replace(signals, wind=None)
     speed = signals.speed[..., None]
-    still_air = -speed * signals.hub_velocity * _IN_PLANE
+    still_air = -speed * still.hub_velocity * _IN_PLANE
     pushed = [speed * (signals.rotation[:, axis] * _IN_PLANE)[:, None] for axis in (0, 1)]
     return Columns(stack(*(hub_wrench(signals.hubs, force) for force in (still_air, *pushed))))
 
@@ -31,7 +36,16 @@ def _linear(physical: Array) -> Array:
     return np.array([drag, drag * x, drag * y])
 
 
-EFFECT = Effect(
+def _blowing(signals: Signals, shape: Mapping[str, float]) -> Signals:
+    return replace(signals, wind=np.array([shape["W_x"], shape["W_y"], 0.0]))
+
+
+def _drag(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    in_plane = _blowing(signals, shape).hub_velocity * _IN_PLANE
+    return Columns(stack(hub_wrench(signals.hubs, -signals.speed[..., None] * in_plane)))
+
+
+_EFFECT = Effect(
     name="wind",
     order=120,
     title="steady wind",
@@ -42,8 +56,8 @@ EFFECT = Effect(
         Coefficient(
             "k_d", "N s^2/(m rad)", 0.0, 5.0, "drag per rotor, rotor speed and air speed", scales.drag_per_rotor_speed
         ),
-        Coefficient("W_x", "m/s", -15.0, 15.0, "wind along x of the world"),
-        Coefficient("W_y", "m/s", -15.0, 15.0, "wind along y of the world"),
+        Coefficient("W_x", "m/s", -_STRONGEST, _STRONGEST, "wind along x of the world"),
+        Coefficient("W_y", "m/s", -_STRONGEST, _STRONGEST, "wind along y of the world"),
     ),
     needs=frozenset({"velocity", "rotor_speed"}),
     excitation="legs in opposite directions, and yaw turns in place",
@@ -59,3 +73,15 @@ EFFECT = Effect(
     linear=_linear,
     holds=frozenset({"rotor_drag"}),
 )
+
+_DRAG, *_WIND = _EFFECT.coefficients
+_EXACT = replace(
+    _EFFECT,
+    coefficients=(_DRAG,),
+    shapes=tuple(Shape(each.name, each.unit, (each.low, 0.0, each.high), each.meaning) for each in _WIND),
+    columns=_drag,
+    physical=None,
+    linear=None,
+    apply=_blowing,
+)
+EFFECT = replace(_EFFECT, exact=_EXACT)

@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.noise_floor import noise_floor
-from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, actuated, columns_of, nuisance
+from cpfls_cli.gap.balance.weak_flight import Candidate, CandidateKey, WeakFlight, actuated, columns_of, nuisance
 
 NEGLIGIBLE = 0.003
 """Share of the torque or force below which nobody could use a correction; sampling alone leaves about as much."""
@@ -38,7 +38,7 @@ class System:
     flights: tuple[WeakFlight, ...]
     chosen: tuple[Candidate, ...]
     signals: tuple[Signals, ...]
-    cache: dict[tuple[str, tuple[float, ...]], Array] = field(default_factory=dict, repr=False)
+    cache: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
 
     def columns(self, candidate: Candidate) -> Array:
         """Evaluate a candidate; a flight that lacks a signal it needs has zeros.
@@ -47,10 +47,9 @@ class System:
         -------
         array, shape (window, 6, coefficient)
         """
-        key = (candidate.effect.name, tuple(candidate.shape.values()))
-        if key not in self.cache:
-            self.cache[key] = self._evaluate(candidate)
-        return self.cache[key]
+        if candidate.key not in self.cache:
+            self.cache[candidate.key] = self._evaluate(candidate)
+        return self.cache[candidate.key]
 
     @cached_property
     def residual(self) -> Array:

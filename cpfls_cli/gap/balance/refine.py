@@ -9,13 +9,17 @@ from scipy.optimize import least_squares, lsq_linear, minimize_scalar
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.catalogue.parameter_error import Change, physical, too_light
-from cpfls_cli.effects.effect import Shape
+from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 
 _EVALUATIONS = 14
 _JOINT_EVALUATIONS = 8
 _STEP = 1e-3
+_STEPS = 6
+_SHARES = (1.0, 0.5, 0.2)
+_SETTLED = 1e-2
+"""Change of the sum of squares, in variances, below which a fit stands still: a tenth of a standard error."""
 _ON_BOUND = 1e-6
 """Share of its range that a coefficient is from its bound at most to be on it."""
 
@@ -32,10 +36,11 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     chosen : sequence of Candidate
     floor : array, shape (6,)
     """
-    best = list(chosen)
+    best = list(_exact(system(flights, chosen), floor).chosen)
     rotor_wrench = system(flights).rotor_wrench
     shapes = [(index, shape) for index, candidate in enumerate(best) for shape in candidate.effect.shapes]
-    newest = [(index, shape) for index, shape in shapes if index == len(best) - 1]
+    # What took the place of a linear effect stands between no points of a grid.
+    newest = [(index, shape) for index, shape in shapes if best[index].effect is chosen[-1].effect]
     # A second round where there are several: the best length of a cable depends on its damping.
     for index, shape in newest * min(len(newest), 2):
         best[index] = _improved(flights, best, index, shape, floor, rotor_wrench)
@@ -176,6 +181,87 @@ def weighted_residual(hypothesis: System, floor: Array, rotor_wrench: Array) -> 
     """
     weight = compensation(rotor_wrench, hypothesis.rotor_wrench) / floor
     return np.asarray((hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)) * weight)
+
+
+def refitted(hypothesis: System, weight: Array) -> System:
+    """Move the shapes of all effects, together with all coefficients, to their least squares by Gauss-Newton steps.
+
+    The last fit of a hypothesis that is believed: it knows no share of the torque that motion does not follow, and
+    stands where the same linear system that gives the intervals asks for no further step.
+
+    Parameters
+    ----------
+    hypothesis : System
+    weight : array, shape (6,), N m and N
+        Standard deviation of each channel.
+    """
+    hypothesis = _exact(hypothesis, weight)
+    if not free_shapes(hypothesis):
+        return hypothesis
+    error = _squares(hypothesis, weight)
+    for _ in range(_STEPS):
+        step = _newton_step(hypothesis, weight)
+        for share in _SHARES:
+            ahead = _moved(hypothesis, share * step)
+            left = _squares(ahead, weight)
+            if left <= error:
+                break
+        else:
+            return hypothesis
+        hypothesis, gained, error = ahead, error - left, left
+        if gained < _SETTLED:
+            break
+    return hypothesis
+
+
+def _exact(hypothesis: System, weight: Array) -> System:
+    """Exchange effects for what takes their place once they are chosen."""
+    linear, first, chosen = fit(hypothesis, weight), 0, {each.effect.name: each for each in hypothesis.chosen}
+    for candidate in hypothesis.free:
+        own = linear[first : first + hypothesis.columns(candidate).shape[2]]
+        first += len(own)
+        if candidate.effect.exact is not None:
+            chosen[candidate.effect.name] = _in_place_of(candidate.effect, candidate.effect.exact, own)
+    listed = tuple(chosen.values())
+    return hypothesis if listed == hypothesis.chosen else system(hypothesis.flights, listed)
+
+
+def _in_place_of(effect: Effect, exact: Effect, linear: Array) -> Candidate:
+    """Start the shapes at what the linear coefficients say."""
+    physical = linear if effect.physical is None else np.nan_to_num(effect.physical(linear))
+    values = {known.name: float(value) for known, value in zip(effect.coefficients, physical, strict=True)}
+    shapes = {s.name: float(np.clip(values[s.name], s.grid[0], s.grid[-1])) for s in exact.shapes}
+    return Candidate(exact, shapes)
+
+
+def _squares(hypothesis: System, weight: Array) -> float:
+    left = hypothesis.residual - hypothesis.base @ fit_within_bounds(hypothesis, weight)[0]
+    return float(((left / weight) ** 2).sum())
+
+
+def _newton_step(hypothesis: System, weight: Array) -> Array:
+    """Solve for the change of the shapes, with the coefficients that no bound holds beside them, shape (shape,)."""
+    linear, held = fit_within_bounds(hypothesis, weight)
+    shapes = shape_columns(hypothesis, linear)
+    columns = np.concatenate([hypothesis.base[..., ~held], shapes], axis=2) / weight[:, None]
+    matrix = columns.reshape(-1, columns.shape[2])
+    length = np.linalg.norm(matrix, axis=0)
+    scale = 1.0 / np.where(length > 0, length, 1.0)
+    right = ((hypothesis.residual - hypothesis.base @ linear) / weight).reshape(-1)
+    change = np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale
+    return np.asarray(change[-shapes.shape[2] :])
+
+
+def _moved(hypothesis: System, step: Array) -> System:
+    """Change the shapes, as far as their ranges go."""
+    changes, chosen = iter(step.tolist()), []
+    for effect, shape in hypothesis.chosen:
+        moved = {
+            each.name: float(np.clip(shape[each.name] + next(changes), each.grid[0], each.grid[-1]))
+            for each in effect.shapes
+        }
+        chosen.append(Candidate(effect, moved))
+    return system(hypothesis.flights, chosen)
 
 
 def _improved(

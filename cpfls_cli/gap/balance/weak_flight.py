@@ -28,11 +28,19 @@ CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
 
 
+CandidateKey = tuple[str, int, tuple[float, ...]]
+
+
 class Candidate(NamedTuple):
     """An effect with a value for each of its shapes."""
 
     effect: Effect
     shape: Mapping[str, float]
+
+    @property
+    def key(self) -> CandidateKey:
+        """What its columns depend on: name and form of the effect, and its shape."""
+        return self.effect.name, len(self.effect.coefficients), tuple(self.shape.values())
 
 
 @dataclass(frozen=True)
@@ -63,7 +71,7 @@ class WeakFlight:
     known: BoolArray
     turns: Array
     cut_off: Array = field(default_factory=lambda: np.full(6, np.inf))
-    seen: dict[tuple[str, tuple[float, ...]], Array] = field(default_factory=dict, repr=False)
+    seen: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return self.windows.count(len(self.signals))
@@ -99,10 +107,9 @@ class WeakFlight:
         """
         if signals is not self.signals:
             return self._rows(candidate, signals)
-        key = (candidate.effect.name, tuple(candidate.shape.values()))
-        if key not in self.seen:
-            self.seen[key] = self._rows(candidate, signals)
-        return self.seen[key]
+        if candidate.key not in self.seen:
+            self.seen[candidate.key] = self._rows(candidate, signals)
+        return self.seen[candidate.key]
 
     def _rows(self, candidate: Candidate, signals: Signals) -> Array:
         rows = self.averaged(columns_of(candidate, signals))
@@ -202,7 +209,7 @@ def nuisance() -> Candidate:
 
 
 def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
-    """Apply the actuator effects among those chosen.
+    """Apply the effects among those chosen that change what all others meet: actuation, and the air.
 
     Parameters
     ----------
@@ -212,7 +219,7 @@ def actuated(signals: Signals, chosen: Iterable[Candidate]) -> Signals:
     """
     for candidate in chosen:
         effect = candidate.effect
-        if effect.apply is not None and effect.kind == "actuator" and not effect.missing(signals):
+        if effect.apply is not None and effect.kind != "sensor" and not effect.missing(signals):
             signals = effect.apply(signals, candidate.shape)
     return signals
 
@@ -288,5 +295,5 @@ def translation_balance(signals: Signals) -> Balance:
     if signals.acceleration is not None:
         felt = np.einsum("tji,tj->ti", signals.rotation, signals.acceleration)
         return Balance(np.zeros((len(signals), 3)), mass * felt + weight)
-    momentum = mass * signals.air_velocity
+    momentum = mass * signals.ground_velocity
     return Balance(momentum, np.cross(signals.body_rate, momentum) + weight)

@@ -109,9 +109,9 @@ class Judge:
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
         kept = [each for each in judgement.found.hypothesis.chosen if each.effect.name != name]
-        linear = fitted(self.training, kept, self.floor, self.settings).estimates.linear
-        there = system(self.repaired, kept)
-        residual, unseen = there.residual - there.base @ linear, judgement.held_out
+        without = fitted(self.training, kept, self.floor, self.settings)
+        there = system(self.repaired, without.hypothesis.chosen)
+        residual, unseen = there.residual - there.base @ without.estimates.linear, judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
         count = np.maximum(unseen.known.sum(axis=0), 1)
         difference, block = squares[0] - squares[1], block_index(there, self.settings)

@@ -9,7 +9,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
-from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, free_estimates, sized, weighted_estimates
 from cpfls_cli.gap.naming.results import Estimate
@@ -59,10 +58,11 @@ class Refusal(NamedTuple):
 
 
 def fitted(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array, settings: GapSettings) -> Fitted:
-    """Fit effects together within their bounds."""
-    hypothesis = system(flights, chosen)
-    block = block_index(hypothesis, settings)
-    return Fitted(hypothesis, block, weighted_estimates(hypothesis, floor, block))
+    """Fit effects together within their bounds, shapes and all."""
+    start = system(flights, chosen)
+    block = block_index(start, settings)
+    hypothesis, estimates = weighted_estimates(start, floor, block)
+    return Fitted(hypothesis, block, estimates)
 
 
 def earned(
@@ -84,7 +84,7 @@ def earned(
             out, refusal = refused
             refusals.append(refusal)
         kept = [candidate for candidate in found.hypothesis.chosen if candidate not in out]
-        found = fitted(flights, refined(flights, kept, floor).chosen if kept else (), floor, settings)
+        found = fitted(flights, kept, floor, settings)
     return found, refusals
 
 
@@ -171,10 +171,8 @@ def _lesser(found: Fitted, floor: Array, *pair: int) -> tuple[list[Candidate], R
     left = {}
     for index in pair:
         others = [candidate for position, candidate in enumerate(chosen) if position != index]
-        without = system(found.hypothesis.flights, others)
-        block = found.block
-        linear = weighted_estimates(without, floor, block).linear
-        left[index] = float((((without.residual - without.base @ linear) / floor) ** 2).sum())
+        without, estimates = weighted_estimates(system(found.hypothesis.flights, others), floor, found.block)
+        left[index] = float((((without.residual - without.base @ estimates.linear) / floor) ** 2).sum())
     out = min(left, key=lambda index: left[index])
     other = next(index for index in pair if index != out)
     names = chosen[out].effect.name, chosen[other].effect.name

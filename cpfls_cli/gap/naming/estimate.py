@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free
-from cpfls_cli.gap.balance.refine import fit, fit_within_bounds, free_shapes, shape_columns
+from cpfls_cli.gap.balance.refine import fit, fit_within_bounds, free_shapes, refitted, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -91,16 +91,23 @@ def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array
     return Estimates(linear, tuple(by_effect), parameters, tuple(linear_by_effect))
 
 
-def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
-    """Fit with the floors as weights, then with the larger of floor and residual.
+def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> tuple[System, Estimates]:
+    """Fit with the floors as weights, then, shapes and all, with the larger of floor and residual.
 
     Parameters
     ----------
     hypothesis : System
     floor : array, shape (6,)
     block : array of int, shape (window,)
+
+    Returns
+    -------
+    hypothesis : System
+        With the shapes that fit best beside one another.
+    estimates : Estimates
     """
-    return estimates(hypothesis, _weight(hypothesis, floor), block)
+    there = refitted(hypothesis, _weight(hypothesis, floor))
+    return there, estimates(there, _weight(there, floor), block)
 
 
 def free_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:

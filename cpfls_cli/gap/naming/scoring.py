@@ -108,7 +108,7 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
     first = hypothesis.base.shape[2] + moving.shape[2]
     base = np.arange(first)
     for candidate in candidates:
-        columns = primary(candidate, hypothesis.columns(candidate))
+        columns = hypothesis.columns(candidate)
         parts.append(columns)
         indices = np.arange(first, first + columns.shape[2])
         placed.append(PlacedCandidate(candidate, indices, _weight(hypothesis, candidate)))
@@ -125,22 +125,6 @@ def layout(hypothesis: System, candidates: Sequence[Candidate], floor: Array) ->
 
 def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
     return next(shape.grid for shape in candidate.effect.shapes if shape.name == name)
-
-
-def primary(candidate: Candidate, columns: Array) -> Array:
-    """Drop the columns of secondary coefficients.
-
-    Parameters
-    ----------
-    candidate : Candidate
-    columns : array, shape (window, 6, coefficient)
-
-    Returns
-    -------
-    array, shape (window, 6, coefficient)
-    """
-    secondary = np.array([coefficient.secondary for coefficient in candidate.effect.coefficients], dtype=bool)
-    return columns[..., ~secondary] if secondary.any() and len(secondary) == columns.shape[2] else columns
 
 
 def score(arranged: Layout, normal: Folds, hypothesis: System) -> list[Scored]:
@@ -259,7 +243,7 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
         False where one lies beyond another bound.
     """
     keep = np.ones(len(linear), dtype=bool)
-    listed = [each for each in effect.coefficients if len(linear) == len(effect.coefficients) or not each.secondary]
+    listed = effect.coefficients
     if effect.physical is not None:
         ends = np.array([effect.physical(linear + way * _ERRORS * error) for way in (-1, 1)])
         physical = effect.physical(linear)
@@ -292,7 +276,7 @@ def information(effect: Effect, columns: int, vehicle: VehicleSettings) -> Array
     array, shape (coefficient,)
         One over the variance; 0 where the physical coefficients are not linear.
     """
-    listed = [each for each in effect.coefficients if columns == len(effect.coefficients) or not each.secondary]
+    listed = effect.coefficients
     if effect.physical is not None or len(listed) != columns:
         return np.zeros(columns)
     return np.array([1.0 / max(abs(bound) for bound in each.bounds(vehicle)) ** 2 for each in listed])

@@ -144,7 +144,7 @@ def _delay(signals: Signals, part: slice, windows: Windows) -> float | None:
     if windows.count(len(time)) < _FEWEST_WINDOWS:
         return None
     delays = np.linspace(-_LONGEST_S, _LONGEST_S, _STEPS)
-    air = signals.air_velocity[part] if "velocity" in signals.available else np.zeros((len(time), 0))
+    air = signals.ground_velocity[part] if "velocity" in signals.available else np.zeros((len(time), 0))
     columns = (windows.derivative(rate), windows.average(rate), windows.average(air))
     explained = np.array([_explained(windows.average(shifted(torque[part], time, -each)), *columns) for each in delays])
     best = int(np.argmax(explained))

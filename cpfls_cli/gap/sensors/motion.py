@@ -211,7 +211,7 @@ def _in_body(name: str, signals: Signals, windows: Windows) -> tuple[Array, Arra
     values = _READ[name](signals)
     assert values is not None, "looked at before"
     if name == "velocity":
-        speed = signals.air_velocity
+        speed = signals.ground_velocity
         held = np.cross(signals.body_rate, speed) + signals.vehicle.gravity_m_s2 * signals.rotation[:, 2]
         return windows.derivative(speed) + windows.average(held), None
     if name == "acceleration":

@@ -8,9 +8,11 @@ import pytest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.naming.earned import fitted
 from cpfls_cli.gap.naming.estimate import estimates
-from cpfls_cli.gap.naming.search import block_index
+from cpfls_cli.gap.naming.search import best_floor, block_index, forward_selection
 from cpfls_cli.gap.settings import GapSettings
+from tests.builders.closed_loop_flights import flown, signals_of
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
 SETTINGS = GapSettings()
@@ -22,6 +24,17 @@ TRUTH = [(candidate("com_offset"), OFFSET), (candidate("linear_damping"), DAMPIN
 def estimated(signals, chosen):
     hypothesis = system([weak(each) for each in signals], chosen)
     return estimates(hypothesis, WEIGHT, block_index(hypothesis, SETTINGS))
+
+
+def refit(signals, chosen, **given):
+    """All named effects together, from a start that need not be near."""
+    flights = [weak(each, **given) for each in signals]
+    return fitted(flights, chosen, best_floor(system(flights, chosen)), SETTINGS)
+
+
+def numbers_of(found):
+    pairs = zip(found.hypothesis.chosen, found.estimates.effects, strict=True)
+    return {one.effect.name: {number.name: number.value for number in numbers} for one, numbers in pairs}
 
 
 def noisy(signals, rng, gyro=0.005, rotor=1.0):
@@ -136,3 +149,73 @@ def test_a_log_with_reversed_yaw_is_told_and_not_built_into_the_model():
     assert numbers["inertia_z"].impossible
     assert not numbers["inertia_x"].impossible
     assert found.linear[2] == pytest.approx(-0.9)
+
+
+def test_a_lag_moves_when_a_damping_comes_beside_it():
+    """Alone the lag takes what the damping does; a shape that stays there would halve it."""
+    flight = signals_of(flown(8.0, effects={"motor_lag": [0.05], "linear_damping": [0.1, 0.1, 0.05]}))
+    found = refit([flight], [candidate("motor_lag", time_constant_s=0.04), candidate("linear_damping")], force=True)
+    numbers = numbers_of(found)
+    assert numbers["motor_lag"]["time_constant_s"] == pytest.approx(0.05, rel=0.01)
+    np.testing.assert_allclose(list(numbers["linear_damping"].values()), [0.1, 0.1, 0.05], rtol=0.05)
+
+
+AIR = {
+    "wind": [1.5e-3, 4.0, -3.0],
+    "inflow": [2e-3],
+    "parasitic_drag": {"c_x": 0.05, "c_y": 0.04, "c_z": 0.06, "cr_z": -0.002},
+}
+
+
+def test_wind_blows_on_all_that_the_air_acts_on():
+    """Rotor drag, inflow and fuselage in one wind: with still air for the last two, floors of a gap stay."""
+    chosen = [candidate(name) for name in AIR]
+    noise = {"body_rate": 0.002, "velocity": 0.01, "acceleration": 0.02, "rotor_speed": 0.3}
+    flight = signals_of(flown(8.0, noise=noise, effects=AIR))
+    found = refit([flight], chosen, force=True)
+    for effect, numbers in zip(AIR.values(), found.estimates.effects, strict=True):
+        true = effect if isinstance(effect, dict) else {n.name: v for n, v in zip(numbers, effect, strict=True)}
+        for number in numbers:
+            # Twice the half width is nearly four standard errors.
+            assert abs(number.value - true.get(number.name, 0.0)) < number.high - number.low
+    wind = numbers_of(found)["wind"]
+    assert (wind["W_x"], wind["W_y"]) == (pytest.approx(4.0, rel=0.05), pytest.approx(-3.0, rel=0.05))
+    there = found.hypothesis
+    floor = best_floor(there)
+    still = system(there.flights, chosen)
+    left = still.residual - still.base @ fit(still, floor), there.residual - there.base @ found.estimates.linear
+    before, after = (np.sqrt(np.mean((each / floor) ** 2, axis=0)).max() for each in left)
+    assert after < 1.5 < before
+
+
+def test_the_height_of_the_centre_of_mass_is_no_flapping():
+    """An offset to all sides, with a drag that has a lever by it: nothing is left for a moment of the hubs."""
+    offset = {"c_x": 0.004, "c_y": -0.003, "c_z": 0.01}
+    noise = {"body_rate": 0.001, "velocity": 0.01, "acceleration": 0.02, "rotor_speed": 0.3}
+    flight = signals_of(flown(8.0, noise=noise, effects={"com_offset": offset, "rotor_drag": [1.5e-3]}))
+    flights, names = [weak(flight, force=True)], ("rotor_drag", "com_offset", "flapping_moment")
+    chosen, _ = forward_selection(flights, [CATALOGUE[name] for name in names], SETTINGS, np.random.default_rng(0))
+    numbers = numbers_of(fitted(flights, chosen, best_floor(system(flights, chosen)), SETTINGS))
+    assert numbers.keys() == {"rotor_drag", "com_offset"}
+    assert numbers["com_offset"] == pytest.approx(offset, rel=0.1)
+
+
+def test_noise_of_the_height_does_not_weaken_the_ground():
+    """The thrust is curved in the height: on a noisy one its mean is more than that of the height itself."""
+    rng = np.random.default_rng(5)
+    flight = fly(1)
+    turn = 2 * np.pi * 0.3
+    position, velocity = flight.position.copy(), flight.velocity.copy()
+    position[:, 2] = 0.3 + 0.15 * np.sin(turn * flight.time)
+    velocity[:, 2] = 0.15 * turn * np.cos(turn * flight.time)
+    low = replace(flight, position=position, velocity=velocity)
+    ground = candidate("ground_effect", G=3.0)
+    pull = ground.effect.columns(low, ground.shape).direct[:, 3:, 0] / low.vehicle.mass_kg
+    felt = replace(low, specific_force=low.specific_force + pull)
+    noise = {name: getattr(felt, name) + size * rng.standard_normal((len(felt), 3)) for name, size in NOISE.items()}
+    found = refit([replace(felt, **noise)], [ground], force=True).estimates.effects[0][0]
+    assert found.low < 3.0 < found.high
+    assert found.value == pytest.approx(3.0, rel=0.02)
+
+
+NOISE = {"position": 0.05, "velocity": 0.05, "specific_force": 0.05}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.balance.windows import Recording
@@ -35,7 +35,7 @@ EFFECTS = {
 def model_of(asked):
     """The true model of a simulated flight."""
     flying = simulated_effects(asked, VEHICLE).listed
-    fitted = [FittedEffect(Candidate(CATALOGUE[one.effect.name], one.shape), np.asarray(one.linear)) for one in flying]
+    fitted = [FittedEffect(Candidate(one.effect, one.shape), np.asarray(one.linear)) for one in flying]
     return ExtendedModel(None, np.zeros(len(PARAMETERS)), tuple(fitted))
 
 

@@ -39,9 +39,10 @@ def test_coefficients_without_a_value_are_zero():
     }
 
 
-def test_wind_becomes_drag_times_wind():
+def test_wind_is_air_that_moves():
     (one,) = simulated_effects({"wind": [1e-3, 3.0, -2.0]}, VEHICLE).listed
-    np.testing.assert_allclose(one.linear, [1e-3, 3e-3, -2e-3])
+    np.testing.assert_allclose(one.linear, [1e-3])
+    assert one.shape == {"W_x": 3.0, "W_y": -2.0}
 
 
 @pytest.mark.parametrize(
