@@ -13,6 +13,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted, on_bound
+from cpfls_cli.gap.naming.estimate import channel_weight, estimates
 from cpfls_cli.gap.naming.held_out import SEEN, HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.search import SearchStep, block_index
@@ -204,15 +205,17 @@ def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tup
     hypothesis, unseen = first.found.hypothesis, first.held_out
     if min(unseen.shares().values()) >= settings.named_share:
         return ()
-    own = fitted(judge.repaired, hypothesis.chosen, unseen.floor, settings)
-    after = own.hypothesis.residual - own.hypothesis.base @ own.estimates.linear
+    # Shapes are held: a load that swings from another start would ask for another cable, and is the same load.
+    refit = system(judge.repaired, hypothesis.chosen)
+    own = estimates(refit, channel_weight(refit, unseen.floor), block_index(refit, settings))
+    after = refit.residual - refit.base @ own.linear
     before = unseen.parameters
     if share_removed(before / unseen.noise, after / unseen.noise, unseen.known) < settings.named_share:
         return ()
     if _size(after * unseen.known, unseen.floor).max() > CLEAR:
         return ()
     sentences = []
-    for there, here in zip(first.found.estimates.effects, own.estimates.effects, strict=True):
+    for there, here in zip(first.found.estimates.effects, own.effects, strict=True):
         for number, other in zip(there, here, strict=False):
             apart = number.name == other.name and (number.high < other.low or other.high < number.low)
             if apart:

@@ -106,8 +106,8 @@ def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> tup
         With the shapes that fit best beside one another.
     estimates : Estimates
     """
-    there = refitted(hypothesis, _weight(hypothesis, floor))
-    return there, estimates(there, _weight(there, floor), block)
+    there = refitted(hypothesis, channel_weight(hypothesis, floor))
+    return there, estimates(there, channel_weight(there, floor), block)
 
 
 def free_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimates:
@@ -119,12 +119,13 @@ def free_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimat
     floor : array, shape (6,)
     block : array of int, shape (window,)
     """
-    weight = _weight(hypothesis, floor)
+    weight = channel_weight(hypothesis, floor)
     linear = fit(hypothesis, weight)
     return _estimated(hypothesis, weight, block, linear, np.zeros(len(linear), dtype=bool))
 
 
-def _weight(hypothesis: System, floor: Array) -> Array:
+def channel_weight(hypothesis: System, floor: Array) -> Array:
+    """Take the larger of floor and residual of each channel, shape (6,)."""
     residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
     return np.asarray(np.maximum(floor, np.sqrt(np.mean(residual**2, axis=0))))
 
