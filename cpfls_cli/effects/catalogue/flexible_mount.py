@@ -55,7 +55,7 @@ def _share(axis: str) -> Coefficient:
 EFFECT = Effect(
     name="flexible_mount",
     order=225,
-    title="flexible mount, a part of the vehicle on springs",
+    title="a part of the vehicle on springs",
     kind="wrench",
     formula="M = d/dt (share I s^2/(s^2 + 2 zeta W s + W^2) omega), W = 2 pi f, for each axis",
     sentence="A part of the vehicle swings on springs: what turns fast turns without it.",
