@@ -99,9 +99,9 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
     floor : array, shape (6,)
     """
     chosen = found.hypothesis.chosen
-    for candidate, numbers in zip(chosen, found.estimates.effects, strict=True):
+    for candidate, estimates in zip(chosen, found.estimates.effects, strict=True):
         names = [shape.name for shape in candidate.effect.shapes]
-        if len(names) > 1 and _reached(numbers).keys() >= {*names}:
+        if len(names) > 1 and _reached(estimates).keys() >= {*names}:
             says = f"{' and '.join(names)} sit on the bounds of what is possible"
             return [candidate], Refusal(candidate.effect.name, says)
     reached = {
