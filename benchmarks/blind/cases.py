@@ -90,7 +90,13 @@ def make(name, group, vehicle, effects, rng, level=None, **options):
     )
 
 
-NAMES = {"drag_factor": "parameter_error"}
+NAMES = {
+    "drag_factor": "parameter_error",
+    "flexible_arm": "flexible_mount",
+    "notch_filter": "notch_filter",
+    "rotor_interference": "own_wake",
+    "wake_on_body": "own_wake",
+}
 """Names that the catalogue has for what is hidden under another; what it takes in of ``OUTSIDE`` gets a line here."""
 
 NEAREST = {

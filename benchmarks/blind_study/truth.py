@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.blind.cases import NAMES
 from benchmarks.blind.plant import USUAL_LAG
 from benchmarks.blind.vehicles import VEHICLES
 
@@ -30,7 +31,7 @@ def coefficients(key):
         By effect, then by coefficient.
     """
     hidden, vehicle = key["hidden"], VEHICLES[key["vehicle"]]
-    known = {name: _OF[name](values, vehicle) for name, values in hidden.items() if name in _OF}
+    known = {NAMES.get(name, name): _OF[name](values, vehicle) for name, values in hidden.items() if name in _OF}
     # The rotors always lag; a log without their speeds shows it.
     if "motor_lag" in key["truth"]:
         lag = hidden.get("motor_lag", {}).get("time_constant", USUAL_LAG)
@@ -77,6 +78,10 @@ def _mismatch(hidden, vehicle):
     return {"difference_1": pairs[0], "difference_2": pairs[1], "drag_imbalance": -lift, "lift_imbalance": lift}
 
 
+def _spring(hidden, _vehicle):
+    return _axes("share", [hidden["share"]] * 3) | {"frequency_hz": hidden["frequency"], "damping": hidden["damping"]}
+
+
 def _payload(hidden, _vehicle):
     mass, (x, y, z) = hidden["mass"], hidden["point"]
     hook = {"mass_times_depth": -mass * z, "mass_times_right": -mass * y, "mass_times_behind": -mass * x}
@@ -108,6 +113,7 @@ _OF = {
     "rotor_gyroscopic": lambda h, _: {"J_r": h["inertia"]},
     "rotor_acceleration": lambda h, _: {"J_r": h["inertia"]},
     "command_delay": lambda h, _: {"delay_s": h["delay"] + _HELD},
+    "notch_filter": lambda h, _: {"frequency_hz": h["frequency"], "width": h["width"]},
     # Thrust goes with the square of the speed.
     "battery_sag": lambda h, _: {"exponent": 2 * h["exponent"]},
     "com_offset": lambda h, _: _axes("c", h["offset"][:2]),
@@ -115,6 +121,7 @@ _OF = {
     "rotor_mismatch": _mismatch,
     "torque_bias": lambda h, _: _axes("M", h["torque"]),
     "payload": _payload,
+    "flexible_arm": _spring,
     "gyro_bias": lambda h, _: _axes("b", h["bias"]),
     "gyro_scale": lambda h, _: _axes("e", h["scale"]),
     "imu_misalignment": lambda h, _: _axes("delta", h["rotation"]),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from math import exp
+from dataclasses import dataclass, replace
+from math import exp, pi, tan
 
 import numpy as np
 from scipy import signal
@@ -15,6 +15,9 @@ from cpfls_cli.effects.signals import Signals
 
 _NODES = 8
 """Of the quadrature over a sample, exact for any lag that is not much shorter than one."""
+
+_HIGHEST = 0.45
+"""Frequency of a filter over that of the sampling, above which it is taken to be there."""
 
 
 def lagged(values: Array, period: float, time_constant: float) -> Array:
@@ -46,6 +49,45 @@ def lagged(values: Array, period: float, time_constant: float) -> Array:
     driven = np.sum([tap * extended[first : len(values) - 1 + first] for first, tap in enumerate(taps)], axis=0)
     rest = signal.lfilter([1.0], [1.0, -decay], driven, axis=0, zi=decay * values[:1])[0]
     return np.concatenate([values[:1], rest])
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """A filter ``(a s^2 + b w s + c w^2) / (s^2 + 2 zeta w s + w^2)``, by the bilinear transform with w kept.
+
+    Attributes
+    ----------
+    over, under : array, shape (3,)
+        Coefficients of the samples put in and given out, the newest first.
+    """
+
+    over: Array
+    under: Array
+
+    @classmethod
+    def of(cls, frequency: float, damping: float, period: float, upper: tuple[float, float, float]) -> SecondOrder:
+        """Make a filter of its natural frequency in Hz, zeta, the sampling period in s, and (a, b, c)."""
+        # Time in units of 1 / w, so that s becomes (1 - 1/z) / (1 + 1/z) over this.
+        half = tan(pi * min(frequency * period, _HIGHEST))
+        square, line, one = np.array([1.0, -2.0, 1.0]), half * np.array([1.0, 0.0, -1.0]), np.array([1.0, 2.0, 1.0])
+        over, under = (
+            most * square + middle * line + least * half**2 * one
+            for most, middle, least in (upper, (1.0, 2 * damping, 1.0))
+        )
+        return cls(over / under[0], under / under[0])
+
+    def settled(self, value: Array) -> Array:
+        """Give the state after a long time at a value, shape (2, ...)."""
+        return signal.lfilter_zi(self.over, self.under).reshape(2, *[1] * np.ndim(value)) * value
+
+    def step(self, value: Array, state: Array) -> tuple[Array, Array]:
+        """Filter one sample; give it and the next state."""
+        passed, later = signal.lfilter(self.over, self.under, value[None], axis=0, zi=state)
+        return passed[0], later
+
+    def along(self, values: Array) -> Array:
+        """Filter signals that were settled before, shape (time, ...)."""
+        return np.asarray(signal.lfilter(self.over, self.under, values, axis=0, zi=self.settled(values[0]))[0])
 
 
 def delayed(values: Array, time: Array, delay: float) -> Array:

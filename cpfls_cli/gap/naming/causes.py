@@ -18,7 +18,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import SearchStep, alternatives, rank_effects
+from cpfls_cli.gap.naming.search import SearchStep, alternatives, rank_effects, settled
 from cpfls_cli.gap.sensors.findings import AuditFinding
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -79,17 +79,18 @@ def judge_effect(
     others = [other for other in chosen if other is not candidate]
     step = rank_effects(flights, others, effects, settings, rng, also=(candidate,))
     scored = next(scored for scored in step.ranking if scored.candidate.effect.name == candidate.effect.name)
+    own, *ranking = settled(flights, chosen, index, step)
     effect = NamedEffect(
         candidate.effect.name,
         candidate,
         estimates.of_effect[index],
         estimates.effects[index],
-        step.p_value(scored.gain),
+        step.p_value(own.gain),
         share,
         _frequency(scored, step),
         effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
     )
-    return JudgedEffect(effect, tuple(alternatives(scored, step.ranking, step.above_floor)))
+    return JudgedEffect(effect, tuple(alternatives(own, ranking, step.above_floor)))
 
 
 def _frequency(chosen: Scored, step: SearchStep) -> float:

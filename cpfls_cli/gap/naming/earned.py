@@ -99,6 +99,11 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
     floor : array, shape (6,)
     """
     chosen = found.hypothesis.chosen
+    for candidate, estimates in zip(chosen, found.estimates.effects, strict=True):
+        names = [shape.name for shape in candidate.effect.shapes]
+        if len(names) > 1 and _reached(estimates).keys() >= {*names}:
+            says = f"{' and '.join(names)} sit on the bounds of what is possible"
+            return [candidate], Refusal(candidate.effect.name, says)
     reached = {
         index: own
         for index, candidate in enumerate(chosen)

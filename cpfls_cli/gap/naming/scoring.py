@@ -253,7 +253,8 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
     low, high = np.array([each.bounds(vehicle) for each in listed]).T
     at_zero = ((linear < low) & (low == 0)) | ((linear > high) & (high == 0))
     beyond = (linear + _ERRORS * error < low) | (linear - _ERRORS * error > high)
-    if effect.lever is not None and len(linear) == len(effect.coefficients):
+    # What is taken out changes the others first: a lever is judged in the round after.
+    if effect.lever is not None and len(linear) == len(effect.coefficients) and not at_zero.any():
         at_zero |= ~effect.lever(np.where(at_zero, 0.0, linear), error, vehicle)
     return ~at_zero, bool(not np.any(beyond & ~at_zero))
 

@@ -11,7 +11,7 @@ from scipy.stats import gumbel_r, wilcoxon
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
-from cpfls_cli.gap.balance.refine import fit, refined
+from cpfls_cli.gap.balance.refine import fit, refined, weighted_residual
 from cpfls_cli.gap.balance.resampling import blocks_of, mirror_shifted
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.results import Alternative
@@ -53,6 +53,7 @@ class SearchStep:
         What the best candidate explains of shifted residuals.
     above_floor : float
         Sum of squares that the hypothesis leaves above the floor, in squared floors.
+    block : array of int, shape (window,)
     """
 
     hypothesis: System
@@ -60,7 +61,7 @@ class SearchStep:
     ranking: tuple[Scored, ...]
     chance: Array
     above_floor: float
-    block_before: Array
+    block: IntArray
 
     def p_value(self, gain: float) -> float:
         """Compute the probability that chance explains as much, over the whole catalogue.
@@ -116,7 +117,7 @@ def rank_effects(
         ranking,
         _chance(arranged, residual, hypothesis, floor, block, settings, rng),
         float(max(before.sum() - _rows(hypothesis), 1e-9)),
-        before,
+        block,
     )
 
 
@@ -213,9 +214,12 @@ def exchanged(
         others = [other for other in kept if other is not candidate]
         step = rank_effects(flights, others, effects, settings, None, also=(candidate,))
         scored = next((each for each in step.ranking if each.candidate.effect.name == candidate.effect.name), None)
-        if scored is None or scored.gain < _LEAST_SHARE * step.above_floor:
-            kept = others
-            continue
+        small = scored is None or scored.gain < _LEAST_SHARE * step.above_floor
+        if scored is None or small or len(_late(others)) > 1:
+            without = _do_without(flights, others, kept, step.floor)
+            kept = kept if without is None else without
+            if scored is None or small or without is not None:
+                continue
         best = step.ranking[0]
         worse = best.candidate.effect.name != candidate.effect.name and scored not in unbeaten(
             best, step.ranking, step.above_floor
@@ -225,6 +229,28 @@ def exchanged(
         if better is not candidate:
             kept = list(refined(flights, [*others, better], step.floor).chosen)
     return tuple(kept)
+
+
+def _late(chosen: Sequence[Candidate]) -> list[Candidate]:
+    """List the effects between command and rotors: two of them, with other shapes, can do what a third does."""
+    return [candidate for candidate in chosen if candidate.effect.actuation is not None]
+
+
+def _do_without(
+    flights: Sequence[WeakFlight], others: list[Candidate], kept: Sequence[Candidate], floor: Array
+) -> list[Candidate] | None:
+    """Refine effects without one of them, if they then explain as much; None if they do not.
+
+    The derivatives by the shapes promise more, or less, where the shapes have to move far.
+    """
+    if not any(candidate.effect.shapes for candidate in others):
+        return others
+    plain, without = system(flights), refined(flights, others, floor)
+    left, before = (
+        float((weighted_residual(there, floor, plain.rotor_wrench) ** 2).sum())
+        for there in (without, system(flights, kept))
+    )
+    return list(without.chosen) if left - before < _LEAST_SHARE * max(left - _rows(plain), 0.0) else None
 
 
 def best_floor(hypothesis: System) -> Array:
@@ -321,6 +347,51 @@ def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) 
         for scored in unbeaten(chosen, ranking, above_floor)
         if effect.name not in (other := scored.candidate.effect).holds
     ]
+
+
+def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: SearchStep) -> list[Scored]:
+    """Score an effect between command and rotors and its like beside another one, once all shapes have moved.
+
+    There a point of a grid is no test: where a lag stands for a delay, the width of a notch moves with it.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    index : int
+        Of the effect among them.
+    step : SearchStep
+        The look at the others without it.
+
+    Returns
+    -------
+    list of Scored
+        The effect, then its like, then all else as ranked; the ranking where nothing has to move.
+    """
+    others = [other for place, other in enumerate(chosen) if place != index]
+    ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != chosen[index].effect.name)
+    if not (_late([chosen[index]]) and _late(others)):
+        return ranked
+    names = {each.effect.name for each in chosen}
+    tried = [scored.candidate for scored in step.ranking if np.isfinite(scored.gain)]
+    return [
+        _rescored(system(flights, [*others, chosen[index]]), step),
+        *(
+            _rescored(refined(flights, [*others, rival], step.floor), step)
+            for rival in _late(tried)
+            if rival.effect.name not in names
+        ),
+        *(scored for scored in ranked if not _late([scored.candidate])),
+    ]
+
+
+def _rescored(refitted: System, step: SearchStep) -> Scored:
+    """Score the last effect of a hypothesis by what that leaves of each block."""
+    plain = system(refitted.flights)
+    square = weighted_residual(refitted, step.floor, plain.rotor_wrench) ** 2
+    error = np.bincount(step.block, square.sum(axis=1)).astype(float)
+    gain = step.above_floor + _rows(plain) - error.sum()
+    return Scored(refitted.chosen[-1], np.zeros(0, dtype=int), float(gain), error, np.zeros(0))
 
 
 def _beats(chosen: Scored, other: Scored, above_floor: float) -> bool:

@@ -60,6 +60,14 @@ def test_a_moment_of_a_drag_needs_its_force():
     assert np.abs(free[-3:]).max() > 5 * np.abs(linear[-3:]).max()
 
 
+def test_springs_of_no_frequency_of_their_own_are_no_name():
+    own = candidate("flexible_mount", frequency_hz=1.2, damping=0.3)
+    known = flights((own, [0.1, 0.1, 0.0]))
+    found, refusals = earned(known, [own], best_floor(system(known, [own])), SETTINGS)
+    assert kept(found) == []
+    assert "frequency_hz and damping sit on the bounds" in refusals[0].sentence
+
+
 def test_what_is_impossible_takes_nothing_from_what_is_possible(monkeypatch):
     """The search goes on without it, and finds what it took the place of."""
     narrow = replace(CATALOGUE["rotor_drag"].coefficients[0], high=1e-4, scale=None)

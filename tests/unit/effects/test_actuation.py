@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.actuation import delayed, lagged
+from cpfls_cli.effects.actuation import SecondOrder, delayed, lagged
+from cpfls_cli.effects.hooks import RotorMotion
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.vehicle.rotors import body_wrench
 
@@ -56,6 +57,26 @@ def test_stated_torque_lags_where_rotor_speeds_are_not_logged(columns, flight):
     assert not found[:, 3:].any()
 
 
+@pytest.mark.parametrize("upper", [(1.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.5, 2.0)])
+@pytest.mark.parametrize("frequency", [0.0, 1.0, 3.0, 9.0])
+def test_filter_answers_a_wave_as_its_formula_says(upper, frequency):
+    natural, damping, period = 3.0, 0.2, 0.002
+    time = period * np.arange(5000)
+    s = 1j * frequency / natural
+    gain = np.polyval(upper, s) / np.polyval((1.0, 2 * damping, 1.0), s)
+    wave = np.exp(2j * np.pi * frequency * time)
+    found = SecondOrder.of(natural, damping, period, upper).along(wave)
+    np.testing.assert_allclose(found[-500:], gain * wave[-500:], atol=2e-3)
+
+
+def test_notch_passes_rotors_step_by_step_as_along_a_flight(commanded):
+    notch, shape = CATALOGUE["notch_filter"], {"frequency_hz": 4.0, "width": 0.7}
+    link = notch.actuation.link(shape, commanded.period)
+    passed = [link(RotorMotion(speed, 0 * speed)) for speed in commanded.speed]
+    np.testing.assert_allclose([one.speed for one in passed], notch.apply(commanded, shape).speed, rtol=1e-12)
+    assert not np.any([one.acceleration for one in passed])
+
+
 def test_battery_takes_the_same_share_of_thrust_and_torque(columns, commanded):
     found = columns("battery_sag", commanded, exponent=1.5).direct[..., 0]
     np.testing.assert_allclose(found, (commanded.voltage**1.5 - 1)[:, None] * commanded.wrench, atol=1e-9)
@@ -64,7 +85,7 @@ def test_battery_takes_the_same_share_of_thrust_and_torque(columns, commanded):
 def test_only_measured_rotors_can_be_late_and_only_commands_can_lag(flight, commanded):
     assert CATALOGUE["channel_delay"].missing(commanded) == ("measured_rotor_speed",)
     assert not CATALOGUE["channel_delay"].missing(flight)
-    for name in ("motor_lag", "command_delay"):
+    for name in ("motor_lag", "command_delay", "notch_filter"):
         assert CATALOGUE[name].missing(flight) == ("command",)
         assert not CATALOGUE[name].missing(commanded)
 
@@ -79,7 +100,7 @@ def test_sag_is_looked_for_in_any_rotor_speeds_with_a_voltage(flight, commanded)
 def test_what_is_applied_before_other_columns_is_what_its_column_says(columns, flight, commanded):
     """The search exchanges the actuation instead of subtracting a column; both must mean the same."""
     actuators = [entry for entry in CATALOGUE.values() if entry.kind == "actuator"]
-    others = {"motor_lag", "command_delay", "battery_sag", "channel_delay"}
+    others = {"motor_lag", "notch_filter", "command_delay", "battery_sag", "channel_delay"}
     assert {entry.name for entry in actuators} == {*others, "drag_factor_error"}
     for entry in actuators:
         known = flight if entry.name == "channel_delay" else commanded

@@ -19,6 +19,11 @@ USUAL = {
     ("rotor_plane_damping", "k_w"): ((0.02 / 1392, 0.1 / 1392), (1e-6 / 7156, 1e-6 / 7156)),
     ("rotor_drag", "k_d"): ((0.8e-3, 2.4e-3), (1e-6, 0.0147 / 7156)),
     ("flapping_moment", "k_f"): ((-2e-4, 2e-4), None),
+    ("own_wake", "c_F"): ((0.01, 0.15), (0.01, 0.15)),
+    ("own_wake", "c_M"): ((0.001, 0.03), (1e-4, 0.005)),
+    ("flexible_mount", "share_x"): ((0.05, 0.5), (0.05, 0.5)),
+    ("flexible_mount", "damping"): ((0.02, 0.3), (0.02, 0.3)),
+    ("notch_filter", "frequency_hz"): ((3.0, 10.0), None),
     ("rolling_moment", "mu"): ((1e-6, 1e-4), None),
     ("inflow", "k_z"): ((0.7e-3, 4e-3), (7.6e-7, 7.6e-7)),
     ("translational_lift", "k_h"): ((5e-3, 8e-2), (0.0, 0.0)),
@@ -110,7 +115,7 @@ def test_all_are_there_and_in_order():
     modules = {module.name for module in pkgutil.iter_modules(catalogue.__path__)}
     assert set(CATALOGUE) == modules
     assert list(CATALOGUE)[:2] == ["linear_damping", "quadratic_damping"]
-    assert list(CATALOGUE)[27] == "parameter_error"
+    assert list(CATALOGUE)[30] == "parameter_error"
 
 
 def test_an_unknown_name_gives_the_nearest():

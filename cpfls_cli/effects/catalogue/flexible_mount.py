@@ -1,0 +1,83 @@
+"""Flexible mount: a part of the vehicle turns on springs against the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.actuation import SecondOrder
+from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape
+from cpfls_cli.effects.hooks import Carrier, Pull
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+
+def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    swing = SecondOrder.of(shape["frequency_hz"], shape["damping"], signals.period, (1.0, 0.0, 0.0))
+    momentum = np.zeros((len(signals), 6, 3))
+    momentum[:, :3] = swing.along(signals.body_rate)[:, :, None] * np.diag(signals.vehicle.inertia_kg_m2[:3])
+    return Columns(np.zeros_like(momentum), momentum)
+
+
+@dataclass(frozen=True)
+class _Spring:
+    """The sprung part in the closed loop: its angles against the vehicle, and their rates.
+
+    ``x'' + 2 zeta w x' + w^2 x = -omega'`` with ``omega' = (a + share (2 zeta w x' + w^2 x)) / (1 - share)``, a being
+    the angular acceleration of the vehicle if it were stiff.
+    """
+
+    share: Array
+    natural: float
+    damping: float
+    start: Array = field(default_factory=lambda: np.zeros(6))
+
+    def pull(self, carrier: Carrier, state: Array) -> Pull:
+        """Turn the vehicle by what the springs give back."""
+        angle, rate = state[:3], state[3:]
+        spring = 2 * self.damping * self.natural * rate + self.natural**2 * angle
+        turning = (carrier.turning + self.share * spring) / (1 - self.share)
+        return Pull(np.zeros(3), turning - carrier.turning, np.concatenate([rate, -turning - spring]))
+
+
+def _carried(_vehicle: VehicleSettings, values: Mapping[str, float]) -> _Spring:
+    share = np.array([values.get(f"share_{axis}", 0.0) for axis in "xyz"])
+    return _Spring(share, 2 * np.pi * values["frequency_hz"], values["damping"])
+
+
+def _share(axis: str) -> Coefficient:
+    return Coefficient(f"share_{axis}", "1", 0.0, 0.8, f"share of the inertia about {axis} that is on springs")
+
+
+EFFECT = Effect(
+    name="flexible_mount",
+    order=225,
+    title="a part of the vehicle on springs",
+    kind="wrench",
+    formula="M = d/dt (share I s^2/(s^2 + 2 zeta W s + W^2) omega), W = 2 pi f, for each axis",
+    sentence="A part of the vehicle swings on springs: what turns fast turns without it.",
+    coefficients=tuple(_share(axis) for axis in "xyz"),
+    needs=frozenset({"body_rate", "torque"}),
+    excitation="roll and pitch sweeps through the resonance, from 0.5 to 8 Hz, then hands off for a second",
+    rivals={
+        "payload": "sweep roll and pitch from 1 to 8 Hz in hover: a load on a cable swings below 1 Hz only",
+        "parameter_error": "compare slow with fast torque: a wrong inertia acts in both",
+        "linear_damping": "sweep at two frequencies: damping grows with the rate, springs ring at their own frequency",
+    },
+    source="two bodies on a spring, e.g. Meirovitch, Elements of Vibration Analysis",
+    columns=_columns,
+    shapes=(
+        Shape(
+            "frequency_hz",
+            "Hz",
+            (1.2, 1.5, 1.9, 2.4, 3.0, 3.8, 4.8, 6.5),
+            "frequency with the rest held still",
+        ),
+        Shape("damping", "1", (0.02, 0.1, 0.3), "their damping ratio", first=0.1),
+    ),
+    rate_derivative=True,
+    carried=_carried,
+)

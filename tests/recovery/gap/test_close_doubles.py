@@ -1,0 +1,172 @@
+"""Effects that look alike come back under their own names, or as rivals of each other, from a simulator of its own.
+
+A body turns under torques that are sums of sines; what lies between command and rotors is the sines' own answer.
+"""
+
+import numpy as np
+import pytest
+
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.naming.search import alternatives, forward_selection, rank_effects, settled
+from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.vehicle.rotors import body_wrench, rotor_demand
+from tests.builders.gap_flights import INERTIA, PERIOD, VEHICLE, candidate, fly, weak
+
+SETTINGS = GapSettings(shifts=99)
+SECONDS = 24.0
+TIME = PERIOD * np.arange(round(SECONDS / PERIOD))
+THRUST = np.full(len(TIME), VEHICLE.mass_kg * 9.81)
+STILL = ("motor_lag", "command_delay", "notch_filter", "flexible_mount", "linear_damping", "products_of_inertia")
+ALIKE = (
+    "flapping_moment", "rotor_drag", "parasitic_drag", "translational_lift", "inflow", "com_offset", "torque_bias",
+    "payload", "own_wake",
+)  # fmt: skip
+
+
+def found(flights, names):
+    effects = [CATALOGUE[name] for name in names]
+    return forward_selection(flights, effects, SETTINGS, np.random.default_rng(0))[0]
+
+
+def shape_of(chosen, name):
+    return next(each.shape for each in chosen if each.effect.name == name)
+
+
+def names_of(chosen):
+    return {each.effect.name for each in chosen}
+
+
+class Waves:
+    """Torques as sums of sines about all axes, and what a filter makes of them."""
+
+    def __init__(self, seed, low=0.2, high=3.0):
+        rng = np.random.default_rng(seed)
+        self.turn = 2 * np.pi * rng.uniform(low, high, (12, 1))
+        self.size = rng.normal(size=(12, 3)) * [0.3, 0.3, 0.1] + 1j * rng.normal(size=(12, 3)) * [0.3, 0.3, 0.1]
+
+    def at(self, time, answer=lambda s: np.ones_like(s)):
+        """Evaluate at times, shape (time, 3), with the gain of a filter at each frequency."""
+        return (np.exp(1j * time[:, None] * self.turn.T) @ (answer(1j * self.turn) * self.size)).real
+
+
+def turned(torque, share=0.0, natural=1.0, damping=0.0):
+    """Integrate the rates of a body a share of whose inertia is on springs, by the classical Runge-Kutta method."""
+    moments = np.diag(INERTIA)
+
+    def rate(state, driven):
+        turning, angle, swing = state
+        stiff = (driven - np.cross(turning, turning @ INERTIA)) / moments
+        spring = natural**2 * angle + 2 * damping * natural * swing
+        spun = (stiff + share * spring) / (1 - share)
+        return np.array([spun, swing, -spun - spring])
+
+    state, rates = np.zeros((3, 3)), []
+    # Torques stand at every half step.
+    for start in range(0, len(torque) - 2, 2):
+        rates.append(state[0])
+        first = rate(state, torque[start])
+        second = rate(state + PERIOD / 2 * first, torque[start + 1])
+        third = rate(state + PERIOD / 2 * second, torque[start + 1])
+        fourth = rate(state + PERIOD * third, torque[start + 2])
+        state = state + PERIOD / 6 * (first + 2 * second + 2 * third + fourth)
+    return np.array(rates)
+
+
+HALVES = np.arange(2 * len(TIME) + 1) * PERIOD / 2
+
+
+def logged(rates, speed, seed, **known):
+    rng = np.random.default_rng(100 + seed)
+    return weak(
+        Signals(
+            time=TIME,
+            vehicle=VEHICLE,
+            body_rate=rates + 0.003 * rng.standard_normal(rates.shape),
+            rotor_speed=speed + 0.5 * rng.standard_normal(speed.shape),
+            **known,
+        )
+    )
+
+
+def on_springs(seed, **spring):
+    waves = Waves(seed)
+    speed = rotor_demand(VEHICLE, THRUST, waves.at(TIME)).speed
+    return logged(turned(waves.at(HALVES), **spring), speed, seed)
+
+
+def late(seed, answer):
+    """Log the command of rotors that answer it by a filter, in speed."""
+    waves = Waves(seed)
+    mix = rotor_demand(VEHICLE, THRUST[:1], np.zeros((1, 3))).speed[0]
+    lever = np.array([[0, 1, -1], [-1, 0, 1], [0, -1, -1], [1, 0, 1]]) * 8.0
+
+    def speed(time, own=lambda s: np.ones_like(s)):
+        return mix + waves.at(time, own) @ lever.T
+
+    torque = body_wrench(VEHICLE, speed(HALVES, answer)).body_torque
+    return logged(turned(torque), speed(TIME), seed, commanded=True)
+
+
+def lag(s):
+    return 1 / (1 + 0.05 * s)
+
+
+def notch(s, width=0.7, natural=2 * np.pi * 4.0):
+    return (s**2 + natural**2) / (s**2 + 2 * width * natural * s + natural**2)
+
+
+def test_a_part_on_springs_is_named_with_its_frequency_and_share():
+    spring = {"share": 0.3, "natural": 2 * np.pi * 2.65, "damping": 0.1}
+    chosen = found([on_springs(seed, **spring) for seed in (1, 2, 3)], STILL)
+    assert names_of(chosen) == {"flexible_mount"}
+    assert shape_of(chosen, "flexible_mount")["frequency_hz"] == pytest.approx(2.65, rel=0.02)
+    assert shape_of(chosen, "flexible_mount")["damping"] == pytest.approx(0.1, rel=0.1)
+
+
+def test_a_stiff_body_has_no_springs():
+    assert not found([on_springs(seed) for seed in (1, 2)], STILL)
+
+
+def test_a_notch_is_named_and_lag_and_delay_beside_it_are_rivals():
+    """Of lag and delay beside a notch the width of the notch takes what tells them apart."""
+    flights = [late(seed, lambda s: lag(s) * notch(s)) for seed in (1, 2)]
+    chosen = found(flights, STILL)
+    (beside,) = names_of(chosen) - {"notch_filter"}
+    assert beside in ("motor_lag", "command_delay")
+    assert shape_of(chosen, "notch_filter")["frequency_hz"] == pytest.approx(4.0, rel=0.1)
+    assert {"motor_lag", "command_delay"} - {beside} <= rivals_of(flights, chosen, beside)
+    assert not rivals_of(flights, chosen, "notch_filter")
+
+
+def rivals_of(flights, chosen, name):
+    index = [each.effect.name for each in chosen].index(name)
+    others = [each for each in chosen if each.effect.name != name]
+    effects = [CATALOGUE[each] for each in STILL]
+    step = rank_effects(flights, others, effects, SETTINGS, None, also=(chosen[index],))
+    own, *ranking = settled(flights, chosen, index, step)
+    assert own.candidate.effect.name == name
+    return {rival.name for rival in alternatives(own, ranking, step.above_floor)}
+
+
+def test_a_lag_and_a_delay_are_no_notch():
+    flights = [late(seed, lambda s: lag(s) * np.exp(-0.03 * s)) for seed in (1, 2)]
+    chosen = found(flights, STILL)
+    assert names_of(chosen) == {"motor_lag", "command_delay"}
+    assert "notch_filter" not in rivals_of(flights, chosen, "command_delay")
+
+
+@pytest.mark.parametrize(
+    ("name", "coefficients"),
+    [
+        ("own_wake", [0.05, 0.01, 0.01]),
+        ("flapping_moment", [-4e-5]),
+        ("flapping_moment", [4e-5]),
+        ("translational_lift", [0.03]),
+        ("com_offset", [0.004, -0.003]),
+    ],
+)
+def test_the_own_wake_and_its_neighbours_are_named_rightly(name, coefficients):
+    truth = (candidate(name), coefficients)
+    flights = [weak(fly(seed, (truth,), gyro=0.005, rotor=1.0), force=True) for seed in (1, 2)]
+    assert names_of(found(flights, ALIKE)) == {name}
