@@ -35,7 +35,7 @@ _PLAIN_WORDS = {
 }
 _OF_A_VEHICLE = ("mass_kg", "inertia_kg_m2", "rotors", "rotor_speed_max_rad_s")
 _OF_A_ROTOR = ("position_m", "spin", "thrust_factor_n_s2", "drag_factor_n_m_s2")
-_ROUNDING = 1 + 1e-6
+_MEASURED = 1.1
 Location = tuple[str, ...]
 
 
@@ -73,7 +73,7 @@ def _no_body(study: Study) -> Iterator[str]:
     It is a rule of configs alone: what is found in noisy flights may break it, and is told as what it is.
     """
     smallest, middle, largest = np.linalg.eigvalsh(symmetric(study.vehicle.inertia_kg_m2))
-    if largest > (smallest + middle) * _ROUNDING:
+    if largest > (smallest + middle) * _MEASURED:
         yield (
             f"vehicle.inertia_kg_m2 = {json.dumps(study.vehicle.inertia_kg_m2)}: no body has this inertia, its largest "
             f"principal moment {largest:.4g} is more than the other two together, {smallest + middle:.4g}; look at the "

@@ -186,8 +186,8 @@ def weighted_residual(hypothesis: System, floor: Array, rotor_wrench: Array) -> 
 def refitted(hypothesis: System, weight: Array) -> System:
     """Move the shapes of all effects, together with all coefficients, to their least squares by Gauss-Newton steps.
 
-    The last fit of a hypothesis that is believed: it knows no share of the torque that motion does not follow, and
-    stands where the same linear system that gives the intervals asks for no further step.
+    The last fit of a hypothesis that is believed: it stands where the same linear system that gives the intervals asks
+    for no further step. As in the search, less torque with less inertia explains nothing (`compensation`).
 
     Parameters
     ----------
@@ -198,12 +198,13 @@ def refitted(hypothesis: System, weight: Array) -> System:
     hypothesis = _exact(hypothesis, weight)
     if not free_shapes(hypothesis):
         return hypothesis
-    error = _squares(hypothesis, weight)
+    rotor_wrench = system(hypothesis.flights).rotor_wrench
+    error = _squares(hypothesis, weight, rotor_wrench)
     for _ in range(_STEPS):
-        step = _newton_step(hypothesis, weight)
+        step = _newton_step(hypothesis, weight, rotor_wrench)
         for share in _SHARES:
             ahead = _moved(hypothesis, share * step)
-            left = _squares(ahead, weight)
+            left = _squares(ahead, weight, rotor_wrench)
             if left <= error:
                 break
         else:
@@ -234,15 +235,17 @@ def _in_place_of(effect: Effect, exact: Effect, linear: Array) -> Candidate:
     return Candidate(exact, shapes)
 
 
-def _squares(hypothesis: System, weight: Array) -> float:
+def _squares(hypothesis: System, weight: Array, rotor_wrench: Array) -> float:
+    weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
     left = hypothesis.residual - hypothesis.base @ fit_within_bounds(hypothesis, weight)[0]
     return float(((left / weight) ** 2).sum())
 
 
-def _newton_step(hypothesis: System, weight: Array) -> Array:
+def _newton_step(hypothesis: System, weight: Array, rotor_wrench: Array) -> Array:
     """Solve for the change of the shapes, with the coefficients that no bound holds beside them, shape (shape,)."""
+    weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
     linear, held = fit_within_bounds(hypothesis, weight)
-    shapes = shape_columns(hypothesis, linear)
+    shapes = shape_columns(hypothesis, linear, rotor_wrench)
     columns = np.concatenate([hypothesis.base[..., ~held], shapes], axis=2) / weight[:, None]
     matrix = columns.reshape(-1, columns.shape[2])
     length = np.linalg.norm(matrix, axis=0)
@@ -336,7 +339,7 @@ def free_shapes(hypothesis: System) -> list[tuple[Candidate, str]]:
     return [(candidate, shape.name) for candidate in hypothesis.chosen for shape in candidate.effect.shapes]
 
 
-def shape_columns(hypothesis: System, linear: Array) -> Array:
+def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None = None) -> Array:
     """Differentiate what the hypothesis explains by each of its shapes, by central differences.
 
     Parameters
@@ -344,6 +347,8 @@ def shape_columns(hypothesis: System, linear: Array) -> Array:
     hypothesis : System
     linear : array, shape (column,)
         Coefficients of the base, held.
+    rotor_wrench : array, shape (window, 6), N m and N, optional
+        Of the rotors without effects on the actuation, for which a change of the rotor torque is compensated.
 
     Returns
     -------
@@ -354,15 +359,23 @@ def shape_columns(hypothesis: System, linear: Array) -> Array:
     for number, (candidate, name) in enumerate(shapes):
         value = candidate.shape[name]
         step = _STEP * (abs(value) or 1.0)
-        ahead, behind = (_residual_at(hypothesis, linear, candidate, name, value + s) for s in (step, -step))
+        ahead, behind = (
+            _residual_at(hypothesis, linear, candidate, name, value + change, rotor_wrench) for change in (step, -step)
+        )
         columns[..., number] = (behind - ahead) / (2 * step)
     return columns
 
 
-def _residual_at(hypothesis: System, linear: Array, moved: Candidate, name: str, value: float) -> Array:
+def _residual_at(
+    hypothesis: System, linear: Array, moved: Candidate, name: str, value: float, rotor_wrench: Array | None
+) -> Array:
     chosen = [Candidate(c.effect, {**c.shape, name: value}) if c is moved else c for c in hypothesis.chosen]
     there = system(hypothesis.flights, chosen)
-    return np.asarray(there.residual - there.base @ linear)
+    left = np.asarray(there.residual - there.base @ linear)
+    if rotor_wrench is None:
+        return left
+    before, after = (compensation(rotor_wrench, each.rotor_wrench) for each in (hypothesis, there))
+    return left * after / before
 
 
 def compensation(before: Array, after: Array) -> Array:

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.gap.balance.balance_system import System, is_free
+from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import fit, fit_within_bounds, free_shapes, refitted, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.results import Estimate
@@ -72,7 +72,8 @@ def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array
     """Add confidence intervals to a fit."""
     shapes = [candidate.shape[name] for candidate, name in free_shapes(hypothesis)]
     values = np.concatenate([linear, shapes])
-    jacobian = np.concatenate([hypothesis.base, shape_columns(hypothesis, linear)], axis=2)
+    moving_shapes = shape_columns(hypothesis, linear, system(hypothesis.flights).rotor_wrench if shapes else None)
+    jacobian = np.concatenate([hypothesis.base, moving_shapes], axis=2)
     rows = (jacobian / weight[:, None], (hypothesis.residual - hypothesis.base @ linear) / weight)
     moving = np.concatenate([~held, np.ones(len(shapes), dtype=bool)])
     left_out = np.tile(values, (len(np.unique(block)), 1))
