@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,9 +115,16 @@ def diagnose(
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, effects)
-    notes = () if differ else tuple(refused.sentence for refused in refusals)
+    notes = () if differ else (*_unsure(judged, settings), *(refused.sentence for refused in refusals))
     diagnosis = _concluded(judged, faults, judgement, differ, notes, steps, settings, torque_alone, audited)
     return DiagnosisRun(diagnosis, audited, hypothesis, estimates, judgement.remainder, judgement.held_out)
+
+
+def _unsure(judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
+    """Say which effects chance could stand for, once the others have done what they can."""
+    for effect in (each.effect for each in judged):
+        if effect.p_value > settings.significance:
+            yield f"{effect.name} is not sure: chance explains as much beside the others, p = {effect.p_value:.2g}"
 
 
 def _searched(

@@ -13,12 +13,12 @@ from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.balance.balance_system import is_free, system
-from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.balance.refine import fit, refined
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import SearchStep, alternatives, rank_effects, settled
+from cpfls_cli.gap.naming.search import SearchStep, alternatives, beside_its_like, rank_effects, settled
 from cpfls_cli.gap.sensors.findings import AuditFinding
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -77,17 +77,21 @@ def judge_effect(
     """
     candidate = chosen[index]
     others = [other for other in chosen if other is not candidate]
-    step = rank_effects(flights, others, effects, settings, rng, also=(candidate,))
-    scored = next(scored for scored in step.ranking if scored.candidate.effect.name == candidate.effect.name)
+    among = beside_its_like(chosen, index)
+    step = rank_effects(flights, others, effects, settings, None if among else rng, also=(candidate,))
     own, *ranking = settled(flights, chosen, index, step)
+    # Chance is asked what it explains once the others have done what they can: they were fitted beside this one.
+    alone = refined(flights, others, step.floor).chosen if among else others
+    apart = rank_effects(flights, alone, effects, settings, rng, also=(candidate,)) if among else step
+    scored = next(scored for scored in apart.ranking if scored.candidate.effect.name == candidate.effect.name)
     effect = NamedEffect(
         candidate.effect.name,
         candidate,
         estimates.of_effect[index],
         estimates.effects[index],
-        step.p_value(own.gain),
+        apart.p_value(scored.gain),
         share,
-        _frequency(scored, step),
+        _frequency(scored, apart),
         effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
     )
     return JudgedEffect(effect, tuple(alternatives(own, ranking, step.above_floor)))

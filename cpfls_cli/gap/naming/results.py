@@ -227,7 +227,8 @@ def verdict_of(
 ) -> GapVerdict:
     """Derive the verdict from named effects, rivals and unexplained residuals.
 
-    What closes the gap of the forces and leaves that of the torques has explained a part, and the other way round.
+    What closes the gap of the forces and leaves that of the torques has explained a part, and the other way round; so
+    has an effect without which chance explains as much beside the others.
 
     Parameters
     ----------
@@ -249,7 +250,8 @@ def verdict_of(
         return GapVerdict.NO_GAP if excited else GapVerdict.NOT_EXCITED
     if max(shares) < settings.partial_share:
         return GapVerdict.UNEXPLAINED
-    if min(shares) < settings.named_share or unexplained or stays:
+    by_chance = any(effect.p_value > settings.significance for effect in effects)
+    if min(shares) < settings.named_share or unexplained or stays or by_chance:
         return GapVerdict.PARTIAL
     main = {effect.name for effect in effects if effect.share >= _MAIN}
     return GapVerdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else GapVerdict.NAMED

@@ -349,6 +349,11 @@ def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) 
     ]
 
 
+def beside_its_like(chosen: Sequence[Candidate], index: int) -> bool:
+    """Tell whether an effect and another one lie between command and rotors, where each can stand for the other."""
+    return chosen[index].effect.actuation is not None and len(_late(chosen)) > 1
+
+
 def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: SearchStep) -> list[Scored]:
     """Score an effect between command and rotors and its like beside another one, once all shapes have moved.
 
@@ -370,7 +375,7 @@ def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: i
     """
     others = [other for place, other in enumerate(chosen) if place != index]
     ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != chosen[index].effect.name)
-    if not (_late([chosen[index]]) and _late(others)):
+    if not beside_its_like(chosen, index):
         return ranked
     names = {each.effect.name for each in chosen}
     tried = [scored.candidate for scored in step.ranking if np.isfinite(scored.gain)]
