@@ -231,8 +231,14 @@ def _wanted(effect: Effect) -> str:
     numbers = effect.numbers
     if not numbers:
         return "no values"
-    listed = ", ".join(f"{number.name} ({number.unit})" for number in numbers)
-    return f"{len(numbers)} value{'s' if len(numbers) > 1 else ''}: {listed}"
+    names = {number.name for number in numbers}
+    more = [number for number in (effect.exact or effect).numbers if number.name not in names]
+    by_name = f"; by name also {_listed(more)}" if more else ""
+    return f"{len(numbers)} value{'s' if len(numbers) > 1 else ''}: {_listed(numbers)}{by_name}"
+
+
+def _listed(numbers: Sequence[Coefficient | Shape]) -> str:
+    return ", ".join(f"{number.name} ({number.unit})" for number in numbers)
 
 
 def _refuse_outside(effect: Effect, number: Coefficient | Shape, value: float, bounds: tuple[float, float]) -> None:

@@ -62,7 +62,7 @@ def test_flight_is_logged_and_keeps_to_its_format(fly, cpfls):
 def test_effects_are_recorded_with_their_values(fly):
     path, said = fly("--effect", "com_offset=0.01,-0.02", "--effect", "torque_bias.M_z=0.05", "--json")
     names, values = read(path, "effects/name", "effects/value")
-    expected = {"com_offset.c_x": 0.01, "com_offset.c_y": -0.02}
+    expected = {"com_offset.c_x": 0.01, "com_offset.c_y": -0.02, "com_offset.c_z": 0.0}
     expected |= {"torque_bias.M_x": 0.0, "torque_bias.M_y": 0.0, "torque_bias.M_z": 0.05}
     assert dict(zip(names.astype(str), values, strict=True)) == expected
     assert json.loads(said)["effects"] == expected
@@ -116,8 +116,8 @@ def test_a_flight_in_closed_loop_can_be_identified(fly, short, cpfls, tmp_path):
         (["rotr_drag=1"], "rotr_drag: no such effect (did you mean rotor_drag"),
         (["rotor_drag=much"], "much is not a number; write NAME=VALUE"),
         (["rotor_drag=9"], "k_d = 9 is not possible on this vehicle: 0 to"),
-        (["com_offset=0.01"], "takes 2 values: c_x (m), c_y (m); 1 given"),
-        (["com_offset.c_z=0.01"], "has no c_z; takes 2 values"),
+        (["com_offset=0.01"], "takes 2 values: c_x (m), c_y (m); by name also c_z (m); 1 given"),
+        (["com_offset.c_w=0.01"], "has no c_w; takes 2 values: c_x (m), c_y (m); by name also c_z (m)"),
         (["com_offset=0.01,0", "com_offset.c_x=0.01"], "com_offset is given twice"),
         (["com_offset.c_x=0.01,0"], "a coefficient takes one value"),
         (["ground_effect=4"], "needs vehicle.rotors.radius_m"),

@@ -15,6 +15,7 @@ from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import fit, fit_within_bounds, free_shapes, refitted, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -104,10 +105,13 @@ def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> tup
     Returns
     -------
     hypothesis : System
-        With the shapes that fit best beside one another.
+        With the shapes that fit best beside one another, where they fit to the noise.
     estimates : Estimates
     """
     there = refitted(hypothesis, channel_weight(hypothesis, floor))
+    if (channel_weight(there, floor) > CLEAR * floor).any():
+        # Formulas that do not fit to the noise would move to what is left: they stay where the search found them.
+        there = hypothesis
     return there, estimates(there, channel_weight(there, floor), block)
 
 

@@ -176,7 +176,7 @@ def test_nothing_hidden_differs_in_nothing():
 
 def test_a_shape_at_the_end_of_what_is_tried_is_no_name():
     """Sizes that stand in a shape alone."""
-    chosen, known = [candidate("ground_effect", G=11.0)], []
+    chosen, known = [candidate("ground_effect", G=CATALOGUE["ground_effect"].shapes[0].grid[-1])], []
     for flight in flights():
         low = replace(flight.signals, position=flight.signals.position - [0.0, 0.0, 29.0])
         pull = chosen[0].effect.columns(low, {"G": 30.0}).direct[:, 3:, 0]
