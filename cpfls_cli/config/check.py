@@ -36,6 +36,8 @@ _PLAIN_WORDS = {
 _OF_A_VEHICLE = ("mass_kg", "inertia_kg_m2", "rotors", "rotor_speed_max_rad_s")
 _OF_A_ROTOR = ("position_m", "spin", "thrust_factor_n_s2", "drag_factor_n_m_s2")
 _MEASURED = 1.1
+"""What a largest principal moment may have over the sum of the others: stated moments are measured, not exact."""
+
 Location = tuple[str, ...]
 
 
