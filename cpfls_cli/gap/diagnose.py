@@ -130,7 +130,7 @@ def _unsure(judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[s
 def _searched(
     weak: Sequence[WeakFlight], settings: GapSettings, rng: np.random.Generator, progress: Callable[[float, str], None]
 ) -> tuple[list[Effect], list[SearchStep], Fitted, list[Refusal]]:
-    """Search for effects that earn their names; once more without those that would have to be impossible.
+    """Search for effects that earn their names; once more without those that stand on a bound, or beyond.
 
     Such an effect takes up what others would explain, and has to go before they can be seen.
     """
@@ -141,7 +141,7 @@ def _searched(
         )
         found, refused = earned(weak, chosen, steps[-1].floor, settings)
         refusals += refused
-        out = {each.name for each in refused if each.impossible}
+        out = {each.name for each in refused if each.in_the_way}
         if not out:
             return effects, steps, found, refusals
         effects = [effect for effect in effects if effect.name not in out]

@@ -13,12 +13,18 @@ from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.balance.balance_system import is_free, system
-from cpfls_cli.gap.balance.refine import fit, refined
+from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import SearchStep, alternatives, beside_its_like, rank_effects, settled
+from cpfls_cli.gap.naming.search import (
+    alternatives,
+    beside_its_like,
+    chance_beside_its_like,
+    rank_effects,
+    settled,
+)
 from cpfls_cli.gap.sensors.findings import AuditFinding
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -80,30 +86,26 @@ def judge_effect(
     among = beside_its_like(chosen, index)
     step = rank_effects(flights, others, effects, settings, None if among else rng, also=(candidate,))
     own, *ranking = settled(flights, chosen, index, step)
-    # Chance is asked what it explains once the others have done what they can: they were fitted beside this one.
-    alone = refined(flights, others, step.floor).chosen if among else others
-    apart = rank_effects(flights, alone, effects, settings, rng, also=(candidate,)) if among else step
-    scored = next(scored for scored in apart.ranking if scored.candidate.effect.name == candidate.effect.name)
     effect = NamedEffect(
         candidate.effect.name,
         candidate,
         estimates.of_effect[index],
         estimates.effects[index],
-        apart.p_value(scored.gain),
+        chance_beside_its_like(flights, chosen, index, effects, settings) if among else step.p_value(own.gain),
         share,
-        _frequency(scored, apart),
+        _frequency(own, ranking),
         effect_sentence(candidate.effect, estimates.effects[index], flights[0].signals.vehicle),
     )
     return JudgedEffect(effect, tuple(alternatives(own, ranking, step.above_floor)))
 
 
-def _frequency(chosen: Scored, step: SearchStep) -> float:
+def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
     """Compute the share of blocks whose omission leaves the effect the best candidate."""
-    total = np.array([scored.block_error.sum() - scored.block_error for scored in step.ranking if _real(scored)])
-    names = [scored.candidate.effect.name for scored in step.ranking if _real(scored)]
-    if chosen.candidate.effect.name not in names:
+    if not _real(chosen):
         return 0.0
-    return float(np.mean(np.argmin(total, axis=0) == names.index(chosen.candidate.effect.name)))
+    others = [scored.block_error for scored in ranking if _real(scored)]
+    total = np.array([error.sum() - error for error in (chosen.block_error, *others)])
+    return float(np.mean(np.argmin(total, axis=0) == 0))
 
 
 def _real(scored: Scored) -> bool:

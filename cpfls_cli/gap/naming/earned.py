@@ -43,13 +43,13 @@ class Refusal(NamedTuple):
     Attributes
     ----------
     name, reason : str
-    impossible : bool
-        Whether the flights surely ask for a number of it that is beyond what is possible.
+    in_the_way : bool
+        Whether others are to be looked for without it: on a bound it may stand for what another one is.
     """
 
     name: str
     reason: str
-    impossible: bool = False
+    in_the_way: bool = False
 
     @property
     def sentence(self) -> str:
@@ -103,7 +103,7 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
         names = [shape.name for shape in candidate.effect.shapes]
         if len(names) > 1 and all(_at_an_end(number) for number in estimates if number.name in names):
             says = f"{' and '.join(names)} may all be at the bounds of what is possible"
-            return [candidate], Refusal(candidate.effect.name, says)
+            return [candidate], Refusal(candidate.effect.name, says, True)
     reached = {
         index: own
         for index, candidate in enumerate(chosen)
@@ -122,7 +122,7 @@ def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | N
         main = [number.name for number in _main(found, index, numbers, floor) if number.name in bounds]
         if main:
             says = f"its {main[0]} sits on the bound of what is possible, {bounds[main[0]]}"
-            return [chosen[index]], Refusal(name, says)
+            return [chosen[index]], Refusal(name, says, True)
     return None
 
 

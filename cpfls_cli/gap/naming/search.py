@@ -11,7 +11,7 @@ from scipy.stats import gumbel_r, wilcoxon
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
-from cpfls_cli.gap.balance.refine import fit, refined, weighted_residual
+from cpfls_cli.gap.balance.refine import compensation, fit, refined, weighted_residual
 from cpfls_cli.gap.balance.resampling import blocks_of, mirror_shifted
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.results import Alternative
@@ -154,7 +154,7 @@ def forward_selection(
         progress(len(steps))
         if len(chosen) >= settings.effects_max or not acceptable(step, settings):
             return chosen, steps
-        best = simplest(step.ranking, step.above_floor)
+        best = simplest(_moved(flights, chosen, step), step.above_floor)
         refitted = refined(flights, [*chosen, best.candidate], step.floor)
         if not quiet_enough(best.gain, step, refitted):
             return chosen, steps
@@ -388,6 +388,59 @@ def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: i
         ),
         *(scored for scored in ranked if not _late([scored.candidate])),
     ]
+
+
+def chance_beside_its_like(
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    index: int,
+    effects: Sequence[Effect],
+    settings: GapSettings,
+) -> float:
+    """Compute how likely it is that an effect between command and rotors adds nothing to its like.
+
+    Shifted residuals cannot tell: each of these effects moves with the command, and so does what the others leave.
+    Compared is therefore what all effects, and the others without it, leave of blocks that their fits did not see, both
+    with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    index : int
+        Of the effect among them.
+    effects : sequence of Effect
+        That the search tried.
+    settings : GapSettings
+    """
+    together = system(flights, chosen)
+    floor = best_floor(together)
+    without = refined(flights, [other for place, other in enumerate(chosen) if place != index], floor)
+    margin = _unseen(without, floor, settings) - _unseen(together, floor, settings)
+    tried = sum(effect.actuation is not None for effect in effects)
+    return float(min(1.0, tried * wilcoxon(margin, alternative="greater").pvalue)) if len(margin) > 1 else 1.0
+
+
+def _unseen(hypothesis: System, floor: Array, settings: GapSettings) -> Array:
+    """Compute what a hypothesis leaves of each block that a fit of coefficients and shapes did not see."""
+    plain = system(hypothesis.flights)
+    weight = floor / compensation(plain.rotor_wrench, hypothesis.rotor_wrench)
+    arranged = layout(hypothesis, (), weight)
+    normal = normal_equations(arranged, hypothesis.residual, weight, block_index(hypothesis, settings))
+    return np.asarray(normal.solve(arranged.base)[1][:, 0])
+
+
+def _moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: SearchStep) -> Sequence[Scored]:
+    """Score anew, with all shapes moved, what lies between command and rotors and comes near the best, if that does.
+
+    Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
+    """
+    best = step.ranking[0]
+    near = [s for s in step.ranking if _late([s.candidate]) and s.gain > _NEAR * best.gain]
+    if best not in near or len(near) < 2:
+        return step.ranking
+    settled_there = [_rescored(refined(flights, [*chosen, s.candidate], step.floor), step) for s in near]
+    return sorted(settled_there, key=lambda scored: -scored.gain)
 
 
 def _rescored(refitted: System, step: SearchStep) -> Scored:
