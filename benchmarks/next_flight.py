@@ -27,7 +27,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, SettingError
 from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
-from cpfls_cli.gap.naming.search import best_floor
+from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, planned_signals
 from cpfls_cli.gap.next_flight.rivals import physical_values, questions_left, usual
 from cpfls_cli.gap.next_flight.room import Room, room_of

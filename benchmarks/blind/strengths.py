@@ -309,7 +309,7 @@ FORMS = {
     "ground_exponential": (ground_effect, "ground_effect"),
     "parasitic_power": (_parasitic(1.5), "parasitic_drag"),
     "inflow_momentum": (inflow, "inflow"),
-    "lag_second_order": (lag_second_order, "motor_lag"),
+    "lag_second_order": (lag_second_order, "low_pass_filter"),
     "lag_uneven": (lag_uneven, "motor_lag"),
     "thrust_tilt": (thrust_tilt, "torque_bias"),
 }

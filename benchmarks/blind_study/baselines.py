@@ -12,8 +12,8 @@ from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.balance.windows import common_windows
 from cpfls_cli.gap.diagnose import considered
+from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of, layout, normal_equations, score
-from cpfls_cli.gap.naming.search import best_floor, block_index
 from cpfls_cli.gap.sensors.audit import audit
 
 

@@ -25,8 +25,8 @@ from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.balance.windows import common_windows
+from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.naming.results import Alternative, GapVerdict
-from cpfls_cli.gap.naming.search import best_floor
 from cpfls_cli.gap.next_flight.logged import (
     Logging,
     expected_floor,

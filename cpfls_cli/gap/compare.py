@@ -14,8 +14,8 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, weak_flight
 from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.leftover import not_excited
+from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NotExcited
-from cpfls_cli.gap.naming.search import best_floor, block_index
 from cpfls_cli.gap.playback import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
 from cpfls_cli.gap.residual.views import HeatMap, Stretch, heat_map, stretches

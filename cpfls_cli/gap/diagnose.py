@@ -21,8 +21,9 @@ from cpfls_cli.gap.naming.earned import Fitted, Refusal, earned
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.leftover import Leftover, not_excited, untried
+from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
 from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
-from cpfls_cli.gap.naming.search import SearchStep, forward_selection, rank_effects
+from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.sensors.audit import Audit, Preparation, audit
 from cpfls_cli.gap.settings import GapSettings
 

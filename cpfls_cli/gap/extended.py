@@ -31,8 +31,8 @@ from cpfls_cli.gap.balance.weak_flight import (
 from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
+from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NamedEffect
-from cpfls_cli.gap.naming.search import best_floor, block_index
 from cpfls_cli.gap.sensors.audit import Audit, Preparation
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.regressor.regressor import InertiaValues

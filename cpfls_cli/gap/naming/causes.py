@@ -15,16 +15,12 @@ from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.actuation import beside_its_like, chance_beside_its_like, settled
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence
+from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect
 from cpfls_cli.gap.naming.scoring import Scored
-from cpfls_cli.gap.naming.search import (
-    alternatives,
-    beside_its_like,
-    chance_beside_its_like,
-    rank_effects,
-    settled,
-)
+from cpfls_cli.gap.naming.search import alternatives
 from cpfls_cli.gap.sensors.findings import AuditFinding
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings

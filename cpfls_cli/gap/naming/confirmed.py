@@ -16,7 +16,7 @@ from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted, on_bound
 from cpfls_cli.gap.naming.estimate import channel_weight, estimates
 from cpfls_cli.gap.naming.held_out import SEEN, HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
-from cpfls_cli.gap.naming.search import SearchStep, block_index
+from cpfls_cli.gap.naming.ranking import SearchStep, block_index
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 
 _WORSE = 1.1

@@ -11,8 +11,8 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, free_estimates, sized, weighted_estimates
+from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.gap.naming.search import block_index
 from cpfls_cli.gap.settings import GapSettings
 
 _ON_BOUND = 1e-3

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import gumbel_r, wilcoxon
+from scipy.stats import wilcoxon
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
-from cpfls_cli.gap.balance.refine import compensation, fit, refined, weighted_residual
-from cpfls_cli.gap.balance.resampling import blocks_of, mirror_shifted
+from cpfls_cli.gap.balance.refine import fit, refined, weighted_residual
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
+from cpfls_cli.gap.naming.actuation import late, moved, parted
+from cpfls_cli.gap.naming.ranking import (
+    NEAR,
+    SearchStep,
+    rank_effects,
+    rows,
+)
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import (
     REFUSED,
-    Layout,
     Scored,
-    candidates_of,
-    chance,
-    layout,
-    normal_equations,
-    score,
 )
 from cpfls_cli.gap.settings import GapSettings
 
@@ -36,89 +35,6 @@ _CLOSE = 0.01
 _VISIBLE = 0.25
 _ERRORS = 2.0
 _CHANCE = 0.02
-_NEAR = 0.6
-
-
-@dataclass(frozen=True)
-class SearchStep:
-    """All candidates ranked beside a hypothesis.
-
-    Attributes
-    ----------
-    hypothesis : System
-    floor : array, shape (6,)
-    ranking : tuple of Scored
-        Best first, each effect once, at its best shape.
-    chance : array, shape (shift,)
-        What the best candidate explains of shifted residuals.
-    above_floor : float
-        Sum of squares that the hypothesis leaves above the floor, in squared floors.
-    block : array of int, shape (window,)
-    """
-
-    hypothesis: System
-    floor: Array
-    ranking: tuple[Scored, ...]
-    chance: Array
-    above_floor: float
-    block: IntArray
-
-    def p_value(self, gain: float) -> float:
-        """Compute the probability that chance explains as much, over the whole catalogue.
-
-        The share of shifts that do; beyond all of them, the tail of the extreme-value law fitted to them.
-        """
-        if not np.isfinite(gain):
-            return 1.0
-        reached = (1 + int((self.chance >= gain).sum())) / (1 + len(self.chance))
-        if reached > 1.5 / (1 + len(self.chance)):
-            return reached
-        # By moments: a fit by likelihood is several times slower and no better in the tail.
-        scale = max(float(np.std(self.chance)) * np.sqrt(6) / np.pi, 1e-12)
-        return float(min(reached, gumbel_r.sf(gain, np.mean(self.chance) - np.euler_gamma * scale, scale)))
-
-
-def rank_effects(
-    flights: Sequence[WeakFlight],
-    chosen: Sequence[Candidate],
-    effects: Sequence[Effect],
-    settings: GapSettings,
-    rng: np.random.Generator | None,
-    also: Sequence[Candidate] = (),
-) -> SearchStep:
-    """Score all effects beside those chosen.
-
-    Parameters
-    ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
-    effects : sequence of Effect
-        To be scored.
-    settings : GapSettings
-    rng : numpy.random.Generator or None
-        Of the shifts; None for none.
-    also : sequence of Candidate
-        Tried beside the grids, with shapes of their own.
-    """
-    hypothesis = system(flights, chosen)
-    floor = best_floor(hypothesis)
-    names = {candidate.effect.name for candidate in chosen}
-    listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
-    tried = [candidate for candidate in listed if hypothesis.can(candidate)]
-    arranged = layout(hypothesis, tried, floor)
-    block = block_index(hypothesis, settings)
-    normal = normal_equations(arranged, hypothesis.residual, floor, block)
-    ranking = _each_once(score(arranged, normal, hypothesis))
-    residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-    before = normal.solve(arranged.base)[1][:, 0]
-    return SearchStep(
-        hypothesis,
-        floor,
-        ranking,
-        _chance(arranged, residual, hypothesis, floor, block, settings, rng),
-        float(max(before.sum() - _rows(hypothesis), 1e-9)),
-        block,
-    )
 
 
 def forward_selection(
@@ -154,8 +70,8 @@ def forward_selection(
         progress(len(steps))
         if len(chosen) >= settings.effects_max or not acceptable(step, settings):
             return chosen, steps
-        best = simplest(_moved(flights, chosen, step), step.above_floor)
-        refitted = refined(flights, [*chosen, best.candidate], step.floor)
+        best = simplest(moved(flights, chosen, step), step.above_floor)
+        refitted = parted(refined(flights, [*chosen, best.candidate], step.floor), step)
         if not quiet_enough(best.gain, step, refitted):
             return chosen, steps
         kept = exchanged(flights, refitted.chosen, effects, settings) if len(refitted.chosen) > 1 else refitted.chosen
@@ -215,25 +131,22 @@ def exchanged(
         step = rank_effects(flights, others, effects, settings, None, also=(candidate,))
         scored = next((each for each in step.ranking if each.candidate.effect.name == candidate.effect.name), None)
         small = scored is None or scored.gain < _LEAST_SHARE * step.above_floor
-        if scored is None or small or len(_late(others)) > 1:
+        if scored is None or small or len(late(others)) > 1:
             without = _do_without(flights, others, kept, step.floor)
             kept = kept if without is None else without
             if scored is None or small or without is not None:
                 continue
-        best = step.ranking[0]
-        worse = best.candidate.effect.name != candidate.effect.name and scored not in unbeaten(
-            best, step.ranking, step.above_floor
+        ranking = moved(flights, others, step)
+        best = simplest(ranking, step.above_floor)
+        scored = next(each for each in ranking if each.candidate.effect.name == candidate.effect.name)
+        worse = best is not scored and (
+            scored not in unbeaten(best, ranking, step.above_floor) or _numbers(best) < _numbers(scored)
         )
         # Beside other effects its own shape may be another one: a delay that is dropped leaves its time to a lag.
         better = best.candidate if worse else scored.candidate
         if better is not candidate:
             kept = list(refined(flights, [*others, better], step.floor).chosen)
     return tuple(kept)
-
-
-def _late(chosen: Sequence[Candidate]) -> list[Candidate]:
-    """List the effects between command and rotors: two of them, with other shapes, can do what a third does."""
-    return [candidate for candidate in chosen if candidate.effect.actuation is not None]
 
 
 def _do_without(
@@ -250,60 +163,7 @@ def _do_without(
         float((weighted_residual(there, floor, plain.rotor_wrench) ** 2).sum())
         for there in (without, system(flights, kept))
     )
-    return list(without.chosen) if left - before < _LEAST_SHARE * max(left - _rows(plain), 0.0) else None
-
-
-def best_floor(hypothesis: System) -> Array:
-    """Estimate the noise floors from the residual of a hypothesis.
-
-    The fit and the floors depend on each other; starting from equal weights, a second round changes nothing any more.
-
-    Returns
-    -------
-    array, shape (6,)
-    """
-    rows = hypothesis.residual
-    floor = np.where(rows.any(axis=0), np.sqrt(np.mean(rows**2, axis=0)), 1.0)
-    for _ in range(2):
-        floor = floors(hypothesis, fit(hypothesis, floor))
-    return floor
-
-
-def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
-    """Assign each window to a block of the cross-validation.
-
-    Returns
-    -------
-    array of int, shape (window,)
-    """
-    centres = np.concatenate([f.windows.centres(f.signals.time) for f in hypothesis.flights])
-    return blocks_of(hypothesis.flight_index, centres, settings.block_s)
-
-
-def _chance(
-    arranged: Layout,
-    residual: Array,
-    hypothesis: System,
-    floor: Array,
-    block: IntArray,
-    settings: GapSettings,
-    rng: np.random.Generator | None,
-) -> Array:
-    if rng is None:
-        return np.zeros(0)
-    draws = mirror_shifted(residual, hypothesis.flight_index, settings.shifts, rng)
-    return chance(arranged, normal_equations(arranged, draws, floor, block))
-
-
-def _each_once(ranking: Sequence[Scored]) -> tuple[Scored, ...]:
-    seen: dict[str, Scored] = {}
-    for scored in ranking:
-        seen.setdefault(scored.candidate.effect.name, scored)
-    return tuple(seen.values())
-
-
-def _rows(hypothesis: System) -> int:
-    return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)
+    return list(without.chosen) if left - before < _LEAST_SHARE * max(left - rows(plain), 0.0) else None
 
 
 def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
@@ -315,7 +175,7 @@ def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> l
         other
         for other in ranking
         if other.candidate.effect.name != chosen.candidate.effect.name
-        and other.gain > _NEAR * chosen.gain
+        and other.gain > NEAR * chosen.gain
         and not _beats(chosen, other, above_floor)
     ]
 
@@ -347,109 +207,6 @@ def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) 
         for scored in unbeaten(chosen, ranking, above_floor)
         if effect.name not in (other := scored.candidate.effect).holds
     ]
-
-
-def beside_its_like(chosen: Sequence[Candidate], index: int) -> bool:
-    """Tell whether an effect and another one lie between command and rotors, where each can stand for the other."""
-    return chosen[index].effect.actuation is not None and len(_late(chosen)) > 1
-
-
-def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: SearchStep) -> list[Scored]:
-    """Score an effect between command and rotors and its like beside another one, once all shapes have moved.
-
-    There a point of a grid is no test: where a lag stands for a delay, the width of a notch moves with it.
-
-    Parameters
-    ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
-    index : int
-        Of the effect among them.
-    step : SearchStep
-        The look at the others without it.
-
-    Returns
-    -------
-    list of Scored
-        The effect, then its like, then all else as ranked; the ranking where nothing has to move.
-    """
-    others = [other for place, other in enumerate(chosen) if place != index]
-    ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != chosen[index].effect.name)
-    if not beside_its_like(chosen, index):
-        return ranked
-    names = {each.effect.name for each in chosen}
-    tried = [scored.candidate for scored in step.ranking if np.isfinite(scored.gain)]
-    return [
-        _rescored(system(flights, [*others, chosen[index]]), step),
-        *(
-            _rescored(refined(flights, [*others, rival], step.floor), step)
-            for rival in _late(tried)
-            if rival.effect.name not in names
-        ),
-        *(scored for scored in ranked if not _late([scored.candidate])),
-    ]
-
-
-def chance_beside_its_like(
-    flights: Sequence[WeakFlight],
-    chosen: Sequence[Candidate],
-    index: int,
-    effects: Sequence[Effect],
-    settings: GapSettings,
-) -> float:
-    """Compute how likely it is that an effect between command and rotors adds nothing to its like.
-
-    Shifted residuals cannot tell: each of these effects moves with the command, and so does what the others leave.
-    Compared is therefore what all effects, and the others without it, leave of blocks that their fits did not see, both
-    with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
-
-    Parameters
-    ----------
-    flights : sequence of WeakFlight
-    chosen : sequence of Candidate
-    index : int
-        Of the effect among them.
-    effects : sequence of Effect
-        That the search tried.
-    settings : GapSettings
-    """
-    together = system(flights, chosen)
-    floor = best_floor(together)
-    without = refined(flights, [other for place, other in enumerate(chosen) if place != index], floor)
-    margin = _unseen(without, floor, settings) - _unseen(together, floor, settings)
-    tried = sum(effect.actuation is not None for effect in effects)
-    return float(min(1.0, tried * wilcoxon(margin, alternative="greater").pvalue)) if len(margin) > 1 else 1.0
-
-
-def _unseen(hypothesis: System, floor: Array, settings: GapSettings) -> Array:
-    """Compute what a hypothesis leaves of each block that a fit of coefficients and shapes did not see."""
-    plain = system(hypothesis.flights)
-    weight = floor / compensation(plain.rotor_wrench, hypothesis.rotor_wrench)
-    arranged = layout(hypothesis, (), weight)
-    normal = normal_equations(arranged, hypothesis.residual, weight, block_index(hypothesis, settings))
-    return np.asarray(normal.solve(arranged.base)[1][:, 0])
-
-
-def _moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: SearchStep) -> Sequence[Scored]:
-    """Score anew, with all shapes moved, what lies between command and rotors and comes near the best, if that does.
-
-    Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
-    """
-    best = step.ranking[0]
-    near = [s for s in step.ranking if _late([s.candidate]) and s.gain > _NEAR * best.gain]
-    if best not in near or len(near) < 2:
-        return step.ranking
-    settled_there = [_rescored(refined(flights, [*chosen, s.candidate], step.floor), step) for s in near]
-    return sorted(settled_there, key=lambda scored: -scored.gain)
-
-
-def _rescored(refitted: System, step: SearchStep) -> Scored:
-    """Score the last effect of a hypothesis by what that leaves of each block."""
-    plain = system(refitted.flights)
-    square = weighted_residual(refitted, step.floor, plain.rotor_wrench) ** 2
-    error = np.bincount(step.block, square.sum(axis=1)).astype(float)
-    gain = step.above_floor + _rows(plain) - error.sum()
-    return Scored(refitted.chosen[-1], np.zeros(0, dtype=int), float(gain), error, np.zeros(0))
 
 
 def _beats(chosen: Scored, other: Scored, above_floor: float) -> bool:
@@ -489,5 +246,6 @@ def least_margin(above_floor: float, left: float) -> float:
 
 
 def _numbers(scored: Scored) -> int:
+    """Count the numbers that a candidate is free to choose."""
     effect = scored.candidate.effect
     return len(effect.shapes) + (0 if effect.unit_coefficient else len(scored.coefficients))

@@ -8,7 +8,10 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.naming.search import alternatives, forward_selection, rank_effects, settled
+from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming.actuation import chance_beside_its_like, settled
+from cpfls_cli.gap.naming.ranking import rank_effects
+from cpfls_cli.gap.naming.search import alternatives, forward_selection
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.rotors import body_wrench, rotor_demand
 from tests.builders.gap_flights import INERTIA, PERIOD, VEHICLE, candidate, fly, weak
@@ -116,6 +119,10 @@ def notch(s, width=0.7, natural=2 * np.pi * 4.0):
     return (s**2 + natural**2) / (s**2 + 2 * width * natural * s + natural**2)
 
 
+def low_pass(s, damping=0.7, natural=2 * np.pi * 3.0):
+    return natural**2 / (s**2 + 2 * damping * natural * s + natural**2)
+
+
 def test_a_part_on_springs_is_named_with_its_frequency_and_share():
     spring = {"share": 0.3, "natural": 2 * np.pi * 2.65, "damping": 0.1}
     chosen = found([on_springs(seed, **spring) for seed in (1, 2, 3)], STILL)
@@ -149,11 +156,33 @@ def rivals_of(flights, chosen, name):
     return {rival.name for rival in alternatives(own, ranking, step.above_floor)}
 
 
-def test_a_lag_and_a_delay_are_no_notch():
+def test_a_lag_and_a_delay_are_no_notch_and_no_low_pass():
     flights = [late(seed, lambda s: lag(s) * np.exp(-0.03 * s)) for seed in (1, 2)]
-    chosen = found(flights, STILL)
+    chosen = found(flights, (*STILL, "low_pass_filter"))
     assert names_of(chosen) == {"motor_lag", "command_delay"}
     assert "notch_filter" not in rivals_of(flights, chosen, "command_delay")
+    assert max(chances(flights, chosen)) < 1e-3
+
+
+def test_a_low_pass_is_no_lag_and_delay():
+    flights = [late(seed, low_pass) for seed in (1, 2)]
+    (chosen,) = found(flights, (*STILL, "low_pass_filter"))
+    assert chosen.effect.name == "low_pass_filter"
+    assert chosen.shape == {"frequency_hz": pytest.approx(3.0, rel=0.05), "damping": pytest.approx(0.7, rel=0.05)}
+
+
+def test_a_delay_that_is_not_there_is_chance_beside_a_lag():
+    flights = [late(seed, lag) for seed in (1, 2)]
+    lagging = {"time_constant_s": 0.05}
+    chosen = [Candidate(CATALOGUE["motor_lag"], lagging), Candidate(CATALOGUE["command_delay"], {"delay_s": 0.004})]
+    of_lag, of_delay = chances(flights, chosen)
+    assert of_lag < 1e-3
+    assert of_delay > 0.1
+
+
+def chances(flights, chosen):
+    effects = [CATALOGUE[each] for each in STILL]
+    return [chance_beside_its_like(flights, chosen, index, effects, SETTINGS) for index in range(len(chosen))]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.confirmed import Judge, differences
 from cpfls_cli.gap.naming.earned import earned, fitted
-from cpfls_cli.gap.naming.search import best_floor, rank_effects
+from cpfls_cli.gap.naming.ranking import best_floor, rank_effects
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak
 
@@ -79,7 +79,7 @@ def test_what_is_impossible_takes_nothing_from_what_is_possible(monkeypatch):
     monkeypatch.setattr(diagnose, "forward_selection", lambda _, effects, *__: ([Candidate(effects[0], {})], [step]))
     effects, _, found, (refusal,) = diagnose._searched(known, SETTINGS, np.random.default_rng(0), lambda *_: None)
     assert [effect.name for effect in effects] == kept(found) == ["flapping_moment"]
-    assert (refusal.name, refusal.impossible) == ("rotor_drag", True)
+    assert (refusal.name, refusal.in_the_way) == ("rotor_drag", True)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_what_would_have_to_be_impossible_is_no_name(truth, bounded, says):
     found, (refusal,) = earned(known, chosen, best_floor(system(known, chosen)), SETTINGS)
     assert kept(found) == []
     assert says in refusal.sentence
-    assert refusal.impossible == ("surely" in says)
+    assert refusal.in_the_way
 
 
 def test_of_two_that_cancel_one_goes():

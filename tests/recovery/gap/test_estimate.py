@@ -10,7 +10,8 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.naming.earned import fitted
 from cpfls_cli.gap.naming.estimate import estimates
-from cpfls_cli.gap.naming.search import best_floor, block_index, forward_selection
+from cpfls_cli.gap.naming.ranking import best_floor, block_index
+from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.closed_loop_flights import flown, signals_of
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak

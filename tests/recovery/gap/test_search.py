@@ -9,7 +9,8 @@ from scipy.stats import gumbel_r
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
-from cpfls_cli.gap.naming.search import SearchStep, acceptable, exchanged, forward_selection, rank_effects
+from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
+from cpfls_cli.gap.naming.search import acceptable, exchanged, forward_selection
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak
 

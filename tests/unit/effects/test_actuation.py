@@ -69,11 +69,12 @@ def test_filter_answers_a_wave_as_its_formula_says(upper, frequency):
     np.testing.assert_allclose(found[-500:], gain * wave[-500:], atol=2e-3)
 
 
-def test_notch_passes_rotors_step_by_step_as_along_a_flight(commanded):
-    notch, shape = CATALOGUE["notch_filter"], {"frequency_hz": 4.0, "width": 0.7}
-    link = notch.actuation.link(shape, commanded.period)
+@pytest.mark.parametrize(("name", "breadth"), [("notch_filter", "width"), ("low_pass_filter", "damping")])
+def test_a_filter_passes_rotors_step_by_step_as_along_a_flight(commanded, name, breadth):
+    known, shape = CATALOGUE[name], {"frequency_hz": 4.0, breadth: 0.7}
+    link = known.actuation.link(shape, commanded.period)
     passed = [link(RotorMotion(speed, 0 * speed)) for speed in commanded.speed]
-    np.testing.assert_allclose([one.speed for one in passed], notch.apply(commanded, shape).speed, rtol=1e-12)
+    np.testing.assert_allclose([one.speed for one in passed], known.apply(commanded, shape).speed, rtol=1e-12)
     assert not np.any([one.acceleration for one in passed])
 
 
@@ -85,7 +86,7 @@ def test_battery_takes_the_same_share_of_thrust_and_torque(columns, commanded):
 def test_only_measured_rotors_can_be_late_and_only_commands_can_lag(flight, commanded):
     assert CATALOGUE["channel_delay"].missing(commanded) == ("measured_rotor_speed",)
     assert not CATALOGUE["channel_delay"].missing(flight)
-    for name in ("motor_lag", "command_delay", "notch_filter"):
+    for name in ("motor_lag", "command_delay", "notch_filter", "low_pass_filter"):
         assert CATALOGUE[name].missing(flight) == ("command",)
         assert not CATALOGUE[name].missing(commanded)
 
@@ -100,7 +101,7 @@ def test_sag_is_looked_for_in_any_rotor_speeds_with_a_voltage(flight, commanded)
 def test_what_is_applied_before_other_columns_is_what_its_column_says(columns, flight, commanded):
     """The search exchanges the actuation instead of subtracting a column; both must mean the same."""
     actuators = [entry for entry in CATALOGUE.values() if entry.kind == "actuator"]
-    others = {"motor_lag", "notch_filter", "command_delay", "battery_sag", "channel_delay"}
+    others = {"motor_lag", "notch_filter", "low_pass_filter", "command_delay", "battery_sag", "channel_delay"}
     assert {entry.name for entry in actuators} == {*others, "drag_factor_error"}
     for entry in actuators:
         known = flight if entry.name == "channel_delay" else commanded

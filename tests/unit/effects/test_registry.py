@@ -24,6 +24,7 @@ USUAL = {
     ("flexible_mount", "share_x"): ((0.05, 0.5), (0.05, 0.5)),
     ("flexible_mount", "damping"): ((0.02, 0.3), (0.02, 0.3)),
     ("notch_filter", "frequency_hz"): ((3.0, 10.0), None),
+    ("low_pass_filter", "frequency_hz"): ((2.0, 10.0), None),
     ("rolling_moment", "mu"): ((1e-6, 1e-4), None),
     ("inflow", "k_z"): ((0.7e-3, 4e-3), (7.6e-7, 7.6e-7)),
     ("translational_lift", "k_h"): ((5e-3, 8e-2), (0.0, 0.0)),
@@ -115,7 +116,7 @@ def test_all_are_there_and_in_order():
     modules = {module.name for module in pkgutil.iter_modules(catalogue.__path__)}
     assert set(CATALOGUE) == modules
     assert list(CATALOGUE)[:2] == ["linear_damping", "quadratic_damping"]
-    assert list(CATALOGUE)[30] == "parameter_error"
+    assert list(CATALOGUE)[31] == "parameter_error"
 
 
 def test_an_unknown_name_gives_the_nearest():

@@ -1,0 +1,67 @@
+"""Second-order low-pass between the autopilot's command and the rotors: a filter, or a drive that swings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.actuation import SecondOrder, with_actuation, wrench_change
+from cpfls_cli.effects.effect import Columns, Effect, Shape
+from cpfls_cli.effects.hooks import Actuation, Link, RotorMotion
+from cpfls_cli.effects.signals import Signals
+
+
+def _filter(shape: Mapping[str, float], period: float) -> SecondOrder:
+    return SecondOrder.of(shape["frequency_hz"], shape["damping"], period, (0.0, 0.0, 1.0))
+
+
+def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
+    return with_actuation(signals, _filter(shape, signals.period).along)
+
+
+def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    return wrench_change(signals, _apply(signals, shape))
+
+
+def _link(values: Mapping[str, float], step: float) -> Link:
+    """Filter speeds and accelerations of the rotors, which were settled before the first step."""
+    passing = _filter(values, step)
+    state: list[Array] = []
+
+    def link(rotors: RotorMotion) -> RotorMotion:
+        now = np.concatenate([rotors.speed, rotors.acceleration])
+        if not state:
+            state.append(passing.settled(np.concatenate([rotors.speed, np.zeros_like(rotors.acceleration)])))
+        passed, state[0] = passing.step(now, state[0])
+        return RotorMotion(*np.split(passed, 2))
+
+    return link
+
+
+EFFECT = Effect(
+    name="low_pass_filter",
+    order=156,
+    title="second-order low-pass before the rotors",
+    kind="actuator",
+    formula="w_i = W^2/(s^2 + 2 b W s + W^2) w_i,commanded, W = 2 pi f;  M = M_rot(w) - M_rot(w_commanded)",
+    sentence="A filter of the autopilot, or a drive with its speed control, passes slow commands and loses fast ones.",
+    coefficients=(),
+    needs=frozenset({"body_rate", "command", "torque"}),
+    excitation="roll and pitch torque sweeps to beyond the cut-off, or steps of the command",
+    rivals={
+        "motor_lag": "log the speeds of the rotors at steps of the command: a lag sets off at once, a low-pass at rest",
+        "command_delay": "sweep the torque to higher frequencies: a delay lets all through, a low-pass ever less",
+        "notch_filter": "sweep the torque through the notch and beyond: behind a notch the motion follows again",
+    },
+    source="second-order low-pass; ArduPilot LowPassFilter2p.cpp, PX4 LowPassFilter2p.hpp (bilinear transform)",
+    columns=_columns,
+    shapes=(
+        Shape("frequency_hz", "Hz", (1.5, 2.2, 3.2, 4.7, 7.0, 11.0), "natural frequency"),
+        Shape("damping", "1", (0.4, 0.7, 1.5), "damping ratio b; 0.71 for a Butterworth filter", first=0.7),
+    ),
+    unit_coefficient=True,
+    apply=_apply,
+    actuation=Actuation(link=_link),
+)

@@ -1,0 +1,155 @@
+"""Effects between command and rotors, where each can stand for another: compared once all their shapes have moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from scipy.stats import wilcoxon
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.refine import compensation, refined, weighted_residual
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.ranking import NEAR, SearchStep, best_floor, block_index, rows
+from cpfls_cli.gap.naming.scoring import (
+    Scored,
+    layout,
+    normal_equations,
+)
+from cpfls_cli.gap.settings import GapSettings
+
+
+def late(chosen: Sequence[Candidate]) -> list[Candidate]:
+    """List the effects between command and rotors: two of them, with other shapes, can do what a third does."""
+    return [candidate for candidate in chosen if candidate.effect.actuation is not None]
+
+
+def beside_its_like(chosen: Sequence[Candidate], index: int) -> bool:
+    """Tell whether an effect and another one lie between command and rotors, where each can stand for the other."""
+    return chosen[index].effect.actuation is not None and len(late(chosen)) > 1
+
+
+def moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: SearchStep) -> Sequence[Scored]:
+    """Score anew, with all shapes moved, what lies between command and rotors and comes near the best, if that does.
+
+    Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
+    """
+    best = step.ranking[0]
+    near = [s for s in step.ranking if late([s.candidate]) and s.gain > NEAR * best.gain]
+    if best not in near or len(near) < 2:
+        return step.ranking
+    settled_there = [_rescored(refined(flights, [*chosen, s.candidate], step.floor), step) for s in near]
+    return sorted(settled_there, key=lambda scored: -scored.gain)
+
+
+def parted(refitted: System, step: SearchStep) -> System:
+    """Take two effects with a shape each for a last one with two, where they leave less."""
+    others, last = refitted.chosen[:-1], len(refitted.chosen) - 1
+    if not _stands_for_two(refitted.chosen, last):
+        return refitted
+    return max([refitted, *_pairs(refitted.flights, others, step)], key=lambda each: _rescored(each, step).gain)
+
+
+def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: SearchStep) -> list[Scored]:
+    """Score an effect between command and rotors and its like beside another one, once all shapes have moved.
+
+    There a point of a grid is no test: where a lag stands for a delay, the width of a notch moves with it.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    index : int
+        Of the effect among them.
+    step : SearchStep
+        The look at the others without it.
+
+    Returns
+    -------
+    list of Scored
+        The effect, then its like, then all else as ranked; the ranking where nothing has to move.
+    """
+    others = [other for place, other in enumerate(chosen) if place != index]
+    ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != chosen[index].effect.name)
+    if _stands_for_two(chosen, index):
+        pairs = _pairs(flights, others, step)
+        own = _rescored(system(flights, [*others, chosen[index]]), step)
+        return [own, *(_rescored(pair, step, last) for pair in pairs for last in (1, 2)), *ranked[1:]]
+    if not beside_its_like(chosen, index):
+        return ranked
+    names = {each.effect.name for each in chosen}
+    tried = [scored.candidate for scored in step.ranking if np.isfinite(scored.gain)]
+    return [
+        _rescored(system(flights, [*others, chosen[index]]), step),
+        *(
+            _rescored(refined(flights, [*others, rival], step.floor), step)
+            for rival in late(tried)
+            if rival.effect.name not in names
+        ),
+        *(scored for scored in ranked if not late([scored.candidate])),
+    ]
+
+
+def chance_beside_its_like(
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    index: int,
+    effects: Sequence[Effect],
+    settings: GapSettings,
+) -> float:
+    """Compute how likely it is that an effect between command and rotors adds nothing to its like.
+
+    Shifted residuals cannot tell: each of these effects moves with the command, and so does what the others leave.
+    Compared is therefore what all effects, and the others without it, leave of blocks that their fits did not see, both
+    with all shapes moved, by the signed-rank test of Wilcoxon; times the number of effects that could have stood there.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    index : int
+        Of the effect among them.
+    effects : sequence of Effect
+        That the search tried.
+    settings : GapSettings
+    """
+    together = system(flights, chosen)
+    floor = best_floor(together)
+    without = refined(flights, [other for place, other in enumerate(chosen) if place != index], floor)
+    margin = _unseen(without, floor, settings) - _unseen(together, floor, settings)
+    tried = sum(effect.actuation is not None for effect in effects)
+    return float(min(1.0, tried * wilcoxon(margin, alternative="greater").pvalue)) if len(margin) > 1 else 1.0
+
+
+def _unseen(hypothesis: System, floor: Array, settings: GapSettings) -> Array:
+    """Compute what a hypothesis leaves of each block that a fit of coefficients and shapes did not see."""
+    plain = system(hypothesis.flights)
+    weight = floor / compensation(plain.rotor_wrench, hypothesis.rotor_wrench)
+    arranged = layout(hypothesis, (), weight)
+    normal = normal_equations(arranged, hypothesis.residual, weight, block_index(hypothesis, settings))
+    return np.asarray(normal.solve(arranged.base)[1][:, 0])
+
+
+def _stands_for_two(chosen: Sequence[Candidate], index: int) -> bool:
+    """Tell whether an effect is the only one between command and rotors and has as many shapes as two others."""
+    effect = chosen[index].effect
+    return effect.actuation is not None and len(effect.shapes) > 1 and not beside_its_like(chosen, index)
+
+
+def _pairs(flights: Sequence[WeakFlight], others: Sequence[Candidate], step: SearchStep) -> list[System]:
+    """Fit each two effects between command and rotors that have one shape."""
+    tried = [scored.candidate for scored in step.ranking if np.isfinite(scored.gain)]
+    single = [candidate for candidate in late(tried) if len(candidate.effect.shapes) == 1]
+    return [refined(flights, [*others, *pair], step.floor) for pair in combinations(single, 2)]
+
+
+def _rescored(refitted: System, step: SearchStep, last: int = 1) -> Scored:
+    """Score the last effect of a hypothesis, or the one before, by what that leaves of each block."""
+    plain = system(refitted.flights)
+    square = weighted_residual(refitted, step.floor, plain.rotor_wrench) ** 2
+    error = np.bincount(step.block, square.sum(axis=1)).astype(float)
+    gain = step.above_floor + rows(plain) - error.sum()
+    return Scored(refitted.chosen[-last], np.zeros(0, dtype=int), float(gain), error, np.zeros(0))

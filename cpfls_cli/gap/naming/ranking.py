@@ -1,0 +1,165 @@
+"""Effects ranked beside a hypothesis, by what they explain of blocks that they have not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import gumbel_r
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.effect import Effect
+from cpfls_cli.gap.balance.balance_system import System, floors, system
+from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.balance.resampling import blocks_of, mirror_shifted
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.scoring import (
+    Layout,
+    Scored,
+    candidates_of,
+    chance,
+    layout,
+    normal_equations,
+    score,
+)
+from cpfls_cli.gap.settings import GapSettings
+
+NEAR = 0.6
+"""Share of what the best one explains from which on another one is compared with it."""
+
+
+@dataclass(frozen=True)
+class SearchStep:
+    """All candidates ranked beside a hypothesis.
+
+    Attributes
+    ----------
+    hypothesis : System
+    floor : array, shape (6,)
+    ranking : tuple of Scored
+        Best first, each effect once, at its best shape.
+    chance : array, shape (shift,)
+        What the best candidate explains of shifted residuals.
+    above_floor : float
+        Sum of squares that the hypothesis leaves above the floor, in squared floors.
+    block : array of int, shape (window,)
+    """
+
+    hypothesis: System
+    floor: Array
+    ranking: tuple[Scored, ...]
+    chance: Array
+    above_floor: float
+    block: IntArray
+
+    def p_value(self, gain: float) -> float:
+        """Compute the probability that chance explains as much, over the whole catalogue.
+
+        The share of shifts that do; beyond all of them, the tail of the extreme-value law fitted to them.
+        """
+        if not np.isfinite(gain):
+            return 1.0
+        reached = (1 + int((self.chance >= gain).sum())) / (1 + len(self.chance))
+        if reached > 1.5 / (1 + len(self.chance)):
+            return reached
+        # By moments: a fit by likelihood is several times slower and no better in the tail.
+        scale = max(float(np.std(self.chance)) * np.sqrt(6) / np.pi, 1e-12)
+        return float(min(reached, gumbel_r.sf(gain, np.mean(self.chance) - np.euler_gamma * scale, scale)))
+
+
+def rank_effects(
+    flights: Sequence[WeakFlight],
+    chosen: Sequence[Candidate],
+    effects: Sequence[Effect],
+    settings: GapSettings,
+    rng: np.random.Generator | None,
+    also: Sequence[Candidate] = (),
+) -> SearchStep:
+    """Score all effects beside those chosen.
+
+    Parameters
+    ----------
+    flights : sequence of WeakFlight
+    chosen : sequence of Candidate
+    effects : sequence of Effect
+        To be scored.
+    settings : GapSettings
+    rng : numpy.random.Generator or None
+        Of the shifts; None for none.
+    also : sequence of Candidate
+        Tried beside the grids, with shapes of their own.
+    """
+    hypothesis = system(flights, chosen)
+    floor = best_floor(hypothesis)
+    names = {candidate.effect.name for candidate in chosen}
+    listed = [*candidates_of([effect for effect in effects if effect.name not in names]), *also]
+    tried = [candidate for candidate in listed if hypothesis.can(candidate)]
+    arranged = layout(hypothesis, tried, floor)
+    block = block_index(hypothesis, settings)
+    normal = normal_equations(arranged, hypothesis.residual, floor, block)
+    ranking = _each_once(score(arranged, normal, hypothesis))
+    residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+    before = normal.solve(arranged.base)[1][:, 0]
+    return SearchStep(
+        hypothesis,
+        floor,
+        ranking,
+        _chance(arranged, residual, hypothesis, floor, block, settings, rng),
+        float(max(before.sum() - rows(hypothesis), 1e-9)),
+        block,
+    )
+
+
+def best_floor(hypothesis: System) -> Array:
+    """Estimate the noise floors from the residual of a hypothesis.
+
+    The fit and the floors depend on each other; starting from equal weights, a second round changes nothing any more.
+
+    Returns
+    -------
+    array, shape (6,)
+    """
+    rows = hypothesis.residual
+    floor = np.where(rows.any(axis=0), np.sqrt(np.mean(rows**2, axis=0)), 1.0)
+    for _ in range(2):
+        floor = floors(hypothesis, fit(hypothesis, floor))
+    return floor
+
+
+def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
+    """Assign each window to a block of the cross-validation.
+
+    Returns
+    -------
+    array of int, shape (window,)
+    """
+    centres = np.concatenate([f.windows.centres(f.signals.time) for f in hypothesis.flights])
+    return blocks_of(hypothesis.flight_index, centres, settings.block_s)
+
+
+def _chance(
+    arranged: Layout,
+    residual: Array,
+    hypothesis: System,
+    floor: Array,
+    block: IntArray,
+    settings: GapSettings,
+    rng: np.random.Generator | None,
+) -> Array:
+    if rng is None:
+        return np.zeros(0)
+    draws = mirror_shifted(residual, hypothesis.flight_index, settings.shifts, rng)
+    return chance(arranged, normal_equations(arranged, draws, floor, block))
+
+
+def _each_once(ranking: Sequence[Scored]) -> tuple[Scored, ...]:
+    seen: dict[str, Scored] = {}
+    for scored in ranking:
+        seen.setdefault(scored.candidate.effect.name, scored)
+    return tuple(seen.values())
+
+
+def rows(hypothesis: System) -> int:
+    """Count the residuals of a hypothesis, over windows and known channels."""
+    return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)
