@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from functools import partial
+from mmap import mmap
 from pathlib import Path
 from time import perf_counter
 
@@ -31,8 +32,8 @@ from benchmarks.shared.studies import CONFIG, paper_flight, paper_study
 from cpfls_cli import __version__
 from cpfls_cli.artifacts.flight import MOTION
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
-from cpfls_cli.artifacts.store import text_sha256
 from cpfls_cli.config.study import resolved_yaml
+from cpfls_cli.files import seal_of, text_sha256
 from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import LARGEST_GENE, refine
@@ -93,6 +94,10 @@ def write_tiled(path: Path, samples: int) -> None:
             for start in range(0, samples, len(flight)):
                 count = min(len(flight), samples - start)
                 dataset[start : start + count] = values[:count] + scale * rng.standard_normal((count, 3))
+    with path.open("r+b") as file, mmap(file.fileno(), 0) as content:
+        line = seal_of(content)
+    with path.open("ab") as file:
+        file.write(line)
 
 
 def measure(path: Path) -> dict[str, float]:

@@ -1,15 +1,34 @@
-"""Check an artifact against its format: one small rule after the other."""
+"""The one gate through which artifacts are opened, and the rules of their formats, one small rule after the other."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Protocol
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
+import h5py
 import numpy as np
 
-from cpfls_cli.artifacts.spec import ArtifactSpec, DatasetSpec
+from cpfls_cli.artifacts.formats import record_of_format
+from cpfls_cli.artifacts.spec import (
+    CONFIG,
+    INPUTS,
+    SCHEMA_VERSION,
+    ArtifactSpec,
+    DatasetSpec,
+    Header,
+    InputFile,
+)
+from cpfls_cli.errors import InputError, NotAnArtifactError
+from cpfls_cli.files import is_hdf5, is_sealed, read_content, text_sha256
 
 _FIXED = {"axis": 3}
+# Text in memory and in a file.
+_KINDS = {"U": "text", "S": "text", "i": "numbers", "u": "numbers", "f": "numbers"}
+_BLOCK = 1 << 18
+"""Numbers that are checked at a time."""
 
 
 class Checkable(Protocol):
@@ -34,7 +53,17 @@ def check_artifact(artifact: Checkable) -> list[str]:
     list of str
         One sentence per finding; empty for a good artifact.
     """
-    return [finding for rule in _RULES for finding in rule(artifact)]
+    return [*check_structure(artifact), *check_values(artifact)]
+
+
+def check_structure(artifact: Checkable) -> list[str]:
+    """Find datasets of the wrong shape or kind, without a look at their values."""
+    return [finding for rule in (_dimensions, _kinds) for finding in rule(artifact)]
+
+
+def check_values(artifact: Checkable) -> list[str]:
+    """Find values that the format does not allow, some rows at a time: datasets may still lie in their file."""
+    return [finding for rule in (_finite, _time_ascends) for finding in rule(artifact)]
 
 
 def _dimensions(artifact: Checkable) -> Iterator[str]:
@@ -53,28 +82,184 @@ def _dimensions(artifact: Checkable) -> Iterator[str]:
 def _kinds(artifact: Checkable) -> Iterator[str]:
     for spec, values in _present(artifact):
         wanted = "text" if spec.units == "text" else "numbers"
-        if (values.dtype.kind == "U") != (wanted == "text") or values.dtype.kind not in "Uiuf":
-            yield f"{spec.path}: holds {values.dtype}, expected {wanted}"
+        held = _KINDS.get(values.dtype.kind, str(values.dtype))
+        if held != wanted:
+            yield f"{spec.path}: holds {held}, expected {wanted}"
 
 
 def _finite(artifact: Checkable) -> Iterator[str]:
     for spec, values in _present(artifact):
-        if values.dtype.kind == "f" and not spec.gaps:
-            bad = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
-            if bad.size:
-                yield f"{spec.path}: {bad.size} samples are not finite, the first at index {bad[0]}"
+        if values.dtype.kind != "f" or spec.gaps:
+            continue
+        bad, first = 0, 0
+        for start, block in _blocks(values):
+            not_finite = ~np.isfinite(block).all(axis=tuple(range(1, block.ndim)))
+            if not bad and not_finite.any():
+                first = start + int(np.argmax(not_finite))
+            bad += int(np.count_nonzero(not_finite))
+        if bad:
+            yield f"{spec.path}: {bad} samples are not finite, the first at index {first}"
 
 
 def _time_ascends(artifact: Checkable) -> Iterator[str]:
-    time = np.asarray(artifact.data.get("time", ()))
-    if time.ndim == 1 and time.dtype.kind in "iuf" and np.any(np.diff(time) <= 0):
-        yield f"time: does not ascend at index {int(np.argmax(np.diff(time) <= 0)) + 1}"
+    time, last = {spec.path: values for spec, values in _present(artifact)}.get("time"), -np.inf
+    if time is None or time.ndim != 1 or time.dtype.kind not in "iuf":
+        return
+    for start, block in _blocks(time):
+        falling = np.diff(block.astype(float), prepend=last) <= 0
+        if falling.any():
+            yield f"time: does not ascend at index {start + int(np.argmax(falling))}"
+            return
+        last = float(block[-1])
 
 
-def _present(artifact: Checkable) -> Iterator[tuple[DatasetSpec, np.ndarray]]:
+def _blocks(values: Any) -> Iterator[tuple[int, np.ndarray]]:
+    """Give the rows of an array or of a dataset in its file, some at a time, each time with the index of the first."""
+    if values.ndim == 0:
+        yield 0, np.reshape(values[()], 1)
+        return
+    rows = max(1, _BLOCK // max(1, math.prod(values.shape[1:])))
+    for start in range(0, len(values), rows):
+        yield start, np.asarray(values[start : start + rows])
+
+
+def _present(artifact: Checkable) -> Iterator[tuple[DatasetSpec, Any]]:
     for spec in artifact.spec.datasets:
         if spec.path in artifact.data:
-            yield spec, np.asarray(artifact.data[spec.path])
+            values = artifact.data[spec.path]
+            yield spec, values if hasattr(values, "ndim") else np.asarray(values)
 
 
-_RULES: tuple[Callable[[Checkable], Iterator[str]], ...] = (_dimensions, _kinds, _finite, _time_ascends)
+class Stored(NamedTuple):
+    """An artifact that still lies in its file."""
+
+    spec: ArtifactSpec
+    header: Header
+    data: Mapping[str, h5py.Dataset]
+
+
+@contextmanager
+def opened(path: Path, *wanted: ArtifactSpec) -> Iterator[Stored]:
+    """Open an artifact: the one gate through which anything of it is read.
+
+    HDF5 trusts what it parses, and damage there may keep it busy for ever; so it opens nothing whose seal does not fit.
+    """
+    _require_sealed(path)
+    try:
+        with h5py.File(path, "r") as file:
+            _refuse_links(file)
+            spec = _identify(path, file)
+            if wanted and spec not in wanted:
+                asked = " or ".join(f"{w.format} (made by {w.makers})" for w in wanted)
+                raise InputError(f"{path}: is a {spec.format}; this command needs a {asked}")
+            data = {d.path: own for d in spec.datasets if (own := _dataset(file, d.path))}
+            yield Stored(spec, _read_header(file), data)
+    except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
+        raise InputError(f"{path}: damaged: {one_line(error)}") from None
+
+
+def _require_sealed(path: Path) -> None:
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, not an artifact")
+    if not path.is_file():
+        raise InputError(f"{path}: is a device or a pipe, not a file")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: is empty")
+    if not is_hdf5(path):
+        raise NotAnArtifactError(path, f"{path}: cannot be read as an artifact: not an HDF5 file, or damaged")
+    if not is_sealed(path):
+        raise NotAnArtifactError(
+            path,
+            f"{path}: cannot be read as an artifact: it does not end in the checksum that cpfls writes: cut off, "
+            "changed by another program, or not made by cpfls; docs/format.md says how to add one",
+        )
+    if not read_content(path).intact:
+        raise InputError(f"{path}: damaged: its content does not fit the checksum at its end; copy or make it again")
+
+
+def _refuse_links(file: h5py.File) -> None:
+    """Refuse what leads to other places, in the file or out of it."""
+    found = file.visititems_links(lambda name, link: None if isinstance(link, h5py.HardLink) else (name, link))
+    if found is not None:
+        raise ValueError(f"{found[0]} is a {type(found[1]).__name__}; an artifact holds all that it names")
+
+
+def _dataset(file: h5py.File, path: str) -> h5py.Dataset | None:
+    found = file.get(path)
+    if not isinstance(found, h5py.Dataset):
+        return None
+    if found.external or found.is_virtual:
+        raise ValueError(f"{path} lies in another file; an artifact holds all that it names")
+    if found.shape is None:
+        raise ValueError(f"{path} holds nothing, not even a shape")
+    return found
+
+
+def _identify(path: Path, file: h5py.File) -> ArtifactSpec:
+    name = _text_attribute(file, "format")
+    if name is None or not name.startswith("cpfls/"):
+        raise InputError(f"{path}: an HDF5 file, but not made by cpfls (no root attribute 'format')")
+    version = file.attrs.get("schema_version")
+    if not isinstance(version, int | np.integer):
+        raise InputError(f"{path}: the root attribute 'schema_version' is missing or not a number")
+    if version < 1:
+        raise InputError(f"{path}: schema_version = {version}: damaged; versions count from 1")
+    if version > SCHEMA_VERSION:
+        raise InputError(
+            f"{path}: schema_version = {version}: written by a newer cpfls; this one reads up to {SCHEMA_VERSION}"
+        )
+    known = record_of_format(name)
+    if known is None:
+        raise InputError(f"{path}: format = '{name}': this cpfls does not know it")
+    return known.spec()
+
+
+def _read_header(file: h5py.File) -> Header:
+    inputs = {
+        role: InputFile(*(str(group.attrs[key]) for key in ("name", "sha256", "format")))
+        for role, group in file.get(INPUTS, {}).items()
+    }
+    config = bytes(file[CONFIG][()]).decode()
+    if text_sha256(config) != file.attrs["config_sha256"]:
+        raise ValueError(f"/{CONFIG} was changed after the file was written (config_sha256 differs)")
+    return Header(str(file.attrs["cpfls_version"]), int(file.attrs["seed"]), config, inputs)
+
+
+def require_all(path: Path, stored: Stored) -> None:
+    """Refuse an artifact that lacks what every one of its format holds.
+
+    Raises
+    ------
+    InputError
+    """
+    missing = [known.path for known in stored.spec.datasets if known.required and known.path not in stored.data]
+    if missing:
+        raise InputError(f"{path}: the {stored.spec.format} lacks {_some(missing)}; make it again")
+
+
+def refuse(path: Path, findings: Sequence[str]) -> None:
+    """Refuse a file in which something was found.
+
+    Raises
+    ------
+    InputError
+    """
+    if findings:
+        raise InputError("\n".join(f"{path}: {finding}" for finding in findings))
+
+
+def _some(names: list[str], most: int = 5) -> str:
+    rest = len(names) - most
+    return ", ".join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def one_line(error: Exception) -> str:
+    """Word an error of a library in one line."""
+    return " ".join(str(error.args[0] if error.args else error).split())
+
+
+def _text_attribute(file: h5py.File, name: str) -> str | None:
+    value = file.attrs.get(name)
+    return value if isinstance(value, str) else None

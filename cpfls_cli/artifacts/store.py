@@ -5,11 +5,9 @@ What is not a good artifact is refused with one message.
 
 from __future__ import annotations
 
-import hashlib
 import io
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,7 +16,16 @@ import h5py
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.check import check_artifact
+from cpfls_cli.artifacts.check import (
+    Stored,
+    check_artifact,
+    check_structure,
+    check_values,
+    one_line,
+    opened,
+    refuse,
+    require_all,
+)
 from cpfls_cli.artifacts.formats import record_of_format
 from cpfls_cli.artifacts.output import atomic_path
 from cpfls_cli.artifacts.spec import (
@@ -28,12 +35,15 @@ from cpfls_cli.artifacts.spec import (
     ArtifactSpec,
     DatasetSpec,
     Header,
-    InputFile,
     Record,
 )
-from cpfls_cli.errors import InputError, NotAnArtifactError, OutputError
+from cpfls_cli.errors import ComputationError, InputError, OutputError
+from cpfls_cli.files import read_content, seal_of, text_sha256
 
 R = TypeVar("R", bound=Record)
+
+_SHORT = 8
+"""Words of text that stand in an outline."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +99,6 @@ def read_record(path: Path, wanted: type[R], *needed: str) -> R:
         If the file is no good artifact of the format, or lacks a field or samples in it; the message names them.
     """
     artifact = read_artifact(path, wanted.spec())
-    findings = check_artifact(artifact)
-    if findings:
-        raise InputError("\n".join(f"{path}: {finding}" for finding in findings))
     names = [wanted.path(name) for name in needed]
     missing = [name for name in names if name not in artifact.data]
     if missing:
@@ -102,7 +109,7 @@ def read_record(path: Path, wanted: type[R], *needed: str) -> R:
 
 
 def read_any(path: Path) -> Record:
-    """Read an artifact of any format, without a check of its values.
+    """Read an artifact of any format.
 
     Raises
     ------
@@ -120,6 +127,8 @@ def _record(path: Path, artifact: Artifact, wanted: type[R]) -> R:
         return wanted.of_data(artifact.header, artifact.data)
     except LookupError as error:
         raise InputError(f"{path}: the {artifact.spec.format} lacks {error.args[0]}; make it again") from None
+    except (ValueError, TypeError, ArithmeticError) as error:
+        raise InputError(f"{path}: damaged: {one_line(error)}") from None
 
 
 def write_record(path: Path, record: Record) -> None:
@@ -144,21 +153,65 @@ def read_artifact(path: Path, *wanted: ArtifactSpec) -> Artifact:
     Raises
     ------
     InputError
-        If the file is missing, truncated, foreign, of another stage or of a newer schema.
+        If the file is missing, damaged, foreign, of another stage or of a newer schema, or breaks its format.
     """
-    with _open(path) as file:
-        try:
-            spec = _identify(path, file)
-            if wanted and spec not in wanted:
-                asked = " or ".join(f"{w.format} (made by {w.makers})" for w in wanted)
-                raise InputError(f"{path}: is a {spec.format}; this command needs a {asked}")
-            missing = [d.path for d in spec.datasets if d.required and d.path not in file]
-            if missing:
-                raise InputError(f"{path}: the {spec.format} lacks {_some(missing)}; make it again")
-            data = {d.path: _read(file[d.path]) for d in spec.datasets if d.path in file}
-            return Artifact(spec, _read_header(file), data)
-        except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError) as error:
-            raise InputError(f"{path}: damaged: {_one_line(error)}") from None
+    with opened(path, *wanted) as stored:
+        require_all(path, stored)
+        refuse(path, check_structure(stored))
+        artifact = Artifact(stored.spec, stored.header, {name: _read(own) for name, own in stored.data.items()})
+        refuse(path, check_values(artifact))
+        return artifact
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What an artifact holds, without what is large.
+
+    Attributes
+    ----------
+    shapes : mapping of str to tuple of int
+        Of all datasets, by path.
+    values : mapping of str to object
+        Single values, and a few words of text.
+    """
+
+    spec: ArtifactSpec
+    header: Header
+    shapes: Mapping[str, tuple[int, ...]]
+    values: Mapping[str, Any]
+
+
+def read_outline(path: Path) -> Outline:
+    """Read what an artifact holds, in little memory however large it is.
+
+    Raises
+    ------
+    InputError
+        As `read_artifact`.
+    """
+    with opened(path) as stored:
+        require_all(path, stored)
+        refuse(path, check_artifact(stored))
+        small = (name for name, own in stored.data.items() if own.ndim == 0 or _is_short_text(own))
+        values = {name: _read(stored.data[name]) for name in small}
+        return Outline(stored.spec, stored.header, {name: own.shape for name, own in stored.data.items()}, values)
+
+
+def _is_short_text(dataset: h5py.Dataset) -> bool:
+    return bool(dataset.dtype.kind == "S" and dataset.size <= _SHORT)
+
+
+def findings_of(path: Path) -> tuple[ArtifactSpec, list[str]]:
+    """List what in an artifact breaks its format, in little memory however large it is.
+
+    Raises
+    ------
+    InputError
+        If the file is not an artifact, or damaged.
+    """
+    with opened(path) as stored:
+        require_all(path, stored)
+        return stored.spec, check_artifact(stored)
 
 
 def format_name(path: Path) -> str | None:
@@ -170,15 +223,15 @@ def format_name(path: Path) -> str | None:
         None where the file is not an artifact.
     """
     try:
-        with h5py.File(path, "r") as file:
-            return _text_attribute(file, "format")
-    except (OSError, RuntimeError, ValueError):
+        with opened(path) as stored:
+            return stored.spec.format
+    except InputError:
         return None
 
 
 def holds(path: Path, wanted: type[Record]) -> bool:
     """Tell whether a file is an artifact of one format, without reading it whole."""
-    return path.is_file() and format_name(path) == wanted.FORMAT.name
+    return format_name(path) == wanted.FORMAT.name
 
 
 def read_header(path: Path) -> Header:
@@ -189,59 +242,8 @@ def read_header(path: Path) -> Header:
     InputError
         If the file is not a good artifact.
     """
-    with _open(path) as file:
-        try:
-            _identify(path, file)
-            return _read_header(file)
-        except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError) as error:
-            raise InputError(f"{path}: damaged: {_one_line(error)}") from None
-
-
-@contextmanager
-def _open(path: Path) -> Iterator[h5py.File]:
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, not an artifact")
-    if not path.is_file():
-        raise InputError(f"{path}: is a device or a pipe, not a file")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: is empty")
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        reason = "truncated" if "truncated" in str(error) else "not an HDF5 file, or damaged"
-        raise NotAnArtifactError(path, f"{path}: cannot be read as an artifact: {reason}") from None
-    with file:
-        yield file
-
-
-def _identify(path: Path, file: h5py.File) -> ArtifactSpec:
-    name = _text_attribute(file, "format")
-    if name is None or not name.startswith("cpfls/"):
-        raise InputError(f"{path}: an HDF5 file, but not made by cpfls (no root attribute 'format')")
-    version = file.attrs.get("schema_version")
-    if not isinstance(version, int | np.integer):
-        raise InputError(f"{path}: the root attribute 'schema_version' is missing or not a number")
-    if version > SCHEMA_VERSION:
-        raise InputError(
-            f"{path}: schema_version = {version}: written by a newer cpfls; this one reads up to {SCHEMA_VERSION}"
-        )
-    known = record_of_format(name)
-    if known is None:
-        raise InputError(f"{path}: format = '{name}': this cpfls does not know it")
-    return known.spec()
-
-
-def _read_header(file: h5py.File) -> Header:
-    inputs = {
-        role: InputFile(*(str(group.attrs[key]) for key in ("name", "sha256", "format")))
-        for role, group in file.get(INPUTS, {}).items()
-    }
-    config = bytes(file[CONFIG][()]).decode()
-    if text_sha256(config) != file.attrs["config_sha256"]:
-        raise ValueError(f"/{CONFIG} was changed after the file was written (config_sha256 differs)")
-    return Header(str(file.attrs["cpfls_version"]), int(file.attrs["seed"]), config, inputs)
+    with opened(path) as stored:
+        return stored.header
 
 
 def _read(dataset: h5py.Dataset) -> Any:
@@ -249,20 +251,6 @@ def _read(dataset: h5py.Dataset) -> Any:
     if dataset.dtype.kind == "S":
         return np.char.decode(np.asarray(value), "utf-8")
     return value
-
-
-def _some(names: list[str], most: int = 5) -> str:
-    rest = len(names) - most
-    return ", ".join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error.args[0] if error.args else error).split())
-
-
-def _text_attribute(file: h5py.File, name: str) -> str | None:
-    value = file.attrs.get(name)
-    return value if isinstance(value, str) else None
 
 
 def write_artifact(path: Path, artifact: Artifact) -> None:
@@ -275,14 +263,20 @@ def write_artifact(path: Path, artifact: Artifact) -> None:
 
     Raises
     ------
+    ComputationError
+        If a result breaks its own format, such as a number that is not finite.
     OutputError
         If the file cannot be written.
     """
+    findings = check_artifact(artifact)
+    if findings:
+        raise ComputationError("\n".join(f"{path}: not written: {finding}" for finding in findings))
     image = _image(artifact)
     with atomic_path(path) as temporary:
         try:
             with temporary.open("wb") as file:
                 file.write(image)
+                file.write(seal_of(image))
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(temporary, path)
@@ -337,26 +331,14 @@ def _write_dataset(file: h5py.File, spec: DatasetSpec, value: Any) -> None:
 
 
 def file_sha256(path: Path) -> str:
-    """Hash a file.
+    """Hash a file; one that was opened as an artifact before is not read again.
 
     Returns
     -------
     str
         Hexadecimal SHA-256.
     """
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def text_sha256(text: str) -> str:
-    """Hash a text.
-
-    Returns
-    -------
-    str
-        Hexadecimal SHA-256 of its UTF-8 bytes.
-    """
-    return hashlib.sha256(text.encode()).hexdigest()
+    return read_content(path).sha256
 
 
 def count_rows(path: Path, spec: ArtifactSpec, first: str) -> int | None:
@@ -372,50 +354,32 @@ def count_rows(path: Path, spec: ArtifactSpec, first: str) -> int | None:
     int or None
         None where the file is no artifact of this format or lacks the dataset; reading it whole says why.
     """
-    if format_name(path) != spec.format:
-        return None
     try:
-        with h5py.File(path, "r") as file:
-            return len(file[first]) if first in file and file[first].ndim else None
-    except (OSError, RuntimeError, ValueError, TypeError):
+        with opened(path, spec) as stored:
+            return len(stored.data[first]) if first in stored.data and stored.data[first].ndim else None
+    except InputError:
         return None
 
 
-def check_rows(path: Path, spec: ArtifactSpec, names: Sequence[str], rows: int) -> None:
-    """Refuse datasets of an artifact that break its format, chunk by chunk.
+def check_rows(path: Path, spec: ArtifactSpec, names: Sequence[str]) -> None:
+    """Refuse datasets of an artifact that break its format, some rows at a time.
 
     Parameters
     ----------
     names : sequence of str
-        Paths of datasets; the first ascends.
-    rows : int
-        Read at a time.
+        Paths of the datasets that are needed; others are not looked at.
 
     Raises
     ------
     InputError
-        If one is missing, has another length or shape, is not finite, or the first does not ascend.
+        If one is missing, or breaks the format.
     """
-    with h5py.File(path, "r") as file:
-        length = len(file[names[0]])
-        for name in names:
-            dataset, known = file.get(name), spec.dataset(name)
-            assert known is not None
-            if dataset is None:
-                raise InputError(f"{path}: lacks {name}; this stage needs {', '.join(names)}")
-            shape = (length, *(3 for _ in known.dimensions[1:]))
-            if dataset.shape != shape:
-                raise InputError(f"{path}: {name}: has shape {dataset.shape}, expected {shape}")
-    last, start = -np.inf, 0
-    for block in read_rows(path, names, 0, length, rows):
-        for name, values in zip(names, block, strict=True):
-            bad = np.flatnonzero(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
-            if bad.size:
-                raise InputError(f"{path}: {name}: is not finite at index {start + int(bad[0])}")
-        steps = np.diff(block[0], prepend=last)
-        if np.any(steps <= 0):
-            raise InputError(f"{path}: {names[0]}: does not ascend at index {start + int(np.argmax(steps <= 0))}")
-        last, start = float(block[0][-1]), start + len(block[0])
+    with opened(path, spec) as stored:
+        missing = [name for name in names if name not in stored.data]
+        if missing:
+            raise InputError(f"{path}: lacks {', '.join(missing)}; this stage needs {', '.join(names)}")
+        needed = Stored(spec, stored.header, {name: stored.data[name] for name in names})
+        refuse(path, check_structure(needed) or check_values(needed))
 
 
 def read_rows(path: Path, names: Sequence[str], start: int, stop: int, rows: int) -> Iterator[list[Array]]:
@@ -440,11 +404,8 @@ def read_rows(path: Path, names: Sequence[str], start: int, stop: int, rows: int
     InputError
         If the file cannot be read any more.
     """
-    try:
-        with h5py.File(path, "r") as file:
-            datasets = [file[name] for name in names]
-            for first in range(start, stop, rows):
-                last = min(first + rows, stop)
-                yield [np.asarray(dataset[first:last], dtype=float) for dataset in datasets]
-    except (OSError, KeyError, RuntimeError) as error:
-        raise InputError(f"{path}: cannot be read any more: {' '.join(str(error).split())}") from None
+    with opened(path) as stored:
+        datasets = [stored.data[name] for name in names]
+        for first in range(start, stop, rows):
+            last = min(first + rows, stop)
+            yield [np.asarray(dataset[first:last], dtype=float) for dataset in datasets]

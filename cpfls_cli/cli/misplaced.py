@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Literal
 
 from cpfls_cli.errors import ConfigError, InputError
+from cpfls_cli.files import is_hdf5
 from cpfls_cli.logs.formats import is_log
 
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 _CONFIGS = (".yaml", ".yml")
 
 Kind = Literal["log", "artifact", "config"]
@@ -29,9 +29,8 @@ def _kind(path: Path) -> Kind | None:
 
 def _format(path: Path) -> str | None:
     """Tell the format of an artifact; None for any other file, which is not opened as one."""
-    with path.open("rb") as stream:
-        if stream.read(len(_HDF5)) != _HDF5:
-            return None
+    if not is_hdf5(path):
+        return None
     from cpfls_cli.artifacts.store import format_name
 
     return format_name(path)
@@ -84,7 +83,7 @@ def what_it_is(path: Path) -> str | None:
     """Say of a file in the place of an artifact what it is and what to do with it; None where that is not known."""
     kind = _kind(path)
     if kind == "log":
-        flight = path.name.partition(".")[0] + ".h5"
+        flight = path.name.partition(".")[0] + ("-flight.h5" if path.suffix == ".h5" else ".h5")
         return f"{path}: is a log, and this takes what cpfls made: cpfls import CONFIG {path} -o {flight}"
     if kind == "config":
         return f"{path}: is a config, and this takes what cpfls made; `cpfls config {path}` shows it"

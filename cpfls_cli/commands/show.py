@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.check import check_artifact
-from cpfls_cli.artifacts.store import Artifact, read_artifact
+from cpfls_cli.artifacts.store import Outline, findings_of, read_outline
 from cpfls_cli.config.keys import commented_default
 from cpfls_cli.config.load import load_study, validate
 from cpfls_cli.config.study import resolved, resolved_yaml
@@ -20,14 +19,12 @@ from cpfls_cli.report.content import Block, Facts, Listing, Table, Text
 from cpfls_cli.report.outcome import Outcome
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_SHORT = 8
-
 
 def info(path: Path) -> Outcome:
     """Describe an artifact: where it comes from and what it holds."""
-    artifact = read_artifact(path)
+    artifact = read_outline(path)
     header = artifact.header
-    datasets = {name: _describe_dataset(artifact, name) for name in artifact.data}
+    datasets = {name: _describe_dataset(artifact, name) for name in artifact.shapes}
     summary = {
         "file": str(path),
         "format": artifact.spec.format,
@@ -44,15 +41,16 @@ def info(path: Path) -> Outcome:
     return Outcome(summary, (Text(f"{artifact.spec.format}: {artifact.spec.description}"), Facts(origin), table))
 
 
-def _describe_dataset(artifact: Artifact, name: str) -> dict[str, Any]:
+def _describe_dataset(artifact: Outline, name: str) -> dict[str, Any]:
     spec = artifact.spec.dataset(name)
-    values = np.asarray(artifact.data[name])
-    entry: dict[str, Any] = {"shape": list(values.shape), "units": "", "description": ""}
-    if spec is not None:
-        entry |= {"units": spec.units, "frame": spec.frame, "description": spec.description}
-    if values.ndim == 0 or (values.dtype.kind == "U" and values.size <= _SHORT):
-        entry["value"] = values.tolist()
-    return entry
+    assert spec is not None, "the format names it"
+    entry = {
+        "shape": list(artifact.shapes[name]),
+        "units": spec.units,
+        "description": spec.description,
+        "frame": spec.frame,
+    }
+    return entry | ({"value": np.asarray(artifact.values[name]).tolist()} if name in artifact.values else {})
 
 
 def _dataset_row(name: str, entry: dict[str, Any]) -> list[str]:
@@ -64,10 +62,9 @@ def _dataset_row(name: str, entry: dict[str, Any]) -> list[str]:
 
 def check(path: Path) -> Outcome:
     """Check an artifact against its format; the exit code is 1 where it does not keep to it."""
-    artifact = read_artifact(path)
-    findings = check_artifact(artifact)
-    summary = {"file": str(path), "format": artifact.spec.format, "good": not findings, "findings": findings}
-    sentences = [f"{path}: {finding}" for finding in findings] or [f"{path}: good ({artifact.spec.format})"]
+    spec, findings = findings_of(path)
+    summary = {"file": str(path), "format": spec.format, "good": not findings, "findings": findings}
+    sentences = [f"{path}: {finding}" for finding in findings] or [f"{path}: good ({spec.format})"]
     return Outcome(summary, tuple(map(Text, sentences)), exit_code=int(bool(findings)))
 
 

@@ -95,7 +95,7 @@ def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
     if samples is None or samples <= IN_MEMORY:
         flight = read_record(path, FlightRecord, *names)
         return _torque_data([getattr(flight, name) for name in names])
-    check_rows(path, FlightRecord.spec(), paths, CHUNK)
+    check_rows(path, FlightRecord.spec(), paths)
     return FlightFile(path.resolve(), paths, 0, samples, path.stat().st_size, samples)
 
 

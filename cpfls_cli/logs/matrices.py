@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Collection, Iterable, Iterator
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -12,10 +15,27 @@ import scipy.io
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.files import State, is_sealed, state_of
 from cpfls_cli.logs.formats import LogContents
 from cpfls_cli.units import known_unit
 
 _MOST_COLUMNS = 64
+_SECONDS, _BYTES_PER_SECOND = 10.0, 2e7
+"""How long another process may read a file: at least so long, and longer with its size."""
+_PROBE = """
+import sys, h5py
+
+def read(name, own):
+    if isinstance(own, h5py.Dataset) and own.dtype.kind in "iufb" and own.ndim and own.size:
+        rows = max(1, (1 << 20) * len(own) // own.size)
+        for start in range(0, len(own), rows):
+            own[start : start + rows]
+
+with h5py.File(sys.argv[1], "r") as file:
+    name = file.attrs.get("format")
+    print(name if isinstance(name, str) and name.startswith("cpfls/") else "")
+    file.visititems(read)
+"""
 _TIME_UNITS = ("s", "ms", "us", "ns")
 
 
@@ -31,13 +51,15 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         If the file cannot be read, is an artifact of this program, or holds no arrays of numbers.
     """
     try:
-        is_hdf5 = h5py.is_hdf5(path)
-        columns, units = _of_hdf5(path, wanted) if is_hdf5 else (dict(_named(_of_mat(path), wanted)), {})
+        hdf5 = h5py.is_hdf5(path)
+        if hdf5:
+            _require_readable(path)
+        columns, units = _of_hdf5(path, wanted) if hdf5 else (dict(_named(_of_mat(path), wanted)), {})
     except InputError:
         raise
     except Exception as error:
         # Each version of .mat breaks in its own way: what the parsers raise is no fixed set.
-        raise InputError(f"{path}: cannot be read as {'HDF5' if is_hdf5 else 'MATLAB'}: {error}") from None
+        raise InputError(f"{path}: cannot be read as {'HDF5' if hdf5 else 'MATLAB'}: {error}") from None
     if not columns:
         raise InputError(f"{path}: holds no vectors or matrices of numbers")
     return LogContents({"": columns}, units)
@@ -45,24 +67,48 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
 
 def is_log(path: Path) -> bool:
     """Tell an HDF5 file of another program from an artifact of this one; what cannot be read is none."""
-    try:
-        with h5py.File(path, "r") as file:
-            return not _artifact(file)
-    except (OSError, RuntimeError):
+    if not h5py.is_hdf5(path) or is_sealed(path):
         return False
+    found = _probed(state_of(path))
+    return found.readable and not found.artifact
 
 
-def _artifact(file: h5py.File) -> str:
-    name = file.attrs.get("format")
-    return name if isinstance(name, str) and name.startswith("cpfls/") else ""
+class _Probed(NamedTuple):
+    """What another process found of an HDF5 file, or why it did not come to its end."""
+
+    readable: bool
+    artifact: str
+    fault: str = ""
+
+
+@lru_cache(maxsize=64)
+def _probed(state: State) -> _Probed:
+    """Read an HDF5 file in another process first: in a damaged one HDF5 may turn for ever, and heeds no signal then."""
+    limit = _SECONDS + state.size / _BYTES_PER_SECOND
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _PROBE, state.path], capture_output=True, timeout=limit, check=False, text=True
+        )
+    except subprocess.TimeoutExpired:
+        return _Probed(False, "", f"damaged: HDF5 does not come to an end with it within {limit:.0f} s")
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or [f"HDF5 ended with {done.returncode}"])[-1]
+        return _Probed(False, "", f"cannot be read as HDF5: {last}")
+    return _Probed(True, done.stdout.strip())
+
+
+def _require_readable(path: Path) -> None:
+    found = _probed(state_of(path))
+    if not found.readable:
+        raise InputError(f"{path}: {found.fault}")
+    if found.artifact:
+        raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
 
 
 def _of_hdf5(path: Path, wanted: Collection[str] | None) -> tuple[dict[str, Array], dict[str, str]]:
     columns: dict[str, Array] = {}
     units: dict[str, str] = {}
     with h5py.File(path, "r") as file:
-        if _artifact(file):
-            raise InputError(f"{path}: is an artifact of this program ({_artifact(file)}), not a log")
         for name, dataset in _datasets(file):
             own = dict(_named([(name, dataset)], wanted))
             unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.store import text_sha256
+from cpfls_cli.files import text_sha256
 
 HASH_SHOWN = 12
 

@@ -12,6 +12,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.builders.artifacts import edited
+
 HOSTILE = '*/ int main(void) { return 7; } /* ??/\n"""\nraise SystemExit(7)\n#error " \\ \u202e'
 ENDINGS = {"json": "json", "c": "c", "python": "py"}
 
@@ -25,7 +27,7 @@ def model(pipeline, tmp_path):
 
 
 def change(path, **values):
-    with h5py.File(path, "r+") as file:
+    with edited(path) as file:
         for name, value in values.items():
             place = name.replace("__", "/")
             if place in file:
@@ -130,7 +132,7 @@ def test_hostile_text_in_a_model_stays_text(cpfls, model, tmp_path, form):
         search__stop_reason=np.array(HOSTILE),
         search__complete=np.uint8(0),
     )
-    with h5py.File(model, "r+") as file:
+    with edited(model) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
     model.rename(hostile)
     output = tmp_path / f"m.{ENDINGS[form]}"
@@ -154,11 +156,11 @@ def test_not_a_good_model(refuse, pipeline, model, study, tmp_path):
     (line,) = refuse("export", study, *words)
     assert line == f"{study}: is a config, and this takes what cpfls made; `cpfls config {study}` shows it"
     assert refuse("export", tmp_path / "none.h5", *words) == [f"{tmp_path / 'none.h5'}: no such file"]
-    with h5py.File(model, "r+") as file:
+    with edited(model) as file:
         file.attrs["schema_version"] = 99
     (line,) = refuse("export", model, *words, "--dry-run")
     assert line == f"{model}: schema_version = 99: written by a newer cpfls; this one reads up to 1"
-    with h5py.File(model, "r+") as file:
+    with edited(model) as file:
         file.attrs["schema_version"] = 1
         file.attrs["format"] = "cpfls/extended"
     lines = refuse("export", model, *words)

@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
@@ -15,6 +14,7 @@ from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.effects.polynomial import Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.motion import State, step
+from tests.builders.artifacts import edited
 from tests.builders.compiled_c import build, require_gcc
 from tests.builders.vehicle_models import QUAD, polynomial_effects, record_of, whole
 
@@ -95,7 +95,7 @@ def test_hostile_text_stays_text(cpfls, tmp_path, form):
     header = Header("0", 1, "seed: 1\n", {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")})
     path = tmp_path / ("x*" + "' \"; raise SystemExit(8)\n#.h5")
     write_record(path, record.with_header(header))
-    with h5py.File(path, "r+") as file:
+    with edited(path) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
     output = tmp_path / f"m.{ENDINGS[form]}"
     result = cpfls("export", path, "-o", output)
@@ -130,13 +130,13 @@ def test_what_an_export_cannot_hold_is_named(refuse, tmp_path, parts, message):
 
 
 def test_a_vehicle_of_wrong_content_is_refused(refuse, vehicle, tmp_path):
-    with h5py.File(vehicle, "r+") as file:
+    with edited(vehicle) as file:
         names = np.char.encode(np.array(["linear_damping", "quadratic_dampin"]), "utf-8")
         del file["vehicle/effect/name"]
         file["vehicle/effect/name"] = names
     (line,) = refuse("export", vehicle, "-o", tmp_path / "m.c")
     assert line.startswith(f"{vehicle}: quadratic_dampin: no such effect (did you mean quadratic_damping")
-    with h5py.File(vehicle, "r+") as file:
+    with edited(vehicle) as file:
         file["vehicle/mass"][()] = np.nan
     (line,) = refuse("export", vehicle, "-o", tmp_path / "m.c")
     assert line == f"{vehicle}: vehicle/mass: 1 samples are not finite, the first at index 0"

@@ -10,6 +10,7 @@ import pytest
 
 import cpfls_cli
 from cpfls_cli.artifacts.formats import record_of_format
+from tests.builders.artifacts import edited
 
 STAGES = ("trajectory", "flight", "selection", "model", "prediction")
 
@@ -85,7 +86,7 @@ def test_files_describe_themselves_and_hold_nothing_that_the_format_does_not_nam
 def test_check_says_what_is_wrong_and_ends_with_1(cpfls, pipeline, tmp_path, name, value, finding):
     path = tmp_path / "flight.h5"
     shutil.copy(pipeline.flight, path)
-    with h5py.File(path, "r+") as file:
+    with edited(path) as file:
         del file[name]
         file[name] = value
     result = cpfls("check", path)

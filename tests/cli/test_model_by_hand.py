@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 import yaml
 
+from tests.builders.artifacts import edited
+
 FUNCTIONS = {
     "D11": ((0, 0), ""),
     "D13": ((0, 2), "p"),
@@ -154,7 +156,7 @@ def test_inertia_and_torque_of_a_stored_model_follow_from_its_datasets(cpfls, pi
     small = ("--set", "identification.ridge.count=2", "--set", "identification.generations=1")
     result = cpfls("identify", study, pipeline.flight, "-o", model, *changed, *small)
     assert result.exit_code == 0, result.stderr
-    with h5py.File(model, "r+") as file:
+    with edited(model) as file:
         # Other numbers than those identified, or a fuzzy part that is switched off would prove nothing.
         numbers = np.random.default_rng(11)
         for key in ("model/coefficients", "model/rigid_body"):

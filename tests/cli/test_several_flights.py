@@ -7,6 +7,7 @@ import pytest
 from cpfls_cli.artifacts import job
 from cpfls_cli.artifacts.store import file_sha256
 from cpfls_cli.flights import flight_source, training
+from tests.builders.artifacts import edited
 
 
 @pytest.fixture(scope="module")
@@ -114,13 +115,16 @@ def test_a_flight_read_chunk_by_chunk_gives_the_same_bytes(cpfls, study, pipelin
 
 @pytest.mark.parametrize(
     ("dataset", "value", "said"),
-    [("torque", np.nan, "torque: is not finite at index 7"), ("time", 0.0, "time: does not ascend at index 7")],
+    [
+        ("torque", np.nan, "torque: 1 samples are not finite, the first at index 7"),
+        ("time", 0.0, "time: does not ascend at index 7"),
+    ],
 )
 def test_a_long_flight_is_checked_too(refuse, study, pipeline, tmp_path, monkeypatch, dataset, value, said):
     monkeypatch.setattr(flight_source, "IN_MEMORY", 100)
     broken = tmp_path / "broken.h5"
     broken.write_bytes(pipeline.flight.read_bytes())
-    with h5py.File(broken, "r+") as file:
+    with edited(broken) as file:
         file[dataset][7] = value
     (message,) = refuse("identify", study, broken, "-o", tmp_path / "model.h5")
     assert said in message
@@ -132,7 +136,7 @@ def test_a_long_flight_without_torque_is_refused_where_it_is_needed(
     monkeypatch.setattr(flight_source, "IN_MEMORY", 100)
     lacking = tmp_path / "lacking.h5"
     lacking.write_bytes(pipeline.flight.read_bytes())
-    with h5py.File(lacking, "r+") as file:
+    with edited(lacking) as file:
         del file["torque"]
     run(cpfls, "reduce", study, lacking, "-o", tmp_path / "selection.h5")
     (message,) = refuse("identify", study, lacking, "-o", tmp_path / "model.h5")

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE
 
 CONFIG = """\
@@ -144,12 +145,12 @@ def test_torques_beyond_the_rotors_leave_their_speeds_out(control):
 
 
 def test_an_unfinished_search_is_said(control, made):
-    with h5py.File(made[2], "r+") as file:
+    with edited(made[2]) as file:
         file["search/complete"][()] = 0
     try:
         _, result = control()
     finally:
-        with h5py.File(made[2], "r+") as file:
+        with edited(made[2]) as file:
             file["search/complete"][()] = 1
     assert "is incomplete: its search was stopped" in result.stderr
 

@@ -12,6 +12,7 @@ import pytest
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.report.outcome import plain
+from tests.builders.artifacts import edited
 from tests.builders.command_line import undrawn
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
@@ -262,7 +263,7 @@ def test_what_cannot_be_resumed_is_refused(cpfls, refuse, config, flights, tmp_p
         (message,) = refuse("vehicle", config, *words, "-o", output, "--resume")
         assert message.startswith(f"{output}.checkpoint: is of another search: ")
         assert named in message
-    with h5py.File(tmp_path / "v.h5.checkpoint", "r+") as file:
+    with edited(tmp_path / "v.h5.checkpoint") as file:
         file["loss"][0] += 1e-9
     (message,) = refuse("vehicle", config, flights[0], "-o", output, "--resume")
     assert "damaged: its datasets were changed after it was written (sha256 differs)" in message
@@ -291,7 +292,7 @@ def test_an_unknown_block_is_refused(refused, flights):
 
 def test_a_flight_without_rotor_speeds_is_refused(refused, flights, tmp_path):
     still = tmp_path / "still.h5"
-    with h5py.File(flights[0]) as source, h5py.File(still, "w") as target:
+    with h5py.File(flights[0]) as source, edited(still, "w") as target:
         target.attrs.update(source.attrs)
         for name in source:
             if name not in ("rotor_speed", "rotor_command", "torque", "body_torque"):

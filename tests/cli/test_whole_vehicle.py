@@ -14,6 +14,7 @@ from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.rotors import RotorResponse
+from tests.builders.artifacts import edited
 from tests.builders.playback_flights import STATED, truth
 from tests.builders.vehicle_models import record_of, remainder
 
@@ -224,7 +225,7 @@ def test_people_read_what_a_prediction_is_held_against(cpfls, config, vehicle, n
 
 def without(flown, target, *names):
     """Copy a flight without some of its signals."""
-    with h5py.File(flown) as source, h5py.File(target, "w") as file:
+    with h5py.File(flown) as source, edited(target, "w") as file:
         file.attrs.update(source.attrs)
         for name in source:
             if name not in names:

@@ -179,7 +179,6 @@ def test_tests_import_from_shared_builders_alone():
 # looked up by its place: a command, an effect, a reader of logs, a form of the report.
 ONE_OF_A_KIND = ("commands/", "effects/catalogue/", "logs/")
 SMALL_ALL_THE_SAME = {
-    "artifacts/formats.py": "the registry of formats, printed for docs/format.md",
     "cli/main.py": "runs before anything heavy is loaded",
     "control/controllers.py": "the laws, beside the loop that they close",
     "excitation/optimise.py": "what the room is for",

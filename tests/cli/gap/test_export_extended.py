@@ -5,13 +5,13 @@ import shutil
 import subprocess
 import sys
 
-import h5py
 import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import read_record
+from tests.builders.artifacts import edited
 
 
 def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
@@ -44,7 +44,7 @@ def test_it_is_exported(cpfls, extended, tmp_path):
 def test_one_of_before_is_refused(refuse, extended, tmp_path):
     old = tmp_path / "old.h5"
     shutil.copy(extended, old)
-    with h5py.File(old, "r+") as file:
+    with edited(old) as file:
         del file["vehicle"]
     (line,) = refuse("export", old, "-o", tmp_path / "m.c")
     assert line.startswith(f"{old}: was made before models with effects could be exported; make it again with ")

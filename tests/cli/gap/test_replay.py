@@ -9,6 +9,7 @@ import pytest
 
 from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.artifacts.store import read_record
+from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -155,7 +156,7 @@ def test_a_simulated_flight_of_the_vehicle_itself_is_predicted(cpfls, replayed, 
 
 def paused(path, flight, gap=slice(1000, 1050)):
     """Take samples out of a flight, so that its clock has a pause."""
-    with h5py.File(flight) as source, h5py.File(path, "w") as target:
+    with h5py.File(flight) as source, edited(path, "w") as target:
         for name, value in source.attrs.items():
             target.attrs[name] = value
         source.copy("config", target)
@@ -193,7 +194,7 @@ def test_a_log_is_played_back_on_both_sides_of_its_gaps(replayed, with_attitude,
 
 def test_unknown_samples_part_a_flight_too(cpfls, replayed, gap_config, with_attitude, tmp_path):
     flight = imported(cpfls, gap_config, with_attitude[0], tmp_path / "flight.h5")
-    with h5py.File(flight, "r+") as file:
+    with edited(flight) as file:
         file["rotor_speed"][500:510] = math.nan
     answer, _ = replayed("vehicle", flight, options=("--every", "1"))
     assert answer["windows"] == (500 - 50) + (2400 - 510 - 50)

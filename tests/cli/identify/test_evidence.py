@@ -11,6 +11,7 @@ import pytest
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.report.numbers import sentence
 from cpfls_cli.validation import validate
+from tests.builders.artifacts import edited
 
 EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "period", "verdict")
 VALIDATION = [spec for spec in ModelRecord.spec().datasets if spec.path.split("/")[0] in EVIDENCE]
@@ -137,7 +138,7 @@ def test_use_of_a_model_that_was_not_judged_or_judged_unfit_is_told(validated, c
     ):
         model, output = tmp_path / f"{number}.h5", tmp_path / f"prediction-{number}.h5"
         model.write_bytes(validated[0].read_bytes())
-        with h5py.File(model, "a") as file:
+        with edited(model) as file:
             attributes = dict(file["verdict/label"].attrs)
             del file["verdict/label"]
             if label is not None:

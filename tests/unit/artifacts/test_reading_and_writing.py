@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import Artifact, format_name, read_artifact, write_artifact
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import ComputationError, InputError
 
 HEADER = Header("1.2.3", 4, "seed: 4\n", {"flight": InputFile("f.h5", "ab" * 32, "cpfls/flight")})
 
@@ -64,7 +64,7 @@ def test_failure_in_the_middle_leaves_the_old_file_and_nothing_else(tmp_path, ol
     path = tmp_path / "s.h5"
     if old is not None:
         path.write_bytes(old)
-    with pytest.raises((KeyError, TypeError)):
+    with pytest.raises((KeyError, ComputationError)):
         write_artifact(path, selection(**failing))
     assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == ([] if old is None else [("s.h5", old)])
 
