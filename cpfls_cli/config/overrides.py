@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -51,10 +52,13 @@ def _override_key(data: dict[str, Any], key: str, value: Any) -> None:
         raise SettingError(key, _MALFORMED)
     *parents, last = parts
     node: Any = data
-    default: Any = resolved(Study())
-    for parent in parents:
+    # A vehicle has no defaults: what its config leaves out is told as missing.
+    default: Any = {section: values for section, values in resolved(Study()).items() if section != "vehicle"}
+    for parent, following in itertools.pairwise(parts):
         default = default.get(parent) if isinstance(default, dict) else None
         node = _enter(node, parent, default, key)
+        if node == {} and following.isdecimal():
+            raise SettingError(key, f"the config holds no list '{parent}', and there is no default for it")
     if isinstance(node, list):
         node[_index(node, last, key)] = value
     elif isinstance(node, dict):

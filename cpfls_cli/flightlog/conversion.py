@@ -129,7 +129,9 @@ def _in_si(columns: Mapping[str, Array], signal: SignalMap) -> Array:
     values = np.column_stack([np.asarray(columns[name], dtype=float) for name in signal.columns])
     sign = np.ones(len(signal.columns)) if signal.sign is None else np.array(signal.sign)
     values[~np.isfinite(values)] = np.nan
-    values = sign * (signal.scale * values + signal.offset)
+    with np.errstate(over="ignore"):
+        # What overflows is told as a value that no flight has.
+        values = sign * (signal.scale * values + signal.offset)
     if signal.mixer is not None:
         mixed = values @ np.array(signal.mixer).T
         # A motor gives no more than all it has and no less than nothing, whatever the mixer adds up to.

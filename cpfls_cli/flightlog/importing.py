@@ -30,6 +30,7 @@ from cpfls_cli.flightlog.repair import (
     fill,
     find_signal_spikes,
     make_continuous,
+    mask_impossible,
     mask_values,
 )
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
@@ -39,6 +40,7 @@ from cpfls_cli.flightlog.stretches import rotors_at_rest, warn_of_dead, warn_of_
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10
+_SHORTEST_PERIOD_S = 1e-6
 _FEWEST_SAMPLES = 10
 
 
@@ -105,7 +107,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         behind, or the pitch is larger than any pitch.
     """
     settings = drop_absent_signals(columns, settings)
-    read = SignalTable(*select_columns(columns, settings))
+    read, broken = mask_impossible(SignalTable(*select_columns(columns, settings)), settings)
     table, dropped = crop_and_order(read, settings)
     table = make_continuous(table)
     spikes = find_signal_spikes(table, settings)
@@ -136,6 +138,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
         rate_hz=rate_hz,
         cut_off_hz=filtered,
         warnings=(
+            *broken,
             *warn_of_values(counts),
             *warn_of_dead(table, tuple(counts.saturated), settings),
             *warn_of_rest(table, resting, settings),
@@ -150,6 +153,11 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
 
 def _uniform_clock(time: Array) -> tuple[Array, float]:
     period = float(np.median(np.diff(time)))
+    if period < _SHORTEST_PERIOD_S or (time[-1] - time[0]) / period > _LARGEST_REFINEMENT * len(time):
+        raise InputError(
+            f"import.time_column: the median step is {period:.3g} s in {time[-1] - time[0]:.3g} s of {len(time)} rows,"
+            " which is no clock of a log; look at import.time_unit and import.time_column"
+        )
     # A whole number of periods that rounding made a little short must not lose its last sample.
     samples = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6) + 1
     return time[0] + period * np.arange(samples), 1 / period

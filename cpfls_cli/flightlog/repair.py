@@ -13,11 +13,25 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.clock import increasing_rows, refuse_restart
 from cpfls_cli.flightlog.settings import ImportSettings
+from cpfls_cli.units import KNOWN_UNITS
 
 # Measured, not derived: over 15 flights no gyroscope, torque or attitude has a value beyond 7, and 99 % of the single
 # spikes of five standard deviations of their channel lie beyond 10.
 _SUSPECTED_DEVIATIONS = 10.0
 _DEVIATION_OF_MEDIAN = 1.4826
+# Far beyond what flies, by SI unit: what is larger is a broken value, or the unit is wrong.
+_LARGEST = {
+    "rad": 1e6,
+    "rad/s": 1e5,
+    "m": 1e9,
+    "m/s": 1e5,
+    "m/s^2": 1e6,
+    "N m": 1e6,
+    "N": 1e8,
+    "V": 1e5,
+    "1": 1e9,
+}
+_LARGEST_SHARE_BROKEN = 0.01
 
 
 @dataclass(frozen=True)
@@ -97,6 +111,48 @@ def _require_values(table: SignalTable, settings: ImportSettings) -> None:
     if problems:
         problems[-1] += "; map another column, or leave the signal out of import.signals"
         raise InputError("\n".join(problems))
+
+
+def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[SignalTable, tuple[str, ...]]:
+    """Take values that no flight has, and quaternions without a length, for absent ones.
+
+    Returns
+    -------
+    table : Table
+    warnings : tuple of str
+        One for each column that held any.
+
+    Raises
+    ------
+    InputError
+        If a column holds many of them.
+    """
+    warnings: list[str] = []
+    signals = dict(table.signals)
+    for name, values in table.signals.items():
+        unit = KNOWN_UNITS[settings.signals[name].unit].si
+        with np.errstate(invalid="ignore"):
+            broken = np.abs(values) > _LARGEST[unit]
+        for column, (label, marked) in enumerate(zip(settings.signals[name].names, broken.T, strict=True)):
+            if marked.any():
+                warnings.append(_broken(name, label, unit, values[:, column], marked))
+        if name == "quaternion":
+            broken = broken | ~np.any(values, axis=1, keepdims=True)
+            rows = int((~np.any(values, axis=1)).sum())
+            warnings += [f"quaternion: {rows} rows are 0 0 0 0, which is no attitude: taken as missing"] if rows else []
+        signals[name] = np.where(broken, np.nan, values)
+    return SignalTable(table.time, signals), tuple(warnings)
+
+
+def _broken(name: str, column: str, unit: str, values: Array, marked: BoolArray) -> str:
+    first = int(np.argmax(marked))
+    text = (
+        f"column {column!r} holds {int(marked.sum())} of {len(values)} values that no flight has, the first"
+        f" {values[first]:.3g} in row {first + 1} (beyond {_LARGEST[unit]:g}{'' if unit == '1' else f' {unit}'})"
+    )
+    if marked.mean() > _LARGEST_SHARE_BROKEN:
+        raise InputError(f"import.signals.{name}: {text}: look at its unit, scale and offset, or leave it out")
+    return f"{name}: {text}: taken as missing"
 
 
 def make_continuous(table: SignalTable) -> SignalTable:

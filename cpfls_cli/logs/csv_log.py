@@ -6,6 +6,7 @@ import csv
 import gzip
 import io
 import zlib
+from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -79,7 +80,7 @@ def _open(path: Path) -> Iterator[TextIO]:
 
 
 def _columns(path: Path, names: list[str], lines: Iterator[list[str]], wanted: set[str]) -> dict[str, Array]:
-    repeated = sorted({name for name in names if names.count(name) > 1 and name in wanted})
+    repeated = sorted(name for name, count in Counter(names).items() if count > 1 and name in wanted)
     if repeated:
         raise InputError(f"{path}: column '{repeated[0]}' stands twice")
     kept = [index for index, name in enumerate(names) if name in wanted]
@@ -122,7 +123,7 @@ def _first_row(path: Path) -> tuple[list[str], list[str]]:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text.strip() or "nan")
+        _value(text.strip() or "nan")
     except ValueError:
         return False
     return True
@@ -133,6 +134,13 @@ def _number(field: str, path: Path, row: int, column: str) -> float:
     if not text:
         return float("nan")
     try:
-        return float(text)
+        return _value(text)
     except ValueError:
         raise InputError(f"{path}:{row}: column '{column}' = {text[:40]!r}: not a number") from None
+
+
+def _value(text: str) -> float:
+    # Python's own numbers may hold underscores and digits of any script; no log means such a number.
+    if "_" in text or not text.isascii():
+        raise ValueError(text)
+    return float(text)

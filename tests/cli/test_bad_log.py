@@ -108,11 +108,75 @@ def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):
         (",".join(NAMES) + "\n0,0,0,0,0,0,0,0\n", "LOG:2: 8 fields, but 7 column names"),
         (",".join(NAMES) + "\n0,0,up,0,0,0,0\n", "LOG:2: column 'pitch' = 'up': not a number"),
         (",".join(NAMES) + "\n0,0,\x00,0,0,0,0\n", "LOG:2: column 'pitch' = '\\x00': not a number"),
+        (",".join(NAMES) + "\n0,0,1_000,0,0,0,0\n", "LOG:2: column 'pitch' = '1_000': not a number"),
+        (",".join(NAMES) + "\n0,0,\uff11,0,0,0,0\n", "LOG:2: column 'pitch' = '\uff11': not a number"),
         (";".join(NAMES) + "\n0;0,5;0;0;0;0;0\n", "LOG:2: column 'roll' = '0,5': not a number"),
     ],
 )
 def test_wrong_table(wrong, content, message):
     assert wrong(content) == [message]
+
+
+def changed(column, value, row=slice(None)):
+    """Write a log in which values of one column are others."""
+    lines = [line.split(",") for line in table().splitlines()]
+    for line in lines[1:][row]:
+        line[NAMES.index(column)] = value
+    return "\n".join(",".join(line) for line in lines) + "\n"
+
+
+def test_one_value_that_no_flight_has_is_missing_and_told(cpfls, log_study, write, tmp_path):
+    flight = tmp_path / "flight.h5"
+    result = cpfls("import", log_study, write(changed("mx", "1e308", slice(40, 41))), "-o", flight, "--json")
+    assert result.exit_code == 0
+    assert json.loads(result.stdout)["missing"] == {"mx": 1}
+    assert (
+        "body_torque: column 'mx' holds 1 of 200 values that no flight has, the first 1e+308 in row 41 "
+        "(beyond 1e+06 N m): taken as missing"
+    ) in result.stderr
+    assert cpfls("check", flight).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (changed("my", "9e18"), "import.signals.body_torque: column 'my' holds 200 of 200 values that no flight has"),
+        (changed("t", "0"), "the log has fewer than two rows of increasing time stamps"),
+        (
+            "\n".join([",".join(NAMES), *(f"{4e-12 * row},0,0,0,0,0,0" for row in range(50))]) + "\n",
+            "import.time_column: the median step is 4e-12 s in 1.96e-10 s of 50 rows, which is no clock of a log",
+        ),
+    ],
+)
+def test_values_that_no_flight_has_are_refused(wrong, content, message):
+    (line,) = wrong(content)
+    assert line.startswith(f"LOG: {message}")
+
+
+QUATERNIONS = """\
+import:
+  time_column: t
+  signals:
+    quaternion: {columns: [qw, qx, qy, qz], unit: "1"}
+  torque_source: null
+"""
+
+
+@pytest.mark.parametrize("zeros", [slice(0, 3), slice(60, 64)])
+def test_quaternions_without_a_length_are_missing(cpfls, log_study, write, tmp_path, zeros):
+    log_study.write_text(QUATERNIONS + VEHICLE)
+    turn = np.arange(200) / 200
+    values = np.column_stack([0.02 * np.arange(200), np.cos(turn), 0 * turn, 0 * turn, np.sin(turn)])
+    values[zeros, 1:] = 0.0
+    lines = "\n".join(",".join(map(str, row)) for row in values)
+    flight = tmp_path / "flight.h5"
+    result = cpfls("import", log_study, write("t,qw,qx,qy,qz\n" + lines + "\n"), "-o", flight)
+    assert result.exit_code == 0
+    rows = zeros.stop - zeros.start
+    assert f"quaternion: {rows} rows are 0 0 0 0, which is no attitude: taken as missing" in result.stderr
+    with h5py.File(flight) as file:
+        first = 0 if zeros.start else rows
+        np.testing.assert_allclose(file["attitude"][:, 2], 2 * turn[first:], atol=1e-3)
 
 
 @pytest.mark.parametrize(

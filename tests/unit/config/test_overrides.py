@@ -4,7 +4,7 @@ import pytest
 
 from cpfls_cli.config.load import load_study, validate
 from cpfls_cli.config.overrides import apply_override, variants
-from cpfls_cli.config.study import resolved
+from cpfls_cli.config.study import Study, resolved
 from cpfls_cli.errors import ConfigError
 from tests.builders.studies import VEHICLE
 
@@ -28,13 +28,12 @@ def test_override(data, override, result):
     assert data == result
 
 
-def test_a_list_that_the_config_leaves_out_starts_from_the_default():
+def test_a_list_that_the_config_leaves_out_starts_from_the_default_unless_it_is_of_a_vehicle():
     data = {}
-    apply_override(data, "vehicle.rotors.2.spin=-1")
-    assert [rotor["spin"] for rotor in data["vehicle"]["rotors"]] == [1, -1, -1, -1]
-    again = {}
-    apply_override(again, "vehicle.rotors.0.spin=1")
-    assert [rotor["spin"] for rotor in again["vehicle"]["rotors"]] == [1, -1, 1, -1]
+    apply_override(data, "trajectory.direction.2=0.5")
+    assert data["trajectory"]["direction"] == [*resolved(Study())["trajectory"]["direction"][:2], 0.5]
+    with pytest.raises(ConfigError, match="the config holds no list 'rotors', and there is no default for it"):
+        apply_override({"vehicle": {"mass_kg": 0.03}}, "vehicle.rotors.2.spin=-1")
 
 
 @pytest.mark.parametrize("override", ["", "=", "a", ".=1", "a.=1", ".a=1", "a..b=1"])
