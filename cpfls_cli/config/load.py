@@ -12,6 +12,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.config.yaml_text import parse_yaml
 from cpfls_cli.errors import ConfigError
 
+_LARGEST = 1_000_000
 ASK = "ASK"
 """Stands in a config for what only a person knows; `cpfls init` writes it."""
 
@@ -54,11 +55,16 @@ def read_config(path: Path) -> dict[str, Any]:
         If the file cannot be read or does not hold a mapping.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open("rb") as stream:
+            # No more of what has no end, such as a device; a pipe is as good as a file.
+            content = stream.read(_LARGEST + 1)
+        text = content.decode("utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot read the config: {error.strerror or error}") from None
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: not a text file; a config is YAML in UTF-8") from None
+    if len(content) > _LARGEST:
+        raise ConfigError(f"{path}: is larger than {_LARGEST / 1e6:g} MB, and no config is")
     return parse_config(text, str(path))
 
 

@@ -11,6 +11,7 @@ from cpfls_cli.errors import ConfigError
 
 _TAG = "tag:yaml.org,2002:"
 _FLOAT = re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$")
+_MOST_VALUES = 100_000
 _INT = re.compile(r"^[-+]?(0|[1-9][0-9]*)$")
 
 
@@ -68,14 +69,58 @@ def parse_yaml(text: str, source: str) -> Any:
     ConfigError
         If the text is not YAML or a key stands twice; the message names line and column.
     """
+    loader = None
     try:
-        return yaml.load(text, Loader=_StudyLoader)
+        loader = _StudyLoader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _written_out(node, {})
+        return loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         raise ConfigError(f"{source}{where}: not valid YAML: {error.problem}") from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise ConfigError(f"{source}: not valid YAML: {str(error).splitlines()[0]}") from None
+    except (yaml.YAMLError, RecursionError, ValueError, LookupError, TypeError, ArithmeticError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise ConfigError(f"{source}: not valid YAML: {reason}") from None
+    finally:
+        if loader is not None:
+            loader.dispose()
+
+
+def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
+    """Count the values of a document with every alias written out, before that is done.
+
+    Parameters
+    ----------
+    known : dict of int to int
+        Counts by identity of the node; 0 for those that are being counted.
+
+    Raises
+    ------
+    yaml.constructor.ConstructorError
+        If there are too many, an anchor holds itself, or a text is none.
+    """
+    if id(node) in known:
+        if not known[id(node)]:
+            raise yaml.constructor.ConstructorError(None, None, "an anchor that holds itself", node.start_mark)
+        return known[id(node)]
+    known[id(node)] = 0
+    count = 1
+    if isinstance(node, yaml.ScalarNode):
+        if any("\ud800" <= character <= "\udfff" for character in node.value):
+            problem = f"{node.value[:40]!r} holds half a character"
+            raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
+    else:
+        # The entries of a mapping are pairs.
+        inner = (part for entry in node.value for part in (entry if isinstance(entry, tuple) else (entry,)))
+        count += sum(_written_out(part, known) for part in inner)
+    if count > _MOST_VALUES:
+        problem = f"more than {_MOST_VALUES} values with every alias written out"
+        raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
+    known[id(node)] = count
+    return count
 
 
 def to_yaml(data: Any) -> str:

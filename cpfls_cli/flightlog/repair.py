@@ -30,6 +30,7 @@ _LARGEST = {
     "N": 1e8,
     "V": 1e5,
     "1": 1e9,
+    "s": 1e3,
 }
 _LARGEST_SHARE_BROKEN = 0.01
 
@@ -129,16 +130,17 @@ def mask_impossible(table: SignalTable, settings: ImportSettings) -> tuple[Signa
     """
     warnings: list[str] = []
     signals = dict(table.signals)
-    for name, values in table.signals.items():
-        unit = KNOWN_UNITS[settings.signals[name].unit].si
+    for name, signal in settings.signals.items():
+        values, unit = signals[name], KNOWN_UNITS[signal.unit].si
         with np.errstate(invalid="ignore"):
             broken = np.abs(values) > _LARGEST[unit]
-        for column, (label, marked) in enumerate(zip(settings.signals[name].names, broken.T, strict=True)):
+        for column, (label, marked) in enumerate(zip(signal.names, broken.T, strict=True)):
             if marked.any():
                 warnings.append(_broken(name, label, unit, values[:, column], marked))
         if name == "quaternion":
-            broken = broken | ~np.any(values, axis=1, keepdims=True)
-            rows = int((~np.any(values, axis=1)).sum())
+            without = ~np.any(values, axis=1, keepdims=True)
+            broken = broken | without
+            rows = int(without.sum())
             warnings += [f"quaternion: {rows} rows are 0 0 0 0, which is no attitude: taken as missing"] if rows else []
         signals[name] = np.where(broken, np.nan, values)
     return SignalTable(table.time, signals), tuple(warnings)

@@ -117,6 +117,10 @@ def test_long_values_are_cut(wrong):
     assert len(line) < 150
 
 
+# A few lines that written out would be a billion values.
+ALIASES = "a0: &a0 [x]\n" + "".join(f"a{n}: &a{n} [{', '.join(10 * [f'*a{n - 1}'])}]\n" for n in range(1, 10))
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -131,7 +135,11 @@ def test_long_values_are_cut(wrong):
         (b"\x89HDF\r\n\x1a\n\xff\xfe", "FILE: not a text file; a config is YAML in UTF-8"),
         (b"seed: \x00\n", "FILE: not valid YAML: unacceptable character #x0000: special characters are not allowed"),
         ("1: 2\n", "FILE:1:1: not valid YAML: key 1 is not text"),
-        ("vehicle: &a [*a]\n", "FILE:1:10: not valid YAML: found unconstructable recursive node"),
+        ("vehicle: &a [*a]\n", "FILE:1:10: not valid YAML: an anchor that holds itself"),
+        ("seed: !!int ''\n", "FILE: not valid YAML: string index out of range"),
+        ('report: {title: "\\ud800"}\n', "FILE:1:17: not valid YAML: '\\ud800' holds half a character"),
+        (ALIASES, "FILE:6:5: not valid YAML: more than 100000 values with every alias written out"),
+        (b"# " + b"x" * 1_000_000, "FILE: is larger than 1 MB, and no config is"),
     ],
 )
 def test_not_a_config(wrong, content, message):
@@ -147,6 +155,10 @@ def test_tags_beyond_plain_data_are_refused(wrong, tag):
 def test_a_number_of_many_digits_and_a_deep_list(wrong):
     assert wrong("seed: 1" + "0" * 5000)[0].startswith("FILE: not valid YAML: ")
     assert wrong("[" * 3000)[0].startswith("FILE: not valid YAML: ")
+
+
+def test_what_has_no_end_is_not_read_to_its_end(refuse):
+    assert refuse("config", "/dev/zero") == ["/dev/zero: is larger than 1 MB, and no config is"]
 
 
 def test_missing_config_and_folder_as_config(refuse, tmp_path):
