@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -48,6 +49,8 @@ class Job:
         Takes note of every input file.
     deferred_interrupts : callable
         Gives a context in which an interrupt does not end the program, but is told to whoever asks.
+    inputs : list of Path
+        The config, and every input that was taken so far: no output may replace them.
     """
 
     study: Study
@@ -57,6 +60,7 @@ class Job:
     progress: Progress
     reads: Callable[[Path], None]
     deferred_interrupts: Callable[[], AbstractContextManager[Interrupted]] = _uninterrupted
+    inputs: list[Path] = field(default_factory=list)
 
 
 def begin(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
@@ -68,8 +72,24 @@ def begin(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
         If an input is missing or is the output, or the output cannot or must not be written.
     """
     files = take_inputs(job, inputs)
-    check_output(job.output, job.force)
+    check_outputs(job, job.output)
     return files
+
+
+def check_outputs(job: Job, *paths: Path, replaceable: bool = False) -> None:
+    """Refuse outputs that cannot or must not be written, such as an input of the job.
+
+    Parameters
+    ----------
+    replaceable : bool
+        Whether they may be replaced without --force.
+
+    Raises
+    ------
+    InputError
+    """
+    for path in paths:
+        check_output(path, job.force or replaceable, job.inputs)
 
 
 def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
@@ -83,23 +103,22 @@ def take_inputs(job: Job, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
     Raises
     ------
     InputError
-        If one is missing, no file, or the output.
+        If one is missing, or no file.
     """
     for path in inputs.values():
-        _check_input(path, job.output)
+        _check_input(path)
         job.reads(path)
+        job.inputs.append(path)
     return {role: input_file(path) for role, path in inputs.items()}
 
 
-def _check_input(path: Path, output: Path) -> None:
+def _check_input(path: Path) -> None:
     if not path.exists():
         raise InputError(f"{path}: no such file")
     if not path.is_file():
         bags = [own.name for kind in ("*.db3", "*.mcap") for own in sorted(path.glob(kind))] if path.is_dir() else []
         remedy = f"; of a ROS 2 bag name the file in it: {', '.join(bags)}" if bags else ""
         raise InputError(f"{path}: is a {'folder' if path.is_dir() else 'device or a pipe'}, not a file{remedy}")
-    if output.exists() and path.samefile(output):
-        raise InputError(f"{output}: is an input of this command; -o must name another file")
 
 
 def finish(job: Job, record: R, inputs: Mapping[str, InputFile]) -> R:
@@ -122,4 +141,6 @@ def header_of(study: Study, inputs: Mapping[str, InputFile]) -> Header:
 
 def input_file(path: Path) -> InputFile:
     """Describe an input file by name, hash and format."""
-    return InputFile(path.name, file_sha256(path), format_name(path) or path.suffix.lstrip("."))
+    # A name of bytes that are no text is stored with a mark in their place.
+    name = os.fsencode(path.name).decode("utf-8", "replace")
+    return InputFile(name, file_sha256(path), format_name(path) or path.suffix.lstrip("."))

@@ -1,30 +1,108 @@
-"""Outputs, files and folders: refused before anything is computed, and written whole or not at all."""
+"""Outputs, files and folders: refused before anything is computed, locked, and written whole or not at all."""
 
 from __future__ import annotations
 
+import glob
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from cpfls_cli.errors import InputError, OutputError
 
+try:
+    import fcntl
+except ImportError:
+    # A system without such locks.
+    fcntl = None  # type: ignore[assignment]
 
-def check_output(path: Path, force: bool) -> None:
+_BESIDE = ("", ".checkpoint", ".partial")
+"""What the names of files add to that of the output beside which a command writes them."""
+
+
+@contextmanager
+def locked(path: Path, title: str) -> Iterator[None]:
+    """Keep other commands from the same output, and remove what a killed one left half-written of it.
+
+    The system frees the lock of a process that ends, however it ends. Where it has none, or the folder cannot be
+    written, nothing is locked.
+
+    Parameters
+    ----------
+    title : str
+        Of the command, for who finds its output locked.
+
+    Raises
+    ------
+    InputError
+        If another command is writing this output.
+    """
+    path = Path(os.path.abspath(path))
+    lock = path.parent / f".{path.name}.lock"
+    handle = _locked(lock, path, title)
+    try:
+        if handle is not None:
+            _tidy(path)
+        yield
+    finally:
+        if handle is not None:
+            lock.unlink(missing_ok=True)
+            os.close(handle)
+
+
+def _locked(lock: Path, path: Path, title: str) -> int | None:
+    while fcntl is not None:
+        try:
+            handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError:
+            return None
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # Whoever held it before may have removed the file between the two calls.
+            if lock.exists() and os.fstat(handle).st_ino == lock.stat().st_ino:
+                os.truncate(handle, 0)
+                os.write(handle, f"cpfls {title}, process {os.getpid()}".encode())
+                return handle
+        except BlockingIOError:
+            holder = os.read(handle, 200).decode(errors="replace") or "another command"
+            os.close(handle)
+            raise InputError(f"{path}: is being written by {holder}; wait for it, or name another output") from None
+        except OSError:
+            os.close(handle)
+            return None
+        os.close(handle)
+    return None
+
+
+def _tidy(path: Path) -> None:
+    for name in (f".{path.name}{addition}." for addition in _BESIDE):
+        for part in path.parent.glob(f"{glob.escape(name)}????????.part"):
+            if part.is_dir():
+                shutil.rmtree(part, ignore_errors=True)
+            else:
+                part.unlink(missing_ok=True)
+
+
+def check_output(path: Path, force: bool, inputs: Iterable[Path] = ()) -> None:
     """Refuse an output that cannot or must not be written, before anything is computed.
 
     Parameters
     ----------
     force : bool
         Allow an existing file to be replaced.
+    inputs : iterable of Path
+        What the command reads: never replaced.
 
     Raises
     ------
     InputError
-        If the file exists, its folder does not, or the folder cannot be written.
+        If the file is an input, a link or no file, if it exists, its folder does not, or the folder cannot be written.
     """
+    refuse_inputs(path, inputs)
+    if os.path.islink(path):
+        raise InputError(f"{path}: is a symbolic link to {os.readlink(path)}; -o names the file itself")
     with _asked_for(path):
         if path.is_dir():
             raise InputError(f"{path}: is a folder; -o names a file")
@@ -32,6 +110,18 @@ def check_output(path: Path, force: bool) -> None:
             raise InputError(f"{path}: is a device or a pipe; -o names a file")
         if path.exists() and not force:
             raise InputError(f"{path}: exists already; --force replaces it")
+
+
+def refuse_inputs(output: Path, inputs: Iterable[Path]) -> None:
+    """Refuse an output that is one of the files that the command reads.
+
+    Raises
+    ------
+    InputError
+    """
+    # Unlike a method of a path, this takes a name that the system does not as one of no file.
+    if os.path.exists(output) and any(path.exists() and path.samefile(output) for path in inputs):
+        raise InputError(f"{output}: is an input of this command; -o must name another file")
 
 
 @contextmanager
@@ -68,26 +158,47 @@ def atomic_path(path: Path) -> Iterator[Path]:
         # mkstemp makes private files; an artifact gets the permissions any new file would.
         mask = os.umask(0)
         os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
+        # What is replaced keeps its own.
+        temporary.chmod(path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~mask)
         yield temporary
     finally:
         temporary.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file under a temporary name, then move it in place.
+    """Write a text file, as `write_texts`."""
+    write_texts({path: text})
+
+
+def write_texts(texts: Mapping[Path, str]) -> None:
+    """Write text files under temporary names, then move them in place when all of them are complete.
+
+    What is no character, such as a byte of a file name that is not UTF-8, is written as a question mark.
 
     Raises
     ------
     OutputError
-        If the file cannot be written.
+        If one cannot be written; then none is.
     """
-    with atomic_path(path) as temporary:
-        try:
-            temporary.write_text(text, encoding="utf-8")
-            os.replace(temporary, path)
-        except OSError as error:
-            raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    with ExitStack() as stack:
+        written = {}
+        for path, text in texts.items():
+            written[path] = temporary = stack.enter_context(atomic_path(path))
+            with _writing(path), temporary.open("wb") as file:
+                file.write(text.encode("utf-8", "replace"))
+                file.flush()
+                os.fsync(file.fileno())
+        for path, temporary in written.items():
+            with _writing(path):
+                os.replace(temporary, path)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
 def check_folder(folder: Path, force: bool) -> None:
@@ -117,7 +228,7 @@ def filled_folder(folder: Path, names: Sequence[str]) -> Iterator[Path]:
     Parameters
     ----------
     folder : Path
-        Made where it does not exist.
+        Made where it does not exist; a link to a folder is followed.
     names : sequence of str
         Files that may be written; those of an earlier run that are not written again are removed.
 
@@ -126,8 +237,9 @@ def filled_folder(folder: Path, names: Sequence[str]) -> Iterator[Path]:
     InputError
         If the folder cannot be written.
     """
+    folder = folder.resolve()
     try:
-        temporary = Path(tempfile.mkdtemp(dir=folder.absolute().parent, prefix=f".{folder.name}.", suffix=".part"))
+        temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.", suffix=".part"))
     except OSError as error:
         raise InputError(f"{folder}: cannot write beside it: {error.strerror}") from None
     try:

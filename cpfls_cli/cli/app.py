@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -644,6 +645,7 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
     """Load the study, run one command with a progress bar, and print what it says."""
     with messages_for_errors():
         from cpfls_cli.artifacts.job import Job
+        from cpfls_cli.artifacts.output import locked
         from cpfls_cli.config.unknown import require_known
 
         narration = Narration(title, common.verbose and not common.quiet)
@@ -651,8 +653,11 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
         require_known(study, title)
         narration.reads(config)
         with progress_bar(title, common) as progress:
-            job = Job(study, output, common.force, common.dry_run, progress, narration.reads, deferred_interrupts)
-            outcome = call(job)
+            job = Job(
+                study, output, common.force, common.dry_run, progress, narration.reads, deferred_interrupts, [config]
+            )
+            with nullcontext() if common.dry_run else locked(output, title):
+                outcome = call(job)
         if not common.dry_run:
             narration.wrote(output)
         tell(outcome, common)
@@ -661,12 +666,14 @@ def _run(title: str, config: Path, output: Path, common: Common, call: Callable[
 def _run_without_config(title: str, output: Path, common: Common, call: Callable[[Job], Outcome]) -> None:
     """Run one command that needs no study, with a progress bar, and print what it says."""
     from cpfls_cli.artifacts.job import Job
+    from cpfls_cli.artifacts.output import locked
     from cpfls_cli.config.load import validate
 
     narration = Narration(title, common.verbose and not common.quiet)
     with progress_bar(title, common) as progress:
         job = Job(validate({}, "default"), output, common.force, common.dry_run, progress, narration.reads)
-        outcome = call(job)
+        with nullcontext() if common.dry_run else locked(output, title):
+            outcome = call(job)
     if not common.dry_run:
         narration.wrote(output)
     tell(outcome, common)

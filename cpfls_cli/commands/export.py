@@ -5,16 +5,15 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cpfls_cli.artifacts.extended import FUZZY_INERTIA, ExtendedRecord
-from cpfls_cli.artifacts.job import Job, take_inputs
+from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.output import check_output, write_text
+from cpfls_cli.artifacts.output import write_texts
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
@@ -54,16 +53,14 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     form = form or _form_of(job.output)
     prefix = _prefix_of(job.output, form, name)
     outputs = _outputs_of(job.output, form)
-    files = [take_inputs(replace(job, output=output), {"model": model})["model"] for output in outputs]
+    source = take_inputs(job, {"model": model})["model"]
     # The file that was asked for first: a message about its folder is to name it.
-    for output in reversed(outputs):
-        check_output(output, job.force)
+    check_outputs(job, *reversed(outputs))
     given = next((kind for kind in (VehicleRecord, ExtendedRecord) if holds(model, kind)), None)
-    sheet = _sheet(model, prefix, files[0].sha256, job) if given is None else _vehicle(model, given, prefix, files[0])
+    sheet = _sheet(model, prefix, source.sha256, job) if given is None else _vehicle(model, given, prefix, source)
     texts = _texts(sheet, form, outputs) if isinstance(sheet, Sheet) else _vehicle_texts(sheet, form, outputs)
     if not job.dry_run:
-        for path, text in texts.items():
-            write_text(path, text)
+        write_texts(texts)
     sizes = {str(path): len(text.encode()) for path, text in texts.items()}
     summary = {
         "dry_run": job.dry_run,

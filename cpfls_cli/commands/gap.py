@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.job import Job, finish, input_file, take_inputs
-from cpfls_cli.artifacts.output import check_folder, filled_folder, write_text
+from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands import report
 from cpfls_cli.commands.compare import check_ignored, compared, flight_roles, progress_of
@@ -96,6 +96,8 @@ def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: P
     roles = flight_roles("flight", flights) | flight_roles("held-out", held_out)
     inputs = take_inputs(job, roles | ({} if model is None else {"model": model}))
     check_folder(job.output, job.force)
+    for name in FILES:
+        refuse_inputs(job.output / name, job.inputs)
     check_ignored(job.study)
     # All flights are read together, so that one battery is full in all of them.
     read = read_flights([*flights, *held_out], job.study)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from cpfls_cli.artifacts.job import Job, take_inputs
-from cpfls_cli.artifacts.output import check_output, write_text
+from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
+from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.proposal import KnownLog, known_log, propose
 from cpfls_cli.logs.formats import log_contents
@@ -32,7 +32,7 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
         If a log cannot be read, nothing in it flies or is recognised, or the logs are of two vehicles.
     """
     take_inputs(job, {f"log-{number}": log for number, log in enumerate(logs)})
-    check_output(job.output, job.force)
+    check_outputs(job, job.output)
     known = []
     for number, log in enumerate(logs):
         job.progress(number, len(logs), log.name)

@@ -11,8 +11,8 @@ import numpy as np
 
 from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.gap_flights import TRAINING
-from cpfls_cli.artifacts.job import Job, begin, finish
-from cpfls_cli.artifacts.output import check_output, write_text
+from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
+from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.trajectory import QuestionGroup, TrajectoryRecord
 from cpfls_cli.commands.trajectory import figure_paths
@@ -94,8 +94,7 @@ def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
     inputs = begin(job, {"diagnosis": diagnosis} if diagnosis else {})
     waypoints = job.output.with_name(f"{job.output.stem}-waypoints.csv")
     figures = figure_paths(job, figure_names(held=False) if plot else ())
-    for path in (waypoints, *figures):
-        check_output(path, job.force)
+    check_outputs(job, waypoints, *figures)
     with settings_of("trajectory", study):
         room = room_of(study.trajectory, study.vehicle, study.gap.ground_height_m, _period(study))
     case = _named(study, room) if diagnosis is None else _left_open(study, diagnosis)

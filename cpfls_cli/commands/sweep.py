@@ -6,8 +6,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from cpfls_cli.artifacts.job import Job, finish, header_of, take_inputs
-from cpfls_cli.artifacts.output import check_output
+from cpfls_cli.artifacts.job import Job, check_outputs, finish, header_of, take_inputs
 from cpfls_cli.commands.stopped import stopped
 from cpfls_cli.flights.inputs import input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
@@ -45,7 +44,7 @@ def run(
     inputs = take_inputs(job, input_roles(flights, None, validate, choose_on))
     partial = PartialSweep.beside(job.output, header_of(job.study, inputs))
     before = partial.take_up(resume=options.resume, force=job.force)
-    check_output(job.output, job.force or (options.resume and partial.output_may_be_replaced()))
+    check_outputs(job, job.output, replaceable=options.resume and partial.output_may_be_replaced())
     plan = sweep_plan(job, flights, validate, inputs, choose_on)
     others = other_vehicles([*choose_on, *validate], job.study)
     if job.dry_run:

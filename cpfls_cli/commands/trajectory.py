@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.job import Job, begin, finish
-from cpfls_cli.artifacts.output import check_output, write_text
+from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
+from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, InputError, SettingError
@@ -71,8 +71,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
     inputs = begin(job, {"waypoints": waypoints} if waypoints else {})
     settings = _settings(job.study, waypoints)
     figures = figure_paths(job, figure_names(held=settings.held) if plot else ())
-    for path in figures:
-        check_output(path, job.force)
+    check_outputs(job, *figures)
     # To optimise takes long; what else can go wrong shows only when it is planned.
     if job.dry_run and settings.path == "optimised":
         return nothing_written(job)

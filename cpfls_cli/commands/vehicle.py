@@ -9,8 +9,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import NamedTuple
 
-from cpfls_cli.artifacts.job import Job, finish
-from cpfls_cli.artifacts.output import check_output, write_text
+from cpfls_cli.artifacts.job import Job, check_outputs, finish
+from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.artifacts.parameters import vehicle_section
 from cpfls_cli.artifacts.replay import HeldOutGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
@@ -75,9 +75,9 @@ def run(
     """
     study = job.study
     roles = flight_roles("flight", flights) | flight_roles("held-out", held_out)
-    if config is not None:
-        check_output(config.copy, job.force)
     inputs, checkpoint, kept = begin_vehicle_search(job, roles, resume=resume)
+    if config is not None:
+        check_outputs(job, config.copy)
     read = _grouped(flights_to_play([*flights, *held_out], study), [*flights, *held_out], study.playback.groups)
     for flight in read:
         _require_rotors(flight)
@@ -88,7 +88,6 @@ def run(
     training, rest = read[: len(flights)], read[len(flights) :]
     if job.dry_run:
         return nothing_written(job)
-    checkpoint.tidy()
     if kept is None:
         checkpoint.remove()
     with checkpoint.kept():

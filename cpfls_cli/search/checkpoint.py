@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import json
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -82,12 +81,6 @@ class Leftover:
     def remove(self) -> None:
         """Remove what is left, if there is anything."""
         self.path.unlink(missing_ok=True)
-
-    def tidy(self) -> None:
-        """Remove what a killed command left half-written of this file and of its output."""
-        for name in (self.path.name, self.output.name):
-            for part in self.path.parent.glob(f".{glob.escape(name)}.????????.part"):
-                part.unlink(missing_ok=True)
 
     @contextmanager
     def kept(self) -> Iterator[None]:

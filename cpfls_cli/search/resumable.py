@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cpfls_cli.artifacts.checkpoint import StoppedSearch
-from cpfls_cli.artifacts.job import Interrupted, Job, header_of, take_inputs
-from cpfls_cli.artifacts.output import check_output
+from cpfls_cli.artifacts.job import Interrupted, Job, check_outputs, header_of, take_inputs
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.archive import Evaluate
@@ -118,7 +117,6 @@ class Resumable:
         SearchRun
             Interrupts are deferred as long as its workers are employed, which is as long as it searches.
         """
-        self.checkpoint.tidy()
         if self.stopped is None:
             self.checkpoint.remove()
 
@@ -175,7 +173,7 @@ def begin_search(
     files = take_inputs(job, inputs)
     header = header_of(job.study, files)
     search = resumable(job.output, header, resume=options.resume, force=job.force)
-    check_output(job.output, job.force or (options.resume and search.checkpoint.output_may_be_replaced()))
+    check_outputs(job, job.output, replaceable=options.resume and search.checkpoint.output_may_be_replaced())
     return files, search
 
 
@@ -230,5 +228,5 @@ def begin_vehicle_search(
     kept = checkpoint.read() if resume else None
     if kept is None:
         checkpoint.require_permission(force=job.force)
-    check_output(job.output, job.force or (resume and checkpoint.output_may_be_replaced()))
+    check_outputs(job, job.output, replaceable=resume and checkpoint.output_may_be_replaced())
     return files, checkpoint, kept

@@ -71,7 +71,6 @@ class PartialSweep(Leftover):
         runs = plan.no_runs if stopped is None else stopped.run
         if stopped is not None:
             self._require_same_plan(plan, stopped)
-        self.tidy()
         self.write(plan, runs)
         return runs
 

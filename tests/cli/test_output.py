@@ -1,9 +1,13 @@
 """Where results go: nothing is replaced, half written or written in a dry run unless it was asked for."""
 
+import json
+import os
 import subprocess
 import sys
 
 import pytest
+
+from cpfls_cli.artifacts.output import locked
 
 
 def test_existing_output_needs_force(cpfls, refuse, study, tmp_path):
@@ -111,3 +115,60 @@ def test_dry_run_finds_bad_input(refuse, pipeline, study, tmp_path):
     for command in ("simulate", "reduce", "identify"):
         assert "this command needs a" in refuse(command, study, pipeline.model, *words)[0]
     assert "this command needs a" in refuse("predict", study, pipeline.flight, pipeline.flight, *words)[0]
+
+
+def test_no_file_that_a_command_reads_is_its_output(refuse, pipeline, study, tmp_path):
+    message = "is an input of this command; -o must name another file"
+    own = tmp_path / "own.yaml"
+    own.write_bytes(study.read_bytes())
+    assert refuse("trajectory", own, "-o", own, "--force") == [f"{own}: {message}"]
+    header = tmp_path / "model.h"
+    header.write_bytes(pipeline.model.read_bytes())
+    assert refuse("export", header, "-o", tmp_path / "model.c", "--force") == [f"{header}: {message}"]
+
+
+def test_two_commands_on_one_output(refuse, study, tmp_path):
+    output = tmp_path / "trajectory.h5"
+    with locked(output, "trajectory"):
+        said = f"{output}: is being written by cpfls trajectory, process {os.getpid()}; "
+        (line,) = refuse("trajectory", study, "-o", output, "--force")
+        assert line == f"{said}wait for it, or name another output"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_killed_command_left_half_written_goes(cpfls, study, tmp_path):
+    (tmp_path / ".trajectory.h5.lock").write_text("cpfls trajectory, process 1")
+    (tmp_path / ".trajectory.h5.ab_12xyz.part").write_text("half")
+    folder = tmp_path / ".trajectory.h5.ab_12xyy.part"
+    folder.mkdir()
+    (folder / "half").write_text("half")
+    assert cpfls("trajectory", study, "-o", tmp_path / "trajectory.h5").exit_code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["trajectory.h5"]
+
+
+def test_links_are_no_outputs(refuse, study, tmp_path):
+    link = tmp_path / "link.h5"
+    for target in (tmp_path / "nowhere.h5", tmp_path / "file.h5"):
+        link.unlink(missing_ok=True)
+        link.symlink_to(target)
+        for force in ((), ("--force",)):
+            (line,) = refuse("trajectory", study, "-o", link, *force)
+            assert line == f"{link}: is a symbolic link to {target}; -o names the file itself"
+        (tmp_path / "file.h5").write_text("precious")
+
+
+def test_a_replaced_file_keeps_its_permissions(cpfls, study, tmp_path):
+    output = tmp_path / "trajectory.h5"
+    output.write_text("private")
+    output.chmod(0o600)
+    assert cpfls("trajectory", study, "-o", output, "--force").exit_code == 0
+    assert output.stat().st_mode & 0o777 == 0o600
+
+
+def test_names_that_are_not_text(cpfls, pipeline, study, tmp_path):
+    flight = tmp_path / os.fsdecode(b"fl\xffight.h5")
+    flight.write_bytes(pipeline.flight.read_bytes())
+    output = tmp_path / os.fsdecode(b"selec\xfetion.h5")
+    assert cpfls("reduce", study, flight, "-o", output).exit_code == 0
+    assert json.loads(cpfls("info", output, "--json").stdout)["inputs"]["flight"]["name"] == "fl\ufffdight.h5"
+    assert cpfls("report", study, output, "-o", tmp_path / os.fsdecode(b"\xfd.html")).exit_code == 0

@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from cpfls_cli.artifacts.output import atomic_path, check_output, filled_folder
-from cpfls_cli.errors import InputError
+from cpfls_cli.artifacts.output import atomic_path, check_output, filled_folder, locked, write_texts
+from cpfls_cli.errors import InputError, OutputError
 
 
 def test_temporary_name_is_hidden_and_in_the_same_folder(tmp_path):
@@ -30,6 +30,29 @@ def test_a_pipe_and_a_folder_are_no_outputs(tmp_path):
     for name, kind in (("pipe", "a device or a pipe"), (".", "a folder")):
         with pytest.raises(InputError, match=f"is {kind}"):
             check_output(tmp_path / name, force=True)
+
+
+def test_only_what_was_half_written_of_an_output_is_tidied(tmp_path):
+    half = [tmp_path / f".{name}.ab_12xyz.part" for name in ("model.h5", "model.h5.checkpoint", "model.h5.partial")]
+    kept = [tmp_path / name for name in (".model.h5.old.ab_12xyz.part", ".other.h5.ab_12xyz.part", "model.h5")]
+    for path in (*half, *kept):
+        path.write_text("")
+    with locked(tmp_path / "model.h5", "identify"):
+        assert sorted(tmp_path.iterdir()) == sorted([*kept, tmp_path / ".model.h5.lock"])
+    assert sorted(tmp_path.iterdir()) == sorted(kept)
+
+
+def test_of_several_texts_all_are_written_or_none(tmp_path, monkeypatch):
+    sync = iter([None, OSError(28, "No space left on device")])
+
+    def fail_at_the_second(_):
+        if error := next(sync):
+            raise error
+
+    monkeypatch.setattr("os.fsync", fail_at_the_second)
+    with pytest.raises(OutputError, match=r"model\.c: cannot be written: No space left on device"):
+        write_texts({tmp_path / "model.h": "header", tmp_path / "model.c": "source"})
+    assert list(tmp_path.iterdir()) == []
 
 
 def fill(folder, error=None):

@@ -179,12 +179,3 @@ def test_damaged_file_is_refused_with_one_message(checkpoint):
         ) as error:
             checkpoint.read()
         assert "\n" not in str(error.value)
-
-
-def test_tidying_leaves_all_but_what_was_half_written(checkpoint, tmp_path):
-    half = [tmp_path / f".{name}.ab_12xyz.part" for name in ("model.h5", "model.h5.checkpoint")]
-    kept = [tmp_path / name for name in (".model.h5.old.ab_12xyz.part", ".other.h5.ab_12xyz.part", "model.h5")]
-    for path in (*half, *kept):
-        path.write_text("")
-    checkpoint.tidy()
-    assert sorted(tmp_path.iterdir()) == sorted([*kept, checkpoint.path])
