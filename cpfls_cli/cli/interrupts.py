@@ -42,6 +42,11 @@ def interruptible() -> Iterator[None]:
     sys.unraisablehook = _sent_again(received, unraisable)
     try:
         yield
+    except SystemExit as end:
+        # A command that was asked to stop may have come to an end itself, and said what it has kept.
+        if received and (end.code != 128 + received[0] or _is_of_interrupt(end)):
+            _leave(received[0], None)
+        raise
     except BaseException:
         # A compiled module whose import is interrupted may raise an error of its own in place of the interrupt.
         if received:
@@ -50,6 +55,10 @@ def interruptible() -> Iterator[None]:
     finally:
         sys.unraisablehook = unraisable
         _install(signal.SIG_DFL)
+
+
+def _is_of_interrupt(error: BaseException | None) -> bool:
+    return error is not None and (isinstance(error, KeyboardInterrupt) or _is_of_interrupt(error.__context__))
 
 
 def _sent_again(received: list[int], otherwise: Callable[[Any], object]) -> Callable[[Any], None]:

@@ -39,6 +39,10 @@ def messages_for_errors() -> Iterator[None]:
         for note in getattr(error, "__notes__", ()):
             _complain(note, "note")
         raise typer.Exit(error.exit_code) from None
+    except KeyboardInterrupt as interrupt:
+        for note in getattr(interrupt, "__notes__", ()):
+            _complain(note, "note")
+        raise
     except MemoryError:
         _complain("not enough memory for this flight and structure; reduce the flight or the number of functions")
         raise typer.Exit(1) from None

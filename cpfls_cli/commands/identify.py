@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from signal import SIGINT
 
 from cpfls_cli.artifacts.job import Job, finish
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import read_header
-from cpfls_cli.commands.stopped import not_judged, stopped, without_model
+from cpfls_cli.commands.stopped import stopped, without_model
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.inputs import choosing_source, held_out_parts, input_roles
@@ -71,7 +73,7 @@ def run(
         raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
     result = _with_length(result, flights, data)
     with search.kept():
-        evidence, interrupt = _evidence(job, result, data, held_out)
+        evidence, signal = _evidence(job, result, data, held_out, watch.signal)
         base, vehicle = job.study.identification.base, job.study.vehicle
         record = finish(job, ModelRecord.of(result, base, data.indices, evidence, vehicle), inputs)
     search.end(result.stop_reason)
@@ -79,7 +81,8 @@ def run(
     summary = {**record.summary, "not_positive_definite": result.indefinite, "seconds": seconds}
     warnings = [Text(sentence, "warning") for sentence in others]
     outcome = Outcome(summary, (*warnings, *answer(source_of(job, record))))
-    return stopped(not_judged(outcome, interrupt, job.output), result.stop_reason, watch.signal, job.output)
+    unjudged = evidence is None and job.study.identification.validation.enabled
+    return stopped(outcome, result.stop_reason, signal, job.output, unjudged=unjudged)
 
 
 def _identify(
@@ -136,12 +139,8 @@ def _note(step: SearchStep) -> str:
     return f"{generation}  best error {step.best[0]:.3g}, max {step.best[1]:.3g} N m, cond {step.best[2]:.4g}"
 
 
-class _StoppedError(Exception):
-    """Somebody waits for the program to stop."""
-
-
 def _evidence(
-    job: Job, result: Identification, data: TrainingData, held_out: Mapping[str, TorqueSource]
+    job: Job, result: Identification, data: TrainingData, held_out: Mapping[str, TorqueSource], signal: int | None
 ) -> tuple[Validation | None, int | None]:
     """Gather the evidence on a model; an interrupt leaves the model without it.
 
@@ -149,26 +148,23 @@ def _evidence(
     ----------
     held_out : mapping of str to TorqueSource
         What nothing was learned from, by name.
+    signal : int or None
+        Number of a signal that came before.
 
     Returns
     -------
     evidence : Validation or None
         None if disabled or interrupted.
     signal : int or None
-        Number of the signal that interrupted it.
+        Number of the signal that came before or meanwhile.
     """
     settings = job.study.identification
-    if not settings.validation.enabled or result.stop_reason == "interrupted":
-        return None, None
+    if not settings.validation.enabled or signal is not None:
+        return None, signal
     rng, total = generator(job.study, "validate"), settings.generations + 1
-    with job.deferred_interrupts() as interrupted, settings_of("identification", job.study):
-
-        def tell(note: str) -> None:
-            if interrupted() is not None:
-                raise _StoppedError
-            job.progress(total, total, note)
-
-        try:
+    try:
+        with settings_of("identification", job.study):
+            tell = partial(job.progress, total, total)
             return examine(data.training, data.learned, held_out, settings, result, rng, tell), None
-        except _StoppedError:
-            return None, interrupted()
+    except KeyboardInterrupt as interrupt:
+        return None, next(iter(interrupt.args), SIGINT)

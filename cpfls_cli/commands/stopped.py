@@ -15,44 +15,41 @@ _REMEDY = "the same command with --resume goes on"
 _FROM_SIGNAL = 128
 
 
-def stopped(outcome: Outcome, reason: StopReason, signal: int | None, output: Path) -> Outcome:
-    """Add to what is said of a model that its search was stopped.
+def stopped(
+    outcome: Outcome, reason: StopReason, signal: int | None, output: Path, *, unjudged: bool = False
+) -> Outcome:
+    """Add to what is said of a result that a signal or the time limit came before all was done, and what is kept.
 
     Parameters
     ----------
     reason : str
         Why the search ended.
     signal : int or None
-        Number of the signal that stopped it.
+        Number of the signal that asked to stop.
     output : Path
-        The model.
+        What was written.
+    unjudged : bool
+        Whether the signal left a whole model without evidence.
 
     Returns
     -------
     Outcome
-        The same for a search that came to its end.
+        The same for a search that came to its end without a signal; after a signal with the exit code that a shell
+        gives a program that it ended.
     """
-    if is_end(reason):
+    if not is_end(reason):
+        note = f"{output}: is incomplete, because {_STOPPED[reason]}; {_REMEDY}"
+    elif signal is None:
         return outcome
-    return _with_note(outcome, f"{output}: is incomplete, because {_STOPPED[reason]}; {_REMEDY}", signal)
-
-
-def not_judged(outcome: Outcome, signal: int | None, output: Path) -> Outcome:
-    """Add to what is said of a model that an interrupt left it without evidence.
-
-    Parameters
-    ----------
-    signal : int or None
-        Number of the signal; None where the evidence was gathered or not asked for.
-    output : Path
-        The model.
-    """
-    if signal is None:
-        return outcome
-    note = (
-        f"{output}: is complete but was not judged, because of the interrupt; the same command with --force judges it"
-    )
-    return _with_note(outcome, note, signal)
+    elif unjudged:
+        note = (
+            f"{output}: is complete but was not judged, because of the interrupt; the same command with --force "
+            "judges it"
+        )
+    else:
+        note = f"{output}: is complete; the interrupt came when there was nothing left to stop"
+    code = 0 if signal is None else _FROM_SIGNAL + signal
+    return replace(outcome, blocks=(*outcome.blocks, Text(note, "warning")), exit_code=code)
 
 
 def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
@@ -74,9 +71,3 @@ def without_model(reason: StopReason, signal: int | None) -> CpflsError | None:
         return None
     message = f"{_STOPPED[reason]} before a model was found, so none is written; {_REMEDY}"
     return ComputationError(message) if signal is None else StoppedError(message, _FROM_SIGNAL + signal)
-
-
-def _with_note(outcome: Outcome, note: str, signal: int | None) -> Outcome:
-    """Add a note, and the exit code that a shell gives a program that a signal ended."""
-    code = 0 if signal is None else _FROM_SIGNAL + signal
-    return replace(outcome, blocks=(*outcome.blocks, Text(note, "warning")), exit_code=code)

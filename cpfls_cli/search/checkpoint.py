@@ -87,7 +87,7 @@ class Leftover:
         """Add to whatever fails inside that the command can go on nevertheless."""
         try:
             yield
-        except (ComputationError, OutputError) as error:
+        except (ComputationError, OutputError, KeyboardInterrupt) as error:
             if self.path.exists():
                 error.add_note(f"{self.path}: is intact; the same command with --resume goes on")
             raise

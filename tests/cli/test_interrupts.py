@@ -52,6 +52,44 @@ def test_signal_during_the_search_keeps_what_can_be_resumed(pipeline, study, tmp
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.h5", "model.h5.checkpoint"]
 
 
+# Sends the signal the moment a function is called that comes after the search.
+SIGNAL_AFTER_THE_SEARCH = """
+import importlib, os, sys
+
+module = importlib.import_module({module!r})
+was = module.{function}
+def signalled(*given, **named):
+    os.kill(os.getpid(), {number})
+    return was(*given, **named)
+
+module.{function} = signalled
+sys.argv = {words!r}
+from cpfls_cli.cli.main import run
+run()
+"""
+
+
+@pytest.mark.parametrize(
+    ("module", "function", "number", "said"),
+    [
+        (
+            "cpfls_cli.identification.identify",
+            "fit_baselines",
+            signal.SIGINT,
+            "is intact; the same command with --resume",
+        ),
+        ("cpfls_cli.validation.validate", "replay_steps", signal.SIGTERM, "is complete but was not judged, because of"),
+    ],
+)
+def test_signal_while_a_model_is_judged(pipeline, study, tmp_path, module, function, number, said):
+    words = ["cpfls", "identify", str(study), str(pipeline.flight), "-o", str(tmp_path / "model.h5")]
+    code = SIGNAL_AFTER_THE_SEARCH.format(module=module, function=function, number=int(number), words=words)
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment())
+    assert (result.returncode, said in result.stderr) == (128 + number, True), result.stderr
+    assert "Traceback" not in result.stderr
+    assert len(list(tmp_path.iterdir())) == 1
+
+
 @pytest.mark.parametrize("swallow", [False, True])
 @pytest.mark.parametrize("module", ["typer", "pydantic", "numpy", "h5py", "scipy.linalg"])
 def test_interrupt_while_loading(pipeline, study, tmp_path, module, swallow):

@@ -75,9 +75,11 @@ def test_interrupted_again_and_again_it_evaluates_nothing_twice(cpfls, words, wh
 def test_interrupted_in_the_last_evaluation_it_is_complete(cpfls, words, whole, tmp_path, interrupt_at):
     interrupt_at(int(stored(whole, "history/evaluations")[-1]))
     result = cpfls(*words, "-o", tmp_path / "model.h5")
-    assert result.exit_code == 0
-    assert (tmp_path / "model.h5").read_bytes() == whole.read_bytes()
+    assert result.exit_code == 130
+    assert f"{tmp_path / 'model.h5'}: is complete but was not judged, because of the interrupt" in result.stderr
     assert names(tmp_path) == ["model.h5"]
+    assert cpfls(*words, "-o", tmp_path / "model.h5", "--force").exit_code == 0
+    assert (tmp_path / "model.h5").read_bytes() == whole.read_bytes()
 
 
 def test_interrupted_without_a_finite_model(cpfls, words, tmp_path, interrupt_at, monkeypatch):

@@ -172,7 +172,10 @@ def test_first_signal_stops_the_search_and_a_second_one_the_program(program, who
     assert names(tmp_path) == ["one.h5", "one.h5.checkpoint"]
     twice = program(tmp_path / "two.h5", patch=signals(2)).wait()
     assert (twice.returncode, twice.stdout) == (code, "")
-    assert twice.stderr == "cpfls: error: interrupted: no half-written file is left\n"
+    assert twice.stderr == (
+        f"cpfls: note: {tmp_path / 'two.h5'}.checkpoint: is intact; the same command with --resume goes on\n"
+        "cpfls: error: interrupted: no half-written file is left\n"
+    )
     assert names(tmp_path) == ["one.h5", "one.h5.checkpoint", "two.h5.checkpoint"]
     for output in (tmp_path / "one.h5", tmp_path / "two.h5"):
         assert program(output, "--resume").wait().returncode == 0
