@@ -27,6 +27,8 @@ from cpfls_cli.files import is_hdf5, is_sealed, read_content, text_sha256
 _FIXED = {"axis": 3}
 # Text in memory and in a file.
 _KINDS = {"U": "text", "S": "text", "i": "numbers", "u": "numbers", "f": "numbers"}
+_LARGEST = 1e150
+"""Nothing that is measured or computed comes near; the square of a larger number is none."""
 _BLOCK = 1 << 18
 """Numbers that are checked at a time."""
 
@@ -93,18 +95,26 @@ def _finite(artifact: Checkable) -> Iterator[str]:
             continue
         bad, first = 0, 0
         for start, block in _blocks(values):
-            not_finite = ~np.isfinite(block).all(axis=tuple(range(1, block.ndim)))
-            if not bad and not_finite.any():
-                first = start + int(np.argmax(not_finite))
-            bad += int(np.count_nonzero(not_finite))
+            # False for what is no number too.
+            wrong = ~(np.abs(block) < _LARGEST).all(axis=tuple(range(1, block.ndim)))
+            if not bad and wrong.any():
+                first = start + int(np.argmax(wrong))
+            bad += int(np.count_nonzero(wrong))
         if bad:
-            yield f"{spec.path}: {bad} samples are not finite, the first at index {first}"
+            fault = (
+                f"beyond {_LARGEST:g}"
+                if np.isfinite(values[first] if values.ndim else values[()]).all()
+                else "not finite"
+            )
+            yield f"{spec.path}: {bad} samples are {fault}, the first at index {first}"
 
 
 def _time_ascends(artifact: Checkable) -> Iterator[str]:
     time, last = {spec.path: values for spec, values in _present(artifact)}.get("time"), -np.inf
     if time is None or time.ndim != 1 or time.dtype.kind not in "iuf":
         return
+    if len(time) < 2:
+        yield f"time: holds {len(time)} samples, and two are the least"
     for start, block in _blocks(time):
         falling = np.diff(block.astype(float), prepend=last) <= 0
         if falling.any():
@@ -234,7 +244,9 @@ def require_all(path: Path, stored: Stored) -> None:
     ------
     InputError
     """
-    missing = [known.path for known in stored.spec.datasets if known.required and known.path not in stored.data]
+    record = record_of_format(stored.spec.format)
+    assert record is not None, "its format is known"
+    missing = record.lacking(stored.data)
     if missing:
         raise InputError(f"{path}: the {stored.spec.format} lacks {_some(missing)}; make it again")
 

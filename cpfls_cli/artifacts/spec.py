@@ -7,7 +7,7 @@ docs/format.md follow from the fields.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cache
 from types import NoneType
@@ -224,6 +224,17 @@ class Record:
         """
         return cls(header=header, **_values(cls, "", data))
 
+    @classmethod
+    def lacking(cls, present: Container[str]) -> list[str]:
+        """List the datasets that an artifact lacks which holds these: of a group that is there, all but the optional.
+
+        Parameters
+        ----------
+        present : container of str
+            Paths of datasets.
+        """
+        return list(_lacking(cls, "", present))
+
     @property
     def data(self) -> dict[str, Any]:
         """Its datasets by path, in the order of the format."""
@@ -351,13 +362,27 @@ def _stored(value: Any) -> Any:
     return array.astype(np.uint8) if array.dtype == bool else array
 
 
+def _is_there(entry: _Entry, inner: str, present: Container[str]) -> bool:
+    """Tell whether a group is: an optional one is there where any of its datasets is."""
+    return not entry.optional or any(spec.path in present for spec in _specs(entry.kind, inner, True))
+
+
+def _lacking(cls: Any, prefix: str, present: Container[str]) -> Iterator[str]:
+    for entry in _entries(cls):
+        if _GROUP in entry.field.metadata:
+            inner = _joined(prefix, entry.field.metadata[_GROUP])
+            if _is_there(entry, inner, present):
+                yield from _lacking(entry.kind, inner, present)
+        elif not entry.optional and (path := _joined(prefix, entry.field.metadata[_PATH].path)) not in present:
+            yield path
+
+
 def _values(cls: Any, prefix: str, data: Mapping[str, Any]) -> dict[str, Any]:
     values = {}
     for entry in _entries(cls):
         if _GROUP in entry.field.metadata:
             inner = _joined(prefix, entry.field.metadata[_GROUP])
-            # An optional group is there where any of its datasets is.
-            if not entry.optional or any(spec.path in data for spec in _specs(entry.kind, inner, True)):
+            if _is_there(entry, inner, data):
                 values[entry.field.name] = entry.kind(**_values(entry.kind, inner, data))
             continue
         path = _joined(prefix, entry.field.metadata[_PATH].path)

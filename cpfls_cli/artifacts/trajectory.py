@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -134,6 +134,13 @@ class TrajectoryRecord(Record):
         sampled = vars(planned)
         signals = {name: sampled[name] for name in cls.__dataclass_fields__ if name in sampled}
         return cls(**signals, leg=LegGroup.of(sampled["legs"]) if sampled.get("legs") else None, question=question)
+
+    @classmethod
+    def lacking(cls, present: Container[str]) -> list[str]:
+        """List the datasets that an artifact lacks which holds these: a path is there with all its derivatives."""
+        path = [cls.path("position" if name == "displacement" else name) for name in DERIVATIVES]
+        partly = any(name in present for name in path)
+        return [*super().lacking(present), *(name for name in path if partly and name not in present)]
 
     @property
     def held(self) -> bool:

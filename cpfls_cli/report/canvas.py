@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -100,6 +101,7 @@ def plot(name: str, caption: str, description: str, height: float, draw: Callabl
         matplotlib.rcParams.update(style)
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         draw(figure)
+        _show_as_written(figure)
         return Plot(name, caption, _inline_svg(figure, name, description), description, panels_of(figure))
 
 
@@ -231,6 +233,18 @@ def runs(marked: Array | BoolArray) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
 
 
+def _show_as_written(figure: Figure) -> None:
+    """Show every text as it is: a dollar sign in the name of a setting is no mathematics, and SVG has no bells."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        # Ticks that are written out only when the figure is drawn are the library's own.
+        if isinstance(text, Text) and (written := text.get_text()):
+            shown = (each if each.isprintable() or each == "\n" else "\N{REPLACEMENT CHARACTER}" for each in written)
+            text.set_text("".join(shown))
+            text.set_parse_math(False)
+
+
 def _inline_svg(figure: Figure, name: str, description: str) -> str:
     """Write a figure as an ``svg`` element for an HTML page.
 
@@ -242,7 +256,10 @@ def _inline_svg(figure: Figure, name: str, description: str) -> str:
         What the figure shows, for those who do not see it.
     """
     stream = io.StringIO()
-    figure.savefig(stream, format="svg", metadata={"Date": None})
+    with warnings.catch_warnings():
+        # A browser finds other fonts for what the one that measures the text lacks.
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        figure.savefig(stream, format="svg", metadata={"Date": None})
     root = ElementTree.fromstring(stream.getvalue())
     _strip(root)
     _rename_ids(root, name)

@@ -1,4 +1,4 @@
-"""The section of a config that has no defaults, for studies that need some vehicle."""
+"""The section of a config that has no defaults, for studies that need some vehicle, and a tiny study."""
 
 import json
 
@@ -25,6 +25,35 @@ vehicle: {
 }
 """
 """The quadrotor of the paper, on one line, to be added to the text of a config."""
+
+TINY = """\
+seed: 1
+trajectory: {sample_time_s: 0.1}
+reduction: {size: 60}
+identification:
+  structure: cpfls
+  input_map: data-range
+  consequents: seesaw
+  products: additive
+  membership_functions: 5
+  base: none
+  population: 10
+  generations: 1
+  local_search: {enabled: false}
+  validation: {draws: 20, windows: 20, horizon_samples: 20}
+"""
+
+
+def stages(study, folder):
+    """Give the artifacts of a study by stage, and the commands that make them."""
+    paths = {stage: folder / f"{stage}.h5" for stage in ("trajectory", "flight", "selection", "model", "prediction")}
+    return paths, {
+        "trajectory": ("trajectory", study),
+        "flight": ("simulate", study, paths["trajectory"]),
+        "selection": ("reduce", study, paths["flight"]),
+        "model": ("identify", study, paths["flight"], "--selection", paths["selection"]),
+        "prediction": ("predict", study, paths["model"], paths["flight"]),
+    }
 
 
 def with_vehicle(text):

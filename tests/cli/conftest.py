@@ -8,25 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.builders import command_line
-from tests.builders.studies import VEHICLE
-
-TINY = """\
-seed: 1
-trajectory: {sample_time_s: 0.1}
-reduction: {size: 60}
-identification:
-  structure: cpfls
-  input_map: data-range
-  consequents: seesaw
-  products: additive
-  membership_functions: 5
-  base: none
-  population: 10
-  generations: 1
-  local_search: {enabled: false}
-  validation: {draws: 20, windows: 20, horizon_samples: 20}
-"""
-
+from tests.builders.studies import TINY, VEHICLE, stages
 
 LOG_STUDY = """\
 import:
@@ -75,15 +57,7 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="session")
 def pipeline(cpfls, study):
     """Every artifact of the tiny study, and what the commands printed with --json."""
-    folder = study.parent
-    paths = {stage: folder / f"{stage}.h5" for stage in ("trajectory", "flight", "selection", "model", "prediction")}
-    commands = {
-        "trajectory": ("trajectory", study),
-        "flight": ("simulate", study, paths["trajectory"]),
-        "selection": ("reduce", study, paths["flight"]),
-        "model": ("identify", study, paths["flight"], "--selection", paths["selection"]),
-        "prediction": ("predict", study, paths["model"], paths["flight"]),
-    }
+    paths, commands = stages(study, study.parent)
     printed = {}
     for stage, words in commands.items():
         result = cpfls(*words, "-o", paths[stage], "--json")

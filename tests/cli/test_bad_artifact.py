@@ -161,7 +161,9 @@ def test_flight_of_no_samples(refuse, changed, study, tmp_path):
             file[name] = np.zeros(shape)
 
     flight = changed("flight", empty)
-    assert refuse("reduce", study, flight, "-o", tmp_path / "out.h5") == [f"{flight}: holds no samples"]
+    assert refuse("reduce", study, flight, "-o", tmp_path / "out.h5") == [
+        f"{flight}: time: holds 0 samples, and two are the least"
+    ]
 
 
 @pytest.mark.parametrize(

@@ -60,5 +60,12 @@ def test_lengths_in_digits_are_fixed():
     ]
 
 
-def test_empty_datasets_are_not_an_error_of_the_rules():
-    assert findings(time=np.zeros(0), attitude=np.zeros((0, 3))) == []
+def test_empty_datasets_are_not_an_error_of_the_rules_but_time_has_two_samples():
+    assert findings(attitude=np.zeros((0, 3))) == []
+    assert findings(time=np.zeros(1)) == ["time: holds 1 samples, and two are the least"]
+
+
+def test_numbers_that_nothing_comes_near_are_told():
+    attitude = np.zeros((4, 3))
+    attitude[1, 2] = 1e308
+    assert findings(**datasets(attitude=attitude)) == ["attitude: 1 samples are beyond 1e+150, the first at index 1"]

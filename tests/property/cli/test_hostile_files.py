@@ -1,0 +1,33 @@
+"""No file makes a command end in a traceback, leave something behind, take nonsense, or end with a wrong exit code."""
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.builders.command_line import undrawn
+from tests.builders.hostile_files import KINDS, Good, tried
+
+# `make fuzz` tries ten thousand of each, with all figures drawn.
+EXAMPLES = {"YAML": 30, "HDF5 structure": 20, "HDF5 bytes": 25, "CSV": 40, "Parquet": 40, "ULog": 40}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    return Good.made(tmp_path_factory.mktemp("good"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_file_hurts(good, kind):
+    @settings(
+        max_examples=EXAMPLES[kind],
+        deadline=None,
+        derandomize=True,
+        suppress_health_check=[HealthCheck.too_slow],
+        database=None,
+    )
+    @given(seed=st.integers(0, 2**32))
+    def holds(seed):
+        with undrawn():
+            assert tried(good.case(kind, seed)) is None
+
+    holds()
