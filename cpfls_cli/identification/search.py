@@ -14,8 +14,9 @@ from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
 from cpfls_cli.evolution.engine import start, step
 from cpfls_cli.evolution.state import End, EvolutionState, History, ended
+from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator, decode, uniform_chromosome
+from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import Choice, IdentificationSettings
 from cpfls_cli.workers.employ import employ

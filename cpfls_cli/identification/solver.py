@@ -121,20 +121,32 @@ class Solver:
     ridge: RidgeChoice | None
     rank_tolerance: float
 
-    def fit(self, partitions: Breakpoints) -> Fit | None:
+    def products(self, partitions: Breakpoints) -> Products | None:
+        """Add up the products of the columns; None where a partition is not defined or a column is not finite.
+
+        A slope of a very narrow function can be beyond what squares can carry.
+        """
+        if not all(np.isfinite(part).all() for part in partitions):
+            return None
+        products = self.learned.products(partitions)
+        return products if np.max(np.abs(products.gram)) <= LARGEST_SQUARE else None
+
+    def fit(self, partitions: Breakpoints, products: Products | None = None) -> Fit | None:
         """Solve for the linear parameters, with the ridge weight that these partitions need.
 
         Parameters
         ----------
         partitions : sequence of array, shape (functions,)
+        products : Products, optional
+            Of these partitions, where they are known already.
 
         Returns
         -------
         Fit or None
             None where the regressor is not finite.
         """
-        products = self.learned.products(partitions)
-        if not _usable(products):
+        products = products or self.products(partitions)
+        if products is None:
             return None
         weight, error, size = 0.0, None, np.ones(self.learned.table.parameters)
         if self.ridge is not None:
@@ -158,18 +170,22 @@ class Solver:
         products = self.learned.products(partitions)
         return None if self.ridge is None else self._curve(products, partitions, column_size(products.sum()))
 
-    def equations(self, partitions: Breakpoints, weight: float, size: Array) -> NormalEquations:
+    def equations(self, products: Products, weight: float, size: Array) -> NormalEquations:
         """Set up the equations for a given ridge.
 
         Parameters
         ----------
-        partitions : sequence of array, shape (functions,)
+        products : Products
+            Under one label.
         weight : float
             Finite.
         size : array, shape (parameters,)
             What the columns of the fuzzy part are divided by.
         """
-        return self._equations(self.learned.products(partitions).sum(), weight, size)
+        divide = self._divide(size)
+        penalty = np.full(len(divide), weight * products.rows[0])
+        penalty[: len(divide) - len(size)] = 0.0
+        return NormalEquations(products.gram[0] / (divide * divide[:, None]), products.moment[0] / divide, penalty)
 
     def parameters(self, solution: Array, size: Array) -> tuple[Array, Array]:
         """Split a solution of the equations into fuzzy coefficients and rigid body."""
@@ -214,18 +230,12 @@ class Solver:
             solution = solve_normal(rigid, self.rank_tolerance, _of_rigid_body(project, len(size)))
             coefficients, rigid_body = np.zeros_like(size), solution.parameters
         else:
-            equations = self._equations(products, weight, size)
+            equations = self.equations(products, weight, size)
             solution = solve_normal(equations, self.rank_tolerance, project)
             coefficients, rigid_body = self.parameters(solution.parameters, size)
             if error is None:
                 error = float((products.square[0] - equations.moment @ solution.parameters) / products.rows[0])
         return Fit(coefficients, rigid_body, weight, max(error or 0.0, 0.0), solution.conditioning, scale, size)
-
-    def _equations(self, products: Products, weight: float, size: Array) -> NormalEquations:
-        divide = self._divide(size)
-        penalty = np.full(len(divide), weight * products.rows[0])
-        penalty[: len(divide) - len(size)] = 0.0
-        return NormalEquations(products.gram[0] / (divide * divide[:, None]), products.moment[0] / divide, penalty)
 
     def _divide(self, size: Array) -> Array:
         return size if self.ridge is None else np.concatenate([np.ones(RIGID), size])
@@ -256,8 +266,3 @@ def _of_rigid_body(project: Project, parameters: int) -> Project:
         return square, back[:RIGID]
 
     return projected
-
-
-def _usable(products: Products) -> bool:
-    """Tell whether a regressor is finite and no slope of a very narrow function beyond what squares can carry."""
-    return bool(np.max(np.abs(products.gram)) <= LARGEST_SQUARE)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Literal
 
+import numpy as np
 from annotated_types import Ge, Le
 from typing_extensions import Doc
 
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
 from cpfls_cli.fuzzy.basis import Consequents, Products, feature_count
 from cpfls_cli.fuzzy.inputs import InputMap
@@ -166,6 +169,25 @@ class ModelStructure:
         for partition in self.partitions:
             yield slice(start, start + partition.weights)
             start += partition.weights
+
+    @cached_property
+    def alike(self) -> tuple[tuple[IntArray, IntArray], ...]:
+        """Partitions of equal numbers of functions, and their weights among the genes, shape (partitions, weights)."""
+        slices, counts = list(self.weight_slices()), np.array([partition.weights for partition in self.partitions])
+        groups = (np.flatnonzero(counts == count) for count in np.unique(counts))
+        return tuple((group, np.array([np.r_[slices[i]] for i in group], dtype=np.int64)) for group in groups)
+
+    @cached_property
+    def inner(self) -> tuple[BoolArray, Array, IntArray]:
+        """How inner breakpoints follow from weights: whose partition is theirs, which lie left of them; the partition.
+
+        The first two of shape (inner breakpoints, genes).
+        """
+        ends = [(i, part, k) for i, part in enumerate(self.weight_slices()) for k in range(1, part.stop - part.start)]
+        own, counted = np.zeros((len(ends), self.genes), dtype=np.bool_), np.zeros((len(ends), self.genes))
+        for row, (_, part, k) in enumerate(ends):
+            own[row, part], counted[row, part.start : part.start + k] = True, 1.0
+        return own, counted, np.array([i for i, _, _ in ends], dtype=np.int64)
 
 
 def model_structure(settings: StructureSettings) -> ModelStructure:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from cpfls_cli.identification import IdentificationSettings, TorqueData
-from cpfls_cli.identification.evaluator import decode
+from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import ValidationSettings

@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque, rigid_columns
 from cpfls_cli.identification import IdentificationSettings, TorqueData
-from cpfls_cli.identification.evaluator import uniform_chromosome
+from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import ValidationSettings

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification import IdentificationSettings, data
-from cpfls_cli.identification.evaluator import uniform_chromosome
+from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.excitation import visited_cells
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification import IdentificationSettings, TorqueData
-from cpfls_cli.identification.evaluator import uniform_chromosome
+from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import ValidationSettings

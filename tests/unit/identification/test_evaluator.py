@@ -1,15 +1,14 @@
 """Chromosomes, and the refinement of partition weights: its Jacobian, and what it does to a chromosome."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import IdentificationSettings
-from cpfls_cli.identification import evaluator as evaluating
-from cpfls_cli.identification.evaluator import LARGEST_GENE, decode, encode, uniform_chromosome
+from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode, uniform_chromosome
+from cpfls_cli.identification.evaluator import Problem
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.regressor import Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
@@ -66,18 +65,16 @@ def problem(structure, base, samples=120):
     return model_evaluator(data, data, settings), rng
 
 
-def captured(monkeypatch, solver, weights):
-    """The residual and the Jacobian that the refinement hands to the optimiser."""
-    handed = {}
+def local_problem(evaluator, rng):
+    """The problem of refining random genes, and these: the fit at the start gives its ridge and column sizes."""
+    genes = encode(rng.uniform(0.3, 0.9, evaluator.structure.genes))
+    return Problem(evaluator.solver, evaluator.fit(genes), evaluator.solver.learned), genes
 
-    def optimiser(residual, start, jac, **_):
-        handed.update(residual=residual, jacobian=jac)
-        return SimpleNamespace(x=start)
 
-    monkeypatch.setattr(evaluating, "least_squares", optimiser)
-    start = solver.fit(decode(solver.learned.structure, weights))
-    evaluating.refine(solver, weights, start, 1)
-    return handed["residual"], handed["jacobian"], start
+def point_at(problem, weights):
+    """Weights between the genes, which `Point` holds as they are."""
+    genes = LARGEST_GENE * weights
+    return problem.point(genes, problem.solver.products(decode(problem.solver.learned.structure, genes)))
 
 
 def written_out(evaluator, start):
@@ -101,28 +98,24 @@ def written_out(evaluator, start):
 
 @pytest.mark.parametrize("structure", STRUCTURES)
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
-def test_gradient_of_the_reduced_cost(monkeypatch, structure, base):
+def test_gradient_of_the_reduced_cost(structure, base):
     evaluator, rng = problem(structure, base)
-    weights = rng.uniform(0.3, 0.9, evaluator.structure.genes)
-    residual, jacobian, start = captured(monkeypatch, evaluator.solver, weights)
-    assert np.isfinite(start.ridge_weight)
-    gradient = jacobian(weights).T @ residual(weights)
-    cost = [[0.5 * np.sum(residual(weights + s * STEP * unit) ** 2) for s in (1, -1)] for unit in np.eye(len(weights))]
+    local, genes = local_problem(evaluator, rng)
+    weights = genes / LARGEST_GENE
+    assert np.isfinite(local.start.ridge_weight)
+    gradient = local.linearised(point_at(local, weights))[1]
+    cost = [[0.5 * point_at(local, weights + s * STEP * unit).square for s in (1, -1)] for unit in np.eye(len(weights))]
     expected = np.subtract(*np.transpose(cost)) / (2 * STEP)
     np.testing.assert_allclose(gradient, expected, atol=1e-5 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
-def test_jacobian_is_that_of_the_residual_beside_what_the_regressor_spans(monkeypatch, structure, base):
-    """Kaufman's approximation leaves out only the part inside the span, which the coefficients follow.
-
-    The rows are turned so that few of them are not zero; a turn leaves their products as they are.
-    """
+def test_jacobian_is_that_of_the_residual_beside_what_the_regressor_spans(structure, base):
+    """Kaufman's approximation leaves out only the part inside the span, which the coefficients follow."""
     evaluator, rng = problem(structure, base)
-    weights = rng.uniform(0.3, 0.9, evaluator.structure.genes)
-    residual, jacobian, start = captured(monkeypatch, evaluator.solver, weights)
-    rows = written_out(evaluator, start)
+    local, genes = local_problem(evaluator, rng)
+    weights, rows = genes / LARGEST_GENE, written_out(evaluator, local.start)
 
     def beside(weights):
         A, y = rows(weights)
@@ -133,12 +126,13 @@ def test_jacobian_is_that_of_the_residual_beside_what_the_regressor_spans(monkey
     )
     A, _ = rows(weights)
     expected = by_weight - A @ np.linalg.lstsq(A, by_weight, rcond=1e-10)[0]
-    J, r = jacobian(weights), residual(weights)
+    point = point_at(local, weights)
+    normal, slope = local.linearised(point)
     square = expected.T @ expected
-    np.testing.assert_allclose(J.T @ J, square, atol=1e-5 * np.abs(square).max())
+    np.testing.assert_allclose(normal, square, atol=1e-5 * np.abs(square).max())
     gradient = expected.T @ beside(weights)
-    np.testing.assert_allclose(J.T @ r, gradient, atol=1e-5 * np.abs(gradient).max())
-    assert r @ r == pytest.approx(np.sum(beside(weights) ** 2), rel=1e-9)
+    np.testing.assert_allclose(slope, gradient, atol=1e-5 * np.abs(gradient).max())
+    assert point.square == pytest.approx(np.sum(beside(weights) ** 2), rel=1e-9)
 
 
 @pytest.mark.parametrize("base", ["none", "rigid-body"])

@@ -5,8 +5,8 @@ import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
 from cpfls_cli.identification import IdentificationSettings, TorqueData, data, identify, samples, solver
+from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.data import Flights, gathered, joined, sample_times
-from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.excitation import axis_evidence
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import score, score_of

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.evaluator import decode
+from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.regressor import (
     Motion,
     Regressor,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.evaluator import decode, weight_jacobian
+from cpfls_cli.identification.chromosome import decode, weight_jacobian
 from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure, torque_sensitivity
 
 SEESAW = {"consequents": "seesaw", "products": "additive"}

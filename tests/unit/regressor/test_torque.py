@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.evaluator import decode
+from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.regressor import Motion, Regressor, StructureSettings, data_ranges, model_structure
 
 ROLL, PITCH = 0, 1
