@@ -1,8 +1,10 @@
 """Compiled loops over samples: sums of a regressor's products without the regressor itself.
 
 A sample fires at most two membership functions per input, so most columns of its three rows are zero; only the
-others are computed, for a few samples at a time, so that the inner loops run over samples. All loops stand in one
-module because the cache of compiled code follows its file.
+others are computed, for a few samples at a time, so that the inner loops run over samples. Samples are taken in the
+order of what they fire: those that fire the same rules have the same columns, and one product of matrices adds them up.
+An inner loop writes one array: of several the compiler cannot tell that they are apart, and takes them one by one.
+All loops stand in one module because the cache of compiled code follows its file.
 """
 
 from __future__ import annotations
@@ -49,8 +51,8 @@ def _compiled_sum(function: Function) -> Function:
 
 
 # Columns of `Table.blocks` and of `Table.partitions`.
-_ROW, _COLUMN, _INPUTS, _FIRST, _SECOND, _FEATURES, _START, _OTHER_RULES = range(8)
-_ANGLE, _FUNCTIONS, _FIRING, _FIRST_INNER = range(4)
+_ROW, _COLUMN, _ROLL, _PITCH, _KIND, _FEATURES, _START, _OTHER_RULES = range(8)
+_ANGLE, _FUNCTIONS, _FIRING_TOGETHER, _FIRST_INNER = range(4)
 
 
 class Table(NamedTuple):
@@ -59,11 +61,13 @@ class Table(NamedTuple):
     Attributes
     ----------
     blocks : array of int, shape (blocks, 8)
-        Row, column, number of inputs, first and second partition, features, first column, rules of the second input.
-    partitions : array of int, shape (partitions, 4)
-        Angle, membership functions, functions that fire at a time, first inner breakpoint.
+        Row, column, partitions of roll and of pitch, kind of features (of roll, of pitch, of both), features, first
+        column, rules of pitch.
+    partitions : array of int, shape (partitions + 1, 4)
+        Angle, membership functions, functions that fire at a time, first inner breakpoint. The last one stands for no
+        partition: its one function always fires.
     active : int
-        Columns that are not zero at a sample, rounded up to an even number.
+        Columns that are not zero at a sample.
     parameters, breakpoints : int
         Columns and inner breakpoints in all.
     circular, data_range, harmonic, tensor : bool
@@ -102,102 +106,57 @@ class Chunk(NamedTuple):
     dense: Array
 
 
-_BATCH = 64
+_BATCH = 128
 """Samples worked on together: enough to spread the cost of a loop, few enough to stay in the fastest memory."""
 
-
-MOST_FUNCTIONS = 15
-"""Membership functions of a partition at most, so that its intervals are digits of a pattern."""
-
-
-class _Batch(NamedTuple):
-    """What the samples of a batch fire; the sample is the last axis.
-
-    Attributes
-    ----------
-    antecedent, antecedent_slope : shape (2, batch)
-        Input of the membership functions by angle, and its slope.
-    rule, degree, degree_slope : shape (partitions, 2, batch)
-        Of the functions that fire along each input; the slope is by the angle.
-    interval, position, width, input_slope : shape (partitions, batch)
-        Where an input lies between breakpoints; its slope by the angle is zero outside the partition.
-    pattern : shape (batch,)
-        Equal for samples that fire the same rules.
-    feature, feature_slope : shape (2, 1 + single, batch)
-        Consequent features by angle.
-    joint : shape (3, features, batch)
-        Of one rule of roll and pitch: value, slope by roll, slope by pitch.
-    carried : shape (blocks, 3, 3, batch)
-        By axis: how value, slope by roll and slope by pitch of an inertia function enter the torque.
-    column : shape (active, batch)
-    rows : shape (active, 3 * batch)
-        Columns that are not zero; the three axes of a sample stand side by side.
-    output : shape (4, 3, batch)
-        Of the rules of one block that fire: value, slope by roll, slope by pitch.
-    total : shape (3, batch)
-        Of one block: value, slope by roll, slope by pitch.
-    step : shape (4, batch)
-        Of the output of a block at a breakpoint; see `_step`.
-    moved_column : shape (2 * partitions, batch)
-        Inner breakpoints at both ends of the interval of each input; negative for none.
-    moved : shape (2 * partitions + 1 or 2, 3 * batch)
-        Derivatives of the torque by them; after them the residual.
-    """
-
-    antecedent: Array
-    antecedent_slope: Array
-    rule: IntArray
-    degree: Array
-    degree_slope: Array
-    interval: IntArray
-    position: Array
-    width: Array
-    input_slope: Array
-    pattern: IntArray
-    feature: Array
-    feature_slope: Array
-    joint: Array
-    carried: Array
-    column: IntArray
-    rows: Array
-    output: Array
-    total: Array
-    step: Array
-    moved_column: IntArray
-    moved: Array
+# What is known of the samples of a batch stands in one array, a line for each quantity, the sample last: handing over
+# one array costs less than many. They are samples that fire the same rules. The lines are, by their first one:
+# antecedent and consequent of roll with their slopes, then of pitch;
+_SEEN, _ANTECEDENT, _ANTECEDENT_SLOPE, _CONSEQUENT, _CONSEQUENT_SLOPE = 0, 0, 1, 2, 3
+# attitude, rate and acceleration;
+_ATTITUDE, _RATE, _ACCELERATION = 8, 11, 14
+# by axis, how value, slope by roll and slope by pitch of one inertia function enter the torque;
+_CARRIED = 17
+# value, slope by roll and slope by pitch of each of the rules of one block that fire;
+_FIRING = 26
+# torque by axis of each of these rules, for each unit of its output, and torque of the slopes of one feature;
+_ALONG, _BESIDE = 38, 50
+# step of the output of a block at a breakpoint, see `_step`, and three lines to work in;
+_STEP, _WORK = 51, 55
+# by partition, degrees of the two functions that fire, their slopes by the angle, and the position between their peaks;
+_DEGREE, _SLOPE, _POSITION, _OF_PARTITION = 58, 2, 4, 5
+# from `_features_at` on, features of roll, of pitch and of both: value, slope by roll and slope by pitch of each.
+_BOTH = 2
 
 
 @_compiled
-def _even(count: int) -> int:
-    return count + count % 2
+def _features_at(table: Table, kind: int) -> int:
+    """Find the first line of the features of a kind."""
+    single = 1 + table.single
+    return _DEGREE + _OF_PARTITION * len(table.partitions) + 3 * single * kind
 
 
 @_compiled
-def _new_batch(table: Table) -> _Batch:
-    partitions, single = len(table.partitions), 1 + table.single
-    return _Batch(
-        antecedent=np.zeros((2, _BATCH)),
-        antecedent_slope=np.zeros((2, _BATCH)),
-        rule=np.zeros((partitions, 2, _BATCH), np.int64),
-        degree=np.ones((partitions, 2, _BATCH)),
-        degree_slope=np.zeros((partitions, 2, _BATCH)),
-        interval=np.zeros((partitions, _BATCH), np.int64),
-        position=np.zeros((partitions, _BATCH)),
-        width=np.ones((partitions, _BATCH)),
-        input_slope=np.zeros((partitions, _BATCH)),
-        pattern=np.zeros(_BATCH, np.int64),
-        feature=np.ones((2, single, _BATCH)),
-        feature_slope=np.zeros((2, single, _BATCH)),
-        joint=np.zeros((3, single * single, _BATCH)),
-        carried=np.zeros((len(table.blocks), 3, 3, _BATCH)),
-        column=np.full((table.active, _BATCH), -1),
-        rows=np.zeros((table.active, 3 * _BATCH)),
-        output=np.zeros((4, 3, _BATCH)),
-        total=np.zeros((3, _BATCH)),
-        step=np.zeros((4, _BATCH)),
-        moved_column=np.full((2 * partitions, _BATCH), -1),
-        moved=np.zeros((_even(2 * partitions + 1), 3 * _BATCH)),
-    )
+def _fours(count: int) -> int:
+    return (count + 3) // 4 * 4
+
+
+@_compiled
+def _new_batch(table: Table) -> Array:
+    """Make room for a batch, with what is the same for all: features that are constant, functions that always fire."""
+    single = 1 + table.single
+    at = np.zeros((_features_at(table, _BOTH) + 3 * single * single, _BATCH))
+    for index in range(len(table.partitions)):
+        at[_DEGREE + _OF_PARTITION * index] = 1.0
+    for kind in range(2):
+        at[_features_at(table, kind)] = 1.0
+    return at
+
+
+@_compiled
+def _space(table: Table, dense: int) -> Array:
+    """Make room for the rows of a batch."""
+    return np.zeros(_fours(table.active + dense) * 3 * _BATCH)
 
 
 @_compiled
@@ -232,30 +191,53 @@ def _map_input(table: Table, axis: int, angle: float) -> tuple[float, float, flo
 
 
 @_compiled
-def _see(table: Table, axis: int, attitude: Array, at: _Batch) -> None:
-    """Map an angle of all samples to antecedent and consequent features."""
-    order, feature, feature_slope = table.single // 2, at.feature[axis], at.feature_slope[axis]
-    antecedent, slope = at.antecedent[axis], at.antecedent_slope[axis]
-    for n in range(len(attitude)):
-        angle = attitude[n, axis]
-        antecedent[n], slope[n], consequent, consequent_slope = _map_input(table, axis, angle)
-        if not table.harmonic:
-            feature[1, n], feature_slope[1, n] = consequent, consequent_slope
-            continue
-        for k in range(1, order + 1):
-            sine, cosine = np.sin(k * angle), np.cos(k * angle)
-            feature[k, n], feature_slope[k, n] = sine, k * cosine
-            feature[order + k, n], feature_slope[order + k, n] = cosine, -k * sine
+def _see(table: Table, attitude: Array) -> Array:
+    """Map the angles of all samples to antecedent and consequent with their slopes, shape (8, samples).
+
+    The slope of an antecedent beyond the partition is zero, as that of its membership functions is.
+    """
+    seen = np.empty((8, len(attitude)))
+    for axis in range(2):
+        for n in range(len(attitude)):
+            antecedent, slope, consequent, consequent_slope = _map_input(table, axis, attitude[n, axis])
+            inside = antecedent >= 0.0 and antecedent <= 1.0
+            seen[4 * axis, n], seen[4 * axis + 1, n] = antecedent, slope if inside else 0.0
+            seen[4 * axis + 2, n], seen[4 * axis + 3, n] = consequent, consequent_slope
+    return seen
 
 
 @_compiled
-def _locate(functions: int, breakpoints: Array, antecedent: Array, interval: IntArray, count: int) -> None:
-    """Count the inner breakpoints left of each input; written so that it needs no branch."""
-    for n in range(count):
-        interval[n] = 0
-    for k in range(1, functions - 1):
-        for n in range(count):
-            interval[n] += 1 if antecedent[n] >= breakpoints[k] else 0
+def _cells(table: Table, breakpoints: Array, seen: Array) -> IntArray:
+    """Count out the cells that all breakpoints cut roll and pitch into, and find that of each sample."""
+    cell = np.zeros(seen.shape[1], np.int64)
+    for axis in range(2):
+        cells, antecedent = 1, seen[4 * axis + _ANTECEDENT]
+        for index in range(len(table.partitions)):
+            if table.partitions[index, _ANGLE] == axis:
+                cells += max(table.partitions[index, _FUNCTIONS] - 2, 0)
+        cell *= cells
+        for index in range(len(table.partitions)):
+            if table.partitions[index, _ANGLE] == axis:
+                for k in range(1, table.partitions[index, _FUNCTIONS] - 1):
+                    at = breakpoints[index, k]
+                    for n in range(len(cell)):
+                        cell[n] += 1 if antecedent[n] >= at else 0
+    return cell
+
+
+@_compiled
+def _sorted(cell: IntArray) -> IntArray:
+    """Put samples in the order of their cells, those of one cell in the order of time."""
+    first = np.zeros(np.max(cell) + 2, np.int64)
+    for n in range(len(cell)):
+        first[cell[n] + 1] += 1
+    for k in range(1, len(first)):
+        first[k] += first[k - 1]
+    order = np.empty(len(cell), np.int64)
+    for n in range(len(cell)):
+        order[first[cell[n]]] = n
+        first[cell[n]] += 1
+    return order
 
 
 @_compiled
@@ -267,174 +249,229 @@ def _z_function(u: float) -> tuple[float, float, float]:
 
 
 @_compiled
-def _fire(table: Table, index: int, breakpoints: Array, count: int, at: _Batch) -> None:
-    """Find the two functions of a partition that fire; see `cpfls_cli.fuzzy.membership.memberships`."""
-    axis, functions = table.partitions[index, _ANGLE], table.partitions[index, _FUNCTIONS]
-    antecedent, antecedent_slope, interval = at.antecedent[axis], at.antecedent_slope[axis], at.interval[index]
-    position, width, input_slope, pattern = at.position[index], at.width[index], at.input_slope[index], at.pattern
-    left, right, left_slope, right_slope = (
-        at.degree[index, 0],
-        at.degree[index, 1],
-        at.degree_slope[index, 0],
-        at.degree_slope[index, 1],
-    )
-    rule, next_rule = at.rule[index, 0], at.rule[index, 1]
-    _locate(functions, breakpoints, antecedent, interval, count)
-    for n in range(count):
-        start, end, x = breakpoints[interval[n]], breakpoints[interval[n] + 1], antecedent[n]
-        wide = end > start
-        inverse = 1.0 / (end - start if wide else 1.0)
-        u = min(max(x, 0.0) - start, end - start) * inverse if wide else 1.0
-        inside = antecedent_slope[n] if x >= 0.0 and x <= 1.0 else 0.0
-        falling, falling_slope, _ = _z_function(u)
-        slope = falling_slope * inside * inverse
-        position[n], width[n], input_slope[n] = u, (end - start if wide else 1.0), inside
-        left[n], right[n], left_slope[n], right_slope[n] = falling, 1.0 - falling, slope, -slope
-    for n in range(count):
-        last = table.circular and interval[n] + 2 == functions
-        rule[n], next_rule[n] = interval[n], 0 if last else interval[n] + 1
-        pattern[n] = pattern[n] * MOST_FUNCTIONS + interval[n]
+def _end_of_run(cell: IntArray, label: IntArray, order: IntArray, start: int) -> int:
+    """Find where samples stop to fire the same rules under the same label, a batch after the start at the latest."""
+    first, stop = order[start], start + 1
+    while stop < min(start + _BATCH, len(order)) and cell[order[stop]] == cell[first]:
+        if label[order[stop]] != label[first]:
+            break
+        stop += 1
+    return stop
 
 
 @_compiled
-def _fire_all(table: Table, breakpoints: Array, attitude: Array, at: _Batch) -> None:
-    """Fire all partitions at the samples of a batch; one function alone always fires, and stays at 1."""
-    at.pattern[:] = 0
+def _take(chunk: Chunk, scale: Array, seen: Array, sample: IntArray, active: int, rows: Array, at: Array) -> None:
+    """Take the samples of a batch out of a chunk, with their dense columns."""
+    for n in range(len(sample)):
+        i = sample[n]
+        for k in range(8):
+            at[_SEEN + k, n] = seen[k, i]
+        for axis in range(3):
+            at[_ATTITUDE + axis, n] = chunk.attitude[i, axis]
+            at[_RATE + axis, n] = chunk.rate[i, axis]
+            at[_ACCELERATION + axis, n] = chunk.acceleration[i, axis]
+            for d in range(chunk.dense.shape[2]):
+                rows[active + d, axis, n] = chunk.dense[i, axis, d] * scale[axis]
+
+
+@_compiled
+def _find_features(table: Table, count: int, at: Array) -> None:
+    """Find the consequent features of each angle, and their products."""
+    single, order, joint = 1 + table.single, table.single // 2, _features_at(table, _BOTH)
     for axis in range(2):
-        _see(table, axis, attitude, at)
-    for index in range(len(table.partitions)):
-        if table.partitions[index, _FIRING] == 2:
-            _fire(table, index, breakpoints[index], len(attitude), at)
-
-
-@_compiled
-def _join(table: Table, count: int, at: _Batch) -> None:
-    """Combine the features of roll and pitch."""
-    single = 1 + table.single
-    for i in range(single):
-        one, one_slope = at.feature[0, i], at.feature_slope[0, i]
-        for j in range(single):
-            if not table.tensor and i > 0 and j > 0:
+        first, seen = _features_at(table, axis), _SEEN + 4 * axis
+        for n in range(count):
+            if not table.harmonic:
+                at[first + 3, n], at[first + 4 + axis, n] = at[seen + _CONSEQUENT, n], at[seen + _CONSEQUENT_SLOPE, n]
                 continue
-            other, other_slope = at.feature[1, j], at.feature_slope[1, j]
+            for k in range(1, order + 1):
+                sine, cosine = np.sin(k * at[_ATTITUDE + axis, n]), np.cos(k * at[_ATTITUDE + axis, n])
+                at[first + 3 * k, n], at[first + 3 * k + 1 + axis, n] = sine, k * cosine
+                at[first + 3 * (order + k), n], at[first + 3 * (order + k) + 1 + axis, n] = cosine, -k * sine
+    for i in range(single):
+        for j in range(single if table.tensor or i == 0 else 1):
             f = i * single + j if table.tensor else (i if j == 0 else single - 1 + j)
-            value, by_roll, by_pitch = at.joint[0, f], at.joint[1, f], at.joint[2, f]
+            roll, pitch = _features_at(table, 0) + 3 * i, _features_at(table, 1) + 3 * j
             for n in range(count):
-                value[n] = one[n] * other[n]
-                by_roll[n] = one_slope[n] * other[n]
-                by_pitch[n] = one[n] * other_slope[n]
+                at[joint + 3 * f, n] = at[roll, n] * at[pitch, n]
+            for n in range(count):
+                at[joint + 3 * f + 1, n] = at[roll + 1, n] * at[pitch, n]
+            for n in range(count):
+                at[joint + 3 * f + 2, n] = at[roll, n] * at[pitch + 2, n]
 
 
 @_compiled
-def _carry(block: IntArray, rate: Array, acceleration: Array, scale: Array, carried: Array) -> None:
+def _fire(partitions: IntArray, index: int, breakpoints: Array, count: int, at: Array) -> int:
+    """Find the two functions of a partition that fire; see `cpfls_cli.fuzzy.membership.memberships`.
+
+    Give the interval between breakpoints.
+    """
+    seen, first, left = _SEEN + 4 * partitions[index, _ANGLE], _DEGREE + _OF_PARTITION * index, 0
+    for k in range(1, partitions[index, _FUNCTIONS] - 1):
+        left += 1 if at[seen + _ANTECEDENT, 0] >= breakpoints[index, k] else 0
+    low, width = breakpoints[index, left], breakpoints[index, left + 1] - breakpoints[index, left]
+    wide, inverse, position = width > 0.0, 1.0 / width if width > 0.0 else 1.0, first + _POSITION
+    for n in range(count):
+        at[position, n] = min(max(at[seen + _ANTECEDENT, n], 0.0) - low, width) * inverse if wide else 1.0
+    for n in range(count):
+        at[first, n] = _z_function(at[position, n])[0]
+    for n in range(count):
+        at[first + 1, n] = 1.0 - at[first, n]
+    for n in range(count):
+        at[first + _SLOPE, n] = _z_function(at[position, n])[1] * at[seen + _ANTECEDENT_SLOPE, n] * inverse
+    for n in range(count):
+        at[first + _SLOPE + 1, n] = -at[first + _SLOPE, n]
+    return left
+
+
+@_compiled
+def _find_firing(block: IntArray, partitions: IntArray, count: int, at: Array) -> int:
+    """Find how strongly the rules of a block fire, and their slopes by roll and pitch; give their number."""
+    rule, slots, others = 0, partitions[block[_ROLL], _FIRING_TOGETHER], partitions[block[_PITCH], _FIRING_TOGETHER]
+    for i in range(slots):
+        for j in range(others):
+            roll = _DEGREE + _OF_PARTITION * block[_ROLL] + i
+            pitch, first = _DEGREE + _OF_PARTITION * block[_PITCH] + j, _FIRING + 3 * rule
+            for n in range(count):
+                at[first, n] = at[roll, n] * at[pitch, n]
+            for n in range(count):
+                at[first + 1, n] = at[roll + _SLOPE, n] * at[pitch, n]
+            for n in range(count):
+                at[first + 2, n] = at[roll, n] * at[pitch + _SLOPE, n]
+            rule += 1
+    return rule
+
+
+@_compiled
+def _carry(block: IntArray, scale: Array, count: int, at: Array) -> None:
     """Find how an inertia function enters the torque; method.md section 2."""
     row, column = block[_ROW], block[_COLUMN]
     share = 0.5 if row == column else 1.0
+    for n in range(count):
+        at[_WORK, n] = share * at[_RATE + row, n] * at[_RATE + column, n]
     for axis in range(3):
-        from_axis = column if axis == row else row
-        acts = 1.0 if axis in (row, column) else 0.0
-        by_value, by_roll, by_pitch = carried[axis, 0], carried[axis, 1], carried[axis, 2]
-        for n in range(len(rate)):
-            energy = share * rate[n, row] * rate[n, column]
-            moved = acts * rate[n, from_axis]
-            by_value[n] = acts * acceleration[n, from_axis] * scale[axis]
-            by_roll[n] = (moved * rate[n, 0] - (energy if axis == 0 else 0.0)) * scale[axis]
-            by_pitch[n] = (moved * rate[n, 1] - (energy if axis == 1 else 0.0)) * scale[axis]
+        from_axis, acts = column if axis == row else row, scale[axis] if axis in (row, column) else 0.0
+        for n in range(count):
+            at[_CARRIED + 3 * axis, n] = acts * at[_ACCELERATION + from_axis, n]
+        for angle in range(2):
+            energy = scale[axis] if axis == angle else 0.0
+            for n in range(count):
+                moved = at[_RATE + from_axis, n] * at[_RATE + angle, n]
+                at[_CARRIED + 3 * axis + 1 + angle, n] = acts * moved - energy * at[_WORK, n]
 
 
 @_compiled
-def _put_one(block: IntArray, carried: Array, angle: int, i: int, f: int, a: int, count: int, at: _Batch) -> None:
-    """Write one column of an inertia function of one angle."""
-    index, row, column = block[_FIRST], at.rows[a], at.column[a]
-    degree, slope, rule = at.degree[index, i], at.degree_slope[index, i], at.rule[index, i]
-    feature, feature_slope = at.feature[angle, f], at.feature_slope[angle, f]
-    for n in range(count):
-        column[n] = block[_START] + rule[n] * block[_FEATURES] + f
-        value, gradient = degree[n] * feature[n], slope[n] * feature[n] + degree[n] * feature_slope[n]
+def _put(features: int, feature: int, slots: int, first: int, count: int, at: Array, rows: Array) -> None:
+    """Write the columns of a block whose rules have fired, from the line of its first feature."""
+    for rule in range(slots):
+        fired = _FIRING + 3 * rule
         for axis in range(3):
-            row[3 * n + axis] = carried[axis, 0, n] * value + carried[axis, 1 + angle, n] * gradient
-
-
-@_compiled
-def _put_two(block: IntArray, carried: Array, i: int, j: int, f: int, a: int, count: int, at: _Batch) -> None:
-    """Write one column of an inertia function of roll and pitch."""
-    first, second, row, column = block[_FIRST], block[_SECOND], at.rows[a], at.column[a]
-    mu, mu_slope, rule = at.degree[first, i], at.degree_slope[first, i], at.rule[first, i]
-    nu, nu_slope, other_rule = at.degree[second, j], at.degree_slope[second, j], at.rule[second, j]
-    value, by_roll, by_pitch = at.joint[0, f], at.joint[1, f], at.joint[2, f]
-    for n in range(count):
-        column[n] = block[_START] + (rule[n] * block[_OTHER_RULES] + other_rule[n]) * block[_FEATURES] + f
-        firing = mu[n] * nu[n]
-        roll = mu_slope[n] * nu[n] * value[n] + firing * by_roll[n]
-        pitch = mu[n] * nu_slope[n] * value[n] + firing * by_pitch[n]
+            carried, along = _CARRIED + 3 * axis, _ALONG + 3 * rule + axis
+            for n in range(count):
+                slopes = at[carried + 1, n] * at[fired + 1, n] + at[carried + 2, n] * at[fired + 2, n]
+                at[along, n] = at[carried, n] * at[fired, n] + slopes
+    for f in range(features):
+        value = feature + 3 * f
         for axis in range(3):
-            carry = carried[axis]
-            row[3 * n + axis] = carry[0, n] * firing * value[n] + carry[1, n] * roll + carry[2, n] * pitch
+            carried = _CARRIED + 3 * axis
+            for n in range(count):
+                at[_BESIDE, n] = at[carried + 1, n] * at[value + 1, n] + at[carried + 2, n] * at[value + 2, n]
+            for rule in range(slots):
+                a, along, fired = first + rule * features + f, _ALONG + 3 * rule + axis, _FIRING + 3 * rule
+                for n in range(count):
+                    rows[a, axis, n] = at[along, n] * at[value, n] + at[fired, n] * at[_BESIDE, n]
 
 
 @_compiled
-def _put_constant(block: IntArray, carried: Array, a: int, count: int, at: _Batch) -> None:
-    at.column[a, :count] = block[_START]
-    for n in range(count):
-        for axis in range(3):
-            at.rows[a, 3 * n + axis] = carried[axis, 0, n]
+def _fill(
+    table: Table,
+    breakpoints: Array,
+    chunk: Chunk,
+    scale: Array,
+    seen: Array,
+    sample: IntArray,
+    space: Array,
+    interval: IntArray,
+    at: Array,
+) -> Array:
+    """Find the columns of the samples of a batch that are not zero, then the dense ones, and zeros up to fours.
 
-
-@_compiled
-def _prepare(table: Table, breakpoints: Array, chunk: Chunk, start: int, stop: int, scale: Array, at: _Batch) -> None:
-    """Evaluate all of the samples of a batch that does not need the columns."""
-    _fire_all(table, breakpoints, chunk.attitude[start:stop], at)
-    _join(table, stop - start, at)
+    Give them with the three axes side by side, shape (columns, 3 * samples), and set the interval of each partition.
+    """
+    count, first, width = len(sample), 0, _fours(table.active + chunk.dense.shape[2])
+    rows = space[: width * 3 * count].reshape(width, 3, count)
+    rows[table.active + chunk.dense.shape[2] :] = 0.0
+    _take(chunk, scale, seen, sample, table.active, rows, at)
+    _find_features(table, count, at)
+    for index in range(len(table.partitions)):
+        if table.partitions[index, _FIRING_TOGETHER] == 2:
+            interval[index] = _fire(table.partitions, index, breakpoints, count, at)
     for b in range(len(table.blocks)):
-        _carry(table.blocks[b], chunk.rate[start:stop], chunk.acceleration[start:stop], scale, at.carried[b])
+        block = table.blocks[b]
+        _carry(block, scale, count, at)
+        slots = _find_firing(block, table.partitions, count, at)
+        _put(block[_FEATURES], _features_at(table, block[_KIND]), slots, first, count, at, rows)
+        first += slots * block[_FEATURES]
+    return rows.reshape(width, 3 * count)
 
 
 @_compiled
-def _fill(table: Table, count: int, at: _Batch) -> None:
-    """Find the columns of the samples of a batch that are not zero, and their rows in them."""
-    a = 0
-    for b in range(len(table.blocks)):
-        block, carried = table.blocks[b], at.carried[b]
-        if block[_INPUTS] == 0:
-            _put_constant(block, carried, a, count, at)
-            a += 1
-            continue
-        for i in range(table.partitions[block[_FIRST], _FIRING]):
-            for j in range(table.partitions[block[_SECOND], _FIRING] if block[_INPUTS] == 2 else 1):
-                for f in range(block[_FEATURES]):
-                    if block[_INPUTS] == 2:
-                        _put_two(block, carried, i, j, f, a, count, at)
-                    else:
-                        _put_one(block, carried, table.partitions[block[_FIRST], _ANGLE], i, f, a, count, at)
+def _rule(circular: bool, functions: int, interval: int, right: int) -> int:
+    """Find the rule of one of the two functions of a partition that fire in an interval."""
+    return 0 if circular and interval + 1 + right == functions else interval + right
+
+
+@_compiled
+def _columns(table: Table, interval: IntArray, column: IntArray) -> None:
+    """Find which columns those of a batch are that are not zero."""
+    a, blocks, partitions, circular = 0, table.blocks, table.partitions, table.circular
+    for b in range(len(blocks)):
+        roll, pitch = blocks[b, _ROLL], blocks[b, _PITCH]
+        for i in range(partitions[roll, _FIRING_TOGETHER]):
+            for j in range(partitions[pitch, _FIRING_TOGETHER]):
+                rule = _rule(circular, partitions[roll, _FUNCTIONS], interval[roll], i) * blocks[b, _OTHER_RULES]
+                rule += _rule(circular, partitions[pitch, _FUNCTIONS], interval[pitch], j)
+                for f in range(blocks[b, _FEATURES]):
+                    column[a] = blocks[b, _START] + rule * blocks[b, _FEATURES] + f
                     a += 1
 
 
-@_compiled
-def _end_of_run(pattern: IntArray, label: IntArray, first: int) -> int:
-    """Find where samples stop to fire the same rules under the same label."""
-    for n in range(first + 1, len(label)):
-        if label[n] != label[first] or pattern[n] != pattern[first]:
-            return n
-    return len(label)
-
-
 @_compiled_sum
-def _multiply(left: Array, right: Array, start: int, stop: int, upper: bool, out: Array) -> None:
-    """Set ``out = left right^T`` over a range of rows, two by two, as far as columns come in pairs.
+def _multiply(left: Array, right: Array, count: int, upper: bool, out: Array) -> None:
+    """Set ``out = left right^T`` over the first rows, four columns by two; of a symmetric product the upper triangle.
 
-    Of a symmetric product the upper triangle will do.
+    The columns of `left` come in fours, those of `right` in twos.
     """
-    for a in range(0, len(left) - 1, 2):
-        x0, x1 = left[a, start:stop], left[a + 1, start:stop]
-        for b in range(a if upper else 0, len(right) - 1, 2):
-            y0, y1 = right[b, start:stop], right[b + 1, start:stop]
-            s00 = s01 = s10 = s11 = 0.0
-            for r in range(len(x0)):
-                s00 += x0[r] * y0[r]
-                s01 += x0[r] * y1[r]
-                s10 += x1[r] * y0[r]
-                s11 += x1[r] * y1[r]
+    for a in range(0, len(left), 4):
+        for b in range(a if upper else 0, len(right), 2):
+            s00 = s01 = s10 = s11 = s20 = s21 = s30 = s31 = 0.0
+            for r in range(count):
+                s00 += left[a, r] * right[b, r]
+                s01 += left[a, r] * right[b + 1, r]
+                s10 += left[a + 1, r] * right[b, r]
+                s11 += left[a + 1, r] * right[b + 1, r]
+                s20 += left[a + 2, r] * right[b, r]
+                s21 += left[a + 2, r] * right[b + 1, r]
+                s30 += left[a + 3, r] * right[b, r]
+                s31 += left[a + 3, r] * right[b + 1, r]
             out[a, b], out[a, b + 1], out[a + 1, b], out[a + 1, b + 1] = s00, s01, s10, s11
+            out[a + 2, b], out[a + 2, b + 1], out[a + 3, b], out[a + 3, b + 1] = s20, s21, s30, s31
+
+
+@_compiled
+def _combine(rows: Array, column: IntArray, coefficients: Array, dense_weights: Array, count: int, out: Array) -> None:
+    """Set the residual ``dense D - Q c`` of the first rows, four columns at a time."""
+    weights = np.zeros(len(rows))
+    for a in range(len(column)):
+        weights[a] = -coefficients[column[a]]
+    for d in range(len(dense_weights)):
+        weights[len(column) + d] = dense_weights[d]
+    out[:count] = 0.0
+    for a in range(0, len(rows), 4):
+        w0, w1, w2, w3 = weights[a], weights[a + 1], weights[a + 2], weights[a + 3]
+        for r in range(count):
+            half = w0 * rows[a, r] + w1 * rows[a + 1, r]
+            out[r] += half + (w2 * rows[a + 2, r] + w3 * rows[a + 3, r])
 
 
 @_compiled
@@ -442,26 +479,9 @@ def _add(rows: IntArray, columns: IntArray, part: Array, upper: bool, total: Arr
     """Add products to the sums over all by the places of their columns; a negative place is none."""
     for a in range(len(rows)):
         if rows[a] >= 0:
-            into, values = total[rows[a]], part[a]
             for b in range(a if upper else 0, len(columns)):
                 if columns[b] >= 0:
-                    into[columns[b]] += values[b]
-
-
-@_compiled
-def _take_dense(dense: Array, scale: Array, out: Array) -> None:
-    for n in range(len(dense)):
-        for axis in range(3):
-            for d in range(dense.shape[2]):
-                out[d, 3 * n + axis] = dense[n, axis, d] * scale[axis]
-
-
-@_compiled
-def _places(count: int) -> IntArray:
-    """Places of columns that are padded to an even number."""
-    places = np.full(_even(count), -1)
-    places[:count] = np.arange(count)
-    return places
+                    total[rows[a], columns[b]] += part[a, b]
 
 
 @_compiled
@@ -484,159 +504,23 @@ def add_gram(
     moment : array, shape (sums, parameters, dense)
         Changed in place.
     """
-    at, active, places = _new_batch(table), table.active, _places(chunk.dense.shape[2])
-    dense = np.zeros((len(places), 3 * _BATCH))
-    square, cross = np.zeros((active, active)), np.zeros((active, len(places)))
-    for start in range(0, len(label), _BATCH):
-        stop = min(start + _BATCH, len(label))
-        _prepare(table, breakpoints, chunk, start, stop, scale, at)
-        _fill(table, stop - start, at)
-        _take_dense(chunk.dense[start:stop], scale, dense)
-        first = 0
-        while first < stop - start:
-            last = _end_of_run(at.pattern, label[start:stop], first)
-            _multiply(at.rows, at.rows, 3 * first, 3 * last, True, square)
-            _multiply(at.rows, dense, 3 * first, 3 * last, False, cross)
-            column, sums = at.column[:, first], label[start + first]
-            _add(column, column, square, True, gram[sums])
-            _add(column, places, cross, False, moment[sums])
-            first = last
-
-
-@_compiled
-def _slots(table: Table, block: IntArray) -> int:
-    """Rules of a block that fire at a time."""
-    slots = table.partitions[block[_FIRST], _FIRING] if block[_INPUTS] > 0 else 1
-    return slots * table.partitions[block[_SECOND], _FIRING] if block[_INPUTS] == 2 else slots
-
-
-@_compiled
-def _output_one(block: IntArray, angle: int, slots: int, coefficients: Array, count: int, at: _Batch) -> None:
-    """Find the outputs of the rules of one input that fire."""
-    for i in range(slots):
-        rule, value, slope = at.rule[block[_FIRST], i], at.output[i, 0], at.output[i, 1 + angle]
-        value[:count], slope[:count] = 0.0, 0.0
-        at.output[i, 2 - angle, :count] = 0.0
-        for f in range(block[_FEATURES]):
-            feature, feature_slope = at.feature[angle, f], at.feature_slope[angle, f]
-            for n in range(count):
-                coefficient = coefficients[block[_START] + rule[n] * block[_FEATURES] + f]
-                value[n] += coefficient * feature[n]
-                slope[n] += coefficient * feature_slope[n]
-
-
-@_compiled
-def _output_two(block: IntArray, i: int, j: int, coefficients: Array, count: int, at: _Batch, out: Array) -> None:
-    """Find the output of one rule of roll and pitch that fires."""
-    rule, other_rule = at.rule[block[_FIRST], i], at.rule[block[_SECOND], j]
-    value, by_roll, by_pitch = out[0], out[1], out[2]
-    out[:, :count] = 0.0
-    for f in range(block[_FEATURES]):
-        joint, joint_roll, joint_pitch = at.joint[0, f], at.joint[1, f], at.joint[2, f]
-        for n in range(count):
-            coefficient = coefficients[
-                block[_START] + (rule[n] * block[_OTHER_RULES] + other_rule[n]) * block[_FEATURES] + f
-            ]
-            value[n] += coefficient * joint[n]
-            by_roll[n] += coefficient * joint_roll[n]
-            by_pitch[n] += coefficient * joint_pitch[n]
-
-
-@_compiled
-def _outputs(table: Table, block: IntArray, coefficients: Array, count: int, at: _Batch) -> None:
-    """Find the outputs of all rules of a block that fire: value, slope by roll, slope by pitch."""
-    if block[_INPUTS] == 0:
-        at.output[0, 0, :count] = coefficients[block[_START]]
-    elif block[_INPUTS] == 1:
-        _output_one(block, table.partitions[block[_FIRST], _ANGLE], _slots(table, block), coefficients, count, at)
-    else:
-        others = table.partitions[block[_SECOND], _FIRING]
-        for i in range(table.partitions[block[_FIRST], _FIRING]):
-            for j in range(others):
-                _output_two(block, i, j, coefficients, count, at, at.output[i * others + j])
-
-
-@_compiled
-def _sum_one(block: IntArray, angle: int, slots: int, count: int, at: _Batch) -> None:
-    """Add up the rules of one input: value, slope by roll, slope by pitch."""
-    value, gradient = at.total[0], at.total[1 + angle]
-    for i in range(slots):
-        degree, degree_slope = at.degree[block[_FIRST], i], at.degree_slope[block[_FIRST], i]
-        output, slope = at.output[i, 0], at.output[i, 1 + angle]
-        for n in range(count):
-            value[n] += degree[n] * output[n]
-            gradient[n] += degree_slope[n] * output[n] + degree[n] * slope[n]
-
-
-@_compiled
-def _sum_two(block: IntArray, i: int, j: int, output: Array, count: int, at: _Batch) -> None:
-    """Add one rule of roll and pitch: value, slope by roll, slope by pitch."""
-    mu, mu_slope = at.degree[block[_FIRST], i], at.degree_slope[block[_FIRST], i]
-    nu, nu_slope = at.degree[block[_SECOND], j], at.degree_slope[block[_SECOND], j]
-    value, by_roll, by_pitch = at.total[0], at.total[1], at.total[2]
-    output_value, output_roll, output_pitch = output[0], output[1], output[2]
-    for n in range(count):
-        firing = mu[n] * nu[n]
-        value[n] += firing * output_value[n]
-        by_roll[n] += mu_slope[n] * nu[n] * output_value[n] + firing * output_roll[n]
-        by_pitch[n] += mu[n] * nu_slope[n] * output_value[n] + firing * output_pitch[n]
-
-
-@_compiled
-def _subtract(table: Table, block: IntArray, carried: Array, count: int, at: _Batch, residual: Array) -> None:
-    """Subtract the torque of a block, whose rules have given their outputs, from a residual."""
-    at.total[:, :count] = 0.0
-    if block[_INPUTS] == 0:
-        at.total[0, :count] = at.output[0, 0, :count]
-    elif block[_INPUTS] == 1:
-        _sum_one(block, table.partitions[block[_FIRST], _ANGLE], _slots(table, block), count, at)
-    else:
-        others = table.partitions[block[_SECOND], _FIRING]
-        for i in range(table.partitions[block[_FIRST], _FIRING]):
-            for j in range(others):
-                _sum_two(block, i, j, at.output[i * others + j], count, at)
-    value, roll, pitch = at.total[0], at.total[1], at.total[2]
-    for axis in range(3):
-        by_value, by_roll, by_pitch = carried[axis, 0], carried[axis, 1], carried[axis, 2]
-        for n in range(count):
-            residual[3 * n + axis] -= by_value[n] * value[n] + by_roll[n] * roll[n] + by_pitch[n] * pitch[n]
-
-
-@_compiled
-def _combine_dense(dense: Array, weights: Array, scale: Array, out: Array) -> None:
-    """Set a combination of the dense columns of samples."""
-    for n in range(len(dense)):
-        for axis in range(3):
-            total = 0.0
-            for d in range(dense.shape[2]):
-                total += dense[n, axis, d] * weights[d]
-            out[3 * n + axis] = total * scale[axis]
-
-
-@_compiled
-def _subtract_columns(
-    rows: Array, column: IntArray, coefficients: Array, start: int, stop: int, residual: Array
-) -> None:
-    """Subtract combinations of the columns of samples that fire alike, two columns at a time."""
-    for a in range(0, len(column), 2):
-        first, second = rows[a, start:stop], rows[a + 1, start:stop]
-        for k in range(len(coefficients)):
-            one = coefficients[k, column[a]]
-            other = coefficients[k, column[a + 1]] if column[a + 1] >= 0 else 0.0
-            total = residual[k, start:stop]
-            for r in range(len(total)):
-                total[r] -= one * first[r] + other * second[r]
-
-
-@_compiled
-def _residual(
-    table: Table, coefficients: Array, dense: Array, dense_weights: Array, scale: Array, at: _Batch, residual: Array
-) -> None:
-    """Set the residual ``dense D - Q c`` of the samples of a batch, whose columns need not be known."""
-    _combine_dense(dense, dense_weights, scale, residual)
-    for b in range(len(table.blocks)):
-        _outputs(table, table.blocks[b], coefficients, len(dense), at)
-        _subtract(table, table.blocks[b], at.carried[b], len(dense), at, residual)
+    active, dense = table.active, chunk.dense.shape[2]
+    at, space, seen = _new_batch(table), _space(table, dense), _see(table, chunk.attitude)
+    cell, column = _cells(table, breakpoints, seen), np.zeros(active, np.int64)
+    interval = np.zeros(len(table.partitions), np.int64)
+    order, part, start = _sorted(cell), np.zeros((_fours(active + dense), _fours(active + dense))), 0
+    while start < len(order):
+        stop = _end_of_run(cell, label, order, start)
+        rows = _fill(table, breakpoints, chunk, scale, seen, order[start:stop], space, interval, at)
+        _multiply(rows, rows, 3 * (stop - start), True, part)
+        _columns(table, interval, column)
+        sums = label[order[start]]
+        for a in range(active):
+            for b in range(a, active):
+                gram[sums, column[a], column[b]] += part[a, b]
+            for d in range(dense):
+                moment[sums, column[a], d] += part[a, active + d]
+        start = stop
 
 
 @_compiled
@@ -668,18 +552,21 @@ def add_errors(
     largest : array, shape (sums, models)
         Largest absolute residuals, changed in place.
     """
-    at, residual = _new_batch(table), np.zeros(3 * _BATCH)
-    for start in range(0, len(label), _BATCH):
-        stop = min(start + _BATCH, len(label))
-        _prepare(table, breakpoints, chunk, start, stop, scale, at)
+    at, space, seen = _new_batch(table), _space(table, chunk.dense.shape[2]), _see(table, chunk.attitude)
+    cell, column = _cells(table, breakpoints, seen), np.zeros(table.active, np.int64)
+    interval = np.zeros(len(table.partitions), np.int64)
+    order, residual, start = _sorted(cell), np.zeros(3 * _BATCH), 0
+    while start < len(order):
+        stop = _end_of_run(cell, label, order, start)
+        rows = _fill(table, breakpoints, chunk, scale, seen, order[start:stop], space, interval, at)
+        _columns(table, interval, column)
+        sums = label[order[start]]
         for k in range(len(coefficients)):
-            _residual(table, coefficients[k], chunk.dense[start:stop], dense_weights[k], scale, at, residual)
-            for n in range(stop - start):
-                sums = label[start + n]
-                for axis in range(3):
-                    value = residual[3 * n + axis]
-                    square[sums, k] += value * value
-                    largest[sums, k] = max(largest[sums, k], abs(value))
+            _combine(rows, column, coefficients[k], dense_weights[k], 3 * (stop - start), residual)
+            for r in range(3 * (stop - start)):
+                square[sums, k] += residual[r] * residual[r]
+                largest[sums, k] = max(largest[sums, k], abs(residual[r]))
+        start = stop
 
 
 @_compiled
@@ -709,99 +596,136 @@ def add_combined(
     dense_back : array, shape (dense, 1)
         The dense columns times the first residual, changed in place.
     """
-    at, models, every = _new_batch(table), len(coefficients), _places(chunk.dense.shape[2])
-    residual, dense = np.zeros((_even(models), 3 * _BATCH)), np.zeros((len(every), 3 * _BATCH))
-    part, first_only = np.zeros((len(residual), len(residual))), np.array([0, -1])
-    local, local_dense = np.zeros((table.active, 2)), np.zeros((len(every), 2))
-    for start in range(0, len(chunk.attitude), _BATCH):
-        stop = min(start + _BATCH, len(chunk.attitude))
-        _prepare(table, breakpoints, chunk, start, stop, scale, at)
-        _fill(table, stop - start, at)
-        _take_dense(chunk.dense[start:stop], scale, dense)
+    active, dense, models = table.active, chunk.dense.shape[2], len(coefficients)
+    at, space, seen = _new_batch(table), _space(table, dense), _see(table, chunk.attitude)
+    cell, column = _cells(table, breakpoints, seen), np.zeros(active, np.int64)
+    interval = np.zeros(len(table.partitions), np.int64)
+    order, residual, start = _sorted(cell), np.zeros((_fours(models), 3 * _BATCH)), 0
+    part, local, label = (
+        np.zeros((len(residual), len(residual))),
+        np.zeros((_fours(active + dense), 2)),
+        np.zeros_like(cell),
+    )
+    while start < len(order):
+        stop = _end_of_run(cell, label, order, start)
+        rows = _fill(table, breakpoints, chunk, scale, seen, order[start:stop], space, interval, at)
+        _columns(table, interval, column)
         for k in range(models):
-            _combine_dense(chunk.dense[start:stop], dense_weights[k], scale, residual[k])
-        first = 0
-        while first < stop - start:
-            last = _end_of_run(at.pattern, at.pattern[: stop - start], first)
-            column = at.column[:, first]
-            _subtract_columns(at.rows, column, coefficients, 3 * first, 3 * last, residual)
-            _multiply(at.rows, residual[:2], 3 * first, 3 * last, False, local)
-            _add(column, first_only, local, False, back)
-            first = last
-        _multiply(residual, residual, 0, 3 * (stop - start), False, part)
+            _combine(rows, column, coefficients[k], dense_weights[k], 3 * (stop - start), residual[k])
+        _multiply(residual, residual, 3 * (stop - start), False, part)
         square += part[:models, :models]
-        _multiply(dense, residual[:2], 0, 3 * (stop - start), False, local_dense)
-        _add(every, first_only, local_dense, False, dense_back)
+        _multiply(rows, residual[:2], 3 * (stop - start), False, local)
+        for a in range(active):
+            back[column[a], 0] += local[a, 0]
+        dense_back[:, 0] += local[active : active + dense, 0]
+        start = stop
 
 
 @_compiled
-def _add_difference(left: Array, right: Array, firing: Array, count: int, total: Array) -> None:
-    for n in range(count):
-        total[n] += firing[n] * (left[n] - right[n])
-
-
-@_compiled
-def _step(table: Table, block: IntArray, input_index: int, count: int, at: _Batch) -> None:
+def _step(
+    table: Table, block: IntArray, input_index: int, coefficients: Array, interval: IntArray, count: int, at: Array
+) -> None:
     """Step of a block's output at a breakpoint of one input: what fires left of it less what fires right of it.
 
     The step of value, slope by roll and slope by pitch; and that of the value where the other input fires by its slope.
     """
-    step = at.step
-    step[:, :count] = 0.0
-    if block[_INPUTS] == 1:
+    index, other, features = block[_ROLL + input_index], block[_PITCH - input_index], block[_FEATURES]
+    along, across = (block[_OTHER_RULES], 1) if input_index == 0 else (1, block[_OTHER_RULES])
+    circular, functions = table.circular, table.partitions[index, _FUNCTIONS]
+    left = _rule(circular, functions, interval[index], 0) * along
+    right = _rule(circular, functions, interval[index], 1) * along
+    at[_STEP : _STEP + 4, :count] = 0.0
+    for o in range(table.partitions[other, _FIRING_TOGETHER]):
+        fixed = _rule(circular, table.partitions[other, _FUNCTIONS], interval[other], o) * across
+        at[_WORK : _WORK + 3, :count] = 0.0
+        for f in range(features):
+            difference = coefficients[block[_START] + (left + fixed) * features + f]
+            difference -= coefficients[block[_START] + (right + fixed) * features + f]
+            feature = _features_at(table, block[_KIND]) + 3 * f
+            for k in range(3):
+                for n in range(count):
+                    at[_WORK + k, n] += difference * at[feature + k, n]
+        degree = _DEGREE + _OF_PARTITION * other + o
         for k in range(3):
             for n in range(count):
-                step[k, n] = at.output[0, k, n] - at.output[1, k, n]
-        return
-    other = block[_SECOND - input_index]
-    others = table.partitions[other, _FIRING]
-    for o in range(others):
-        left, right = (o, others + o) if input_index == 0 else (2 * o, 2 * o + 1)
-        for k in range(3):
-            _add_difference(at.output[left, k], at.output[right, k], at.degree[other, o], count, step[k])
-        _add_difference(at.output[left, 0], at.output[right, 0], at.degree_slope[other, o], count, step[3])
-
-
-@_compiled
-def _move(table: Table, block: IntArray, carried: Array, input_index: int, count: int, at: _Batch) -> None:
-    """Differentiate the torque of an inertia function by the breakpoints around one of its inputs."""
-    index = block[_FIRST + input_index]
-    angle, functions, first = (
-        table.partitions[index, _ANGLE],
-        table.partitions[index, _FUNCTIONS],
-        table.partitions[index, _FIRST_INNER],
-    )
-    _step(table, block, input_index, count, at)
-    value, by_own, by_other, beside = at.step[0], at.step[1 + angle], at.step[2 - angle], at.step[3]
-    position, width = at.position[index], at.width[index]
-    input_slope, interval = at.input_slope[index], at.interval[index]
-    for end in range(2):
-        moved, column = at.moved[2 * index + end], at.moved_column[2 * index + end]
+                at[_STEP + k, n] += at[degree, n] * at[_WORK + k, n]
         for n in range(count):
-            k, u = interval[n] + end, position[n]
-            inner = k >= 1 and k <= functions - 2
-            column[n] = first + k - 1 if inner else -1
-            moves = 1.0 if inner and input_slope[n] != 0.0 else 0.0
-            _, falling, bending = _z_function(u)
-            towards = u - 1.0 if end == 0 else -u
-            per_width = moves / width[n]
-            degree = falling * towards * per_width
-            slope = (bending * towards + (1.0 - 2.0 * end) * falling) * per_width / width[n] * input_slope[n]
-            own_slope = slope * value[n] + degree * by_own[n]
-            other_slope = degree * (by_other[n] + beside[n])
-            for axis in range(3):
-                carry = carried[axis, 0, n] * degree * value[n] + carried[axis, 1 + angle, n] * own_slope
-                moved[3 * n + axis] = carry + carried[axis, 2 - angle, n] * other_slope
+            at[_STEP + 3, n] += at[degree + _SLOPE, n] * at[_WORK, n]
 
 
 @_compiled
-def _move_all(table: Table, coefficients: Array, count: int, at: _Batch) -> None:
+def _move(table: Table, index: int, interval: int, breakpoints: Array, count: int, at: Array, moved: Array) -> None:
+    """Differentiate the torque of an inertia function by the breakpoints around one of its inputs, of known step."""
+    angle, functions = table.partitions[index, _ANGLE], table.partitions[index, _FUNCTIONS]
+    own, other, position = _STEP + 1 + angle, _STEP + 2 - angle, _DEGREE + _OF_PARTITION * index + _POSITION
+    slope, width = (
+        _SEEN + 4 * angle + _ANTECEDENT_SLOPE,
+        breakpoints[index, interval + 1] - breakpoints[index, interval],
+    )
+    per_width = 1.0 / width if width > 0.0 else 1.0
+    for end in range(2):
+        k, row, sign, own_end = interval + end, 2 * index + end, 1.0 - 2.0 * end, 1.0 - end
+        moves = per_width if k >= 1 and k <= functions - 2 else 0.0
+        # How the degree changes, the slope by this angle, and that by the other.
+        for n in range(count):
+            change = _z_function(at[position, n])[1] * (sign * at[position, n] - own_end) * moves
+            at[_WORK, n] = change if at[slope, n] != 0.0 else 0.0
+        for n in range(count):
+            _, falling, bending = _z_function(at[position, n])
+            change = (bending * (sign * at[position, n] - own_end) + sign * falling) * moves * per_width
+            at[_WORK + 1, n] = change * at[slope, n] * at[_STEP, n] + at[_WORK, n] * at[own, n]
+        for n in range(count):
+            at[_WORK + 2, n] = at[_WORK, n] * (at[other, n] + at[_STEP + 3, n])
+        for n in range(count):
+            at[_WORK, n] *= at[_STEP, n]
+        for axis in range(3):
+            by_value, by_own, by_other = (
+                _CARRIED + 3 * axis,
+                _CARRIED + 3 * axis + 1 + angle,
+                _CARRIED + 3 * axis + 2 - angle,
+            )
+            for n in range(count):
+                by_slopes = at[by_own, n] * at[_WORK + 1, n] + at[by_other, n] * at[_WORK + 2, n]
+                moved[row, axis, n] = at[by_value, n] * at[_WORK, n] + by_slopes
+
+
+@_compiled
+def _move_all(
+    table: Table,
+    breakpoints: Array,
+    coefficients: Array,
+    scale: Array,
+    interval: IntArray,
+    count: int,
+    space: Array,
+    at: Array,
+) -> Array:
+    """Differentiate the torque of a batch by the breakpoints at both ends of the interval of each input.
+
+    Give the derivatives, room for the residual, and zeros up to fours, shape (columns, 3 * samples).
+    """
+    width = _fours(2 * len(table.partitions) + 1)
+    moved = space[: width * 3 * count].reshape(width, 3, count)
+    moved[:] = 0.0
     for b in range(len(table.blocks)):
         block = table.blocks[b]
-        _outputs(table, block, coefficients, count, at)
-        for input_index in range(block[_INPUTS]):
-            if table.partitions[block[_FIRST + input_index], _FUNCTIONS] > 2:
-                _move(table, block, at.carried[b], input_index, count, at)
+        _carry(block, scale, count, at)
+        for input_index in range(2):
+            index = block[_ROLL + input_index]
+            if table.partitions[index, _FUNCTIONS] > 2:
+                _step(table, block, input_index, coefficients, interval, count, at)
+                _move(table, index, interval[index], breakpoints, count, at, moved)
+    return moved.reshape(width, 3 * count)
+
+
+@_compiled
+def _inner(table: Table, interval: IntArray, places: IntArray) -> None:
+    """Find which inner breakpoints those at both ends of the intervals of a batch are; negative for none."""
+    for index in range(len(table.partitions)):
+        for end in range(2):
+            k = interval[index] + end
+            inner = k >= 1 and k <= table.partitions[index, _FUNCTIONS] - 2
+            places[2 * index + end] = table.partitions[index, _FIRST_INNER] + k - 1 if inner else -1
 
 
 @_compiled
@@ -835,31 +759,25 @@ def add_moved(
     square : array, shape (inner breakpoints + 1, inner breakpoints + 1)
         ``[M, r]^T [M, r]``, upper triangle, changed in place; entries mean the sum with their mirror images.
     """
-    at, active, every = _new_batch(table), table.active, _places(chunk.dense.shape[2])
-    moves, dense, moved = 2 * len(table.partitions), np.zeros((len(every), 3 * _BATCH)), at.moved
-    places = np.full(len(moved), -1)
-    local, local_dense = np.zeros((active, len(moved))), np.zeros((len(every), len(moved)))
-    local_square = np.zeros((len(moved), len(moved)))
-    places[moves] = table.breakpoints
-    for start in range(0, len(chunk.attitude), _BATCH):
-        stop = min(start + _BATCH, len(chunk.attitude))
-        _prepare(table, breakpoints, chunk, start, stop, scale, at)
-        _fill(table, stop - start, at)
-        _move_all(table, coefficients, stop - start, at)
-        _take_dense(chunk.dense[start:stop], scale, dense)
-        _combine_dense(chunk.dense[start:stop], dense_weights, scale, moved[moves])
-        first = 0
-        while first < stop - start:
-            last = _end_of_run(at.pattern, at.pattern[: stop - start], first)
-            column = at.column[:, first]
-            _subtract_columns(
-                at.rows, column, coefficients.reshape(1, -1), 3 * first, 3 * last, moved[moves : moves + 1]
-            )
-            _multiply(at.rows, moved, 3 * first, 3 * last, False, local)
-            _multiply(dense, moved, 3 * first, 3 * last, False, local_dense)
-            _multiply(moved, moved, 3 * first, 3 * last, True, local_square)
-            places[:moves] = at.moved_column[:, first]
-            _add(column, places, local, False, cross)
-            _add(every, places, local_dense, False, dense_cross)
-            _add(places, places, local_square, True, square)
-            first = last
+    active, dense, moves = table.active, chunk.dense.shape[2], 2 * len(table.partitions)
+    at, space, seen = _new_batch(table), _space(table, dense), _see(table, chunk.attitude)
+    cell, column = _cells(table, breakpoints, seen), np.zeros(active, np.int64)
+    interval = np.zeros(len(table.partitions), np.int64)
+    order, start = _sorted(cell), 0
+    places, every, label = np.full(moves + 1, table.breakpoints), np.arange(dense), np.zeros_like(cell)
+    local = np.zeros((_fours(active + dense), _fours(moves + 1)))
+    local_square = np.zeros((_fours(moves + 1), _fours(moves + 1)))
+    moved_space = np.zeros(len(local_square) * 3 * _BATCH)
+    while start < len(order):
+        stop = _end_of_run(cell, label, order, start)
+        rows = _fill(table, breakpoints, chunk, scale, seen, order[start:stop], space, interval, at)
+        moved = _move_all(table, breakpoints, coefficients, scale, interval, stop - start, moved_space, at)
+        _columns(table, interval, column)
+        _combine(rows, column, coefficients, dense_weights, 3 * (stop - start), moved[moves])
+        _multiply(rows, moved, 3 * (stop - start), False, local)
+        _multiply(moved, moved, 3 * (stop - start), True, local_square)
+        _inner(table, interval, places)
+        _add(column, places, local[:active], False, cross)
+        _add(every, places, local[active : active + dense], False, dense_cross)
+        _add(places, places, local_square, True, square)
+        start = stop

@@ -6,9 +6,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.regressor.kernels import MOST_FUNCTIONS, Table
+from cpfls_cli.regressor.kernels import Table
 from cpfls_cli.regressor.regressor import Breakpoints
-from cpfls_cli.regressor.structure import Block, ModelStructure, Partition
+from cpfls_cli.regressor.structure import PITCH, ROLL, Block, ModelStructure, Partition
 
 
 def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRange]) -> Table:
@@ -21,7 +21,6 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
         Of roll and pitch over the training data.
     """
     settings = structure.settings
-    assert all(partition.functions <= MOST_FUNCTIONS for partition in structure.partitions)
     harmonic = settings.consequents == "harmonic"
     active = sum(_active(structure, block) for block in structure.blocks)
     inner = [max(partition.functions - 2, 0) for partition in structure.partitions]
@@ -30,10 +29,12 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
         (partition.input, partition.functions, _firing(structure, partition), int(start))
         for partition, start in zip(structure.partitions, first, strict=True)
     ]
+    # One that stands for no partition.
+    partitions.append((ROLL, 1, 1, 0))
     return Table(
         blocks=np.array([_block(structure, block) for block in structure.blocks]),
         partitions=np.array(partitions),
-        active=active + active % 2,
+        active=active,
         parameters=structure.parameters,
         breakpoints=sum(inner),
         circular=structure.circular,
@@ -73,8 +74,10 @@ def _active(structure: ModelStructure, block: Block) -> int:
 
 
 def _block(structure: ModelStructure, block: Block) -> tuple[int, ...]:
-    first, second = (*block.partitions, 0, 0)[:2]
-    functions = structure.partitions[second].functions
+    none, inputs = len(structure.partitions), block.function.inputs
+    roll, pitch = (block.partitions[inputs.index(angle)] if angle in inputs else none for angle in (ROLL, PITCH))
+    functions = structure.partitions[pitch].functions if pitch < none else 1
     rules = max(functions - 1, 1) if structure.circular else functions
-    entry = block.function.row, block.function.column, len(block.partitions)
-    return (*entry, first, second, block.features, block.columns.start, rules)
+    kind = len(inputs) if len(inputs) != 1 else inputs[0]
+    entry = block.function.row, block.function.column, roll, pitch, kind
+    return (*entry, block.features, block.columns.start, rules)
