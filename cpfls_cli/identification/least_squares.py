@@ -16,6 +16,10 @@ SMALLEST_SINGULAR_SHARE = 3e-7
 # Up to here the squares have digits enough; above, the lowest directions are multiplied out once more.
 _WELL_CONDITIONED = 1e4
 _LOWEST_DIRECTIONS = 3
+# Columns from which Lanczos is worth its calls; its steps at most, and the residual at which an eigenvalue is exact.
+_MANY = 200
+_STEPS = 80
+_SETTLED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -190,23 +194,102 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
     Björck, Numerical Methods for Least Squares Problems (1996), sections 2.9 and 6.6 (accuracy of the normal equations,
     refinement).
     """
-    eigenvalues, vectors = np.linalg.eigh(equations.matrix)
     tolerance = max(rank_tolerance, SMALLEST_SINGULAR_SHARE)
-    kept = eigenvalues > tolerance**2 * eigenvalues[-1]
-    rank = int(np.count_nonzero(kept))
-    if rank == 0:
-        return NormalSolution(np.zeros_like(eigenvalues), float("inf"))
+    inverse = _inverted(equations.matrix, tolerance**2)
+    if inverse is None:
+        return NormalSolution(np.zeros_like(equations.moment), float("inf"))
+    parameters, smallest = inverse.apply(equations.moment), inverse.smallest
+    if inverse.largest > _WELL_CONDITIONED**2 * smallest:
+        square, back = project(parameters, inverse.lowest)
+        parameters = parameters + inverse.apply(back - equations.penalty * parameters)
+        penalised = square + (inverse.lowest.T * equations.penalty) @ inverse.lowest
+        smallest = np.linalg.eigvalsh(penalised)[0]
+    condition = float(np.sqrt(inverse.largest / smallest))
+    return NormalSolution(parameters, condition if inverse.missing == 0 else (1.0 + inverse.missing) / tolerance)
+
+
+@dataclass(frozen=True)
+class _Inverse:
+    """Pseudoinverse of a symmetric matrix.
+
+    Attributes
+    ----------
+    apply : callable
+        Multiplies a vector.
+    largest, smallest : float
+        Eigenvalues; the smallest of those that do not count as zero.
+    lowest : array, shape (parameters, up to 3)
+        Orthonormal directions of the smallest ones.
+    missing : int
+        Eigenvalues that count as zero.
+    """
+
+    apply: Callable[[Array], Array]
+    largest: float
+    smallest: float
+    lowest: Array
+    missing: int
+
+
+def _inverted(matrix: Array, tolerance: float) -> _Inverse | None:
+    """Invert a matrix whose eigenvalues below a share of the largest count as zero; None where all are zero.
+
+    Where it is large, a Cholesky decomposition and few steps of Lanczos tell all that is asked, if it has full rank.
+    """
+    found = _factored(matrix, tolerance) if len(matrix) >= _MANY else None
+    if found is not None:
+        return found
+    eigenvalues, vectors = np.linalg.eigh(matrix)
+    kept = eigenvalues > tolerance * eigenvalues[-1]
+    if not kept.any():
+        return None
     inverse, basis = 1.0 / eigenvalues[kept], vectors[:, kept]
-    parameters = basis @ (inverse * (basis.T @ equations.moment))
-    smallest = 1.0 / inverse[0]
-    if eigenvalues[-1] > _WELL_CONDITIONED**2 * smallest:
-        lowest = basis[:, :_LOWEST_DIRECTIONS]
-        square, back = project(parameters, lowest)
-        parameters = parameters + basis @ (inverse * (basis.T @ (back - equations.penalty * parameters)))
-        smallest = np.linalg.eigvalsh(square + (lowest.T * equations.penalty) @ lowest)[0]
-    missing = len(eigenvalues) - rank
-    condition = float(np.sqrt(eigenvalues[-1] / smallest))
-    return NormalSolution(parameters, condition if missing == 0 else (1.0 + missing) / tolerance)
+
+    def apply(right_side: Array) -> Array:
+        return np.asarray(basis @ (inverse * (basis.T @ right_side)))
+
+    missing = len(eigenvalues) - len(inverse)
+    return _Inverse(apply, eigenvalues[-1], 1.0 / inverse[0], basis[:, :_LOWEST_DIRECTIONS], missing)
+
+
+def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
+    """Invert by Cholesky; None where the rank may not be full."""
+    try:
+        factor = linalg.cho_factor(matrix, check_finite=False)
+    except np.linalg.LinAlgError:
+        return None
+
+    def apply(right_side: Array) -> Array:
+        return np.asarray(linalg.cho_solve(factor, right_side, check_finite=False))
+
+    upper, lower = _extreme(lambda vector: matrix @ vector, len(matrix)), _extreme(apply, len(matrix))
+    # Far enough from zero that no rounding decides the rank.
+    if upper is None or lower is None or not 1.0 / lower[0] > 4.0 * tolerance * upper[0]:
+        return None
+    return _Inverse(apply, upper[0], 1.0 / lower[0], lower[1], 0)
+
+
+def _extreme(apply: Callable[[Array], Array], size: int) -> tuple[float, Array] | None:
+    """Find the largest eigenvalue of a symmetric operator, and directions of the largest ones, largest first.
+
+    Lanczos with full reorthogonalisation; None where it does not settle soon.
+    """
+    basis = np.zeros((_STEPS + 1, size))
+    basis[0] = np.random.default_rng(0).standard_normal(size)
+    basis[0] /= np.linalg.norm(basis[0])
+    diagonal, beside = np.zeros(_STEPS), np.zeros(_STEPS)
+    for step in range(min(_STEPS, size)):
+        known, ahead = basis[: step + 1], apply(basis[step])
+        diagonal[step] = ahead @ basis[step]
+        for _ in range(2):
+            ahead = ahead - (known @ ahead) @ known
+        beside[step] = np.linalg.norm(ahead)
+        if step % 5 == 4 or step + 1 == size:
+            values, vectors = linalg.eigh_tridiagonal(diagonal[: step + 1], beside[:step], check_finite=False)
+            if beside[step] * np.abs(vectors[-1, -1]) <= _SETTLED * values[-1]:
+                return float(values[-1]), known.T @ vectors[:, : -1 - _LOWEST_DIRECTIONS : -1]
+        basis[step + 1] = ahead / beside[step]
+    return None
 
 
 def quick_solution(equations: NormalEquations) -> tuple[Array, tuple[Array, bool], Array]:
