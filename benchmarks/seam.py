@@ -70,7 +70,7 @@ def main() -> None:
         "Torque about roll along a turn of roll, and about pitch along a turn of pitch: the harmonic system is smooth, "
         "the seesaw system jumps at 90 and 270 degrees, neither jumps at 0 and 360 degrees"
     )
-    OUTPUT.write_text(plot("seam", caption, description, 5.0, lambda figure: draw(figure, models)).svg + "\n")
+    OUTPUT.write_text(plot("seam", caption, description, 5.0, lambda figure: draw(figure, models)).picture.svg + "\n")
     print(f"wrote {OUTPUT}")
 
 

@@ -269,7 +269,7 @@ def draw(output: Path) -> None:
         axes.set_yticks([], minor=True)
         legend_above(axes, columns=3)
 
-    output.write_text(plot("planner-cost", caption, description, 3.6, fill).svg + "\n", encoding="utf-8")
+    output.write_text(plot("planner-cost", caption, description, 3.6, fill).picture.svg + "\n", encoding="utf-8")
     print(f"wrote {output}")
 
 

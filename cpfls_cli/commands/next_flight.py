@@ -112,7 +112,7 @@ def run(job: Job, diagnosis: Path | None = None, plot: bool = False) -> Outcome:
     write_text(waypoints, waypoint_lines(planned))
     source = source_of(job, record)
     for path, drawn in zip(figures, path_figures(source) if figures else (), strict=True):
-        write_text(path, drawn.svg)
+        write_text(path, drawn.picture.svg)
     blocks = [*plan_blocks(planned, demand, None), *answer(source), *notes_blocks([*case.notes, *notes])]
     blocks += [Text(f"written beside it: {', '.join(map(str, (waypoints, *figures)))}")]
     files = {"waypoints": str(waypoints), "figures": [str(path) for path in figures]}

@@ -86,7 +86,7 @@ def run(job: Job, waypoints: Path | None = None, plot: bool = False) -> Outcome:
         return nothing_written(job)
     source = source_of(job, finish(job, TrajectoryRecord.of(planned), inputs))
     for path, drawn in zip(figures, path_figures(source) if figures else (), strict=True):
-        write_text(path, drawn.svg)
+        write_text(path, drawn.picture.svg)
     blocks = [*plan_blocks(planned, demand, excitation), *answer(source)]
     blocks += [Text(f"drawn: {', '.join(map(str, figures))}")] if figures else []
     blocks += [Text(problem, "warning") for problem in problems]

@@ -33,6 +33,7 @@ from cpfls_cli.pages.gap import (
     gap_sizes_figure,
     gap_table,
     keep_in_view,
+    leaves_view,
     marked,
 )
 from cpfls_cli.pages.replay import beside_rivals, playback_figure
@@ -166,24 +167,26 @@ def free_runs_figure(name: str, run: RunGroup, after: str, *, repaired: bool) ->
     """
     curves = {"measured": run.measured, "before": run.before, "after": run.after}
     parts = np.split(np.arange(len(run.time)), np.searchsorted(run.time, run.restart[1:] - 1e-9))
-    astray: list[str] = []
+    rates = [{key: values[:, index] for key, values in curves.items()} for index in range(len(AXES))]
 
     def draw(figure: Figure) -> None:
         panels = stacked(figure, len(AXES) + 1)
         for axes, start in product(panels, run.restart):
             axes.axvline(start, color=GREY, linewidth=1.2, linestyle=(0, (1, 1.5)), zorder=0.5)
-        for index, (axes, axis) in enumerate(zip(panels, AXES, strict=False)):
-            rates = {key: values[:, index] for key, values in curves.items()}
-            _draw_runs(axes, run.time, rates, parts, f"body rate about {axis}")
-            if keep_in_view(axes, (rates["measured"], rates["after"]), rates["before"]):
-                astray.append(axis)
+        for axes, about, axis in zip(panels, rates, AXES, strict=False):
+            _draw_runs(axes, run.time, about, parts, f"body rate about {axis}")
+            keep_in_view(axes, (about["measured"], about["after"]), about["before"])
         errors = {key: curves[key][:, run.axis] - run.measured[:, run.axis] for key in ("before", "after")}
         _draw_runs(panels[-1], run.time, errors, parts, f"simulated less measured about {AXES[run.axis]}")
         panels[-1].axhline(0.0, color="black", linewidth=0.8)
         legend_over(figure, panels[0])
         panels[-1].set_xlabel("time, s")
 
-    drawn = plot(name, "", "Body rates about three axes, measured and simulated before and after, over time", 6.4, draw)
+    astray = [
+        axis
+        for axis, about in zip(AXES, rates, strict=True)
+        if leaves_view((about["measured"], about["after"]), about["before"])
+    ]
     leaves = f" About {' and '.join(astray)} the model as given leaves the picture." if astray else ""
     faults = " Measured are the rates without the faults of the sensors; before starts from the log as it is."
     caption = (
@@ -191,7 +194,8 @@ def free_runs_figure(name: str, run: RunGroup, after: str, *, repaired: bool) ->
         "simulation starts from the measured rates and then runs freely on the rotor speeds of the flight. Before: the "
         f"model as given; after: {after}.{faults if repaired else ''}{leaves}"
     )
-    return replace(drawn, caption=caption)
+    description = "Body rates about three axes, measured and simulated before and after, over time"
+    return plot(name, caption, description, 6.4, draw)
 
 
 def _draw_runs(axes: Axes, time: Array, curves: dict[str, Array], runs: Sequence[IntArray], title: str) -> None:

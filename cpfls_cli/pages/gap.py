@@ -83,8 +83,14 @@ def marked(points: int) -> dict[str, Any]:
     return {**AFTER, "marker": "o", "markersize": 3.6, "markerfacecolor": "white", "markevery": every}
 
 
-def keep_in_view(axes: Axes, shown: Sequence[Array], astray: Array) -> bool:
-    """Stop a curve that runs away from flattening the others.
+def keep_in_view(axes: Axes, shown: Sequence[Array], astray: Array) -> None:
+    """Stop a curve that runs away from flattening the others; parameters as those of `leaves_view`."""
+    if leaves_view(shown, astray):
+        axes.set_ylim(*_view(shown))
+
+
+def leaves_view(shown: Sequence[Array], astray: Array) -> bool:
+    """Tell whether a curve runs away from the others.
 
     Parameters
     ----------
@@ -92,18 +98,15 @@ def keep_in_view(axes: Axes, shown: Sequence[Array], astray: Array) -> bool:
         Curves that must be seen in full.
     astray : array
         The curve that may leave the picture.
-
-    Returns
-    -------
-    bool
-        Whether it does.
     """
+    low, high = _view(shown)
+    return bool(astray.min() < low or astray.max() > high)
+
+
+def _view(shown: Sequence[Array]) -> tuple[float, float]:
     low, high = float(min(curve.min() for curve in shown)), float(max(curve.max() for curve in shown))
     room = _ROOM * max(high - low, 1e-12)
-    leaves = bool(astray.min() < low - room or astray.max() > high + room)
-    if leaves:
-        axes.set_ylim(low - room, high + room)
-    return leaves
+    return low - room, high + room
 
 
 def gap_sizes_figure(name: str, gap: GapChangeGroup) -> Plot:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.report.content import Plot
+from cpfls_cli.report.content import Panel, Plot
 from cpfls_cli.report.numbers import plain
 
 if TYPE_CHECKING:
@@ -76,7 +79,7 @@ _ROWS = 25
 
 
 def plot(name: str, caption: str, description: str, height: float, draw: Callable[[Figure], None]) -> Plot:
-    """Draw a figure.
+    """Describe a figure; it is drawn when it is asked for.
 
     Parameters
     ----------
@@ -89,20 +92,56 @@ def plot(name: str, caption: str, description: str, height: float, draw: Callabl
     draw : callable
         Fills an empty figure.
     """
-    import matplotlib
-    from matplotlib.figure import Figure
+    return Plot(name, caption, _Drawing(name, description, height, draw), description)
 
-    from cpfls_cli.report.collect import panels_of
 
-    style: Any = {**_STYLE, "svg.hashsalt": name}
-    with matplotlib.rc_context():
-        # A reader's own matplotlib settings must not change the page.
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(style)
-        figure = Figure(figsize=(WIDTH, height), layout="constrained")
-        draw(figure)
-        _show_as_written(figure)
-        return Plot(name, caption, _inline_svg(figure, name, description), description, panels_of(figure))
+@dataclass(frozen=True)
+class _Drawing:
+    """A figure in the style of the pages."""
+
+    name: str
+    description: str
+    height: float
+    draw: Callable[[Figure], None]
+
+    @cached_property
+    def svg(self) -> str:
+        with self._drawn() as figure:
+            # A page that shows a figure tells its numbers as well: it is drawn once for both.
+            vars(self)["panels"] = self._panels_of(figure)
+            return _inline_svg(figure, self.name, self.description)
+
+    @cached_property
+    def panels(self) -> list[Panel]:
+        with self._drawn() as figure:
+            return self._panels_of(figure)
+
+    def figure(self) -> Figure:
+        with self._drawn() as figure:
+            # Ticks take their style when they are first laid out.
+            figure.draw_without_rendering()
+            return figure
+
+    @staticmethod
+    def _panels_of(figure: Figure) -> list[Panel]:
+        from cpfls_cli.report.collect import panels_of
+
+        return panels_of(figure)
+
+    @contextmanager
+    def _drawn(self) -> Iterator[Figure]:
+        import matplotlib
+        from matplotlib.figure import Figure
+
+        style: Any = {**_STYLE, "svg.hashsalt": self.name}
+        with matplotlib.rc_context():
+            # A reader's own matplotlib settings must not change the page.
+            matplotlib.rcdefaults()
+            matplotlib.rcParams.update(style)
+            figure = Figure(figsize=(WIDTH, self.height), layout="constrained")
+            self.draw(figure)
+            _show_as_written(figure)
+            yield figure
 
 
 def line(axes: Axes, x: Array, y: Array, **style: Any) -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.files import text_sha256
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 HASH_SHOWN = 12
 
@@ -135,27 +138,40 @@ class Panel:
     y_names: Mapping[float, str] = field(default_factory=dict)
 
 
+class Picture(Protocol):
+    """A figure that is drawn when somebody asks what it looks like: not every form of a page shows it."""
+
+    @property
+    def svg(self) -> str:
+        """One ``svg`` element without external references."""
+        ...
+
+    @property
+    def panels(self) -> Sequence[Panel]:
+        """The numbers behind it."""
+        ...
+
+    def figure(self) -> Figure:
+        """Draw it for whoever goes on with it."""
+        ...
+
+
 @dataclass(frozen=True)
 class Plot:
-    """A figure as SVG.
+    """A figure.
 
     Attributes
     ----------
     name : str
         Unique on the page.
-    svg : str
-        One ``svg`` element without external references.
     description : str
         What the figure shows, for those who do not see it.
-    panels : sequence of Panel
-        The numbers behind it.
     """
 
     name: str
     caption: str
-    svg: str
+    picture: Picture
     description: str = ""
-    panels: Sequence[Panel] = ()
     kind: ClassVar[str] = "plot"
 
 

@@ -44,7 +44,7 @@ def _block(block: Block) -> dict[str, Any]:
         case Facts():
             return {"kind": block.kind, "rows": [list(row) for row in block.rows]}
         case Plot():
-            panels = [_panel(panel) for panel in block.panels]
+            panels = [_panel(panel) for panel in block.picture.panels]
             words = {"name": block.name, "caption": block.caption, "description": block.description}
             return {"kind": "figure", **words, "panels": panels}
         case _:

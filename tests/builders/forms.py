@@ -5,6 +5,7 @@ import re
 import sys
 from contextlib import ExitStack
 from html import unescape
+from types import SimpleNamespace
 from unittest.mock import patch
 
 from cpfls_cli.config.study import Study, resolved
@@ -78,7 +79,7 @@ def _plain(pages):
 
 def _undrawn(name, caption, description, _height, _draw):
     """Stand for a figure whose curves are of no interest: drawing them takes longer than all the rest."""
-    return Plot(name, caption, "<svg></svg>", description)
+    return Plot(name, caption, SimpleNamespace(svg="<svg></svg>", panels=()), description)
 
 
 def _of_html(page):

@@ -101,7 +101,9 @@ def test_clipping_extrapolation_and_impossible_inertia_are_told():
 
 def test_the_figure_draws_each_controller_at_its_error():
     (figure,) = (block for block in sections([0.5, 1.0, 8.0, np.nan]).blocks if isinstance(block, Plot))
-    curves = {series.label: series for series in figure.panels[0].series if series.form == "line" and len(series.x)}
+    curves = {
+        series.label: series for series in figure.picture.panels[0].series if series.form == "line" and len(series.x)
+    }
     assert list(curves) == ["identified model", "rigid body", "PD alone"]
     for curve, size in zip(curves.values(), (0.5, 1.0, 8.0), strict=True):
         np.testing.assert_allclose(curve.y, size)

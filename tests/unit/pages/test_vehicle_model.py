@@ -64,7 +64,7 @@ def test_torque_and_force_are_drawn_where_they_were_learned(rows, panels):
     source = source_of_record(record_of(replace(whole(), remainder=remainder(2, rows=rows))))
     section = found_vehicle_section(Sources([source], source.vehicle, Study().report))
     (drawn,) = [block for block in section.blocks if isinstance(block, Plot) and "remainder" in block.name]
-    assert len(drawn.panels) == panels
+    assert len(drawn.picture.panels) == panels
 
 
 @pytest.mark.parametrize(("moment", "told"), [(0.03, True), (0.02, False)])

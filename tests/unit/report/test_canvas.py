@@ -16,14 +16,14 @@ def draw(figure):
 
 
 def test_equal_figures_are_equal_text_whatever_the_reader_s_settings():
-    first = plot("one", "", "what", 2.0, draw).svg
+    first = plot("one", "", "what", 2.0, draw).picture.svg
     with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "svg.fonttype": "path", "lines.linewidth": 9}):
-        assert plot("one", "", "what", 2.0, draw).svg == first
+        assert plot("one", "", "what", 2.0, draw).picture.svg == first
         assert matplotlib.rcParams["font.size"] == 30
 
 
 def test_ids_of_two_figures_do_not_meet_and_all_references_resolve():
-    pictures = [plot(name, "", "what", 2.0, draw).svg for name in ("one", "two")]
+    pictures = [plot(name, "", "what", 2.0, draw).picture.svg for name in ("one", "two")]
     ids = [re.findall(r'\bid="([^"]+)"', svg) for svg in pictures]
     assert ids[0]
     assert not set(ids[0]) & set(ids[1])
@@ -34,7 +34,7 @@ def test_ids_of_two_figures_do_not_meet_and_all_references_resolve():
 
 
 def test_a_figure_is_well_formed_named_and_carries_no_style_sheet():
-    svg = plot("one", "", 'says "what" & <more>', 2.0, draw).svg
+    svg = plot("one", "", 'says "what" & <more>', 2.0, draw).picture.svg
     root = ElementTree.fromstring(svg)
     assert root.get("aria-label") == 'says "what" & <more>'
     assert root.get("role") == "img"

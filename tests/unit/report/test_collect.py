@@ -129,7 +129,7 @@ def test_a_table_of_a_thinned_curve_shows_samples_of_the_whole_one_at_a_common_x
         line(axes, time, 2 * rough, label="two")
         axes.set_xlabel("time, s")
 
-    panels = plot("name", "", "what", 2.0, draw).panels
+    panels = plot("name", "", "what", 2.0, draw).picture.panels
     assert all(len(series.x) < 2000 for series in panels[0].series)
     (table,) = figure_tables(panels)
     assert list(table.header) == ["time, s", "one", "two"]
