@@ -4,6 +4,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 CPFLS := $(BIN)/cpfls
+# Python compiles what it imports; to compile all that is installed takes as long as the rest of the installation.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 INSTALLED := .venv/.installed
 INSTALLED_DEV := .venv/.installed-dev
 export OPENBLAS_NUM_THREADS := 1
@@ -62,11 +64,11 @@ endif
 
 $(INSTALLED): pyproject.toml
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(PIP) -e .
 	@touch $@
 
 $(INSTALLED_DEV): pyproject.toml | $(INSTALLED)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
+	$(PIP) -e ".[dev]"
 	@touch $@
 
 # Each artifact depends on its inputs and on its own part of the config, written out with all defaults and the version
@@ -260,6 +262,13 @@ $(REPLAY)/report.html: $(REPLAY_CONFIG) $(REPLAY)/vehicle.h5 $(REPLAY)/replay-fo
 docs/replay-example.svg: $(REPLAY)/report.html
 	sed -n '/<figure id="vehicle-errors-1">/,/<\/svg>/{/<figure/d;s/.*<svg/<svg/;s/<\/svg>.*/<\/svg>/;p}' $< > $@
 
+# What the docstrings say, and what the cells of the notebook give.
+docs/api.md: FORCE | $(INSTALLED_DEV)
+	$(BIN)/python docs/api_page.py > $@.new && mv $@.new $@
+
+docs/notebook.ipynb: FORCE | $(INSTALLED_DEV)
+	$(BIN)/python docs/run_notebook.py > $@.new && mv $@.new $@
+
 test: $(INSTALLED_DEV)
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
@@ -272,7 +281,7 @@ lint: $(INSTALLED_DEV)
 # Every table is also written to benchmarks/results, as JSON.
 STUDY := configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
 bench: $(INSTALLED_DEV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[bench,dask]"
+	$(PIP) -e ".[bench,dask]"
 	$(BIN)/python benchmarks/evaluation.py
 	$(BIN)/python benchmarks/whole_run.py
 	$(BIN)/python benchmarks/workers.py

@@ -71,3 +71,8 @@ class SettingError(ValueError):
     def __init__(self, key: str, message: str) -> None:
         super().__init__(message)
         self.key = key
+
+
+def install_command(extra: str) -> str:
+    """Say how to install what an optional part needs."""
+    return f'pip install "cpfls[{extra}]"'

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-import cpfls_cli
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.spec import Header, InputFile, Record
 from cpfls_cli.artifacts.store import file_sha256, format_name, write_record
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
+from cpfls_cli.version import __version__
 
 R = TypeVar("R", bound=Record)
 
@@ -136,7 +136,7 @@ def header_of(study: Study, inputs: Mapping[str, InputFile]) -> Header:
     inputs : mapping of str to InputFile
         By role.
     """
-    return Header(cpfls_cli.__version__, study.seed, resolved_yaml(study), inputs)
+    return Header(__version__, study.seed, resolved_yaml(study), inputs)
 
 
 def input_file(path: Path) -> InputFile:

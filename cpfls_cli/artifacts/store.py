@@ -139,7 +139,12 @@ def write_record(path: Path, record: Record) -> None:
     OutputError
         If the file cannot be written.
     """
-    write_artifact(path, Artifact(record.spec(), record.origin, record.data))
+    write_artifact(path, artifact_of(record))
+
+
+def artifact_of(record: Record) -> Artifact:
+    """Give the datasets of a record that was written or read, by path."""
+    return Artifact(record.spec(), record.origin, record.data)
 
 
 def read_artifact(path: Path, *wanted: ArtifactSpec) -> Artifact:

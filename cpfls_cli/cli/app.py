@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cpfls_cli import __version__
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.cli.options import Common, ConfigArgument, OutputOption, seconds, with_common
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.logs.formats import formats_in_words, suffixes_in_words
 from cpfls_cli.report.forms import Form
+from cpfls_cli.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -33,7 +33,7 @@ from cpfls_cli.pages.model import export_answer, vehicle_export_answer
 from cpfls_cli.report.outcome import Outcome
 
 _SEED = 1
-_ENDINGS = {"json": ".json", "c": ".c", "python": ".py"}
+ENDINGS = {"json": ".json", "c": ".c", "python": ".py"}
 # What the module imports: under such a name it would import itself.
 _IMPORTED = ("numpy", "sys", "warnings")
 
@@ -176,10 +176,10 @@ def _form_of(output: Path) -> str:
     ------
     InputError
     """
-    for form, ending in _ENDINGS.items():
+    for form, ending in ENDINGS.items():
         if output.suffix == ending:
             return form
-    endings = ", ".join(f"{ending} ({form})" for form, ending in _ENDINGS.items())
+    endings = ", ".join(f"{ending} ({form})" for form, ending in ENDINGS.items())
     raise InputError(f"{output}: the ending tells no form; end the name in one of {endings}")
 
 
@@ -209,7 +209,7 @@ def _outputs_of(output: Path, form: str) -> list[Path]:
     ------
     InputError
     """
-    ending = _ENDINGS[form]
+    ending = ENDINGS[form]
     if output.suffix != ending:
         raise InputError(f"{output}: --format {form} writes a file that ends in {ending}; name it so")
     if form == "python" and not _importable(output.stem):

@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-import cpfls_cli
 from cpfls_cli.artifacts.job import Job, begin
 from cpfls_cli.artifacts.output import write_text
+from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.store import read_any
 from cpfls_cli.config.load import validate
 from cpfls_cli.config.study import resolved
@@ -19,6 +19,7 @@ from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.forms import Form, form_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.version import __version__
 
 
 def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcome:
@@ -39,7 +40,7 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
     if job.dry_run:
         return nothing_written(job)
     given = Sources(sources, job.study.vehicle, job.study.report)
-    page = report_page(given, cpfls_cli.__version__, form or form_of(job.output))
+    page = report_page(given, __version__, form or form_of(job.output))
     write_text(job.output, page.text)
     again = [f"{path}: given {times} times; shown once" for path, times in Counter(artifacts).items() if times > 1]
     equal = [f"{path}: holds the same as {distinct[files[path]]}; shown once" for path in files if path not in kept]
@@ -48,11 +49,20 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
 
 def _sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
     labels = unique_labels([_printable(path.name) for path in paths], hashes)
-    return [_source(path, label, sha256) for path, label, sha256 in zip(paths, labels, hashes, strict=True)]
+    given = zip(paths, labels, hashes, strict=True)
+    return [source_of_record(read_any(path), path, label, sha256) for path, label, sha256 in given]
 
 
-def _source(path: Path, label: str, sha256: str) -> Source:
-    record = read_any(path)
+def source_of_record(record: Record, path: object, label: str, sha256: str) -> Source:
+    """Name an artifact for a report.
+
+    Parameters
+    ----------
+    path : object
+        Where it was read from, for messages.
+    label : str
+        Its name on the page.
+    """
     study = validate(parse_yaml(record.origin.config, f"{path}: /config"), f"{path}: /config")
     parameters = model_structure(study.identification).parameters
     return Source.of(label, sha256, record, resolved(study), study.vehicle, parameters)

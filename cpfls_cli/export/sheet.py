@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-import cpfls_cli
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import MODEL
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor.structure import Block, ModelStructure
+from cpfls_cli.version import __version__
 
-EXPORTER = cpfls_cli.__version__
+EXPORTER = __version__
 """Version of the program that exports."""
 
 _SIGNS = {1: "for", -1: "against"}

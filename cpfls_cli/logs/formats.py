@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import InputError, install_command
 
 if TYPE_CHECKING:
     from cpfls_cli.arrays import Array
@@ -297,5 +297,5 @@ def _require_packages(path: Path, form: LogFormat) -> None:
         except ImportError:
             package = module.partition(".")[0]
             raise InputError(
-                f'{path}: reading {path.suffix} needs the package {package}; pip install "cpfls[{form.extra}]"'
+                f"{path}: reading {path.suffix} needs the package {package}; {install_command(form.extra)}"
             ) from None

@@ -26,7 +26,7 @@ from cpfls_cli.pages.tracking import tracking_section
 from cpfls_cli.pages.trajectory import path_section
 from cpfls_cli.pages.uncertainty import uncertainty_section
 from cpfls_cli.pages.vehicle_model import found_vehicle_section
-from cpfls_cli.report.content import Document
+from cpfls_cli.report.content import Document, Section
 from cpfls_cli.report.forms import Form
 from cpfls_cli.report.html import html_page
 from cpfls_cli.report.json_page import json_page
@@ -85,6 +85,11 @@ class Page:
     missing: tuple[str, ...]
 
 
+def sections_of(sources: Sources) -> list[Section]:
+    """List what there is to say of artifacts, section by section."""
+    return [section for make in _SECTIONS if (section := make(sources)) is not None]
+
+
 def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
     """Write a report about artifacts.
 
@@ -98,7 +103,7 @@ def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
     Page
         Equal text for equal artifacts and settings.
     """
-    sections = [section for make in _SECTIONS if (section := make(sources)) is not None]
+    sections = sections_of(sources)
     return Page(
         text=_WRITE[form](Document(sources.title, version, sections, sources.all)),
         sections=tuple(section.name for section in sections),

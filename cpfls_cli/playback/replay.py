@@ -22,6 +22,8 @@ from cpfls_cli.playback.model import (
     used_terms,
     weights_by_step,
 )
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.motion import step as step_of_rigid_body
 from cpfls_cli.playback.rotors import Hold, RotorResponse, rotor_terms_by_step
 from cpfls_cli.regressor.regressor import InertiaValues
 
@@ -142,6 +144,27 @@ def _late(values: Array, flight: PlaybackFlight, response: RotorResponse) -> Arr
         values, flight.motion.period, flight.hold, response.delay_s, response.lag_s, response.slow_s
     )
     return np.asarray(terms, dtype=float)
+
+
+def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> State:
+    """Take one step of any model, by the rule of its free runs.
+
+    Parameters
+    ----------
+    rotor : array, shape (samples, 1 + 4 rotors)
+        See `VehicleModel.rotor_terms`.
+    period : float, s
+
+    Returns
+    -------
+    State
+        Not a number where an inertia that depends on the attitude is none of a body.
+    """
+    if model.fuzzy is None:
+        return step_of_rigid_body(model, state, rotor, period)
+    player = Player(table=model.weights, rotor=rotor, body=model.body, remainder=model.remainder, fuzzy=model.fuzzy)
+    used, weights = player.step_weights(slice(None))
+    return _FuzzyRuns(player, model.fuzzy, Motion(*state, period), used, weights, translates=True).one_step()
 
 
 class Runs(NamedTuple):
@@ -286,10 +309,7 @@ class _FuzzyRuns:
     def written(self, starts: IntArray, errors: Array) -> IntArray:
         """Simulate, write the errors, and give the steps at which runs diverged."""
         motion, diverged = self.motion, np.full(len(starts), -1)
-        rate, rotation = motion.rate[starts], motion.rotation[starts]
-        momentum = rotations.multiply(np.nan_to_num(self._body_inertia(rotation).matrices), rate)
-        state = _State(motion.position[starts], motion.velocity[starts], rotation, momentum)
-        now = self._fuzzy(state.rotation, state.momentum)
+        state, rate, now = self._begun(starts)
         for step in range(errors.shape[1]):
             with np.errstate(all="ignore"):
                 moved, after = self._step(state, rate, now, self.weights[starts + step])
@@ -305,6 +325,21 @@ class _FuzzyRuns:
             errors[:, step, 2] = rotation_vectors(motion.rotation[at], state.rotation)
             errors[:, step, 3] = rate - motion.rate[at]
         return diverged
+
+    def one_step(self) -> State:
+        """Take one step from each sample; not a number where it meets an attitude at which no body has the inertia."""
+        state, rate, now = self._begun(np.arange(len(self.motion.rate)))
+        with np.errstate(all="ignore"):
+            moved, after = self._step(state, rate, now, self.weights)
+        parts = (moved.position, moved.velocity, moved.rotation, after.rate)
+        return State(*(_kept(after.exists, part, np.full_like(part, np.nan)) for part in parts))
+
+    def _begun(self, starts: IntArray) -> tuple[_State, Array, _Fuzzy]:
+        motion = self.motion
+        rate, rotation = motion.rate[starts], motion.rotation[starts]
+        momentum = rotations.multiply(np.nan_to_num(self._body_inertia(rotation).matrices), rate)
+        state = _State(motion.position[starts], motion.velocity[starts], rotation, momentum)
+        return state, rate, self._fuzzy(state.rotation, state.momentum)
 
     def _step(self, state: _State, rate: Array, now: _Fuzzy, weights: Array) -> tuple[_State, _Fuzzy]:
         period = self.motion.period

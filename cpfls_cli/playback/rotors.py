@@ -66,6 +66,17 @@ def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, l
     return np.hstack([one, mean, squared, (end - start) / period, slow - squared])
 
 
+def steady_terms(speed: Array) -> Array:
+    """Evaluate the terms of rotors that keep their speeds, shape (vehicles, 1 + 4 rotors).
+
+    Parameters
+    ----------
+    speed : array, shape (vehicles, rotor), rad/s
+    """
+    still = np.zeros_like(speed)
+    return np.hstack([np.ones((len(speed), 1)), speed, speed**2, still, still])
+
+
 def rotor_terms_at_samples(speed: Array, period: float, hold: Hold, response: RotorResponse) -> Array:
     """Evaluate the terms of the rotors at the samples themselves, where torque and force are asked for.
 

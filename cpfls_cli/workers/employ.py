@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, nullcontext
 from urllib.parse import urlsplit
 
 from cpfls_cli.arrays import IntArray
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import InputError, install_command
 from cpfls_cli.evolution.archive import Evaluate, Evaluation
 from cpfls_cli.workers.processes import processes
 from cpfls_cli.workers.workforce import WorkerError, Workforce, chunks
@@ -54,7 +54,7 @@ def _cluster(evaluate: Evaluate, address: str) -> AbstractContextManager[Workfor
         from cpfls_cli.workers.cluster import cluster
     except ModuleNotFoundError as error:
         raise WorkerError(
-            f"a scheduler needs Dask, which is not installed here ({error}): pip install 'cpfls[dask]'"
+            f"a scheduler needs Dask, which is not installed here ({error}): {install_command('dask')}"
         ) from error
     return cluster(evaluate, address)
 

@@ -33,6 +33,11 @@ def test_the_version_and_the_help_load_nothing_heavy():
     assert loaded(("--version",), ("--help",)) == []
 
 
+def test_the_python_interface_loads_nothing_heavy_before_it_is_used():
+    code = f"import sys, cpfls_cli; print(sorted({HEAVY | {'typer', 'rich'}} & set(sys.modules)))"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "[]\n"
+
+
 def test_what_is_printed_loads_no_plotting(pipeline, study, tmp_path):
     short = "trajectory={legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, yaw_turn_rad: 0.3}"
     packages = loaded(

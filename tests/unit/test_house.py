@@ -134,8 +134,8 @@ def looked_up(node):
             return text
         case ast.Compare(left=ast.Constant(str(text)), comparators=[ast.Attribute(attr="data")]):
             return text
-        case ast.alias(name=name) if name in GENERIC:
-            return name
+        case ast.ImportFrom(module=str(module), names=names) if module.startswith("cpfls_cli.artifacts"):
+            return next((alias.name for alias in names if alias.name in GENERIC), None)
     return None
 
 
@@ -184,11 +184,9 @@ SMALL_ALL_THE_SAME = {
     "excitation/optimise.py": "what the room is for",
     "gap/next_flight/search.py": "what the room is for",
     "identification/reference.py": "the slow, plain evaluation that tests hold the compiled one against",
-    "pages/page.py": "the list of sections",
     "regressor/table.py": "loads without compiled loops",
     "report/json_page.py": "a form",
     "report/markdown.py": "a form",
-    "report/terminal.py": "a form",
     "workers/compatibility.py": "loads without Dask",
 }
 FEW_LINES = 80

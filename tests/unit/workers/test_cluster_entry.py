@@ -65,7 +65,7 @@ def test_a_worker_with_another_processor_is_named(answer, words):
 def test_without_dask_the_message_says_what_to_install(monkeypatch):
     for module in ("distributed", "cpfls_cli.workers.cluster"):
         monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(ComputationError, match=r"pip install 'cpfls\[dask\]'"):
+    with pytest.raises(ComputationError, match=r'pip install "cpfls\[dask\]"'):
         employ(print, scheduler="tcp://127.0.0.1:8786")
 
 

@@ -1,0 +1,129 @@
+"""Artifacts in Python: every format as named arrays with units, figures as the report draws them."""
+
+import json
+import sys
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import cpfls_cli
+from cpfls_cli.artifacts.formats import RECORDS
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.store import Artifact, file_sha256, read_artifact, write_artifact
+from cpfls_cli.errors import InputError
+
+
+def made_up(spec):
+    """An artifact with all datasets of its format, each label with a length of its own."""
+    labels = sorted({label for dataset in spec.datasets for label in dataset.dimensions if not label.isdigit()})
+    lengths = {label: 3 if label == "axis" else 4 + index for index, label in enumerate(labels)}
+    data = {}
+    for index, dataset in enumerate(spec.datasets):
+        shape = tuple(int(label) if label.isdigit() else lengths[label] for label in dataset.dimensions)
+        values = index + np.arange(np.prod(shape, dtype=int)).reshape(shape)
+        data[dataset.path] = values.astype("U" if dataset.units == "text" else float)
+    return Artifact(spec, Header("0", 1, "seed: 1\n"), data)
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=lambda record: record.FORMAT.name)
+def test_every_dataset_of_every_format_has_its_values_dimensions_and_unit(record, tmp_path):
+    path, spec = tmp_path / "a.h5", record.spec()
+    write_artifact(path, made_up(spec))
+    artifact = cpfls_cli.read(path)
+    stored, named = artifact_data(artifact), artifact.to_xarray()
+    assert artifact.format == named.attrs["format"] == spec.format
+    assert list(artifact) == [dataset.path for dataset in spec.datasets]
+    for dataset in spec.datasets:
+        values = named[dataset.path]
+        np.testing.assert_array_equal(values, stored[dataset.path])
+        assert len(set(values.dims)) == values.ndim
+        plain = [label.removesuffix("_2").removesuffix("_index") for label in values.dims]
+        assert plain == list(dataset.dimensions)
+        assert values.attrs == {"units": dataset.units, "frame": dataset.frame, "long_name": dataset.description}
+        assert artifact.about(dataset.path) == dataset
+
+
+def artifact_data(artifact):
+    return {name: artifact[name] for name in artifact}
+
+
+def test_columns_are_named_by_axis_and_have_units(pipeline):
+    flight = cpfls_cli.read(pipeline.flight)
+    frame = flight.to_pandas()
+    np.testing.assert_array_equal(frame.index, flight["time"])
+    np.testing.assert_array_equal(frame["attitude.pitch"], flight["attitude"][:, 1])
+    np.testing.assert_array_equal(frame["rotor_speed.3"], flight["rotor_speed"][:, 3])
+    assert frame.attrs["units"]["body_torque.z"] == "N m"
+    assert {"position.x", "torque.yaw"} <= set(frame.columns)
+    matrices = cpfls_cli.read(pipeline.prediction).to_pandas("time")
+    np.testing.assert_array_equal(matrices["inertia.roll.yaw"], cpfls_cli.read(pipeline.prediction)["inertia"][:, 0, 2])
+
+
+def test_another_dimension_counts_where_it_has_no_numbers_of_its_own(pipeline):
+    model = cpfls_cli.read(pipeline.model)
+    frame = model.to_pandas("rule")
+    assert frame.index.name == "rule"
+    assert list(frame["rules/name"]) == list(model["rules/name"])
+    with pytest.raises(InputError, match=r"no dataset along 'rules'; its dimensions are .*rule"):
+        model.to_pandas("rules")
+
+
+def test_single_values_are_numbers_and_words(pipeline):
+    model = cpfls_cli.read(pipeline.model)
+    assert model["model/base"] == "none"
+    assert isinstance(model["solve/rank"], int)
+    assert model.summary["rank"] == model["solve/rank"] == pipeline.summaries["model"]["rank"]
+    assert model.config["identification"]["membership_functions"] == 5
+    with pytest.raises(KeyError, match="solve/rang"):
+        model["solve/rang"]
+
+
+def test_it_prints_what_info_prints(cpfls, pipeline):
+    assert f"{cpfls_cli.read(pipeline.flight)}\n" == cpfls("info", pipeline.flight).stdout
+
+
+def test_it_is_written_again_byte_by_byte_and_never_over_a_file(pipeline, tmp_path):
+    flight, copy = cpfls_cli.read(pipeline.flight), tmp_path / "copy.h5"
+    flight.write(copy)
+    assert file_sha256(copy) == file_sha256(pipeline.flight)
+    assert flight.path == copy
+    with pytest.raises(InputError, match="exists already"):
+        flight.write(copy)
+    flight.write(copy, force=True)
+
+
+def test_what_is_no_good_artifact_is_refused(pipeline, tmp_path):
+    path = tmp_path / "bad.h5"
+    artifact = read_artifact(pipeline.flight)
+    time = artifact.array("time").copy()
+    time[7] = time[6]
+    write_artifact(path, Artifact(artifact.spec, artifact.header, {**artifact.data, "time": time}))
+    with pytest.raises(InputError, match=r"bad\.h5: time: does not ascend at index 7"):
+        cpfls_cli.read(path)
+    with pytest.raises(InputError, match="no such file"):
+        cpfls_cli.read(tmp_path / "none.h5")
+
+
+@pytest.mark.parametrize("package", ["xarray", "pandas"])
+def test_a_package_that_is_missing_is_named_with_the_command(pipeline, monkeypatch, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(InputError, match=rf'needs the package {package}; pip install "cpfls\[notebook\]"'):
+        getattr(cpfls_cli.read(pipeline.flight), f"to_{package}")()
+
+
+def test_figures_are_those_of_the_report(cpfls, pipeline, study, tmp_path):
+    flight, model, prediction = (
+        cpfls_cli.read(path) for path in (pipeline.flight, pipeline.model, pipeline.prediction)
+    )
+    given = (pipeline.prediction, pipeline.flight, pipeline.model)
+    report = cpfls("report", study, *given, "-o", tmp_path / "r.md", "--json")
+    figures = prediction.figures(flight, model)
+    assert list(figures) == json.loads(report.stdout)["figures"]
+    with matplotlib.rc_context({"font.size": 30}):
+        drawn = figures["torques-1"]
+    assert isinstance(drawn, Figure)
+    assert [axes.get_title(loc) for axes in drawn.axes for loc in ("left", "right") if axes.get_title(loc)]
+    assert drawn.axes[0].yaxis.label.get_size() == 9.5
+    assert len(drawn.axes[0].lines[0].get_xdata()) == len(prediction["time"])
