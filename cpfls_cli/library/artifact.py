@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from cpfls_cli.artifacts.spec import DatasetSpec, Record
 
-_EXTRA = "notebook"
-
 
 def read(path: str | os.PathLike[str]) -> Artifact:
     """Read an artifact of any format.
@@ -266,4 +264,4 @@ def _optional(package: str) -> Any:
     try:
         return import_module(package)
     except ImportError:
-        raise InputError(f"needs the package {package}; {install_command(_EXTRA)}") from None
+        raise InputError(f"needs the package {package}; {install_command('notebook')}") from None

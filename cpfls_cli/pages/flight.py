@@ -33,6 +33,10 @@ _LACKS = {
     " rotors with import.signals.rotor_speed or rotor_command, and name it in import.torque_source;"
     " cpfls vehicle and replay need rotors instead",
 }
+_NO_TORQUE_BUT_ROTORS = (
+    "the flight has rotors and no torque: cpfls vehicle and replay take it as it is; identify will refuse it until"
+    " import.torque_source names rotor-speed or rotor-command, which needs the factors of the rotors as numbers"
+)
 _ORIGINS = {"trajectory": "simulated along", "log": "imported from", "model": "with"}
 _PAPER_VEHICLE = ("9.81", "6", "4", "0.3", "121.5 × 10⁻⁶", "2.7 × 10⁻⁶", "0.6", "0.6", "1.2")
 _PAPER_DURATION = "55"
@@ -62,7 +66,9 @@ def answer(flight: Source[FlightRecord], index: int = 1) -> Iterator[Block]:
 
 def missing_signals(flight: FlightRecord) -> tuple[str, ...]:
     """Say which later commands will refuse a flight for what it lacks, and which key of the config would provide it."""
-    return tuple(_LACKS[name] for name in flight.lacks)
+    rotors = flight.rotor_speed is not None or flight.rotor_command is not None
+    sentences = _LACKS | ({"torque": _NO_TORQUE_BUT_ROTORS} if rotors else {})
+    return tuple(sentences[name] for name in flight.lacks)
 
 
 def import_blocks(report: ImportReport) -> Iterator[Block]:

@@ -19,6 +19,8 @@ NO_ATTITUDE = "the flight has no attitude, so reduce, identify and predict will 
 NO_ROTATION = "the flight has neither attitude nor body rates: only the balance of its rotors"
 NO_TORQUE = "the flight has no torque, so identify will refuse it: map one with import.signals.body_torque"
 
+TORQUE_OPEN = "the flight has rotors and no torque: cpfls vehicle and replay take it as it is; identify will refuse it"
+
 
 @pytest.fixture
 def imported(cpfls, tmp_path):
@@ -45,7 +47,8 @@ def imported(cpfls, tmp_path):
     [
         (("body_rate",), "null", [NO_ATTITUDE, NO_TORQUE]),
         (("body_rate", "body_torque"), "column", [NO_ATTITUDE]),
-        (("rotor_command",), "null", [NO_ATTITUDE, NO_ROTATION, NO_TORQUE]),
+        (("rotor_command",), "null", [NO_ATTITUDE, NO_ROTATION, TORQUE_OPEN]),
+        (("attitude", "rotor_speed"), "null", [TORQUE_OPEN]),
         (("attitude",), "null", [NO_TORQUE]),
         (("attitude", "body_torque"), "column", []),
         (("attitude", "rotor_command"), "rotor-command", []),

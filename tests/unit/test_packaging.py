@@ -1,0 +1,34 @@
+"""What is told of the package beside it: its version, its extras, and what hosts run to check it."""
+
+import os
+import re
+import tomllib
+from pathlib import Path
+
+import yaml
+
+from cpfls_cli import __version__
+from cpfls_cli.logs.formats import LOG_FORMATS
+
+ROOT = Path(__file__).parents[2]
+EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+
+
+def test_the_citation_is_of_this_version():
+    told = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert str(told["version"]) == __version__
+    assert {"cff-version", "message", "title", "authors"} <= told.keys()
+
+
+def test_the_workflow_runs_what_has_to_be_green():
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    assert {"run": ".ci/run"} in workflow["jobs"]["run"]["steps"]
+    assert os.access(ROOT / ".ci" / "run", os.X_OK)
+
+
+def test_every_extra_that_a_message_names_exists_and_has_its_row():
+    code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "cpfls_cli").rglob("*.py"))
+    named = {*re.findall(r"install_command\([\"'](\w+)", code), *(form.extra for form in LOG_FORMATS if form.extra)}
+    assert {"dask", "notebook", "parquet", "rosbag", "ulog"} <= named <= EXTRAS.keys()
+    page = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `([\w-]+)` \| \w", page, re.MULTILINE)) == EXTRAS.keys()
