@@ -185,6 +185,13 @@ class Outline:
     shapes: Mapping[str, tuple[int, ...]]
     values: Mapping[str, Any]
 
+    @classmethod
+    def of(cls, artifact: Artifact) -> Outline:
+        """Take the outline of what is read already."""
+        arrays = {name: np.asarray(value) for name, value in artifact.data.items()}
+        small = {name: own for name, own in arrays.items() if own.ndim == 0 or _is_short_text(own)}
+        return cls(artifact.spec, artifact.header, {name: own.shape for name, own in arrays.items()}, small)
+
 
 def read_outline(path: Path) -> Outline:
     """Read what an artifact holds, in little memory however large it is.
@@ -202,8 +209,8 @@ def read_outline(path: Path) -> Outline:
         return Outline(stored.spec, stored.header, {name: own.shape for name, own in stored.data.items()}, values)
 
 
-def _is_short_text(dataset: h5py.Dataset) -> bool:
-    return bool(dataset.dtype.kind == "S" and dataset.size <= _SHORT)
+def _is_short_text(dataset: h5py.Dataset | Array) -> bool:
+    return bool(dataset.dtype.kind in "SU" and dataset.size <= _SHORT)
 
 
 def findings_of(path: Path) -> tuple[ArtifactSpec, list[str]]:

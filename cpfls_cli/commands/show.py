@@ -36,12 +36,12 @@ def info(path: Path) -> Outcome:
     return Outcome(summary, description(artifact))
 
 
-def description(artifact: Artifact) -> tuple[Block, ...]:
+def description(artifact: Outline) -> tuple[Block, ...]:
     """Tell where an artifact comes from and what it holds, dataset by dataset."""
     header = artifact.header
     origin = [("made by", f"cpfls {header.version}, seed {header.seed}")]
     origin += [(role, f"{source.name} (sha256 {source.sha256[:12]})") for role, source in header.inputs.items()]
-    rows = [_dataset_row(name, _describe_dataset(artifact, name)) for name in artifact.data]
+    rows = [_dataset_row(name, _describe_dataset(artifact, name)) for name in artifact.shapes]
     columns = ("Dataset", "Shape", "Unit", "What it holds")
     table = Table("datasets", "", columns, rows, frozenset(range(len(columns))), frozenset({3}))
     return Text(f"{artifact.spec.format}: {artifact.spec.description}"), Facts(origin), table

@@ -66,11 +66,11 @@ class Artifact(Mapping[str, Any]):
         return f"<{self.format}: {len(self)} datasets{f' of {self._path}' if self._path else ''}>"
 
     def __str__(self) -> str:
-        from cpfls_cli.artifacts.store import artifact_of
+        from cpfls_cli.artifacts.store import Outline, artifact_of
         from cpfls_cli.commands.show import description
         from cpfls_cli.report.terminal import terminal_lines
 
-        return "\n".join(terminal_lines(description(artifact_of(self._record))))
+        return "\n".join(terminal_lines(description(Outline.of(artifact_of(self._record)))))
 
     @property
     def path(self) -> Path:
