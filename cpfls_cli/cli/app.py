@@ -150,6 +150,21 @@ class ExportFormat(StrEnum):
     JSON = "json"
     C = "c"
     PYTHON = "python"
+    SDF = "sdf"
+    MJCF = "mjcf"
+    ROTORPY = "rotorpy"
+    CASADI = "casadi"
+    JAX = "jax"
+
+
+class Flown(StrEnum):
+    """What an exported vehicle is flown in."""
+
+    SDF = "sdf"
+    MJCF = "mjcf"
+    ROTORPY = "rotorpy"
+    CASADI = "casadi"
+    JAX = "jax"
 
 
 WorkersOption = Annotated[int, typer.Option("--workers", metavar="N", min=1, help="Processes that evaluate.")]
@@ -567,7 +582,8 @@ def export(
         typer.Option(
             "--format",
             help="json: every parameter, with names and units; c: C99 source and header, no dependencies; python: a "
-            "module that needs NumPy only; without, by the suffix of FILE (.json, .c, .py).",
+            "module that needs NumPy only; sdf (Gazebo), mjcf (MuJoCo), rotorpy, casadi, jax: the vehicle for a "
+            "simulator or a library; without, by the suffix of FILE (.json, .c, .py, .xml, .sdf).",
         ),
     ] = None,
     name: Annotated[
@@ -575,17 +591,41 @@ def export(
         typer.Option(
             "--name",
             metavar="NAME",
-            help="Prefix of the names in C, name in JSON; without, from the name of FILE.",
+            help="Prefix of the names in C, name in JSON and XML; without, from the name of FILE.",
         ),
     ] = None,
     *,
     common: Common,
 ) -> None:
-    """Write a model as JSON, C or Python that computes torque, and of a whole vehicle its motion, on its own."""
+    """Write a model as JSON, C or Python that computes on its own, or as a vehicle for a simulator or a library."""
     with messages_for_errors():
         from cpfls_cli.commands import export as command
 
         _run_without_config("export", output, common, lambda job: command.run(job, model, form and form.value, name))
+
+
+@app.command("verify-export")
+@with_common
+def verify_export(
+    model: ModelArgument,
+    flight: Annotated[
+        Path, typer.Argument(metavar="FLIGHT", help="A flight, or a log that the config of the model describes.")
+    ],
+    form: Annotated[Flown, typer.Option("--format", help="What the exported vehicle is flown in.")],
+    horizon: HorizonOption = None,
+    windows: Annotated[int, typer.Option("--windows", metavar="N", min=1, help="Runs, spread over the flight.")] = 10,
+    hold: HoldOption = None,
+    *,
+    common: Common,
+) -> None:
+    """Fly an exported vehicle along a flight, from measured states, and compare it with the playback of its model."""
+    with messages_for_errors():
+        from cpfls_cli.commands import verify_export as command
+
+        options = command.Options(
+            form.value, 0.5 if horizon is None else horizon, windows, None if hold is None else hold.value
+        )
+        tell(command.run(model, flight, options, force=common.force), common)
 
 
 @app.command()

@@ -1,26 +1,28 @@
-"""Command `export`: an identified model or a whole vehicle as JSON, C or Python, for use without this program."""
+"""Command `export`: any model as JSON, C or Python, or as a vehicle for simulators and for libraries."""
 
 from __future__ import annotations
 
 import keyword
 import re
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.extended import FUZZY_INERTIA, ExtendedRecord
+from cpfls_cli.artifacts.extended import FUZZY_INERTIA
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import write_texts
 from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.store import holds, read_record
-from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.commands.vehicle_sheets import require_usable, sheet_of, whole_of
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points
+from cpfls_cli.export.registry import TARGETS, exported
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.export.text import checked_identifier, identifier
@@ -28,14 +30,13 @@ from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_json, vehicle_pyth
 from cpfls_cli.export.vehicle_sheet import VehicleSheet
 from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
-from cpfls_cli.pages.extended import worth_in_words
-from cpfls_cli.pages.model import export_answer, vehicle_export_answer
+from cpfls_cli.pages.export import export_answer, vehicle_export_answer
 from cpfls_cli.report.outcome import Outcome
 
 _SEED = 1
-ENDINGS = {"json": ".json", "c": ".c", "python": ".py"}
+ENDINGS = {"json": ".json", "c": ".c", "python": ".py"} | {form: target.ending for form, target in TARGETS.items()}
 # What the module imports: under such a name it would import itself.
-_IMPORTED = ("numpy", "sys", "warnings")
+_IMPORTED = ("casadi", "jax", "math", "numpy", "rotorpy", "sys", "warnings")
 
 
 def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
@@ -45,10 +46,10 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     ----------
     job : Job
         Its study is not used: a model holds its own.
-    form : {"json", "c", "python"} or None
+    form : {"json", "c", "python"}, a word of `TARGETS`, or None
         None takes the suffix of the output.
     name : str or None
-        Prefix of the names in C, name of the model in JSON; None takes the name of the output.
+        Prefix of the names in C, name of the model in JSON and XML; None takes the name of the output.
     """
     form = form or _form_of(job.output)
     prefix = _prefix_of(job.output, form, name)
@@ -56,8 +57,10 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     source = take_inputs(job, {"model": model})["model"]
     # The file that was asked for first: a message about its folder is to name it.
     check_outputs(job, *reversed(outputs))
-    given = next((kind for kind in (VehicleRecord, ExtendedRecord) if holds(model, kind)), None)
-    sheet = _sheet(model, prefix, source.sha256, job) if given is None else _vehicle(model, given, prefix, source)
+    if form in TARGETS:
+        return _for_target(job, sheet_of(model, prefix, source, force=job.force), form)
+    given = whole_of(model)
+    sheet = _sheet(model, prefix, source.sha256, job) if given is None else _vehicle(model, prefix, source, job)
     texts = _texts(sheet, form, outputs) if isinstance(sheet, Sheet) else _vehicle_texts(sheet, form, outputs)
     if not job.dry_run:
         write_texts(texts)
@@ -72,6 +75,25 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     if isinstance(sheet, VehicleSheet):
         return Outcome(summary | _vehicle_summary(sheet), tuple(vehicle_export_answer(sheet.told, sizes, job.dry_run)))
     return Outcome(summary | _summary(sheet), tuple(export_answer(sheet.record, model, sizes, dry_run=job.dry_run)))
+
+
+def _for_target(job: Job, sheet: VehicleSheet, form: str) -> Outcome:
+    """Write a vehicle for a simulator or a library."""
+    made = exported(sheet, form, job.output.name)
+    if not job.dry_run:
+        write_texts({job.output: made.text})
+    size = len(made.text.encode())
+    summary = {
+        "dry_run": job.dry_run,
+        "format": form,
+        "name": sheet.name,
+        "output": [str(job.output)],
+        "bytes": size,
+        **_vehicle_summary(sheet),
+        "missing": [asdict(each) for each in made.missing],
+    }
+    told = [*sheet.told, *made.told]
+    return Outcome(summary, tuple(vehicle_export_answer(told, {str(job.output): size}, job.dry_run)))
 
 
 def _summary(sheet: Sheet) -> dict[str, Any]:
@@ -101,25 +123,16 @@ def _sheet(path: Path, name: str, sha256: str, job: Job) -> Sheet:
             f"{path}: the search for this model did not come to its end ({record.stop_reason or 'unknown'}); "
             "`cpfls identify ... --resume` goes on, --force exports the model as it is, marked as incomplete"
         )
+    require_usable(path, record.verdict_label, force=job.force)
     return Sheet(name, _usable(record.rebuilt(path), path), record, path.name, sha256)
 
 
-def _vehicle(path: Path, kind: type[VehicleRecord | ExtendedRecord], name: str, file: InputFile) -> VehicleSheet:
+def _vehicle(path: Path, name: str, file: InputFile, job: Job) -> VehicleSheet:
     """Read a whole vehicle, and refuse one that is more than its table of weights."""
-    record = read_record(path, kind)
-    if record.vehicle is None:
-        raise InputError(
-            f"{path}: was made before models with effects could be exported; make it again with `cpfls extend` or "
-            "`cpfls gap`"
-        )
-    if record.vehicle.not_held:
-        raise InputError(f"{path}: {_not_exported(record.vehicle.not_held)}")
-    worth = tuple(worth_in_words(record)) if isinstance(record, ExtendedRecord) else ()
-    try:
-        model = record.vehicle.vehicle_model()
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    return VehicleSheet(name, model, worth, record.origin, path.name, file.sha256)
+    sheet = sheet_of(path, name, file, force=job.force)
+    if sheet.outside:
+        raise InputError(f"{path}: {_not_exported(sheet.outside)}")
+    return sheet
 
 
 def _not_exported(parts: Sequence[str]) -> str:
@@ -170,7 +183,7 @@ def _form_of(output: Path) -> str:
 
     Returns
     -------
-    {"json", "c", "python"}
+    str
 
     Raises
     ------
@@ -179,7 +192,10 @@ def _form_of(output: Path) -> str:
     for form, ending in ENDINGS.items():
         if output.suffix == ending:
             return form
-    endings = ", ".join(f"{ending} ({form})" for form, ending in ENDINGS.items())
+    told: dict[str, str] = {}
+    for form, ending in ENDINGS.items():
+        told.setdefault(ending, form)
+    endings = ", ".join(f"{ending} ({form})" for ending, form in told.items())
     raise InputError(f"{output}: the ending tells no form; end the name in one of {endings}")
 
 
@@ -197,7 +213,7 @@ def _prefix_of(output: Path, form: str, name: str | None) -> str:
     """
     if name is None:
         return identifier(output.stem)
-    if form == "python":
+    if ENDINGS[form] == ".py":
         raise InputError(f"--name {name}: a module of Python is called as its file is; leave --name out, or rename -o")
     return checked_identifier(name)
 
@@ -212,10 +228,11 @@ def _outputs_of(output: Path, form: str) -> list[Path]:
     ending = ENDINGS[form]
     if output.suffix != ending:
         raise InputError(f"{output}: --format {form} writes a file that ends in {ending}; name it so")
-    if form == "python" and not _importable(output.stem):
+    if ending == ".py" and not _importable(output.stem):
         raise InputError(
             f"{output}: Python cannot import a module of this name; use letters, digits and _, no digit first, none of "
-            f"its own words, not {' or '.join(_IMPORTED)}, such as {identifier(output.stem)}_model.py"
+            f"its own words, not {', '.join(_IMPORTED[:-1])} or {_IMPORTED[-1]}, such as "
+            f"{identifier(output.stem)}_model.py"
         )
     if form != "c":
         return [output]

@@ -127,11 +127,11 @@ def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array
     if known.columns is None or known.kind != "wrench" or known.missing(probe.signals):
         return None
     columns = known.columns(probe.signals, shape)
-    direct = _fitted(columns.direct, probe)
+    direct = fitted_terms(columns.direct, probe)
     if direct is None or columns.momentum is None:
         return direct
     # A momentum of the rotors alone changes with their acceleration; one of the body is inertia, and no wrench.
-    momentum = _fitted(columns.momentum, probe)
+    momentum = fitted_terms(columns.momentum, probe)
     rotors = len(probe.signals.vehicle.rotors)
     if momentum is None or np.any(momentum[:, :, 1:]) or np.any(momentum[:, :, :, 1 + rotors :]):
         return None
@@ -139,8 +139,19 @@ def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array
     return direct
 
 
-def _fitted(columns: Array, probe: Probe) -> Array | None:
-    """Fit terms to columns, shape (time, 6, coefficient); None where they leave anything."""
+def fitted_terms(columns: Array, probe: Probe) -> Array | None:
+    """Find the weights that columns of torque and force along a probe are.
+
+    Parameters
+    ----------
+    columns : array, shape (time, 6, coefficient)
+    probe : Probe
+
+    Returns
+    -------
+    array, shape (coefficient, 6, state terms, rotor terms), or None
+        None where they leave anything.
+    """
     joint, inverse, scale = probe.joint
     values = columns.reshape(len(columns), -1)
     weights = inverse @ values

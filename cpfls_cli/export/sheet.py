@@ -18,6 +18,8 @@ from cpfls_cli.version import __version__
 EXPORTER = __version__
 """Version of the program that exports."""
 
+DO_NOT_USE = "DO NOT USE: this is the verdict on the model, which was exported all the same."
+
 _SIGNS = {1: "for", -1: "against"}
 
 
@@ -65,11 +67,12 @@ class Sheet:
 
     @property
     def banner(self) -> list[str]:
-        """Paragraphs that must not be overlooked; none for a complete model."""
+        """Paragraphs that must not be overlooked; none for a complete model that is fit for use."""
+        unfit = ["", DO_NOT_USE] if self.record.verdict_label == "do-not-use" else []
         if self.record.complete:
-            return []
+            return unfit
         why = f" ({self.record.stop_reason})" if self.record.stop_reason else ""
-        return ["", f"INCOMPLETE MODEL: its search did not come to its end{why}. Do not fly with it."]
+        return ["", f"INCOMPLETE MODEL: its search did not come to its end{why}. Do not fly with it.", *unfit]
 
     @property
     def facts(self) -> list[str]:

@@ -47,6 +47,12 @@ def comment_text(text: str) -> str:
     return re.sub(r"(?<=\*)/", " /", re.sub(r"/(?=\*)", "/ ", single))
 
 
+def xml_text(paragraphs: Sequence[str]) -> str:
+    """Break text into the lines of a comment of XML, which no two hyphens may stand in."""
+    lines = [line.replace("--", "- -").replace("--", "- -").rstrip("-") for line in comment_lines(paragraphs)]
+    return "\n".join(["", *lines, ""])
+
+
 def literal_text(text: str) -> str:
     """Make text fit for a string literal of C: letters, digits and a few signs."""
     return re.sub(r"[^A-Za-z0-9 .,:;_+()=-]", "_", text)

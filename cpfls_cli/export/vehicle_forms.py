@@ -76,7 +76,7 @@ def vehicle_c(sheet: VehicleSheet, stem: str) -> CSource:
     weights = zip(*(column.tolist() for column in sheet.weights), strict=True)
     peaks = _peaks(sheet)
     words = {
-        **_common_words(sheet),
+        **common_words(sheet),
         "source": comment_text(f"{stem}.c"),
         "header": comment_text(f"{stem}.h"),
         "history": int(sheet.model.response.delay_s / _FASTEST_PERIOD * (1 + 1e-9)) + 2,
@@ -106,7 +106,7 @@ def vehicle_python(sheet: VehicleSheet, file: str) -> str:
     points, runs = _references(sheet)
     weights = zip(*(column.tolist() for column in sheet.weights), strict=True)
     words = {
-        **_common_words(sheet),
+        **common_words(sheet),
         "source": comment_text(file),
         "inertia_rows": python_rows(sheet.model.body.inertia, 4),
         "inverse_rows": python_rows(sheet.model.body.inverse, 4),
@@ -171,7 +171,7 @@ def _references(sheet: VehicleSheet) -> tuple[ReferencePoints, tuple[ReferenceRu
     return points, (reference_run(sheet.model, rng, "linear"), reference_run(sheet.model, rng, "previous"))
 
 
-def _common_words(sheet: VehicleSheet) -> dict[str, Any]:
+def common_words(sheet: VehicleSheet) -> dict[str, Any]:
     """Gather what both languages ask for."""
     vehicle, response = sheet.model.vehicle, sheet.model.response
     return {

@@ -115,6 +115,12 @@ class VehicleSheet:
         Of the artifact that it was read from.
     file, sha256 : str
         Name, without its folder, and hash of the artifact.
+    outside : tuple of str
+        Parts of the artifact that the model does not hold: effects that are no sums of weights.
+    floor : tuple of float, length 6, N m and N
+        Noise floors of the flights that it was made with; NaN where unknown.
+    mark : str
+        What must not be overlooked; empty for nothing.
     """
 
     name: str
@@ -123,6 +129,9 @@ class VehicleSheet:
     origin: Header
     file: str
     sha256: str
+    outside: tuple[str, ...] = ()
+    floor: tuple[float, ...] = (np.nan,) * 6
+    mark: str = ""
 
     @cached_property
     def weights(self) -> Weights:
@@ -163,7 +172,7 @@ class VehicleSheet:
     @property
     def told(self) -> list[str]:
         """What it is and what it is worth."""
-        return [*self._structure(), *self.worth]
+        return [*([self.mark] if self.mark else []), *self._structure(), *self.worth]
 
     def _structure(self) -> Iterator[str]:
         model, response = self.model, self.model.response

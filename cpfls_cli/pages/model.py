@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -172,51 +172,3 @@ def trust_notes(model: ModelRecord, path: object) -> Iterator[Text]:
         )
     elif model.verdict.label == "do-not-use":
         yield Text(f"{path}: its verdict is: do not use; {model.verdict.reasons[0][0]}", "warning")
-
-
-def export_answer(model: ModelRecord, path: object, sizes: Mapping[str, int], *, dry_run: bool) -> Iterator[Text]:
-    """Say which files a model was exported to, what it is worth, and what speaks against flying with it.
-
-    Parameters
-    ----------
-    path : Path
-        Of the model.
-    sizes : mapping of str to int
-        Bytes of each file.
-    """
-    yield from _sizes_in_words(sizes, dry_run)
-    yield Text(f"training visited {float(np.mean(model.model.visited)):.1%} of the circle of roll and pitch")
-    yield Text(f"verdict: {model.verdict_label or 'none'}")
-    yield from (Text(warning, "warning") for warning in _export_warnings(model, path))
-
-
-def vehicle_export_answer(told: Sequence[str], sizes: Mapping[str, int], dry_run: bool) -> Iterator[Text]:
-    """Say which files a whole vehicle was exported to, and what stands in them.
-
-    Parameters
-    ----------
-    told : sequence of str
-        What the vehicle is and what it is worth.
-    sizes : mapping of str to int
-        Bytes of each file.
-    """
-    yield from _sizes_in_words(sizes, dry_run)
-    yield from map(Text, told)
-
-
-def _sizes_in_words(sizes: Mapping[str, int], dry_run: bool) -> Iterator[Text]:
-    verb = "would be written" if dry_run else "written"
-    for file, size in sizes.items():
-        yield Text(f"{file}: {verb} ({size} bytes)")
-
-
-def _export_warnings(model: ModelRecord, path: object) -> Iterator[str]:
-    if not model.complete:
-        yield "the model is incomplete, and marked as such: do not fly with it"
-    if model.verdict is None or model.verdict.label is None:
-        off = not model.study.identification.validation.enabled
-        why = "identification.validation.enabled was off when it was identified" if off else "it was not validated"
-        yield f"{path}: holds no verdict: {why}; nothing says how far to trust it; `cpfls identify` it with it on"
-    elif model.verdict.label == "do-not-use":
-        against = [reason for reason, speaks in model.verdict.reasons if speaks < 0]
-        yield ": ".join([f"{path}: its verdict is do-not-use, exported all the same", *against[:1]])

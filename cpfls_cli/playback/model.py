@@ -109,6 +109,10 @@ class VehicleModel:
         ComputationError
             If the remainder has more columns than the compiled loops hold.
         """
+        return dict(self._parts)
+
+    @cached_property
+    def _parts(self) -> dict[str, Array]:
         if airflow_terms(self.airflow) > 2 * MOST_COLUMNS:
             columns = airflow_terms(self.airflow) // 2
             raise ComputationError(f"a remainder of {columns} columns is too large; {MOST_COLUMNS} are possible")

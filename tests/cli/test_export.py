@@ -259,7 +259,8 @@ def test_the_suffix_tells_the_form(cpfls, pipeline, tmp_path, form):
 def test_a_suffix_that_tells_no_form(refuse, pipeline, tmp_path):
     (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.h")
     assert line == (
-        f"{tmp_path / 'm.h'}: the ending tells no form; end the name in one of .json (json), .c (c), .py (python)"
+        f"{tmp_path / 'm.h'}: the ending tells no form; end the name in one of .json (json), .c (c), .py (python), "
+        ".xml (mjcf), .sdf (sdf)"
     )
 
 
@@ -292,15 +293,19 @@ def test_a_model_without_verdict_is_told(cpfls, model, tmp_path, form):
         assert ("VERDICT = None\n" if form == "python" else '"verdict": null') in output.read_text()
 
 
-def test_a_model_that_was_judged_unfit_is_told(cpfls, model, tmp_path):
+def test_a_model_that_was_judged_unfit_is_marked(cpfls, refuse, model, tmp_path):
     change(
         model,
         verdict__label=np.array("do-not-use"),
         verdict__reason=np.array(["it is fast", "it explains nothing"]),
         verdict__speaks=np.array([1, -1]),
     )
-    result = cpfls("export", model, "-o", tmp_path / "m.c")
+    (line,) = refuse("export", model, "-o", tmp_path / "m.c")
+    assert line == f"{model}: its verdict is do-not-use; --force exports it all the same, marked so"
+    assert not (tmp_path / "m.c").exists()
+    result = cpfls("export", model, "-o", tmp_path / "m.c", "--force")
     assert result.exit_code == 0
+    assert "DO NOT USE: this is the verdict on the model" in (tmp_path / "m.c").read_text()
     assert result.stderr == (
         f"cpfls: note: {model}: its verdict is do-not-use, exported all the same: it explains nothing\n"
     )

@@ -21,6 +21,7 @@ COMMANDS = (
     "vehicle",
     "replay",
     "export",
+    "verify-export",
     "report",
     "compare",
     "diagnose",
@@ -43,7 +44,7 @@ def test_help_of_every_command_lists_the_common_options(cpfls, command):
     result = cpfls(command, "--help")
     assert result.exit_code == 0
     assert all(option in result.stdout for option in COMMON)
-    assert ("--output" in result.stdout) == (command not in {"info", "check", "config", "effects"})
+    assert ("--output" in result.stdout) == (command not in {"verify-export", "info", "check", "config", "effects"})
 
 
 def test_version_loads_nothing_heavy():

@@ -336,3 +336,18 @@ def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_con
     words = {"compare": (log,), "predict": (log, log), "replay": ("vehicle", log)}[command]
     (line,) = refuse(command, left_open, *words, "-o", tmp_path / "x.h5")
     assert f"not known in this config, and `cpfls {command}` needs what is null there" in line
+
+
+def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy):
+    """By Gazebo's equations, which any machine has: what it holds it flies, and what differs is said."""
+    result = cpfls("verify-export", vehicle, noisy, "--format", "sdf", "--windows", "3", "--horizon", "0.1", "--json")
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert (found["format"], found["agrees"], found["windows"]) == ("sdf", True, 3)
+    assert max(found["largest"]["equations"].values()) < 1e-6
+    assert found["largest"]["not_held"]["body_rate"] > 0.01
+    assert 0.001 < found["playback_error"]["body_rate"] < found["target_error"]["body_rate"]
+    words = ("verify-export", vehicle, flight, "--format", "sdf", "--windows", "2", "--horizon", "0.05")
+    assert "Gazebo's motor model flies what was exported: 2 runs of 0.05 s along flight.h5" in cpfls(*words).stdout
+    (line,) = refuse("verify-export", vehicle, flight.with_name("none.h5"), "--format", "sdf")
+    assert line == f"{flight.with_name('none.h5')}: no such file"

@@ -1,6 +1,7 @@
 """Artifacts in Python: every format as named arrays with units, figures as the report draws them."""
 
 import json
+import shutil
 import sys
 
 import matplotlib
@@ -11,8 +12,9 @@ from matplotlib.figure import Figure
 import cpfls_cli
 from cpfls_cli.artifacts.formats import RECORDS
 from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.store import Artifact, file_sha256, read_artifact, write_artifact
+from cpfls_cli.artifacts.store import Artifact, file_sha256, write_artifact
 from cpfls_cli.errors import InputError
+from tests.builders.artifacts import edited
 
 
 def made_up(spec):
@@ -96,10 +98,9 @@ def test_it_is_written_again_byte_by_byte_and_never_over_a_file(pipeline, tmp_pa
 
 def test_what_is_no_good_artifact_is_refused(pipeline, tmp_path):
     path = tmp_path / "bad.h5"
-    artifact = read_artifact(pipeline.flight)
-    time = artifact.array("time").copy()
-    time[7] = time[6]
-    write_artifact(path, Artifact(artifact.spec, artifact.header, {**artifact.data, "time": time}))
+    shutil.copy(pipeline.flight, path)
+    with edited(path) as file:
+        file["time"][7] = file["time"][6]
     with pytest.raises(InputError, match=r"bad\.h5: time: does not ascend at index 7"):
         cpfls_cli.read(path)
     with pytest.raises(InputError, match="no such file"):

@@ -1,0 +1,76 @@
+"""Command `verify-export`: an exported vehicle flown along a flight, and compared with its model's playback."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.job import input_file
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.commands.vehicle_sheets import sheet_of, study_of, whole_of
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.registry import exported, require_package
+from cpfls_cli.export.text import identifier
+from cpfls_cli.export.verify import verified
+from cpfls_cli.flights.playback import flights_to_play, model_to_play
+from cpfls_cli.pages.export import verification_answer, verification_summary
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
+from cpfls_cli.playback.rotors import Hold
+from cpfls_cli.report.outcome import Outcome
+
+
+@dataclass(frozen=True)
+class Options:
+    """How an export is verified.
+
+    Attributes
+    ----------
+    form : str
+        Word of the target.
+    horizon_s : float
+        How far each run goes, s.
+    windows : int
+        Runs, at most.
+    hold : {"linear", "previous"} or None
+        What a speed is between samples; None for what is usual.
+    """
+
+    form: str
+    horizon_s: float = 0.5
+    windows: int = 10
+    hold: Hold | None = None
+
+
+def run(model: Path, flight: Path, options: Options, *, force: bool) -> Outcome:
+    """Export a model, fly it, and say how far it is from its own playback.
+
+    Parameters
+    ----------
+    force : bool
+        Take a model that nobody should use.
+    """
+    require_package(options.form)
+    for path in (model, flight):
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+    sheet = sheet_of(model, identifier(model.stem), input_file(model), force=force)
+    made = exported(sheet, options.form, f"{sheet.name}.py")
+    study = study_of(sheet)
+    to_play = model_to_play(model, study)
+    (logged,) = flights_to_play([flight], study, options.hold)
+    played = to_play.played(logged)
+    horizon = max(1, round(options.horizon_s / played.flight.motion.period))
+    found = verified(
+        options.form, made, _as_logged(model, logged), (played.flight, played.model), horizon, options.windows
+    )
+    blocks = verification_answer(options.form, made.told, logged, found)
+    return Outcome(verification_summary(options.form, made.missing, found), tuple(blocks), int(not found.agrees))
+
+
+def _as_logged(model: Path, logged: LoggedFlight) -> PlaybackFlight:
+    """Give a flight with its logged rotor speeds, but without the faults of sensors that a model knows of."""
+    if whole_of(model) is not ExtendedRecord:
+        return logged.playback
+    extended = read_record(model, ExtendedRecord).rebuilt(model)
+    return playback_flight(logged.name, [extended.repaired(part) for part in logged.parts], logged.hold)

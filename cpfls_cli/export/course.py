@@ -1,0 +1,109 @@
+"""Courses that an exported vehicle is flown along: where runs start, and what its rotors are told between samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Motion
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.replay import rotation_vectors
+from cpfls_cli.playback.rotors import RotorResponse, rotor_terms_at_samples
+
+
+@dataclass(frozen=True)
+class Course:
+    """Runs along the logged rotor speeds of a flight, from states that were measured.
+
+    Attributes
+    ----------
+    flight : PlaybackFlight
+    starts : array of int, shape (run,)
+        Ascending samples of the flight.
+    horizon : int
+        Samples that each run goes.
+    finer : int
+        Steps of a simulator between two samples.
+    gravity : float, m/s^2
+        Of the world, where no file of the vehicle says it.
+    """
+
+    flight: PlaybackFlight
+    starts: IntArray
+    horizon: int
+    finer: int = 1
+    gravity: float = 9.81
+
+    @property
+    def period(self) -> float:
+        """Length of a step of a simulator, s."""
+        return self.flight.motion.period / self.finer
+
+    @property
+    def start(self) -> State:
+        """Measured states that the runs start from."""
+        motion = self.flight.motion
+        return State(*(part[self.starts] for part in (motion.position, motion.velocity, motion.rotation, motion.rate)))
+
+    @property
+    def commands(self) -> Array:
+        """Mean of the logged speeds over each step of a simulator, shape (run, horizon * finer, rotor), rad/s."""
+        along = _finer_speed(self.flight, self.finer)
+        after = np.concatenate([along[1:], along[-1:]])
+        mean = 0.5 * (along + after) if self.flight.hold == "linear" else along
+        steps = self.finer * self.starts[:, None] + np.arange(self.horizon * self.finer)
+        return np.asarray(mean[steps])
+
+    def lagged(self, response: RotorResponse, power: int = 1) -> Array:
+        """Give the speeds, or their squares, at which rotors that lag turn at the starts, shape (run, rotor)."""
+        flight = self.finer_flight
+        parts = [
+            rotor_terms_at_samples(flight.speed[part] ** power, flight.motion.period, flight.hold, response)
+            for part in flight.stretches
+        ]
+        return np.concatenate(parts)[self.finer * self.starts, 1 : 1 + flight.speed.shape[1]]
+
+    @property
+    def finer_flight(self) -> PlaybackFlight:
+        """The flight at the steps of a simulator; between samples its motion is that of the sample before."""
+        motion, finer = self.flight.motion, self.finer
+        position, velocity, rotation, rate = (np.repeat(part, finer, axis=0) for part in motion[:4])
+        own = Motion(position, velocity, rotation, rate, self.period)
+        stretches = tuple(slice(finer * part.start, finer * part.stop) for part in self.flight.stretches)
+        return replace(self.flight, motion=own, speed=_finer_speed(self.flight, finer), stretches=stretches)
+
+    def errors(self, states: State) -> Array:
+        """Compare runs with what was measured, as `cpfls_cli.playback.replay.Runs` does.
+
+        Parameters
+        ----------
+        states : State
+            At the samples behind each start, shape (run, horizon, ...).
+
+        Returns
+        -------
+        array, shape (run, horizon, 4, 3)
+        """
+        motion, at = self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon)
+        off = np.empty((len(self.starts), self.horizon, 4, 3))
+        off[:, :, 0] = states.position - motion.position[at]
+        off[:, :, 1] = states.velocity - motion.velocity[at]
+        off[:, :, 2] = rotation_vectors(motion.rotation[at], states.rotation)
+        off[:, :, 3] = states.rate - motion.rate[at]
+        return off
+
+
+def _finer_speed(flight: PlaybackFlight, finer: int) -> Array:
+    """Give the logged speeds at the steps of a simulator: on straight lines, or what they were."""
+    if flight.hold == "previous":
+        return np.repeat(flight.speed, finer, axis=0)
+    parts = []
+    for part in flight.stretches:
+        speed = flight.speed[part]
+        after = np.concatenate([speed[1:], speed[-1:]])
+        share = (np.arange(finer) / finer)[:, None]
+        parts.append((speed[:, None] + share * (after - speed)[:, None]).reshape(-1, speed.shape[1]))
+    return np.concatenate(parts)

@@ -1,0 +1,299 @@
+"""What a simulator holds of a vehicle: its part of the weights, its rotors, and the size of what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.effects.polynomial import STATE_TERMS, state_terms
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Body, Motion
+from cpfls_cli.playback.model import Remainder, VehicleModel, remainder_terms, wrench_of
+from cpfls_cli.playback.replay import Player, free_runs, player_of, rotor_terms_along
+from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.rotations import rotation_matrix
+
+HORIZON_S = 0.5
+"""How far ahead the size of what is missing is told."""
+
+_RUNS, _PERIOD = 24, 0.01
+_FREQUENCIES = (0.7, 2.0, 5.0)
+_SPEED_SPREAD, _VELOCITY, _RATE, _TILT = 0.05, 1.5, 1.0, 0.25
+_NOTHING = 1e-9
+_LAG, _DELAY, _SLOW = "lag of the rotors", "delay of the rotors", "slow actuation"
+_LINEAR = "part of the thrust that is linear in the speed"
+_ROTORS = "what differs between rotors, and their places"
+_LEARNED = "what is learned, without a name"
+_NO_BODY = "inertia with a moment larger than the sum of the others, which no body has: the nearest that one has"
+FUZZY = "inertia that depends on the attitude"
+
+Holds = Callable[[Array], Array]
+"""From a table of weights, shape (6, terms, 1 + 4 rotors), to the part of it that a target holds; linear."""
+
+
+class Off(NamedTuple):
+    """How far runs of half a second end apart: means of the norms of body rate, attitude, velocity and position, SI."""
+
+    rate: float
+    attitude: float
+    velocity: float
+    position: float
+
+    @property
+    def sentence(self) -> str:
+        """All four, with their units."""
+        return (
+            f"{self.rate:.3g} rad/s, {np.degrees(self.attitude):.3g} degrees, {self.velocity:.3g} m/s and "
+            f"{self.position:.3g} m"
+        )
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A part of a vehicle that a target does not hold, or not whole.
+
+    Attributes
+    ----------
+    title : str
+    torque, force : float, N m and N
+        Root mean square of the largest axis along runs about hover; NaN for what is no sum of weights.
+    floors : float
+        The same in noise floors of the flights that the model was made with; NaN where the model holds none.
+    off : Off or None
+        How far half a second without it ends from the whole model; None for what depends on a flight.
+    """
+
+    title: str
+    torque: float
+    force: float
+    floors: float
+    off: Off | None
+
+    @property
+    def sentence(self) -> str:
+        """What is missing, and its size."""
+        if self.off is None:
+            return (
+                f"Not held: {self.title}, which is no sum of motion and rotor speeds; its size depends on the flight."
+            )
+        if not (self.torque or self.force):
+            return f"Not held, or not whole: {self.title}; half a second without it ends {self.off.sentence} off."
+        floors = "" if np.isnan(self.floors) else f", {self.floors:.3g} noise floors"
+        return (
+            f"Not held, or not whole: {self.title}: {self.torque:.3g} N m and {self.force:.3g} N about hover{floors}; "
+            f"half a second without it ends {self.off.sentence} off."
+        )
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a target flies.
+
+    Attributes
+    ----------
+    weights : array, shape (6, terms, 1 + 4 rotors)
+    response : RotorResponse
+    body : Body
+    squares : bool
+        Whether the lag acts on speeds and on squared speeds each, and not on the speeds alone.
+    remainder : Remainder or None
+        What is learned; its weights stand behind the others.
+    fuzzy : InertiaModel or None
+        In the place of the inertia of `body`.
+    numbers : mapping of str to float
+        Of a target that has numbers of its own.
+    """
+
+    weights: Array
+    response: RotorResponse
+    body: Body
+    squares: bool = False
+    remainder: Remainder | None = None
+    fuzzy: InertiaModel | None = None
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def whole(cls, model: VehicleModel) -> Self:
+        """Hold everything."""
+        return cls(model.weights, model.response, model.body, remainder=model.remainder, fuzzy=model.fuzzy)
+
+    def rotor(self, flight: PlaybackFlight) -> Array:
+        """Evaluate the terms of the rotors over each step of a flight, shape (time, 1 + 4 rotors)."""
+        terms = rotor_terms_along(flight, self.response)
+        if self.squares:
+            rotors = flight.speed.shape[1]
+            squared = rotor_terms_along(replace(flight, speed=flight.speed**2), self.response)
+            terms[:, 1 + rotors : 1 + 2 * rotors] = squared[:, 1 : 1 + rotors]
+        return terms
+
+    def player(self, flight: PlaybackFlight) -> Player:
+        """Make it ready for a flight."""
+        return Player(self.weights, self.rotor(flight), self.body, None, self.remainder, self.fuzzy)
+
+
+def held_by(
+    model: VehicleModel, holds: Holds, response: RotorResponse, body: Body | None = None, *, squares: bool = False
+) -> Held:
+    """Take what a target holds of a vehicle.
+
+    Parameters
+    ----------
+    response : RotorResponse
+        Of the target's rotors.
+    body : Body or None
+        Mass, gravity and inertia of the target; None for those of the model.
+    squares : bool
+        See `Held`.
+    """
+    known = slice(0, len(STATE_TERMS))
+    return Held(holds(model.weights)[:, known], response, body or model.body, squares)
+
+
+def of_a_body(body: Body, margin: float = 0.0) -> Body:
+    """Take the nearest inertia that a body can have: no principal moment is more than the sum of the others.
+
+    Parameters
+    ----------
+    margin : float, kg m^2
+        By which the sum is larger at least.
+    """
+    moments, axes = np.linalg.eigh(body.inertia)
+    excess = moments[2] - moments[0] - moments[1] + margin
+    if excess <= 0.0:
+        return body
+    # A little more than a third of the excess each, so that rounding brings none of it back.
+    third = excess / 3.0 + _NOTHING * moments[2]
+    inertia = (axes * (moments + third * np.array([1.0, 1.0, -1.0]))) @ axes.T
+    return body._replace(inertia=inertia, inverse=np.asarray(np.linalg.inv(inertia), dtype=float))
+
+
+def missing(model: VehicleModel, held: Held, holds: Holds, floor: Array, outside: Sequence[str]) -> list[Missing]:
+    """List what a target does not hold, each with its size.
+
+    Parameters
+    ----------
+    model : VehicleModel
+    held : Held
+    holds : callable
+        That `held` was made with.
+    floor : array, shape (6,), N m and N
+        Noise floors; NaN where unknown.
+    outside : sequence of str
+        Names of effects that are no sum of weights, so that no target holds them.
+    """
+    flight = probe_flight(model)
+    whole = player_of(model, flight)
+    found = [_of_table(name, left, whole, flight, floor) for name, left in _left(model, holds)]
+    found += [_of_player(name, other, whole, flight, floor) for name, other in _others(model, held, whole, flight)]
+    unknown = float("nan")
+    found += [
+        Missing(CATALOGUE[name].title if name in CATALOGUE else name, unknown, unknown, unknown, None)
+        for name in outside
+    ]
+    return [each for each in found if each.off is None or max(each.off) > _NOTHING]
+
+
+def together(model: VehicleModel, held: Held) -> Off:
+    """Tell how far a target ends from the whole model after half a second about hover."""
+    flight = probe_flight(model)
+    return _apart(player_of(model, flight), held.player(flight), flight)
+
+
+def _left(model: VehicleModel, holds: Holds) -> Iterator[tuple[str, Array]]:
+    """Give the rests of the parts of the table."""
+    rotors = model.rotors
+    columns = {_ROTORS: slice(1 + rotors, 1 + 2 * rotors), _LINEAR: slice(1, 1 + rotors)}
+    columns[_SLOW] = slice(1 + 3 * rotors, None)
+    for name, weights in model.part_weights().items():
+        if name == "rotors":
+            for title, own in columns.items():
+                part = np.zeros_like(weights)
+                part[:, :, own] = weights[:, :, own]
+                yield title, part - holds(part)
+        else:
+            yield CATALOGUE[name].title if name in CATALOGUE else _LEARNED, weights - holds(weights)
+
+
+def _others(model: VehicleModel, held: Held, whole: Player, flight: PlaybackFlight) -> Iterator[tuple[str, Player]]:
+    """Give the whole model but for what a target has otherwise beside the table."""
+    own, other = model.response, held.response
+    if own.delay_s != other.delay_s:
+        yield _DELAY, replace(whole, rotor=rotor_terms_along(flight, replace(own, delay_s=other.delay_s)))
+    if own.lag_s != other.lag_s or (held.squares and own.lag_s):
+        late = replace(held, response=replace(own, lag_s=other.lag_s))
+        yield f"{_LAG}: it acts on squared speeds" if held.squares else _LAG, replace(whole, rotor=late.rotor(flight))
+    if whole.fuzzy is not None and held.fuzzy is None:
+        yield FUZZY, replace(whole, fuzzy=None, body=held.body)
+    elif np.any(held.body.inertia != whole.body.inertia):
+        yield _NO_BODY, replace(whole, body=held.body._replace(gravity=whole.body.gravity))
+    if held.body.gravity != whole.body.gravity:
+        yield "gravity", replace(whole, body=whole.body._replace(gravity=held.body.gravity))
+
+
+def _of_table(name: str, left: Array, whole: Player, flight: PlaybackFlight, floor: Array) -> Missing:
+    without = replace(whole, table=whole.table - left)
+    return _sized(name, _wrench(replace(whole, table=left), flight), floor, _apart(whole, without, flight))
+
+
+def _of_player(name: str, other: Player, whole: Player, flight: PlaybackFlight, floor: Array) -> Missing:
+    difference = _wrench(whole, flight) - _wrench(other, flight)
+    return _sized(name, difference, floor, _apart(whole, other, flight))
+
+
+def _sized(name: str, wrench: Array, floor: Array, off: Off) -> Missing:
+    size = np.sqrt((wrench**2).mean(axis=0))
+    floors = size / floor
+    largest = float(np.nanmax(floors)) if np.isfinite(floors).any() else float("nan")
+    return Missing(name, float(size[:3].max()), float(size[3:].max()), largest, off)
+
+
+def _wrench(player: Player, flight: PlaybackFlight) -> Array:
+    """Evaluate torque and force along the measured motion, shape (time, 6)."""
+    motion = flight.motion
+    air = np.einsum("tji,tj->ti", motion.rotation, motion.velocity)
+    terms = np.hstack([state_terms(air, motion.rate), remainder_terms(player.remainder, air)])
+    return wrench_of(player.table, terms, player.rotor)
+
+
+def _apart(first: Player, second: Player, flight: PlaybackFlight) -> Off:
+    horizon = len(flight) // len(flight.stretches) - 1
+    starts = flight.starts(horizon, 1)
+    ends = [free_runs(player, flight, starts, horizon).errors[:, -1] for player in (first, second)]
+    position, velocity, attitude, rate = np.linalg.norm(ends[1] - ends[0], axis=2).mean(axis=0).tolist()
+    return Off(rate, attitude, velocity, position)
+
+
+def probe_flight(model: VehicleModel) -> PlaybackFlight:
+    """Make a flight of short stretches about hover, each from a state at random along rotor speeds that wave."""
+    rng, samples = np.random.default_rng(0), round(HORIZON_S / _PERIOD) + 1
+    time = _PERIOD * np.arange(samples)
+    hover, shape = hover_speed(model.vehicle), (_RUNS, model.rotors)
+    waves = [
+        np.sin(2 * np.pi * f * time[None, :, None] + rng.uniform(0, 2 * np.pi, shape)[:, None]) for f in _FREQUENCIES
+    ]
+    speed = hover * (1.0 + _SPEED_SPREAD * np.sum(waves, axis=0))
+    velocity = rng.normal(0.0, _VELOCITY, (_RUNS, 3))
+    rate = rng.normal(0.0, _RATE, (_RUNS, 3))
+    rotation = rotation_matrix(rng.normal(0.0, [_TILT, _TILT, 1.0], (_RUNS, 3)))
+    motion = Motion(
+        np.zeros((_RUNS * samples, 3)),
+        np.repeat(velocity, samples, axis=0),
+        np.repeat(rotation, samples, axis=0),
+        np.repeat(rate, samples, axis=0),
+        _PERIOD,
+    )
+    stretches = tuple(slice(start, start + samples) for start in range(0, _RUNS * samples, samples))
+    return PlaybackFlight(
+        name="about hover",
+        motion=motion,
+        speed=np.ascontiguousarray(speed.reshape(-1, model.rotors)),
+        hold="linear",
+        stretches=stretches,
+    )

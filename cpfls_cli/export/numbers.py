@@ -1,0 +1,114 @@
+"""Simulators with numbers of their own: their published equations as weights, and the numbers that come nearest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, fitted_terms
+from cpfls_cli.effects.scales import arm, hover_speed
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.vehicle.rotors import allocation_matrix
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_ROLL, _PITCH, _YAW, _UP = 0, 1, 2, 5
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A simulator's numbers, each with the torque and force that it gives per unit.
+
+    Attributes
+    ----------
+    names : tuple of str
+    tables : array, shape (number, 6, terms, 1 + 4 rotors)
+    size : array, shape (6, terms, 1 + 4 rotors)
+        Natural size of what one weight does.
+    """
+
+    names: tuple[str, ...]
+    tables: Array
+    size: Array
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """From weights in their sizes to the numbers."""
+        rows = (self.tables * self.size).reshape(len(self.names), -1)
+        length = np.linalg.norm(rows, axis=1)
+        return np.asarray(np.linalg.pinv((rows / length[:, None]).T) / length[:, None])
+
+    def of(self, weights: Array) -> dict[str, float]:
+        """Find the numbers whose torque and force come nearest to those of a table of weights."""
+        known = weights[:, : len(STATE_TERMS)]
+        return dict(zip(self.names, (self._inverse @ (known * self.size).ravel()).tolist(), strict=True))
+
+    def holds(self, weights: Array) -> Array:
+        """Give the weights of the nearest numbers, shape (6, terms, 1 + 4 rotors)."""
+        held = np.zeros_like(weights)
+        held[:, : len(STATE_TERMS)] = np.tensordot(list(self.of(weights).values()), self.tables, axes=1)
+        return held
+
+
+Wrenches = Callable[[Signals], Mapping[str, Array]]
+"""From a motion to torque and force per unit of numbers, each of shape (time, 6)."""
+
+
+def numbers_of(model: VehicleModel, wrenches: Wrenches, *, alike: bool) -> Numbers:
+    """Arrange the numbers of a simulator whose rotors give thrust and yaw torque by their squared speeds.
+
+    Parameters
+    ----------
+    wrenches : callable
+        What it knows beside thrust, yaw torque and the places of the rotors.
+    alike : bool
+        Whether one thrust factor and one torque factor are those of all rotors.
+    """
+    rotors = model.rotors
+    hubs = places(model, alike=alike)
+    moved = tuple(replace(rotor, position_m=tuple(hub)) for rotor, hub in zip(model.vehicle.rotors, hubs, strict=True))
+    probe = Probe.of(replace(model.vehicle, rotors=moved))
+    tables = _squares(model.vehicle, alike)
+    for name, wrench in wrenches(probe.signals).items():
+        found = fitted_terms(wrench[:, :, None], probe)
+        assert found is not None, f"the published equation of {name} is a sum of weights"
+        tables[name] = np.concatenate([found[0], np.zeros((6, len(STATE_TERMS), rotors))], axis=2)
+    row = np.repeat([1 / arm(model.vehicle), 1.0], 3)
+    hover = hover_speed(model.vehicle)
+    # All rotors count alike, so that numbers of all rotors are means.
+    turning = np.concatenate([[1.0], np.repeat([hover, hover**2, hover, hover**2], rotors)])
+    size = row[:, None, None] * np.sqrt((probe.state**2).mean(axis=0))[:, None] * turning
+    return Numbers(tuple(tables), np.array(list(tables.values())), size)
+
+
+def places(model: VehicleModel, *, alike: bool) -> Array:
+    """Find where rotors have to stand so that their thrust gives the torque of the model, shape (rotor, 3), m."""
+    squares = model.weights[:, 0, 1 + model.rotors : 1 + 2 * model.rotors]
+    thrust = np.full(model.rotors, squares[_UP].mean()) if alike else squares[_UP]
+    hubs = np.array([rotor.position_m for rotor in model.vehicle.rotors], dtype=float)
+    return np.column_stack([-squares[_PITCH] / thrust, squares[_ROLL] / thrust, hubs[:, 2]])
+
+
+def spins(vehicle: VehicleSettings) -> Array:
+    """Give the sign of the yaw torque of each rotor, shape (rotor,)."""
+    return np.asarray(np.sign(allocation_matrix(vehicle)[3]), dtype=float)
+
+
+def _squares(vehicle: VehicleSettings, alike: bool) -> dict[str, Array]:
+    """Give the weights of thrust, yaw torque and levers by squared speeds."""
+    rotors, turns = len(vehicle.rotors), spins(vehicle)
+    tables: dict[str, Array] = {}
+    groups: Sequence[tuple[str, list[int]]] = [(f"_{i + 1}", [i]) for i in range(rotors)]
+    for suffix, own in [("", list(range(rotors)))] if alike else groups:
+        for name, row, signs in ((f"thrust{suffix}", _UP, np.ones(rotors)), (f"yaw{suffix}", _YAW, turns)):
+            tables[name] = np.zeros((6, len(STATE_TERMS), 1 + 4 * rotors))
+            tables[name][row, 0, [1 + rotors + i for i in own]] = signs[own]
+    for suffix, own in groups:
+        for name, row in (("roll", _ROLL), ("pitch", _PITCH)):
+            tables[f"{name}{suffix}"] = np.zeros((6, len(STATE_TERMS), 1 + 4 * rotors))
+            tables[f"{name}{suffix}"][row, 0, 1 + rotors + own[0]] = 1.0
+    return tables

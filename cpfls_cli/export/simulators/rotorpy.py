@@ -1,0 +1,139 @@
+"""A vehicle for RotorPy: the dictionary of numbers that its `Multirotor` takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import hub_wrench, thrust_wrench, wrench
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.course import Course
+from cpfls_cli.export.holding import Held, Holds, held_by
+from cpfls_cli.export.numbers import numbers_of, places, spins
+from cpfls_cli.export.source import fill_template
+from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.rotors import RotorResponse
+
+if TYPE_CHECKING:
+    from cpfls_cli.export.vehicle_sheet import VehicleSheet
+
+_ROTORS = 4
+_GRAVITY = 9.81
+_FASTEST_S = 1e-3
+"""RotorPy divides by the time constant of its motors."""
+
+_INTEGRATOR = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-9}
+
+
+def rotorpy_held(model: VehicleModel) -> tuple[Held, Holds]:
+    """Take what RotorPy flies of a vehicle.
+
+    Raises
+    ------
+    InputError
+        If it has not four rotors.
+    """
+    if model.rotors != _ROTORS:
+        raise InputError(
+            f"RotorPy allocates thrust and torque to four rotors, this vehicle has {model.rotors}; --format mjcf, sdf, "
+            "jax and casadi take any number"
+        )
+    numbers = numbers_of(model, _wrenches, alike=True)
+    body = model.body._replace(gravity=_GRAVITY)
+    held = held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body)
+    return replace(held, numbers=numbers.of(model.weights)), numbers.holds
+
+
+def _wrenches(signals: Signals) -> Mapping[str, Array]:
+    """Write RotorPy's `compute_body_wrench` for a unit of each of its numbers."""
+    air, local, speed = signals.air_velocity, signals.hub_velocity, signals.speed[..., None]
+    drag = -np.linalg.norm(air, axis=1, keepdims=True) * air
+    x, y, _ = np.moveaxis((speed * local).sum(axis=1), 1, 0)
+    of_axis = {f"c_D{axis}": wrench(force=drag * np.eye(3)[k]) for k, axis in enumerate("xyz")}
+    return of_axis | {
+        "k_d": hub_wrench(signals.hubs, -speed * local * [1.0, 1.0, 0.0]),
+        "k_z": hub_wrench(signals.hubs, -speed * local * [0.0, 0.0, 1.0]),
+        "k_h": thrust_wrench(signals.hubs, (local[..., :2] ** 2).sum(axis=-1)),
+        "k_flap": wrench(-np.column_stack([y, -x, np.zeros_like(x)])),
+    }
+
+
+def rotorpy_text(sheet: VehicleSheet, held: Held, told: Sequence[str], file: str) -> str:
+    """Write a vehicle as a module with RotorPy's dictionary.
+
+    Parameters
+    ----------
+    told : sequence of str
+        Paragraphs of the head.
+    file : str
+        Name of the file.
+    """
+    model = sheet.model
+    found = held.numbers
+    given = {
+        "mass": held.body.mass,
+        **{f"I{'xyz'[i]}{'xyz'[j]}": held.body.inertia[i, j] for i in range(3) for j in range(i, 3)},
+        **{name: value for name, value in found.items() if name.startswith(("c_", "k_"))},
+        "k_eta": found["thrust"],
+        "k_m": found["yaw"],
+        "tau_m": held.response.lag_s or _FASTEST_S,
+        "rotor_speed_min": 0.0,
+        "rotor_speed_max": model.vehicle.rotor_speed_max_rad_s,
+    }
+    words = {
+        "source": comment_text(file),
+        "facts": comment_lines(told),
+        "lags": held.response.lag_s > 0.0,
+        "numbers": {name: number(value) for name, value in given.items()},
+        "positions": [python_rows(place, 0) for place in places(model, alike=True)],
+        "directions": python_rows(spins(model.vehicle), 0),
+    }
+    return fill_template("rotorpy.py.j2", words)
+
+
+def fly_rotorpy(text: str, course: Course) -> State:
+    """Fly an exported vehicle in RotorPy.
+
+    Parameters
+    ----------
+    text : str
+        Of the module.
+
+    Returns
+    -------
+    State
+        At the samples behind each start, shape (run, horizon, ...).
+    """
+    from rotorpy.vehicles.multirotor import Multirotor
+    from scipy.spatial.transform import Rotation
+
+    module: dict[str, object] = {"__name__": "exported"}
+    exec(text, module)
+    parameters = module["quad_params"]
+    assert isinstance(parameters, dict)
+    flown = Multirotor(parameters, control_abstraction="cmd_motor_speeds", integrator_kwargs=dict(_INTEGRATOR))
+    lags, start = module["ROTORS_LAG"], course.start
+    before = course.lagged(RotorResponse(lag_s=parameters["tau_m"]))
+    rows = []
+    for run, commands in enumerate(course.commands):
+        now = flown.initial_state | {
+            "x": start.position[run],
+            "v": start.velocity[run],
+            "q": Rotation.from_matrix(start.rotation[run]).as_quat(),
+            "w": start.rate[run],
+            "rotor_speeds": before[run],
+        }
+        for step, speed in enumerate(commands, 1):
+            now["rotor_speeds"] = now["rotor_speeds"] if lags else speed
+            now = flown.step(now, {"cmd_motor_speeds": speed}, course.period)
+            if step % course.finer == 0:
+                rows.append([now["x"], now["v"], Rotation.from_quat(now["q"]).as_matrix(), now["w"]])
+    shape = len(course.starts), course.horizon
+    return State(*(np.array(part).reshape(*shape, *part[0].shape) for part in zip(*rows, strict=True)))

@@ -1,0 +1,235 @@
+"""A vehicle for Gazebo: SDF with a link and a multicopter motor model for each rotor, and the equations of that plugin.
+
+The plugin's equations, as published with it: a rotor at speed w through the air v of its link, across its axis, gives
+
+    thrust = motorConstant w^2,   yaw torque = -direction momentConstant thrust,
+    drag = -|w| rotorDragCoefficient v,   rolling moment = -|w| rollingMomentCoefficient v,
+
+and its speed follows the command by a first-order filter. `fly_sdf` is these equations, not Gazebo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array
+from cpfls_cli.effects.effect import hub_wrench, wrench
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.export.course import Course
+from cpfls_cli.export.holding import Held, Holds, held_by, of_a_body
+from cpfls_cli.export.numbers import numbers_of, places, spins
+from cpfls_cli.export.text import number, xml_text
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.rotors import RotorResponse
+
+if TYPE_CHECKING:
+    from cpfls_cli.export.vehicle_sheet import VehicleSheet
+
+_PLUGIN = {"filename": "gz-sim-multicopter-motor-model-system", "name": "gz::sim::systems::MulticopterMotorModel"}
+_ROTOR_SHARE = 1e-3
+"""Share of the mass in the link of each rotor, which Gazebo needs; it is taken from the body."""
+
+_SLOWER, _MARGIN = 10.0, 1.5
+_RADIUS_M = 0.05
+_SHORTEST_S = 1e-6
+_ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+def sdf_held(model: VehicleModel) -> tuple[Held, Holds]:
+    """Take what the motor model flies of a vehicle."""
+    numbers = numbers_of(model, _wrenches, alike=False)
+    # The links of the rotors take more from the sum of two moments of the body than from the third.
+    heights = np.array([rotor.position_m[2] for rotor in model.vehicle.rotors])
+    margin = 2.0 * _MARGIN * _ROTOR_SHARE * model.body.mass * float((heights**2).sum())
+    body = of_a_body(model.body, margin)
+    held = held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body)
+    return replace(held, numbers=numbers.of(model.weights)), numbers.holds
+
+
+def _wrenches(signals: Signals) -> Mapping[str, Array]:
+    """Write drag and rolling moment for a unit of the coefficient of each rotor."""
+    across = signals.speed[..., None] * signals.hub_velocity * [1.0, 1.0, 0.0]
+    found = {}
+    for i in range(across.shape[1]):
+        found[f"drag_{i + 1}"] = hub_wrench(signals.hubs[[i]], -across[:, [i]])
+        found[f"rolling_{i + 1}"] = wrench(-across[:, i])
+    return found
+
+
+def sdf_text(sheet: VehicleSheet, held: Held, told: Sequence[str], _file: str) -> str:
+    """Write a vehicle as SDF.
+
+    Parameters
+    ----------
+    told : sequence of str
+        Paragraphs of the head.
+    """
+    root = ElementTree.Element("sdf", version="1.9")
+    root.append(ElementTree.Comment(xml_text([*told, "", _spin_in_words(sheet, held), *_USE])))
+    model = ElementTree.SubElement(root, "model", name=sheet.name)
+    hubs = places(sheet.model, alike=False)
+    rotor = _rotor_inertia(sheet, held)
+    mass = held.body.mass * (1.0 - len(hubs) * _ROTOR_SHARE)
+    centre = -(_ROTOR_SHARE * held.body.mass / mass) * hubs.sum(axis=0)
+    own = held.body.inertia - mass * _apart(centre)
+    for hub in hubs:
+        own = own - rotor[0] * _apart(hub) - np.diag(rotor[1])
+    _link(model, "base_link", np.zeros(3), centre, mass, own)
+    for i, hub in enumerate(hubs, 1):
+        _link(model, f"rotor_{i}", hub, np.zeros(3), rotor[0], np.diag(rotor[1]))
+        joint = ElementTree.SubElement(model, "joint", name=f"rotor_{i}_joint", type="revolute")
+        ElementTree.SubElement(joint, "parent").text = "base_link"
+        ElementTree.SubElement(joint, "child").text = f"rotor_{i}"
+        axis = ElementTree.SubElement(joint, "axis")
+        ElementTree.SubElement(axis, "xyz").text = "0 0 1"
+        limit = ElementTree.SubElement(axis, "limit")
+        ElementTree.SubElement(limit, "lower").text, ElementTree.SubElement(limit, "upper").text = "-1e16", "1e16"
+    for i in range(1, len(hubs) + 1):
+        plugin = ElementTree.SubElement(model, "plugin", _PLUGIN)
+        for name, value in _motor(sheet, held, i).items():
+            ElementTree.SubElement(plugin, name).text = value if isinstance(value, str) else number(value)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+_USE = (
+    "Commands: actuators messages on the topic /NAME/command/motor_speed, speeds in rad/s in the order of the config. "
+    "The world has to set gravity and a wind, which may be zero; the model needs no other plugin.",
+)
+
+
+def _spin_in_words(sheet: VehicleSheet, held: Held) -> str:
+    """Tell what Gazebo adds, because the links of the rotors turn."""
+    mass, moments = _rotor_inertia(sheet, held)
+    speed = sheet.model.vehicle.rotor_speed_max_rad_s / _SLOWER
+    return (
+        f"Gazebo adds what the rotor links of {mass:.3g} kg do by turning, at a tenth of the speed of the rotors: up "
+        f"to {moments[2] * speed:.2g} N m for each rotor at a body rate of 1 rad/s."
+    )
+
+
+def _rotor_inertia(sheet: VehicleSheet, held: Held) -> tuple[float, Array]:
+    radii = [rotor.radius_m or _RADIUS_M for rotor in sheet.model.vehicle.rotors]
+    mass = _ROTOR_SHARE * held.body.mass
+    return mass, mass * float(np.mean(radii)) ** 2 * np.array([0.25, 0.25, 0.5])
+
+
+def _apart(place: Array) -> Array:
+    """Inertia per mass of a point at a place."""
+    return np.asarray(place @ place * np.eye(3) - np.outer(place, place))
+
+
+def _link(model: ElementTree.Element, name: str, place: Array, centre: Array, mass: float, inertia: Array) -> None:
+    link = ElementTree.SubElement(model, "link", name=name)
+    ElementTree.SubElement(link, "pose").text = _pose(place)
+    inertial = ElementTree.SubElement(link, "inertial")
+    ElementTree.SubElement(inertial, "pose").text = _pose(centre)
+    ElementTree.SubElement(inertial, "mass").text = number(mass)
+    entries = ElementTree.SubElement(inertial, "inertia")
+    for entry, place_of in zip(_ENTRIES, INERTIA_ENTRIES, strict=True):
+        ElementTree.SubElement(entries, entry).text = number(inertia[place_of])
+
+
+def _pose(place: Array) -> str:
+    return " ".join([*map(number, place), "0 0 0"])
+
+
+def _motor(sheet: VehicleSheet, held: Held, rotor: int) -> dict[str, str | float]:
+    """Give the parameters of the plugin of one rotor."""
+    numbers, lag = held.numbers, max(held.response.lag_s, _SHORTEST_S)
+    # A rotor that turns counter-clockwise turns the body clockwise.
+    turns = "cw" if spins(sheet.model.vehicle)[rotor - 1] > 0 else "ccw"
+    return {
+        "robotNamespace": sheet.name,
+        "jointName": f"rotor_{rotor}_joint",
+        "linkName": f"rotor_{rotor}",
+        "turningDirection": turns,
+        "timeConstantUp": lag,
+        "timeConstantDown": lag,
+        "maxRotVelocity": sheet.model.vehicle.rotor_speed_max_rad_s,
+        "motorConstant": numbers[f"thrust_{rotor}"],
+        "momentConstant": numbers[f"yaw_{rotor}"] / numbers[f"thrust_{rotor}"],
+        "commandSubTopic": "command/motor_speed",
+        "motorNumber": str(rotor - 1),
+        "rotorDragCoefficient": numbers[f"drag_{rotor}"],
+        "rollingMomentCoefficient": numbers[f"rolling_{rotor}"],
+        "rotorVelocitySlowdownSim": _SLOWER,
+        "motorType": "velocity",
+    }
+
+
+def fly_sdf(text: str, course: Course) -> State:
+    """Fly an exported vehicle by the published equations of the plugin.
+
+    Parameters
+    ----------
+    text : str
+        SDF.
+
+    Returns
+    -------
+    State
+        At the samples behind each start, shape (run, horizon, ...).
+    """
+    model = ElementTree.fromstring(text).find("model")
+    assert model is not None
+    mass, inertia, hubs = _whole_body(model)
+    motors = [{child.tag: child.text or "" for child in plugin} for plugin in model.iter("plugin")]
+
+    def column(name: str) -> Array:
+        return np.array([float(motor[name]) for motor in motors])
+
+    thrust, drag, rolling = (
+        column(name) for name in ("motorConstant", "rotorDragCoefficient", "rollingMomentCoefficient")
+    )
+    yaw = -np.array([1.0 if motor["turningDirection"] == "ccw" else -1.0 for motor in motors]) * column(
+        "momentConstant"
+    )
+    lag, period = float(column("timeConstantUp")[0]), course.period
+    gravity = np.array([0.0, 0.0, -course.gravity])
+    speed, state = course.lagged(RotorResponse(lag_s=lag)), course.start
+    rows, keep = [], np.exp(-period / lag)
+    for step, command in enumerate(course.commands.swapaxes(0, 1), 1):
+        # Without a lag the filter is at the command at once.
+        speed = command if lag <= _SHORTEST_S else speed
+        air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
+        across = (air[:, None] + np.cross(state.rate[:, None], hubs)) * [1.0, 1.0, 0.0] * np.abs(speed)[..., None]
+        force = -drag[:, None] * across + (thrust * speed**2)[..., None] * [0.0, 0.0, 1.0]
+        torque = (
+            np.cross(hubs, force) - rolling[:, None] * across + (yaw * thrust * speed**2)[..., None] * [0.0, 0.0, 1.0]
+        )
+        linear = np.einsum("nij,nj->ni", state.rotation, force.sum(axis=1)) / mass + gravity
+        moment = torque.sum(axis=1) - np.cross(state.rate, state.rate @ inertia)
+        velocity, rate = state.velocity + period * linear, state.rate + period * np.linalg.solve(inertia, moment.T).T
+        turned = state.rotation @ rotations.turns(period * rate)
+        state = State(state.position + period * velocity, velocity, turned, rate)
+        speed = keep * speed + (1.0 - keep) * command
+        if step % course.finer == 0:
+            rows.append(state)
+    return State(*(np.stack(parts, axis=1) for parts in zip(*rows, strict=True)))
+
+
+def _whole_body(model: ElementTree.Element) -> tuple[float, Array, Array]:
+    """Read mass, inertia about the centre of mass and places of the rotors from links."""
+    masses, centres, own, hubs = [], [], [], []
+    for link in model.iter("link"):
+        place = np.array([float(word) for word in link.findtext("pose", "").split()[:3]])
+        inner = np.array([float(word) for word in link.findtext("inertial/pose", "").split()[:3]])
+        masses.append(float(link.findtext("inertial/mass", "")))
+        centres.append(place + inner)
+        own.append(symmetric([float(link.findtext(f"inertial/inertia/{entry}", "")) for entry in _ENTRIES]))
+        if link.get("name") != "base_link":
+            hubs.append(place)
+    mass = float(sum(masses))
+    centre = np.average(centres, axis=0, weights=masses)
+    parts = zip(masses, centres, own, strict=True)
+    inertia = sum(tensor + weight * _apart(place - centre) for weight, place, tensor in parts)
+    return mass, np.asarray(inertia), np.array(hubs) - centre

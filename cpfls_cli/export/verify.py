@@ -1,0 +1,146 @@
+"""Exported vehicles flown along recorded flights: how far they end from the playback of their model, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import ceil
+
+import numpy as np
+
+from cpfls_cli.arrays import Array
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.course import Course
+from cpfls_cli.export.holding import Held
+from cpfls_cli.export.registry import TARGETS, Exported
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.replay import Player, free_runs
+
+AGREES = 1e-6
+"""Largest distance in SI at which the equations of a target are those that were exported."""
+
+_FINE = 32
+
+
+@dataclass(frozen=True)
+class Verification:
+    """An exported vehicle flown along a flight.
+
+    Attributes
+    ----------
+    errors : array, shape (3, 4)
+        Mean norms at the end of the horizon, SI, of position, velocity, attitude and body rate: of the playback of the
+        model and of the target, each less what was measured, and of the target less the playback.
+    step, equations, missing : array, shape (4,)
+        Largest norm over all windows and horizons of what the target's step leaves; of what is left between the target
+        and what was exported where steps have no length; and of what the target does not hold.
+    windows : int
+    horizon_s : float
+    """
+
+    errors: Array
+    step: Array
+    equations: Array
+    missing: Array
+    windows: int
+    horizon_s: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the target flies what was exported."""
+        return bool(np.all(self.equations < AGREES))
+
+
+def verified(
+    form: str,
+    exported: Exported,
+    flight: PlaybackFlight,
+    model: tuple[PlaybackFlight, Player],
+    horizon: int,
+    windows: int,
+) -> Verification:
+    """Fly an exported vehicle from samples of a flight, and compare it with the playback of its model.
+
+    Parameters
+    ----------
+    form : str
+        Of `TARGETS`.
+    flight : PlaybackFlight
+        As logged, faults of sensors taken out.
+    model : tuple of PlaybackFlight and Player
+        What `cpfls replay` plays back along the flight.
+    horizon : int
+        Samples.
+    windows : int
+        At most; spread over the flight.
+
+    Raises
+    ------
+    InputError
+        If the flight does not say what the vehicle needs to be flown.
+    """
+    _require(flight, exported.held)
+    found = flight.starts(horizon, 1)
+    starts = found[np.unique(np.linspace(0, len(found) - 1, windows).round().astype(int))]
+    target, held = TARGETS[form], exported.held
+    course = Course(flight, starts, horizon, gravity=held.body.gravity)
+    replayed = free_runs(model[1], model[0], starts, horizon).errors
+    same = free_runs(held.player(flight), flight, starts, horizon).errors
+    if not target.levels:
+        flown = limit = course.errors(target.fly(exported.text, course))
+        fine = same
+    else:
+        finer = 1 if np.isinf(target.step_s) else ceil(flight.motion.period / target.step_s - 1e-9)
+        flown, limit = _limit(form, exported.text, course, finer)
+        fine = _fine(held, course, _FINE * finer)
+    if not flight.translates:
+        for errors in (replayed, same, flown, limit, fine):
+            errors[:, :, :3] = 0.0
+    ends = [errors[:, -1] for errors in (replayed, flown, flown - replayed)]
+    return Verification(
+        np.array([np.linalg.norm(end, axis=2).mean(axis=0) for end in ends]),
+        _largest(flown - limit),
+        _largest(limit - fine),
+        _largest(same - replayed),
+        len(starts),
+        horizon * flight.motion.period,
+    )
+
+
+def _require(flight: PlaybackFlight, held: Held) -> None:
+    if flight.wrench is not None:
+        raise InputError(
+            f"{flight.name}: has no rotor speeds, by which an exported vehicle flies; verify along one that has"
+        )
+    if not flight.translates and held.player(flight).feels_air:
+        raise InputError(
+            f"{flight.name}: lacks attitude or velocity, and the vehicle depends on its velocity through the air; "
+            "verify along a flight that has both"
+        )
+
+
+def _largest(errors: Array) -> Array:
+    return np.asarray(np.linalg.norm(errors, axis=3).max(axis=(0, 1)))
+
+
+def _limit(form: str, text: str, course: Course, finer: int) -> tuple[Array, Array]:
+    """Fly with the step of the target, and with halves of it, from which follows a step of no length.
+
+    What a step leaves is ``a h + b h^2 + ...``, of which each more flight takes one term out.
+    """
+    target = TARGETS[form]
+    steps = [replace(course, finer=finer * 2**level) for level in range(target.levels)]
+    once, *rest = found = [course.errors(target.fly(text, each)) for each in steps]
+    for power in range(1, len(rest) + 1):
+        found = [(2**power * fine - coarse) / (2**power - 1) for coarse, fine in pairwise(found)]
+    return once, found[0]
+
+
+def _fine(held: Held, course: Course, finer: int) -> Array:
+    """Play what was exported back with steps of no length: those of the midpoint rule leave ``b h^2``."""
+    found = []
+    for steps in (finer, 2 * finer):
+        flight = replace(course, finer=steps).finer_flight
+        runs = free_runs(held.player(flight), flight, course.starts * steps, course.horizon * steps)
+        found.append(runs.errors[:, steps - 1 :: steps])
+    return np.asarray((4.0 * found[1] - found[0]) / 3.0)

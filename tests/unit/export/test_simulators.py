@@ -1,0 +1,174 @@
+"""Vehicles exported for simulators and libraries, flown there: the equations are those that were exported."""
+
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import InputError
+from cpfls_cli.export.holding import FUZZY, of_a_body, probe_flight
+from cpfls_cli.export.registry import TARGETS, exported, require_package
+from cpfls_cli.export.verify import AGREES, verified
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.replay import player_of
+from cpfls_cli.playback.rotors import RotorResponse
+from tests.builders.exported_models import CASES, model_of
+from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.playback_flights import STATED, truth
+from tests.builders.vehicle_models import HEXA, QUAD, whole
+
+LIBRARIES = ("casadi", "jax")
+SIMULATORS = [form for form in TARGETS if form not in LIBRARIES]
+# JAX compiles for seconds what CasADi does not; both are written by one template.
+STRUCTURES = ["paper", "rigid body, rules", "classic, full-circle, tensor", "harmonic, data-range", "zero width"]
+
+
+def require(form):
+    if TARGETS[form].package and find_spec(TARGETS[form].package) is None:
+        pytest.skip(f"needs the package {TARGETS[form].package}, of the extra simulators")
+
+
+def fly(form, model, horizon=8, windows=3, **changed):
+    require(form)
+    flight = replace(probe_flight(model), **changed)
+    made = exported(sheet_of_vehicle(model), form, "vehicle.py")
+    return made, verified(form, made, flight, (flight, player_of(model, flight)), horizon, windows)
+
+
+@pytest.mark.parametrize("hold", ["linear", "previous"])
+@pytest.mark.parametrize("form", LIBRARIES)
+def test_a_library_holds_every_part(form, hold):
+    made, found = fly(form, whole(), 20, hold=hold)
+    assert made.missing == ()
+    assert found.errors[2].max() < 1e-12
+    assert found.errors[0].max() > 0.1
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+def test_a_library_holds_inertia_that_depends_on_the_attitude(structure):
+    fuzzy = model_of(CASES[structure])
+    size = 0.003 * np.mean(STATED.inertia_kg_m2) / np.abs(fuzzy.coefficients).max()
+    rigid = np.array([*STATED.inertia_kg_m2, 1e-4, -2e-4, 5e-5])
+    fuzzy = replace(fuzzy, coefficients=size * fuzzy.coefficients, rigid_body=rigid)
+    made, found = fly("casadi", replace(truth(), fuzzy=fuzzy))
+    assert made.missing == ()
+    assert found.errors[2].max() < 1e-10
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.035])
+@pytest.mark.parametrize("form", SIMULATORS)
+def test_a_simulator_flies_what_it_holds(form, lag):
+    model = whole(response=RotorResponse(lag_s=lag), remainder=None)
+    _, found = fly(form, model)
+    assert found.equations.max() < AGREES
+    assert found.missing.max() > 1e-3
+    assert found.step.max() < 0.3
+
+
+def test_each_simulator_names_what_it_lacks():
+    model = whole()
+    lacks = {
+        form: " ".join(each.title for each in exported(sheet_of_vehicle(model), form, "v").missing)
+        for form in SIMULATORS
+    }
+    for words in lacks.values():
+        assert all(each in words for each in ("slow actuation", "delay of the rotors", "what is learned"))
+    assert "constant torque" in lacks["rotorpy"]
+    assert "rolling moment" in lacks["rotorpy"]
+    assert "rolling moment" not in lacks["sdf"]
+    assert "rotors that differ" not in lacks["sdf"]
+    assert "constant torque" not in lacks["mjcf"]
+    assert "linear rotational damping" in lacks["rotorpy"]
+    assert "linear rotational damping" not in lacks["mjcf"]
+    assert "rotor drag" not in lacks["mjcf"]
+    assert "flapping" in lacks["mjcf"]
+
+
+def test_sizes_are_those_of_what_is_missing():
+    """Torque, floors and the end of half a second, of a vehicle that lacks one part alone."""
+    flapping = truth().effects[2]
+    model = replace(truth(), effects=(flapping,), response=RotorResponse())
+    floor = (1e-3,) * 6
+    (missing,) = exported(sheet_of_vehicle(model, floor=floor), "mjcf", "v").missing
+    assert missing.title == "flapping hub moment"
+    assert missing.floors == pytest.approx(max(missing.torque, missing.force) / 1e-3)
+    assert 0.1 < missing.off.rate < 10.0
+    half = replace(model, effects=(flapping._replace(coefficients=0.5 * flapping.coefficients),))
+    (smaller,) = exported(sheet_of_vehicle(half), "mjcf", "v").missing
+    assert smaller.torque == pytest.approx(0.5 * missing.torque)
+    assert smaller.off.rate < missing.off.rate
+    assert np.isnan(smaller.floors)
+
+
+def test_an_effect_outside_the_weights_is_named():
+    made = exported(sheet_of_vehicle(truth(), outside=("wind",)), "casadi", "v.py")
+    assert [each.title for each in made.missing] == ["steady wind"]
+    (sentence,) = made.told
+    assert sentence.startswith("Not held: steady wind, which is no sum of motion and rotor speeds")
+    assert "Not held: steady wind" in made.text
+
+
+def test_an_inertia_that_depends_on_the_attitude_is_named():
+    fuzzy = replace(model_of(CASES["default"]), rigid_body=np.array([*STATED.inertia_kg_m2, 0.0, 0.0, 0.0]))
+    fuzzy = replace(fuzzy, coefficients=1e-5 * fuzzy.coefficients)
+    made = exported(sheet_of_vehicle(replace(truth(), fuzzy=fuzzy)), "mjcf", "v.xml")
+    assert FUZZY in [each.title for each in made.missing]
+
+
+def test_an_inertia_that_no_body_has_is_brought_to_the_nearest():
+    model = replace(truth(), vehicle=replace(QUAD, inertia_kg_m2=(0.004, 0.005, 0.0096)), effects=())
+    body = of_a_body(model.body)
+    np.testing.assert_allclose(np.diag(body.inertia), [0.0042, 0.0052, 0.0094], rtol=1e-6)
+    made = exported(sheet_of_vehicle(model), "mjcf", "v.xml")
+    assert any("which no body has" in each.title for each in made.missing)
+    if find_spec("mujoco") is not None:
+        import mujoco
+
+        mujoco.MjModel.from_xml_string(made.text)
+
+
+def test_six_rotors_are_too_many_for_rotorpy_alone():
+    model = whole(HEXA)
+    with pytest.raises(InputError, match=r"vehicle\.h5: RotorPy allocates .* to four rotors, this vehicle has 6"):
+        exported(sheet_of_vehicle(model), "rotorpy", "v.py")
+    _, found = fly("mjcf", replace(model, remainder=None, response=RotorResponse()), 4, 2)
+    assert found.agrees
+
+
+def test_a_flight_that_an_export_cannot_be_flown_along_is_refused():
+    model = truth()
+    made = exported(sheet_of_vehicle(model), "mjcf", "v.xml")
+    flight: PlaybackFlight = probe_flight(model)
+    pair = flight, player_of(model, flight)
+    with pytest.raises(InputError, match="has no rotor speeds, by which an exported vehicle flies"):
+        verified("mjcf", made, replace(flight, wrench=np.zeros((len(flight), 6))), pair, 4, 2)
+    with pytest.raises(InputError, match="lacks attitude or velocity, and the vehicle depends on its velocity"):
+        verified("mjcf", made, replace(flight, has_velocity=False), pair, 4, 2)
+
+
+def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
+    monkeypatch.setitem(TARGETS, "mjcf", replace(TARGETS["mjcf"], package="no_such_simulator"))
+    with pytest.raises(InputError, match=r'needs the package no_such_simulator; pip install "cpfls\[simulators\]"'):
+        require_package("mjcf")
+
+
+def test_jax_differentiates_and_batches():
+    require("jax")
+    import jax
+
+    model = replace(truth(), effects=())
+    names = {"__name__": "exported"}
+    exec(exported(sheet_of_vehicle(model), "jax", "v.py").text, names)
+    state = np.concatenate([np.zeros(6), np.eye(3).ravel(), np.zeros(3)])
+    with jax.enable_x64(True):
+        parameters = jax.numpy.array(names["PARAMETERS"])
+        rotor = names["steady"](jax.numpy.full(4, 600.0))
+
+        def climb(p):
+            return names["step"](jax.numpy.array(state), rotor, 0.01, p)[5]
+
+        slopes = jax.jit(jax.vmap(jax.grad(climb)))(parameters * np.ones((3, 1)))
+    thrust = 4 * 600.0**2 * model.vehicle.rotors[0].thrust_factor_n_s2
+    by_mass = np.array(slopes[:, names["PARAMETER_NAMES"].index("mass")])
+    np.testing.assert_allclose(by_mass, [-0.01 * thrust / model.vehicle.mass_kg**2] * 3, rtol=1e-9)
