@@ -6,7 +6,6 @@ import subprocess
 from dataclasses import replace
 from xml.etree import ElementTree
 
-import h5py
 import numpy as np
 import pytest
 
@@ -14,6 +13,7 @@ from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.export.registry import TARGETS
+from tests.builders.artifacts import edited
 from tests.builders.playback_flights import truth
 from tests.builders.vehicle_models import HEXA, record_of, whole
 
@@ -41,7 +41,7 @@ def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form
     header = Header("0", 1, "seed: 1\n", {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")})
     path = tmp_path / ("x--" + "' \"; raise SystemExit(8)\n#-->.h5")
     write_record(path, record_of(truth(), ("wind",)).with_header(header))
-    with h5py.File(path, "r+") as file:
+    with edited(path) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
     output = tmp_path / f"uav{TARGETS[form].ending}"
     words = ("export", path, "--format", form, "-o", output)
