@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import binary_closing, binary_opening, find_objects, label
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.flightlog.names import BY_HAND
 
 _OF_HOVER = 0.6
 """Share of the level at hover below which rotors idle."""
@@ -106,7 +107,10 @@ def _active(
         starts_there = abs(float(np.median(height[: max(1, round(_SHORT_S / period))])) - ground) < _LEAST_HEIGHT
         return (_smoothed(above, period) if starts_there else np.ones(len(height), dtype=bool)), "no height"
     if rate is None:
-        return None, "no rotors, no height and no rates are recognised, so a flight cannot be told from a stand"
+        return (
+            None,
+            f"no rotors, no height and no rates are recognised, so no flight can be told from a stand: {BY_HAND}",
+        )
     quiet = _quiet(rate, period)
     return ~quiet, "no turning at all"
 

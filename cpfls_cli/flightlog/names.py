@@ -37,9 +37,15 @@ class ColumnGroup:
         return self.columns[0].partition(".")[0] if "." in self.columns[0] else ""
 
     @property
+    def unit(self) -> str:
+        """Unit at the end of the name, such as ``rad_s``; empty where there is none."""
+        return next((ending for ending in _UNITS_BY_ENDING if self.pattern.endswith(f"_{ending}")), "")
+
+    @property
     def words(self) -> tuple[str, ...]:
-        """Words of the pattern in lower case, without numbers."""
-        return tuple(word for word in _words(self.pattern) if not word.isdecimal())
+        """Words of the pattern in lower case, without numbers and without the unit at its end."""
+        named = self.pattern.removesuffix(f"_{self.unit}") if self.unit else self.pattern
+        return tuple(word for word in _words(named) if not word.isdecimal())
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,9 @@ class Named:
     sign: tuple[float, ...] | None = None
 
 
+BY_HAND: Final = "rename them as many logs do (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
+"""What to do where names do not tell what columns hold."""
+
 _ANGLES: Final = (
     ("roll", "pitch", "yaw"),
     ("phi", "theta", "psi"),
@@ -82,6 +91,14 @@ _ANGLES: Final = (
 _AXES: Final = (("x", "y", "z"), ("X", "Y", "Z"), ("N", "E", "D"))
 _QUATERNIONS: Final = (("w", "x", "y", "z"), ("W", "X", "Y", "Z"))
 _SHORTEST_NUMBERED, _LONGEST_NUMBERED = 3, 16
+_UNITS_BY_ENDING: Final[Mapping[str, Mapping[SignalName, UnitName]]] = {
+    "rad_s": {"body_rate": "rad/s", "rotor_speed": "rad/s", "rotor_command": "rad/s"},
+    "deg_s": {"body_rate": "deg/s"},
+    "m_s2": {"acceleration": "m/s^2"},
+    "m_s": {"velocity": "m/s"},
+    "m": {"position": "m"},
+}
+"""Units as keys of a config end in them, and the signals that have them."""
 
 
 def column_groups(names: Mapping[str, object] | tuple[str, ...]) -> tuple[ColumnGroup, ...]:
@@ -363,10 +380,11 @@ def _by_words(group: ColumnGroup) -> Iterator[Named]:
             continue
         allowed = frozenset({"thrust"}) if signal == "thrust" else frozenset()
         excluded = _NOT_MEASURED - allowed - (_ALLOWED_OF_ROTORS if signal in _ROTOR_SIGNALS else frozenset())
-        if not _suits(name, group) or excluded & set(words):
+        ending = _UNITS_BY_ENDING.get(group.unit)
+        if not _suits(name, group) or excluded & set(words) or (ending is not None and name not in ending):
             continue
         if _means(name, group, words, meant):
-            yield Named(name, group, rank, _unit(name, words))
+            yield Named(name, group, rank, _unit(name, words) if ending is None else ending[name])
 
 
 def _means(signal: SignalName, group: ColumnGroup, words: list[str], meant: set[str]) -> bool:
@@ -375,7 +393,7 @@ def _means(signal: SignalName, group: ColumnGroup, words: list[str], meant: set[
     if signal == "attitude" and group.kind == "angles":
         return not set(words) & (_WORDS["body_rate"] | _WORDS["body_torque"] | {"speed"})
     if signal == "body_rate" and group.kind == "angles":
-        return bool(set(words) & (meant | {"speed"})) or group.columns == ("p", "q", "r")
+        return bool(set(words) & (meant | {"speed"})) or _axes_of(group) == ("p", "q", "r")
     if signal in _ROTOR_SIGNALS:
         return _means_rotors(signal, group, words)
     if signal == "quaternion" and group.kind == "numbers":
@@ -385,6 +403,10 @@ def _means(signal: SignalName, group: ColumnGroup, words: list[str], meant: set[
     if signal == "velocity":
         return bool(set(words[-2:]) & meant) and not set(words) & {"angular", "acc", "acceleration", "a"}
     return bool(set(words) & meant)
+
+
+def _axes_of(group: ColumnGroup) -> tuple[str, ...]:
+    return tuple(column.removesuffix(f"_{group.unit}") for column in group.columns)
 
 
 def _means_position(group: ColumnGroup, words: list[str], meant: set[str]) -> bool:

@@ -34,7 +34,7 @@ from cpfls_cli.flightlog.log_table import (
     refuse_dead_rotors,
 )
 from cpfls_cli.flightlog.nameless import OF_A_MATRIX, nameless_signals
-from cpfls_cli.flightlog.names import Named, column_groups, named_signals
+from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals
 from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival, Sure
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_rotors
 from cpfls_cli.flightlog.settings import SignalMap, SignalName
@@ -97,7 +97,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         candidates = holding_values(log, nameless_signals(topics[""], log.clock("")))
     if not candidates:
         shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
-        raise InputError(f"no column is recognised as a signal of a flight (columns: {shown})")
+        raise InputError(f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}")
     refuse_dead_rotors(log, named, candidates)
     make_grid(log, candidates)
     return _Recogniser(log, candidates, parameters, system).result()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog.flown import find_flown
+from cpfls_cli.flightlog.names import BY_HAND
 
 TIME = np.arange(0.0, 40.0, 0.01)
 
@@ -60,7 +61,12 @@ def test_height_alone_tells_a_flight():
     [
         (0 * TIME, None, turning(0, 40), "nothing flies in it: the rotors stand all the time"),
         (0 * TIME + 0.3, 0 * TIME, 0 * TIME, "nothing flies in it: the vehicle neither turns nor moves"),
-        (None, None, None, "no rotors, no height and no rates are recognised, so a flight cannot be told from a stand"),
+        (
+            None,
+            None,
+            None,
+            f"no rotors, no height and no rates are recognised, so no flight can be told from a stand: {BY_HAND}",
+        ),
     ],
 )
 def test_what_does_not_fly_is_said_to(level, height, rate, reason):

@@ -46,6 +46,13 @@ def first(names, signal, system=""):
         ("om1 om2 om3 om4 omcmd1 omcmd2 omcmd3 omcmd4", "rotor_command", "omcmd1 omcmd2 omcmd3 omcmd4"),
         ("pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "rotor_command", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm"),
         ("u1 u2 u3 u4", "rotor_command", "u1 u2 u3 u4"),
+        # Named as keys of a config are, each with its unit.
+        ("p_rad_s q_rad_s r_rad_s", "body_rate", "p_rad_s q_rad_s r_rad_s"),
+        ("roll_rad pitch_rad yaw_rad p_rad_s q_rad_s r_rad_s", "attitude", "roll_rad pitch_rad yaw_rad"),
+        ("x_m y_m z_m vx_m_s vy_m_s vz_m_s", "position", "x_m y_m z_m"),
+        ("x_m y_m z_m vx_m_s vy_m_s vz_m_s", "velocity", "vx_m_s vy_m_s vz_m_s"),
+        ("ax_m_s2 ay_m_s2 az_m_s2", "acceleration", "ax_m_s2 ay_m_s2 az_m_s2"),
+        ("w1_rad_s w2_rad_s w3_rad_s w4_rad_s", "rotor_speed", "w1_rad_s w2_rad_s w3_rad_s w4_rad_s"),
         # The first instance of a topic bears no number.
         ("ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM", "rotor_speed", "ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM"),
     ],
