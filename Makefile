@@ -13,7 +13,7 @@ export OPENBLAS_NUM_THREADS := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help reproduce reproduce-full quick hexarotor full-circle crazyflie gap-example replay-example test lint bench blind-study blind-quick clean FORCE
+.PHONY: help reproduce reproduce-full quick hexarotor full-circle crazyflie gap-example replay-example test lint bench blind-study blind-quick fuzz clean FORCE
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
@@ -28,6 +28,7 @@ help:
 	@echo "  make bench       benchmarks, as Markdown tables"
 	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
 	@echo "  make blind-quick [SIZE=...]                          a few sets of each group in six minutes"
+	@echo "  make fuzz [EACH=N KILLS=N]   hostile files and killed commands against all that reads and writes them"
 	@echo "  make clean       remove what studies produced"
 
 reproduce: data/paper/report.html
@@ -319,6 +320,12 @@ blind-study: $(INSTALLED_DEV)
 # A few sets of each group on a seed for development: what a change of the rules does. Flights are flown once and kept.
 blind-quick: $(INSTALLED_DEV)
 	$(BIN)/python -m benchmarks.blind_study quick --out data/blind-quick --seed 31 --processes 1 $(SIZE)
+
+# Hostile files and killed commands, as two tables; hours at full size. FUZZ takes more options.
+EACH := 10000
+KILLS := 100
+fuzz: $(INSTALLED_DEV)
+	$(BIN)/python -m benchmarks.fuzz --each $(EACH) --kills $(KILLS) $(FUZZ)
 
 clean:
 	rm -rf data/paper data/quick data/hexarotor data/full-circle data/crazyflie data/gap-example data/replay-example
