@@ -132,14 +132,19 @@ def _describe_effect(entry: Effect) -> dict[str, Any]:
         "kind": entry.kind,
         "formula": entry.formula,
         "sentence": entry.sentence,
-        "coefficients": [_describe_coefficient(coefficient) for coefficient in entry.coefficients],
-        "shapes": [vars(shape) for shape in entry.shapes],
+        "coefficients": [_describe_coefficient(coefficient) for coefficient in _whole(entry).coefficients],
+        "shapes": [vars(shape) for shape in _whole(entry).shapes],
         "needs": sorted(entry.needs),
         "seen_in": "sensors alone" if entry.columns is None else "torque and force",
         "excitation": entry.excitation,
         "rivals": dict(entry.rivals),
         "source": entry.source,
     }
+
+
+def _whole(entry: Effect) -> Effect:
+    """Give an effect with all numbers that the last fit of a diagnosis finds."""
+    return entry.exact or entry
 
 
 def _describe_coefficient(coefficient: Coefficient) -> dict[str, Any]:
@@ -152,8 +157,8 @@ def _effect_blocks(entry: Effect) -> Iterator[Block]:
     yield Text(f"{entry.name}: {entry.title} ({entry.kind})")
     facts = [("", entry.sentence), ("formula", entry.formula)]
     facts.append(("needs", ", ".join(sorted(entry.needs)) or "rates and torque alone"))
-    facts += [("coefficient", _coefficient_text(coefficient)) for coefficient in entry.coefficients]
-    facts += [("shape", _shape_text(shape)) for shape in entry.shapes]
+    facts += [("coefficient", _coefficient_text(coefficient)) for coefficient in _whole(entry).coefficients]
+    facts += [("shape", _shape_text(shape)) for shape in _whole(entry).shapes]
     if entry.coefficients:
         facts.append(("", f"Ranges are for the vehicle: {_vehicle_name()}."))
     facts.append(("excitation", entry.excitation))

@@ -116,10 +116,11 @@ def _outcomes(asked: QuestionGroup) -> Iterator[str]:
             yield f"If the diagnosis then names {true}, it is there; if not, it is {absent}. {taken}".rstrip()
             continue
         chance = max(other["wrong"] for other in rows if {other["true"], other["rival"]} == {true, rival})
+        surely = f"Surely told from {least} on. " if least else ""
         error = f"less than {100 * _RARE:g} %" if chance < _RARE else f"{100 * chance:.2g} %"
         yield (
             f"If the diagnosis then names {true} alone, it is {true} and not {rival} (by chance the wrong one of the "
-            f"two is named in {error} of flights). {taken}Surely told from {least} on. By hand: {row['advice']}."
+            f"two is named in {error} of flights). {taken}{surely}By hand: {row['advice']}."
         )
     if any(asked.rival):
         yield (

@@ -21,6 +21,11 @@ def test_one_effect_tells_its_range_and_its_rivals(cpfls):
     assert all(re.search(f"^looks like  +{rival}; to tell: ", text, re.MULTILINE) for rival in CATALOGUE["wind"].rivals)
 
 
+def test_what_takes_an_effects_place_once_it_is_named_is_listed(cpfls):
+    text = cpfls("effects", "com_offset").stdout
+    assert re.findall(r"^coefficient +(c_.) from", text, re.MULTILINE) == ["c_x", "c_y", "c_z"]
+
+
 def test_machines_get_the_same(cpfls):
     summary = json.loads(cpfls("effects", "motor_lag", "--json").stdout)
     assert (summary["kind"], summary["shapes"][0]["name"]) == ("actuator", "time_constant_s")
