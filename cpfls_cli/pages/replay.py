@@ -92,7 +92,7 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     good = all(better[name] for name in moving)
     signals = joined(_SIGNALS[name][0] for name in moving if better[name] == good)
     title = f"{_name(record)} predicts {'better' if good else 'worse'} than what it has to beat"
-    whole = sentence(f"{title}, over {_seconds(record.horizon_s[-1])}: {signals}")
+    whole = sentence(f"{title}, summed over all horizons to {_seconds(record.horizon_s[-1])}: {signals}")
     return Box("REPLAY", whole, sentences, "good" if good else "warning")
 
 

@@ -216,7 +216,7 @@ def test_people_read_to_which_horizon_it_is_better(cpfls, gap_config, extended, 
     result = cpfls("replay", gap_config, extended, shifted[0], "-o", tmp_path / "r.h5", *FAST)
     assert result.exit_code == 0
     assert result.stdout.startswith(
-        "REPLAY: extended.h5 predicts better than what it has to beat, over 0.5 s: body rate."
+        "REPLAY: extended.h5 predicts better than what it has to beat, summed over all horizons to 0.5 s: body rate."
     )
     assert "better than “nothing moves” at" in result.stdout
     assert "% smaller" in result.stdout
