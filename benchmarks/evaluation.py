@@ -85,7 +85,7 @@ def local_search(training, learned, settings: IdentificationSettings) -> tuple[f
     for start in starts:
         weights, fit = start / LARGEST_GENE, fast.fit(start)
         assert fit is not None
-        problem = Problem(fast.solver, fit, fast.judge)
+        problem = Problem(fast.solver, fit)
         products = fast.solver.products(decode(fast.structure, start.astype(float)))
         found: list[np.ndarray] = []
         slow = seconds(lambda: found.append(encode(reference.refine(weights))))  # noqa: B023

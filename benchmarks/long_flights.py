@@ -113,7 +113,7 @@ def measure(path: Path) -> dict[str, float]:
             for _ in range(EVALUATIONS)
         ]
     )
-    problem = Problem(evaluator.solver, fitted(evaluator, chromosome), evaluator.judge)
+    problem = Problem(evaluator.solver, fitted(evaluator, chromosome))
     products = evaluator.solver.products(decode(evaluator.structure, chromosome.astype(float)))
     search = per_sample(partial(refine, problem, chromosome, products, BUDGET), source)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -24,7 +24,7 @@ _FIRST_DAMPING = 1e-3
 _TRUSTED, _DISTRUSTED = 0.75, 0.25
 _LOWER, _RAISE = 0.1, 1e3
 # Weights keep this share in one step: a function that gets narrow at once is one that falls between samples.
-_KEPT = 0.6
+_KEPT = 0.85
 # Below this share of the torque the difference of two sums has lost too many digits to compare by.
 _SMALL_ERROR = 1e-9
 
@@ -44,9 +44,7 @@ class Point:
         Cholesky factor of the matrix whose rows and columns are multiplied by `scale`.
     scale : array, shape (columns,)
     square : float
-        Sum of the squared residuals of the samples that judge, and of the penalty.
-    learned_square : float
-        The same of the samples that the parameters are learned from, up to rounding.
+        Smallest sum of squared residuals, penalty included.
     """
 
     genes: IntArray
@@ -56,7 +54,6 @@ class Point:
     factor: tuple[Array, bool]
     scale: Array
     square: float
-    learned_square: float
 
 
 @dataclass(frozen=True)
@@ -71,25 +68,24 @@ class Problem:
     solver : Solver
     start : Fit
         The fit at the start; its ridge weight is finite.
-    judge : Samples
-        The error over these decides whether a step was good.
     """
 
     solver: Solver
     start: Fit
-    judge: Samples
 
     def point(self, genes: IntArray, products: Products) -> Point:
         """Solve for the linear parameters of a chromosome, whose products are given."""
         total = products.sum()
         equations = self.solver.equations(total, self.start.ridge_weight, self.start.column_size)
         solution, factor, scale = quick_solution(equations)
-        square = learned = float(total.square[0] - equations.moment @ solution)
-        if self.judge is not self.solver.learned or square < _SMALL_ERROR * total.square[0]:
+        square = float(total.square[0] - equations.moment @ solution)
+        if square < _SMALL_ERROR * total.square[0]:
             parameters = self.solver.parameters(solution, self.start.column_size)
-            partitions = decode(self.judge.structure, genes.astype(float))
-            square = float(self.judge.errors(partitions, *parameters)[0].sum() + equations.penalty @ solution**2)
-        return Point(genes, products, equations, solution, factor, scale, square, learned)
+            partitions = decode(self.solver.learned.structure, genes.astype(float))
+            square = float(
+                self.solver.learned.errors(partitions, *parameters)[0].sum() + equations.penalty @ solution**2
+            )
+        return Point(genes, products, equations, solution, factor, scale, square)
 
     def linearised(self, point: Point) -> tuple[Array, Array]:
         """Give ``J^T J`` and ``J^T r`` of residual r and Jacobian J by the weights, by Kaufman's approximation.
@@ -157,7 +153,7 @@ def _changed(before: Point, after: Point, normal: Array, gradient: Array) -> flo
     """Factor of the damping after a good step: how much of what was promised has come."""
     step = (after.genes - before.genes) / LARGEST_GENE
     promised = -float(2.0 * gradient @ step + step @ normal @ step)
-    came = before.learned_square - after.learned_square
+    came = before.square - after.square
     return _LOWER if came > _TRUSTED * promised else _RAISE if came < _DISTRUSTED * promised else 1.0
 
 
@@ -272,8 +268,7 @@ class Evaluator:
             return chromosome, NOT_DEFINED
         objectives = self.objectives(chromosome, fit)
         if self._refines(fit):
-            problem = Problem(self.solver, fit, self.solver.learned if self.cross_validated else self.judge)
-            refined = refine(problem, chromosome, products, self.local_search.evaluations)
+            refined = refine(Problem(self.solver, fit), chromosome, products, self.local_search.evaluations)
             better = self._fit(refined.genes, refined.products) if refined.products is not products else None
             after = NOT_DEFINED if better is None else self.objectives(refined.genes, better)
             if after[0] < objectives[0]:

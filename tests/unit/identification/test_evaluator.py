@@ -68,7 +68,7 @@ def problem(structure, base, samples=120):
 def local_problem(evaluator, rng):
     """The problem of refining random genes, and these: the fit at the start gives its ridge and column sizes."""
     genes = encode(rng.uniform(0.3, 0.9, evaluator.structure.genes))
-    return Problem(evaluator.solver, evaluator.fit(genes), evaluator.solver.learned), genes
+    return Problem(evaluator.solver, evaluator.fit(genes)), genes
 
 
 def point_at(problem, weights):

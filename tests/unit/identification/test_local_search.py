@@ -44,7 +44,7 @@ def test_a_step_is_the_minimum_of_the_damped_model_between_the_bounds(seed, damp
     weights[0] = 1.0
     normal, gradient = J.T @ J, 3.0 * J.T @ r
     damped = np.linalg.cholesky(normal + damping * np.diag(np.diag(normal))).T
-    low = 0.6 * weights - weights
+    low = 0.85 * weights - weights
     expected = lsq_linear(damped, -np.linalg.solve(damped.T, gradient), (low, np.fmax(1.0 - weights, 1e-300)))
     found = stepped(weights, normal, gradient, damping) - weights
 
@@ -84,7 +84,7 @@ def test_a_refinement_spends_its_budget_and_hands_back_the_products_of_its_genes
     genes = np.random.default_rng(51).integers(20000, LARGEST_GENE, evaluator.structure.genes)
     partitions = decode(evaluator.structure, genes.astype(float))
     products, calls = evaluator.solver.products(partitions), []
-    problem = Problem(evaluator.solver, evaluator.solver.fit(partitions, products), evaluator.judge)
+    problem = Problem(evaluator.solver, evaluator.solver.fit(partitions, products))
     counted = Samples.products
     monkeypatch.setattr(Samples, "products", lambda self, at: calls.append(at) or counted(self, at))
     found = refine(problem, genes, products, evaluations)
@@ -92,4 +92,4 @@ def test_a_refinement_spends_its_budget_and_hands_back_the_products_of_its_genes
     again = evaluator.solver.products(decode(evaluator.structure, found.genes.astype(float)))
     np.testing.assert_array_equal(found.products.gram, again.gram)
     start = problem.point(genes, products).square
-    assert found.square < start if evaluations == 4 else found.square <= start
+    assert found.square < start if evaluations > 1 else found.square == start

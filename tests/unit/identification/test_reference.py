@@ -141,7 +141,7 @@ def test_local_search_ends_in_the_minimum_beside_its_start(seed):
 
     start = weights * rng.uniform(0.98, 1.02, structure.genes)
     genes = encode(start)
-    problem = Problem(fast.solver, fit(genes.astype(float)), fast.judge)
+    problem = Problem(fast.solver, fit(genes.astype(float)))
     refined = refine(problem, genes, fast.solver.products(decode(structure, genes.astype(float))), 20)
     # One step more, which is not rounded to genes.
     last = stepped(refined.genes / LARGEST_GENE, *problem.linearised(refined), damping=1e-6)
