@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.commands.stopped import stopped, without_model
 from cpfls_cli.config.study import generator, settings_of
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.flights.inputs import choosing_source, held_out_parts, input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.flights.training import TrainingData, read_training
@@ -110,7 +110,7 @@ def _identify(
     except WorkerError:
         # Says where it evaluated; nothing is wrong with the flights.
         raise
-    except ComputationError as error:
+    except (ComputationError, ConfigError) as error:
         raise _of(flights, error) from None
 
 
@@ -122,8 +122,9 @@ def _with_length(result: Identification, flights: Sequence[Path], data: Training
     return result if short is None else replace(result, findings=(*result.findings, short))
 
 
-def _of(flights: Sequence[Path], error: ComputationError) -> ComputationError:
-    return ComputationError(f"{' '.join(str(path) for path in flights)}: {error}")
+def _of(flights: Sequence[Path], error: ComputationError | ConfigError) -> ComputationError | ConfigError:
+    kind = ConfigError if isinstance(error, ConfigError) else ComputationError
+    return kind(f"{' '.join(str(path) for path in flights)}: {error}")
 
 
 def _shown(job: Job) -> Callable[[SearchStep], None]:

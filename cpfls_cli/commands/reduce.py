@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.config.study import generator, settings_of
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.flights.training import flight_roles, split_training, uniform_regressor
 from cpfls_cli.pages.selection import answer
 from cpfls_cli.pages.source import source_of
@@ -44,5 +44,6 @@ def run(job: Job, flights: Sequence[Path]) -> Outcome:
 def _naming(flights: Sequence[Path]) -> Iterator[None]:
     try:
         yield
-    except ComputationError as error:
-        raise ComputationError(f"{' '.join(str(path) for path in flights)}: {error}") from None
+    except (ComputationError, ConfigError) as error:
+        kind = ConfigError if isinstance(error, ConfigError) else ComputationError
+        raise kind(f"{' '.join(str(path) for path in flights)}: {error}") from None

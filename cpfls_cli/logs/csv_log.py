@@ -16,7 +16,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.formats import LogContents
+from cpfls_cli.logs.formats import LogContents, some
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -26,7 +26,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     names, first = _first_row(path)
     numeric = [name for name, text in zip(names, first, strict=False) if _is_number(text)]
     left_out = sorted(set(names) - set(numeric))
-    warnings = (f"columns that hold text are left out: {', '.join(left_out)}",) if left_out else ()
+    warnings = (f"columns that hold text are left out: {some(left_out)}",) if left_out else ()
     columns = read_csv(path, set(numeric))
     return LogContents({"": {name: columns[name] for name in numeric}}, warnings=warnings)
 

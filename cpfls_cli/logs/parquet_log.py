@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -12,9 +14,12 @@ from pyarrow import parquet
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.formats import LogContents
+from cpfls_cli.logs.formats import LogContents, some
 
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
+
+_LONGEST = 200
+"""Characters of a message of the library, which may list all columns."""
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -32,20 +37,22 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
             _require_single(path, kept)
             table = file.read(columns=kept)
     except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"{path}: cannot be read as Parquet: {str(error).splitlines()[0]}") from None
+        raise InputError(
+            f"{path}: cannot be read as Parquet: {shorten(str(error).splitlines()[0], _LONGEST, placeholder=' ...')}"
+        ) from None
     if file.metadata.num_rows == 0:
         raise InputError(f"{path}: holds column names but no samples")
     left_out = [name for name in kept if wanted is None and not _is_numeric(schema.field(name).type)]
     columns: dict[str, Array] = {name: np.empty(0) for name in schema.names if name not in left_out}
     for name in set(columns) & set(kept):
         columns[name] = _numbers(path, name, table.column(name))
-    warnings = (f"columns that hold no numbers are left out: {', '.join(left_out)}",) if left_out else ()
+    warnings = (f"columns that hold no numbers are left out: {some(left_out)}",) if left_out else ()
     units = {name: "s" for name in set(columns) & set(kept) if _states_unit(schema.field(name).type)}
     return LogContents({"": columns}, units, warnings=warnings)
 
 
 def _require_single(path: Path, names: list[str]) -> None:
-    repeated = sorted({name for name in names if names.count(name) > 1})
+    repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
         raise InputError(f"{path}: column '{repeated[0]}' stands twice")
 

@@ -123,6 +123,9 @@ def _connected(address: str, patience_s: float) -> Iterator[Client]:
                 # Dask warns of versions that differ; here those that matter are an error.
                 warnings.simplefilter("ignore")
                 client = Client(address, timeout=patience_s, set_as_default=False)
+        except TypeError as error:
+            # What Dask makes of an address with TLS where its settings name no certificates, or wrong ones.
+            raise WorkerError(f"{address}: no connection with TLS: {str(error).splitlines()[0]}") from error
         except (OSError, ImportError) as error:
             raise WorkerError(
                 f"no Dask scheduler of a fitting version answers at {address} within {patience_s:g} s: start one with "

@@ -17,7 +17,9 @@ from cpfls_cli.report.numbers import number
 )
 def test_size_that_does_not_suit_the_flight(refuse, pipeline, study, tmp_path, size, message, dry):
     words = ("-o", tmp_path / "out.h5", "--set", f"reduction.size={size}", *dry)
-    assert refuse("reduce", study, pipeline.flight, *words) == [f"reduction.size = {size}: {message}"]
+    assert refuse("reduce", study, pipeline.flight, *words) == [
+        f"{pipeline.flight}: reduction.size = {size}: {message}"
+    ]
 
 
 def test_all_samples_can_be_asked_for(cpfls, pipeline, study, tmp_path):
