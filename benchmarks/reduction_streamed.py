@@ -28,8 +28,8 @@ import numpy as np
 
 from benchmarks.shared.studies import paper_flight, paper_study
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.reduction import CriterionName, ReductionSettings, Survey, survey
-from cpfls_cli.reduction.survey import space_of
+from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
+from cpfls_cli.reduction.survey import Survey, space_of, survey
 from cpfls_cli.reduction.training_set import Pool, choose, draw_pool
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cpfls_cli.flightlog.results import ImportedFlight
     from cpfls_cli.identification.model import Model
     from cpfls_cli.regressor.motion import Motion
-    from cpfls_cli.simulation import SimulatedEffects
+    from cpfls_cli.simulation.model import SimulatedEffects
 
 MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
 """Fields of trajectories and flights that hold Euler angles and their derivatives."""

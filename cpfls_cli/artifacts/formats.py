@@ -38,9 +38,6 @@ RECORDS: tuple[type[Record], ...] = (
 )
 """Every artifact format."""
 
-FORMATS = tuple(record.spec() for record in RECORDS)
-"""Their specifications."""
-
 # Of a line of docs.
 _WIDTH = 120
 _HEAD = "| dataset | dimensions | units | frame | required | description |\n|---|---|---|---|---|---|"
@@ -59,7 +56,7 @@ def format_tables() -> str:
     str
         Markdown, one section for each format.
     """
-    return "\n".join(_section(spec) for spec in FORMATS)
+    return "\n".join(_section(record.spec()) for record in RECORDS)
 
 
 def _section(spec: ArtifactSpec) -> str:

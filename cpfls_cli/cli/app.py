@@ -660,9 +660,9 @@ def config_(
 ) -> None:
     """Print the resolved config; without CONFIG, a commented default."""
     with messages_for_errors():
-        from cpfls_cli.commands import show
+        from cpfls_cli.commands import config as command
 
-        tell(show.config(config, section or [], common.overrides or [], common.seed), common)
+        tell(command.run(config, section or [], common.overrides or [], common.seed), common)
 
 
 @app.command()
@@ -676,9 +676,9 @@ def effects(
 ) -> None:
     """Show the effects that a model can miss, and the flights that tell them apart."""
     with messages_for_errors():
-        from cpfls_cli.commands import show
+        from cpfls_cli.commands import effects as command
 
-        tell(show.effects(name), common)
+        tell(command.run(name), common)
 
 
 def _run(title: str, config: Path, output: Path, common: Common, call: Callable[[Job], Outcome]) -> None:

@@ -29,16 +29,9 @@ from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.trajectory import violation_sentence
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.simulation import (
-    MeasuredFlight,
-    SimulatedFlight,
-    SimulatedModel,
-    measure,
-    simulate,
-    simulated_effects,
-    simulated_model,
-    simulated_vehicle,
-)
+from cpfls_cli.simulation.inverse import SimulatedFlight, simulate
+from cpfls_cli.simulation.measured import MeasuredFlight, measure
+from cpfls_cli.simulation.model import SimulatedModel, simulated_effects, simulated_model, simulated_vehicle
 from cpfls_cli.simulation.settings import Mode
 
 _MOVED = ("position", "velocity", "acceleration")

@@ -41,8 +41,8 @@ from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.tracking import answer
 from cpfls_cli.report.outcome import Outcome, nothing_written
-from cpfls_cli.simulation import ComputedTorqueSettings
 from cpfls_cli.simulation.measured import noisy
+from cpfls_cli.simulation.settings import ComputedTorqueSettings
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -30,18 +30,11 @@ from cpfls_cli.pages.trajectory import (
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
-from cpfls_cli.trajectory import (
-    PlannedRotation,
-    RotationPath,
-    Trajectory,
-    TrajectorySettings,
-    full_rotation,
-    held_rotation,
-    plan,
-)
 from cpfls_cli.trajectory.consistency import check_waypoints
 from cpfls_cli.trajectory.legs import Leg
-from cpfls_cli.trajectory.settings import WaypointSettings
+from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rotation, plan
+from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
+from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
 
 PlanAt = Callable[[float], PlannedRotation]
 """Samples a plan with a sample time in s."""

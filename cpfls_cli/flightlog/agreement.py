@@ -7,12 +7,12 @@ from itertools import permutations, product
 from typing import Final
 
 import numpy as np
-from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.repair import align_quaternion_signs
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
+from cpfls_cli.units import STANDARD_GRAVITY
 
 _FILTER_ORDER = 2
 _EDGE_S = 0.5
@@ -204,7 +204,7 @@ def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Arra
     """
     axis = rotation.as_matrix()[:, :, 2]
     upright = np.where(np.abs(axis[:, 2:]) < 0.2, 0.2, axis[:, 2:])
-    lean = slow(standard_gravity * axis[:, :2] / np.abs(upright), rate_hz, _TILT_HZ)
+    lean = slow(STANDARD_GRAVITY * axis[:, :2] / np.abs(upright), rate_hz, _TILT_HZ)
     ground = slow(acceleration[:, :2], rate_hz, _TILT_HZ)
     lean, ground = lean - lean.mean(axis=0), ground - ground.mean(axis=0)
     power, total = float((lean**2).sum()), float((ground**2).sum())

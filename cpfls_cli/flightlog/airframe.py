@@ -9,12 +9,12 @@ from math import cos, hypot, pi, radians, sin
 from typing import Final
 
 import numpy as np
-from scipy.constants import g as standard_gravity
 from scipy.signal import lfilter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
+from cpfls_cli.units import STANDARD_GRAVITY
 
 Parameters = Mapping[str, float | str]
 _ACCELERATION_HZ = 12.0
@@ -337,4 +337,4 @@ def thrust_number(mass_kg: float, arm_m: float, speed: Array) -> float:
     rotors = speed.shape[1]
     diameter = 2 * arm_m * sin(pi / rotors)
     turns = (speed / (2 * pi)) ** 2
-    return float(mass_kg * standard_gravity / (_AIR_KG_M3 * turns.mean(axis=0).sum() * diameter**4))
+    return float(mass_kg * STANDARD_GRAVITY / (_AIR_KG_M3 * turns.mean(axis=0).sum() * diameter**4))

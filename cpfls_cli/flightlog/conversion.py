@@ -8,7 +8,6 @@ from difflib import get_close_matches
 from typing import Literal
 
 import numpy as np
-from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
@@ -16,7 +15,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import ColumnMap, ImportSettings, SignalMap
-from cpfls_cli.units import to_si
+from cpfls_cli.units import STANDARD_GRAVITY, to_si
 
 _SUFFICIENT_SIGNALS = ("attitude", "quaternion", "body_rate", "rotor_speed", "rotor_command")
 _WORLD_SIGNALS = ("position", "velocity", "acceleration")
@@ -345,5 +344,5 @@ def acceleration_from_specific_force(attitude: Array, specific_force: Array) -> 
     array, shape (time, 3), m/s^2, world frame ENU
     """
     acceleration: Array = rotations.multiply(rotations.rotation_matrix(attitude), specific_force)
-    acceleration[:, 2] -= standard_gravity
+    acceleration[:, 2] -= STANDARD_GRAVITY
     return acceleration

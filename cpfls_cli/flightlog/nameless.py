@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
@@ -22,6 +21,7 @@ from cpfls_cli.flightlog.agreement import (
 )
 from cpfls_cli.flightlog.names import ColumnGroup, Named
 from cpfls_cli.flightlog.settings import SignalName
+from cpfls_cli.units import STANDARD_GRAVITY
 
 _FEWEST_COLUMNS = 12
 _STEPS_S = (2e-4, 0.2)
@@ -86,7 +86,7 @@ class _Matrix:
         self.names, self.table, self.grid, self.time = names, table, grid, time
         self.rate_hz = 1 / float(grid[1] - grid[0])
         self.taken: set[int] = set()
-        self.carried: tuple[float, ...] = (standard_gravity,)
+        self.carried: tuple[float, ...] = (STANDARD_GRAVITY,)
 
     def runs(self, length: int) -> Iterator[tuple[int, Array]]:
         """Go through the runs of neighbours of which none is taken."""
@@ -156,7 +156,7 @@ class _Matrix:
     def _sizes(self, place: int) -> tuple[float, ...]:
         """Give the usual size of what carries the vehicle, z of the position upward and downward."""
         moving = second_derivative(self.table[:, place : place + 3], self.rate_hz)
-        sizes = (np.linalg.norm(moving + np.array([0.0, 0.0, up * standard_gravity]), axis=1) for up in (1.0, -1.0))
+        sizes = (np.linalg.norm(moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]), axis=1) for up in (1.0, -1.0))
         return tuple(float(np.median(size)) for size in sizes)
 
     def _accelerometer(self) -> int | None:

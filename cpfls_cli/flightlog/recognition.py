@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
-from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
@@ -39,7 +38,7 @@ from cpfls_cli.flightlog.recognised import Choice, Guess, Recognition, Rival, Su
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_rotors
 from cpfls_cli.flightlog.settings import SignalMap, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
-from cpfls_cli.units import UnitName, known_unit
+from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 
 _DEGREES = 180 / np.pi
 _CLEAR, _GOOD = 0.3, 0.6
@@ -55,7 +54,7 @@ _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 _LARGEST_ANGLE = 6.6
 _LARGEST_TILT = 1.7
 _SENSED: Final[tuple[tuple[float, UnitName, float], ...]] = (
-    (standard_gravity, "m/s^2", 1.0),
+    (STANDARD_GRAVITY, "m/s^2", 1.0),
     (1.0, "g", 1.0),
     (1000.0, "g", 1e-3),
     (2048.0, "g", 1 / 2048),
@@ -513,7 +512,7 @@ class _Recogniser:
                 " ground does not explain it"
             )
             return False
-        unit: UnitName = "g" if abs(np.log(along_world.gain * standard_gravity)) < np.log(2) else "m/s^2"
+        unit: UnitName = "g" if abs(np.log(along_world.gain * STANDARD_GRAVITY)) < np.log(2) else "m/s^2"
         self.guesses["acceleration"] = Guess(
             signal="acceleration",
             columns=SignalMap(columns=named.group.columns, unit=stated or unit, scale=named.scale),
@@ -533,8 +532,8 @@ class _Recogniser:
             return 1.0
         moving = second_derivative(self.grid(position), self.rate_hz) / (1000.0 if tilt.gain > 100 else 1.0)
         up = tilt.sign[2] * (1.0 if tilt.body == "FLU" else -1.0)
-        size = np.linalg.norm(moving + np.array([0.0, 0.0, up * standard_gravity]), axis=1)
-        return float(np.median(size)) / standard_gravity
+        size = np.linalg.norm(moving + np.array([0.0, 0.0, up * STANDARD_GRAVITY]), axis=1)
+        return float(np.median(size)) / STANDARD_GRAVITY
 
     def _world_acceleration(self) -> Array | None:
         position, velocity = self.first("position"), self.guesses.get("velocity")

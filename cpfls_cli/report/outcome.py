@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cpfls_cli.artifacts.job import Job
 from cpfls_cli.report.content import Block, Text
+
+if TYPE_CHECKING:
+    from cpfls_cli.artifacts.job import Job
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from benchmarks.shared.flight_csv import write_flight
 from benchmarks.shared.playback_scores import HORIZON, Runs, as_published, nothing_moves, rate_stays, score
 from cpfls_cli.config.load import load_study
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog import import_log
+from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Motion

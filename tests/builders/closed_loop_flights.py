@@ -3,7 +3,8 @@
 import numpy as np
 
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.simulation import ClosedLoopSettings, SimulationSettings, measure
+from cpfls_cli.simulation.measured import measure
+from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.attitude import flat_attitude
 from cpfls_cli.vehicle import RotorSettings, VehicleSettings
 

@@ -4,9 +4,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification import TorqueData
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.regressor import Motion
-from cpfls_cli.trajectory import full_rotation
+from cpfls_cli.trajectory.rotation import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
 
 INERTIA = np.diag([0.6, 0.7, 1.2])

@@ -3,7 +3,7 @@
 import json
 import re
 
-from cpfls_cli.commands.show import effects
+from cpfls_cli.commands.effects import run as effects
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.report.terminal import terminal_lines
 

@@ -38,6 +38,11 @@ def test_the_python_interface_loads_nothing_heavy_before_it_is_used():
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "[]\n"
 
 
+def test_what_only_reads_loads_neither_compiled_loops_nor_scipy(pipeline, study):
+    commands = ("info", pipeline.model), ("check", pipeline.model), ("check", pipeline.flight), ("config", study)
+    assert loaded(*commands, ("config",)) == ["h5py", "numpy", "pydantic", "yaml"]
+
+
 def test_what_is_printed_loads_no_plotting(pipeline, study, tmp_path):
     short = "trajectory={legs: 1, displacement_m: 1.0, period_s: 0.18, duration_s: 3.0, yaw_turn_rad: 0.3}"
     packages = loaded(

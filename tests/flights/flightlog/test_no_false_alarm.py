@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.flightlog import ImportSettings, SignalMap, read_signals
+from cpfls_cli.flightlog.importing import read_signals
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from tests.builders.recorded_flights import columns_of_log
 
 ARPL = {

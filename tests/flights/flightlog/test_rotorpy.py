@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
+from cpfls_cli.flightlog.importing import import_log
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.smoothing import derivative
 from tests.builders.recorded_flights import columns_of_log
 

@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cpfls_cli.reduction import ReductionSettings, random_selections, reduce
+from cpfls_cli.reduction.settings import ReductionSettings
+from cpfls_cli.reduction.training_set import random_selections, reduce
 from cpfls_cli.regressor import (
     Motion,
     Regressor,
@@ -17,7 +18,8 @@ from cpfls_cli.regressor import (
     model_structure,
     uniform_breakpoints,
 )
-from cpfls_cli.trajectory import TrajectorySettings, plan
+from cpfls_cli.trajectory.planning import plan
+from cpfls_cli.trajectory.settings import TrajectorySettings
 
 
 @pytest.fixture(scope="module")

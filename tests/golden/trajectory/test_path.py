@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.trajectory import TrajectorySettings, plan
+from cpfls_cli.trajectory.planning import plan
+from cpfls_cli.trajectory.settings import TrajectorySettings
 
 
 @pytest.fixture(scope="module", params=[("along-path", [10.662, 9.480]), ("per-axis", [19.864, 17.762])])

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.settings import LocalSearchSettings
+from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from tests.builders.flights import random_motion, rigid_torque
 
 SEESAW = {"consequents": "seesaw", "products": "additive"}

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from cpfls_cli.trajectory import BaseProfile, Holds
+from cpfls_cli.trajectory.profile import BaseProfile, Holds
 
 hold = st.one_of(st.just(0.0), st.floats(0.01, 3.0))
 profiles = st.builds(

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.chromosome import decode
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.validation import bands
 from cpfls_cli.validation.bands import band, inertia_band, torque_band
 from cpfls_cli.validation.bootstrap import bootstrap

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification import Model
+from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.validation.physical import energy_share, physical_sense
 

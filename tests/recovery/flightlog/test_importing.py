@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError, InputError, SettingError
-from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
+from cpfls_cli.flightlog.importing import import_log
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.smoothing import derivative
 from cpfls_cli.rotations import body_acceleration, body_rate, generalised_torque
 

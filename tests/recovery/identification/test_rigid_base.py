@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
-from cpfls_cli.identification import IdentificationSettings, TorqueData
-from cpfls_cli.identification.data import axis_scale
+from cpfls_cli.identification.data import TorqueData, axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
+from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Regressor, data_ranges, model_structure, uniform_breakpoints
 from tests.builders.flights import bent_torque, random_motion, rigid_torque
 

@@ -5,7 +5,9 @@ import pytest
 
 from cpfls_cli import rotations
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.identify import identify
+from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion
 
 INERTIA = np.diag([0.6, 0.65, 1.2])

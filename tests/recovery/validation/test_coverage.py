@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque, rigid_columns
-from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.chromosome import uniform_chromosome
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.validation.bands import band, inertia_band
 from cpfls_cli.validation.bootstrap import BlockScores, bootstrap

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification import Model, TorqueData
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.validation.replay import replay_steps

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.chromosome import uniform_chromosome
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor import Motion, uniform_breakpoints
 from cpfls_cli.validation.bands import inertia_band
 from cpfls_cli.validation.bootstrap import bootstrap

@@ -6,8 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
-from cpfls_cli.identification.settings import LocalSearchSettings
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.identify import identify
+from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.validation.grounds import Grounds
 from cpfls_cli.validation.paired import Comparison, compare_torque

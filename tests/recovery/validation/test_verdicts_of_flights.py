@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
-from cpfls_cli.identification.settings import LocalSearchSettings, ValidationSettings
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.identify import identify
+from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings, ValidationSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import generalised_torque

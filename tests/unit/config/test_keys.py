@@ -5,7 +5,7 @@ from typing import get_args
 from cpfls_cli.config.keys import commented_default, keys_of, known_keys
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import SECTIONS, Study
-from cpfls_cli.flightlog import SignalName
+from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.units import KNOWN_UNITS
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.flightlog import ImportSettings
 from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals, warn_of_cut_offs, warn_of_slow
 from cpfls_cli.flightlog.repair import SignalTable
+from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import low_pass
 from tests.builders.closed_loop_flights import flown, signals_of
 

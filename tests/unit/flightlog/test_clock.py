@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog import ImportSettings, SignalMap, read_signals
+from cpfls_cli.flightlog.importing import read_signals
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
 RATE = {"body_rate": SignalMap(columns=("p", "q", "r"), unit="rad/s")}
 STAMPS = 0.01 * np.arange(3000)

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
 from cpfls_cli.flightlog.conversion import acceleration_from_specific_force, attitude_to_enu_flu, to_program_frames
+from cpfls_cli.flightlog.importing import import_log
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
 NAMES = ("roll", "pitch", "yaw")
 

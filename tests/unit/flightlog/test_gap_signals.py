@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
+from cpfls_cli.flightlog.importing import import_log
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.smoothing import low_pass
 
 TIME = 0.01 * np.arange(400)

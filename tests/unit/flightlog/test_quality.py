@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.flightlog import ImportSettings, SignalMap, import_log
+from cpfls_cli.flightlog.importing import import_log
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.rotations import body_rate
 
 TIME = np.arange(2000) / 250

@@ -3,7 +3,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.flightlog import ImportSettings, SignalMap
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
 ATTITUDE = SignalMap(columns=("a", "b", "c"), unit="deg")
 RATE = SignalMap(columns=("p", "q", "r"), unit="rad/s")

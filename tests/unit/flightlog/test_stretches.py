@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.flightlog import ImportSettings, SignalMap, read_signals
+from cpfls_cli.flightlog.importing import read_signals
+from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
 TIME = np.arange(1000) / 50
 NOISE = 0.02 * np.random.default_rng(3).standard_normal((1000, 7))

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
-from cpfls_cli.identification import IdentificationSettings
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode, uniform_chromosome
 from cpfls_cli.identification.evaluator import Problem
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.settings import LocalSearchSettings
+from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.regressor import Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.motion import RIGID
 from tests.builders.flights import random_flight, rigid_torque

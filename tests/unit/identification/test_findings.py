@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque, not_positive_definite, why_unphysical
-from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.excitation import axis_evidence
+from cpfls_cli.identification.identify import identify
+from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion
 from cpfls_cli.rotations import body_rate, generalised_torque
 

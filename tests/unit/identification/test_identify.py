@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.identification import IdentificationSettings, TorqueData, identify
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.search import SearchRun
-from cpfls_cli.identification.settings import LocalSearchSettings, RidgeSettings
+from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings, RidgeSettings
 from cpfls_cli.regressor import Motion
 from tests.builders.flights import random_flight, rigid_torque
 

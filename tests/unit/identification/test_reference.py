@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.identification import IdentificationSettings, TorqueData
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import Problem, refine, stepped
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.reference import ReferenceEvaluator
-from cpfls_cli.identification.settings import LocalSearchSettings
+from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure
-from cpfls_cli.trajectory import TrajectorySettings, plan
+from cpfls_cli.trajectory.planning import plan
+from cpfls_cli.trajectory.settings import TrajectorySettings
 
 PAPER = {"base": "none", "consequents": "seesaw", "products": "additive", "input_map": "data-range"}
 OFF = LocalSearchSettings(enabled=False)

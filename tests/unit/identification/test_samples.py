@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
-from cpfls_cli.identification import IdentificationSettings, data
+from cpfls_cli.identification import data
 from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.cross_validation import contiguous_blocks, with_folds
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
-from cpfls_cli.identification.settings import RidgeSettings
+from cpfls_cli.identification.settings import IdentificationSettings, RidgeSettings
 from cpfls_cli.regressor import Regressor, data_ranges, model_structure, torque_sensitivity
 from cpfls_cli.regressor.motion import RIGID
 from tests.builders.flights import no_torque, random_flight

@@ -10,7 +10,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.identification import identify
+from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.search import NothingFoundError, SearchRun, choose, search
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.regressor.structure import model_structure

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
-from cpfls_cli.identification import IdentificationSettings, TorqueData, data, identify, samples, solver
+from cpfls_cli.identification import data, samples, solver
 from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.identification.data import Flights, gathered, joined, sample_times
+from cpfls_cli.identification.data import Flights, TorqueData, gathered, joined, sample_times
 from cpfls_cli.identification.excitation import axis_evidence
-from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.identify import identify, model_evaluator
 from cpfls_cli.identification.judge import score, score_of
-from cpfls_cli.identification.settings import LocalSearchSettings
+from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges
 from tests.builders.flights import random_flight, rigid_torque
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.reduction import ReductionSettings, reduce
+from cpfls_cli.reduction.settings import ReductionSettings
+from cpfls_cli.reduction.training_set import reduce
 
 
 def problem(seed, samples=40, columns=8):

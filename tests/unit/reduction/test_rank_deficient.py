@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.reduction import ReductionSettings, random_selections, reduce
+from cpfls_cli.reduction.settings import ReductionSettings
+from cpfls_cli.reduction.training_set import random_selections, reduce
 
 
 def deficient(rank=7, columns=16, samples=60, seed=0):

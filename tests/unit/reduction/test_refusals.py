@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.reduction import ReductionSettings, check_reducible, random_selections, reduce
+from cpfls_cli.reduction.settings import ReductionSettings
+from cpfls_cli.reduction.training_set import check_reducible, random_selections, reduce
 
 REGRESSOR = np.random.default_rng(0).standard_normal((20, 3, 10))
 

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.reduction import (
-    ReductionSettings,
+from cpfls_cli.reduction.settings import ReductionSettings
+from cpfls_cli.reduction.survey import survey
+from cpfls_cli.reduction.training_set import (
     check_streamed,
+    draw_pool,
     random_selections,
     random_streamed,
     reduce,
     reduce_streamed,
-    survey,
 )
-from cpfls_cli.reduction.training_set import draw_pool
 
 
 def regressor(samples=3000, columns=7, seed=0):

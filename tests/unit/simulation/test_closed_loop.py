@@ -13,7 +13,8 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.balance.windows import windows
-from cpfls_cli.simulation import SimulationSettings, measure
+from cpfls_cli.simulation.measured import measure
+from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.vehicle import RotorSettings
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, planned, signals_of
 

@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
 from cpfls_cli.errors import SettingError
-from cpfls_cli.simulation import SimulationSettings, flyability, simulate
-from cpfls_cli.simulation.inverse import collective_thrust, single_axis_torque
-from cpfls_cli.trajectory import TrajectorySettings, plan
+from cpfls_cli.simulation.inverse import collective_thrust, flyability, simulate, single_axis_torque
+from cpfls_cli.simulation.settings import SimulationSettings
+from cpfls_cli.trajectory.planning import plan
+from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle import RotorSettings, VehicleSettings, allocation_matrix, body_wrench
 
 VEHICLE = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.02, -0.03, 0.01))

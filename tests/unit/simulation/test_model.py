@@ -6,15 +6,10 @@ import pytest
 from cpfls_cli import rotations
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError, SettingError
-from cpfls_cli.simulation import (
-    ClosedLoopSettings,
-    SimulatedModel,
-    SimulationSettings,
-    simulated_effects,
-    simulated_model,
-)
 from cpfls_cli.simulation.actuators import mixer
 from cpfls_cli.simulation.closed_loop import upright
+from cpfls_cli.simulation.model import SimulatedModel, simulated_effects, simulated_model
+from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.vehicle import VehicleSettings, body_wrench
 
 VEHICLE = VehicleSettings()

@@ -5,7 +5,8 @@ import pytest
 
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.rotations import euler_rate_matrix
-from cpfls_cli.trajectory import TrajectorySettings, plan
+from cpfls_cli.trajectory.planning import plan
+from cpfls_cli.trajectory.settings import TrajectorySettings
 
 GRAVITY = 9.81
 CHAIN = ["position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop"]

@@ -1,9 +1,8 @@
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.trajectory import TrajectorySettings
 from cpfls_cli.trajectory.limits import LimitSettings
-from cpfls_cli.trajectory.settings import WaypointSettings
+from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
 
 
 def point(x, **more):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification import Model
+from cpfls_cli.identification.model import Model
 from cpfls_cli.regressor import StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.validation.bands import definite_share
 from cpfls_cli.validation.bootstrap import Draws

@@ -7,13 +7,13 @@ import pytest
 from scipy import linalg
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
-from cpfls_cli.identification import IdentificationSettings, data
+from cpfls_cli.identification import data
 from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.model import Model
-from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor import Regressor
 from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.validation.bootstrap import bootstrap

@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification import Model
+from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import StructureSettings, model_structure, uniform_breakpoints
 from cpfls_cli.regressor.regressor import InertiaValues

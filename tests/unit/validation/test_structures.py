@@ -7,11 +7,10 @@ import pytest
 from scipy import linalg
 
 from cpfls_cli.dynamics.rigid_body import rigid_columns
-from cpfls_cli.identification import IdentificationSettings
 from cpfls_cli.identification.cross_validation import contiguous_blocks
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.settings import ValidationSettings
+from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor import Regressor, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.validation.structures import RIGID_BODY_NAME, candidate_structures, compare_structures, structure_name
 from tests.builders.flights import bent_torque, random_flight
