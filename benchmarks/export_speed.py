@@ -23,8 +23,8 @@ import numpy as np
 
 from cpfls_cli.export import c_source, reference_points
 from cpfls_cli.fuzzy import InputRange
-from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure, uniform_breakpoints
 from tests.builders.exported_models import sheet_of
 

@@ -11,6 +11,9 @@ from typing import Final, Literal
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 
+SPEED_UNITS = frozenset({"rad/s", "rpm"})
+"""Units in which a rotor command is a speed."""
+
 STANDARD_GRAVITY: Final = 9.80665
 """m/s^2, by definition; scipy.constants takes 0.1 s to load."""
 

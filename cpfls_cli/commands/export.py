@@ -28,8 +28,8 @@ from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_json, vehicle_python
 from cpfls_cli.export.vehicle_sheet import VehicleSheet
-from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.pages.export import export_answer, vehicle_export_answer
 from cpfls_cli.report.outcome import Outcome
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from math import exp, pi, tan
 
 import numpy as np
-from scipy import signal
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Columns, stack
@@ -38,6 +37,9 @@ def lagged(values: Array, period: float, time_constant: float) -> Array:
     array, shape (time, ...)
         y.
     """
+    # Slow to load, and who lists or shows effects filters nothing.
+    from scipy.signal import lfilter
+
     decay = exp(-period / time_constant)
     nodes, lengths = np.polynomial.legendre.leggauss(_NODES)
     place = 0.5 * (nodes + 1)
@@ -47,7 +49,7 @@ def lagged(values: Array, period: float, time_constant: float) -> Array:
     taps *= (1 - decay) / taps.sum()
     extended = _extended(values)
     driven = np.sum([tap * extended[first : len(values) - 1 + first] for first, tap in enumerate(taps)], axis=0)
-    rest = signal.lfilter([1.0], [1.0, -decay], driven, axis=0, zi=decay * values[:1])[0]
+    rest = lfilter([1.0], [1.0, -decay], driven, axis=0, zi=decay * values[:1])[0]
     return np.concatenate([values[:1], rest])
 
 
@@ -78,16 +80,22 @@ class SecondOrder:
 
     def settled(self, value: Array) -> Array:
         """Give the state after a long time at a value, shape (2, ...)."""
-        return signal.lfilter_zi(self.over, self.under).reshape(2, *[1] * np.ndim(value)) * value
+        from scipy.signal import lfilter_zi
+
+        return lfilter_zi(self.over, self.under).reshape(2, *[1] * np.ndim(value)) * value
 
     def step(self, value: Array, state: Array) -> tuple[Array, Array]:
         """Filter one sample; give it and the next state."""
-        passed, later = signal.lfilter(self.over, self.under, value[None], axis=0, zi=state)
+        from scipy.signal import lfilter
+
+        passed, later = lfilter(self.over, self.under, value[None], axis=0, zi=state)
         return passed[0], later
 
     def along(self, values: Array) -> Array:
         """Filter signals that were settled before, shape (time, ...)."""
-        return np.asarray(signal.lfilter(self.over, self.under, values, axis=0, zi=self.settled(values[0]))[0])
+        from scipy.signal import lfilter
+
+        return np.asarray(lfilter(self.over, self.under, values, axis=0, zi=self.settled(values[0]))[0])
 
 
 def delayed(values: Array, time: Array, delay: float) -> Array:

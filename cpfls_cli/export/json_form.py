@@ -14,7 +14,7 @@ from cpfls_cli.export.source import visited_rows
 from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.inputs import InputRange
 from cpfls_cli.fuzzy.membership import Z_FUNCTION
-from cpfls_cli.identification.excitation import CELLS
+from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.regressor.structure import Block
 

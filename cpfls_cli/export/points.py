@@ -11,8 +11,8 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import body_torque
-from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor

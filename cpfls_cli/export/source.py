@@ -13,8 +13,8 @@ from cpfls_cli.dynamics.rigid_body import VERTICAL, vertical
 from cpfls_cli.export.points import Expected
 from cpfls_cli.export.sheet import Sheet, rule_labels, rules_along
 from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
-from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import ModelStructure
 

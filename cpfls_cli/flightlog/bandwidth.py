@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.signal import welch
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.flightlog.repair import SignalTable
@@ -167,6 +166,8 @@ def _cut_off(values: Array, rate_hz: float) -> float | None:
 
 def _spectrum(values: Array, rate_hz: float) -> tuple[Array, Array]:
     """Estimate the spectrum in dB in bands of an eighth of an octave, by the logarithm of their frequency."""
+    from scipy.signal import welch
+
     length = min(len(values) // _SEGMENTS, _LONGEST_SEGMENT)
     if length < _FEWEST_IN_SEGMENT or np.ptp(values) == 0:
         return np.empty(0), np.empty(0)

@@ -15,10 +15,8 @@ from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
 from cpfls_cli.logs.formats import read_log
+from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.vehicle.rotors import body_wrench
-
-SPEED_UNITS = frozenset({"rad/s", "rpm"})
-"""Units in which a rotor command is a speed."""
 
 _DROPPED: Final = MappingProxyType(
     {

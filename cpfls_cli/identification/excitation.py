@@ -1,8 +1,7 @@
-"""Excitation by the training data: visited cells of attitude, fired rules, and what explains each axis."""
+"""Excitation by the training data: fired rules, and what explains each axis."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,6 @@ from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical
-from cpfls_cli.fuzzy.inputs import wrap
 from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale
 from cpfls_cli.identification.judge import Explained
 from cpfls_cli.identification.least_squares import Triangle
@@ -19,9 +17,6 @@ from cpfls_cli.identification.solver import regressor_blocks
 from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.rotations import body_acceleration, body_torque, euler_rate_matrix
-
-CELLS = 72
-"""Cells per turn, 5 degrees each."""
 
 SILENT_FIRING = 1e-3
 DETERMINED_SHARE = 0.5
@@ -50,41 +45,6 @@ class RuleExcitation:
     def excited(self) -> BoolArray:
         """Whether a rule fires at all and data determine at least half of its coefficients."""
         return np.asarray((self.firing > SILENT_FIRING) & (self.determined >= DETERMINED_SHARE))
-
-
-def visited_cells(attitudes: Iterable[Array]) -> BoolArray:
-    """Mark the cells of roll and pitch that data visit, and their neighbours.
-
-    Parameters
-    ----------
-    attitudes : iterable of array, shape (samples, 3), rad
-        Chunk by chunk.
-
-    Returns
-    -------
-    array of bool, shape (72, 72)
-        Roll along the first axis, from -180 degrees.
-    """
-    visited = np.zeros((CELLS, CELLS), dtype=bool)
-    for attitude in attitudes:
-        visited[_cells(attitude[:, 0]), _cells(attitude[:, 1])] = True
-    shifts = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
-    return np.asarray(np.any([np.roll(visited, shift, axis=(0, 1)) for shift in shifts], axis=0))
-
-
-def outside_visited(visited: BoolArray, attitude: Array) -> BoolArray:
-    """Flag attitudes whose cell was not visited.
-
-    Parameters
-    ----------
-    visited : array of bool, shape (72, 72)
-    attitude : array, shape (samples, 3), rad
-
-    Returns
-    -------
-    array of bool, shape (samples,)
-    """
-    return np.asarray(~visited[_cells(attitude[:, 0]), _cells(attitude[:, 1])])
 
 
 def rule_excitation(
@@ -131,11 +91,6 @@ def _firing(learned: Samples, partitions: Breakpoints) -> Array:
         for _, regressor in regressor_blocks(learned)
     ]
     return np.asarray(np.max(strongest, axis=0))
-
-
-def _cells(angle: Array) -> IntArray:
-    cells: IntArray = np.floor((wrap(angle) + np.pi) * (CELLS / (2 * np.pi))).astype(np.int64)
-    return np.clip(cells, 0, CELLS - 1)
 
 
 @dataclass(frozen=True)

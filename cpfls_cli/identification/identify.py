@@ -15,7 +15,7 @@ from cpfls_cli.identification.chromosome import decode, uniform_chromosome
 from cpfls_cli.identification.cross_validation import RidgeCurve, with_folds
 from cpfls_cli.identification.data import TorqueSource, axis_scale
 from cpfls_cli.identification.evaluator import Evaluator
-from cpfls_cli.identification.excitation import RuleExcitation, axis_evidence, rule_excitation, visited_cells
+from cpfls_cli.identification.excitation import RuleExcitation, axis_evidence, rule_excitation
 from cpfls_cli.identification.findings import FitDiagnostics, findings
 from cpfls_cli.identification.judge import Baseline, Score, fit_baselines, score_of
 from cpfls_cli.identification.least_squares import LeastSquares
@@ -24,6 +24,7 @@ from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import UNWATCHED, Front, SearchRun, StopReason, is_end, search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import Fit, Solver
+from cpfls_cli.identification.visited import visited_cells
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
 from cpfls_cli.regressor.structure import model_structure

@@ -10,7 +10,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, rigid_columns
 from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.identification.excitation import outside_visited
+from cpfls_cli.identification.visited import outside_visited
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues, Regressor

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.integrate import trapezoid
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.scores import MODEL, TRAINING
@@ -318,6 +317,8 @@ def _move(sources: Sources) -> Measurement:
 
 def _move_numbers(trajectory: Source[TrajectoryRecord]) -> dict[str, float]:
     """Measure the first move of a path: its peaks by derivative, its time and its integral of absolute jerk."""
+    from scipy.integrate import trapezoid
+
     leg = trajectory.record.first_leg()
     peaks = {name: float(np.max(np.abs(leg.curves[name]))) for name in PRINTED_PEAKS}
     taken = float(leg.time[-1] - leg.time[0])

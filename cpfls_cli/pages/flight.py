@@ -10,13 +10,13 @@ import numpy as np
 from cpfls_cli.artifacts.flight import DelayGroup, FlightRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-from cpfls_cli.flights.imported import SPEED_UNITS
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.pages.trajectory import attitude_figure, rotation_figure
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Facts, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, count, joined, number, plain
+from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
-from scipy.stats import t as student
-from scipy.stats import wilcoxon
+from scipy.special import stdtrit
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
@@ -80,15 +79,22 @@ def paired_ratio(setting: SettingRuns, reference: SettingRuns) -> PairedRatio:
         return PairedRatio(len(both), *failed, np.inf, np.inf, np.inf, float("nan"))
     mean = float(np.mean(logs)) if len(logs) else float("nan")
     half = _half_width(logs)
-    p_value = float(wilcoxon(logs).pvalue) if len(logs) > 1 and logs.any() else float("nan")
+    p_value = _p_value(logs)
     low, ratio, high = np.exp([mean - half, mean, mean + half])
     return PairedRatio(len(both), *failed, float(ratio), float(low), float(high), p_value)
+
+
+def _p_value(logs: Array) -> float:
+    # As long to load as all else of a report that compares no sweeps.
+    from scipy.stats import wilcoxon
+
+    return float(wilcoxon(logs).pvalue) if len(logs) > 1 and logs.any() else float("nan")
 
 
 def _half_width(logs: Array) -> float:
     if len(logs) < 2:
         return float("nan")
-    quantile = student.ppf(0.5 + 0.5 * _CONFIDENCE, len(logs) - 1)
+    quantile = stdtrit(len(logs) - 1, 0.5 + 0.5 * _CONFIDENCE)
     return float(quantile * np.std(logs, ddof=1) / np.sqrt(len(logs)))
 
 

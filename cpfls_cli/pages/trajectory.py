@@ -16,7 +16,6 @@ from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import number, plain
-from cpfls_cli.simulation.inverse import Flyability, TooMuch
 from cpfls_cli.trajectory.legs import Leg
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 from cpfls_cli.vehicle.rotors import RotorViolation
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cpfls_cli.excitation import Excitation
+    from cpfls_cli.simulation.inverse import Flyability, TooMuch
 
 _UNITS = ("m/s⁶", "m/s⁵", "m/s⁴", "m/s³", "m/s²", "m/s", "m")
 _MOVES_SHOWN = 20

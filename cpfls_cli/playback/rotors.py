@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from cpfls_cli.arrays import Array
 
@@ -121,6 +120,8 @@ def _lagged(values: Numbers, period: float, time_constant: Any, hold: Hold) -> t
     if np.real(time_constant) < _SHORTEST_S and not np.imag(time_constant):
         before = values if hold == "linear" else np.concatenate([values[:1], values[:-1]])
         return 0.5 * (values + after) if hold == "linear" else values, after, before
+    from scipy.signal import lfilter
+
     constant = time_constant if np.real(time_constant) > _SHORTEST_S else _SHORTEST_S + 1j * np.imag(time_constant)
     ratio = constant / period
     decay = np.exp(-1 / ratio)

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.inertia import beyond_any_body
@@ -242,7 +242,7 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
     value = float(above.sum() / below.sum())
     without = (above.sum() - above) / (below.sum() - below)
     deviation = float(np.sqrt((number - 1) / number * np.sum((without - without.mean()) ** 2)))
-    low, high = _interval(value, float(student.ppf(0.975, number - 1)) * deviation, positive=True)
+    low, high = _interval(value, float(stdtrit(number - 1, 0.975)) * deviation, positive=True)
     return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < _KNOWN * low, False)
 
 
@@ -276,7 +276,7 @@ def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
     physical = layout.physical(values)
     stated = layout.physical(layout.starts)
     half = _half_intervals(layout.physical, fitted, spread)
-    own = student.ppf(0.975, spread.blocks - 1) * np.sqrt(np.diag(spread.covariance))
+    own = stdtrit(spread.blocks - 1, 0.975) * np.sqrt(np.diag(spread.covariance))
     for place, (number, (name, found)) in enumerate(zip(layout.numbers, physical.items(), strict=True)):
         span = _AT_BOUND * number.scale
         bound = min(values[place] - number.low, number.high - values[place]) <= span
@@ -309,7 +309,7 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
 def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
     """Turn the covariance of a fit into half widths of 95 % intervals of what follows from its numbers."""
     deviation = np.sqrt(np.diag(_covariance(physical, fitted, spread)))
-    return np.asarray(student.ppf(0.975, spread.blocks - 1) * deviation)
+    return np.asarray(stdtrit(spread.blocks - 1, 0.975) * deviation)
 
 
 def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:

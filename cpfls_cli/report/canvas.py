@@ -74,6 +74,8 @@ _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}(?!\d*e)")
 _REFERENCE = re.compile(r"url\(#([^)]+)\)")
 
 _LARGEST = 1500
+# Of an inch of an SVG.
+_POINTS = 72
 _ROWS = 25
 """Of a table of the data of a figure, at most."""
 
@@ -294,12 +296,10 @@ def _inline_svg(figure: Figure, name: str, description: str) -> str:
     description : str
         What the figure shows, for those who do not see it.
     """
-    stream = io.StringIO()
     with warnings.catch_warnings():
         # A browser finds other fonts for what the one that measures the text lacks.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
-        figure.savefig(stream, format="svg", metadata={"Date": None})
-    root = ElementTree.fromstring(stream.getvalue())
+        root = ElementTree.fromstring(_svg(figure))
     _strip(root)
     _rename_ids(root, name)
     _shorten(root)
@@ -307,6 +307,19 @@ def _inline_svg(figure: Figure, name: str, description: str) -> str:
         root.attrib.pop(attribute, None)
     root.attrib |= {"xmlns": _NAMESPACE, "role": "img", "aria-label": description}
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _svg(figure: Figure) -> str:
+    """Lay out a figure, and draw it once: `savefig` draws it twice, of which the first is for a layout."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    stream, canvas, engine = io.StringIO(), FigureCanvasSVG(figure), figure.get_layout_engine()
+    figure.set_dpi(_POINTS)
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    canvas.print_svg(stream, metadata={"Date": None})  # type: ignore[no-untyped-call]  # matplotlib types it not
+    return stream.getvalue()
 
 
 def _strip(element: ElementTree.Element) -> None:

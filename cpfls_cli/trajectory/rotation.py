@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
@@ -259,6 +258,8 @@ class RotationLimits:
             If the turns alone exceed a limit.
         """
         self._require_turns(path)
+
+        from scipy.optimize import brentq
 
         def excess(factor: float) -> float:
             return float(self.peaks(path.scaled(factor)).max()) - 1.0

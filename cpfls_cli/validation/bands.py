@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, rigid_columns
@@ -13,9 +14,11 @@ from cpfls_cli.identification.model import Model
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor.motion import RIGID, Motion
 from cpfls_cli.regressor.regressor import Regressor
-from cpfls_cli.validation.bootstrap import Draws
 from cpfls_cli.validation.physical import cell_centres
 from cpfls_cli.validation.replay import CLEAR
+
+if TYPE_CHECKING:
+    from cpfls_cli.validation.bootstrap import Draws
 
 COVERAGE = 0.95
 _BATCH = 1024
@@ -116,7 +119,7 @@ def _spread(rows: Array, deviations: Array) -> Array:
 
 
 def _quantile(blocks: int) -> float:
-    return float(stats.t.ppf(0.5 + 0.5 * COVERAGE, max(blocks - 1, 1)))
+    return float(stdtrit(max(blocks - 1, 1), 0.5 + 0.5 * COVERAGE))
 
 
 def _batches(samples: int) -> Iterator[slice]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import fft
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
@@ -90,7 +90,7 @@ def _chance(values: Array) -> float:
     """Half the width of the 95 % interval of a mean; infinite for too few."""
     if len(values) < _FEWEST_BLOCKS:
         return float("inf")
-    return float(student.ppf(_CONFIDENCE, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
+    return float(stdtrit(len(values) - 1, _CONFIDENCE) * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
 def _block_means(errors: Array, block: IntArray) -> Array:

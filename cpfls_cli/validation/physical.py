@@ -11,9 +11,9 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.regressor.regressor import InertiaValues
 

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, norm
-from scipy.stats import t as student
+from scipy.special import chdtrc, ndtri, stdtr
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.fuzzy.inputs import wrap
@@ -138,7 +137,7 @@ def examine_residuals(
         correlation=cross_correlation(errors, inputs, number, exact, lags),
         histogram_edge=edges,
         histogram_count=counts,
-        normal_quantile=np.asarray(norm.ppf(_PROBABILITIES)),
+        normal_quantile=np.asarray(ndtri(_PROBABILITIES)),
         quantile=np.quantile(errors, _PROBABILITIES, axis=0),
         exact=exact,
     )
@@ -185,7 +184,7 @@ def autocorrelation(errors: Array, number: IntArray, without: BoolArray, lags: i
     value = products / np.where(square > 0, square, 1.0)
     statistic = samples * (samples + 2) * np.sum(value**2 / pairs[:, None], axis=0)
     unknown = without | (len(pairs) == 0)
-    p_value = np.where(unknown, np.nan, chi2.sf(statistic, max(len(pairs), 1)))
+    p_value = np.where(unknown, np.nan, chdtrc(max(len(pairs), 1), statistic))
     return np.where(unknown, np.nan, value), p_value
 
 
@@ -225,7 +224,7 @@ def mean_p_value(errors: Array, without: BoolArray) -> Array:
     middle, spread = means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(blocks)
     # A constant without any noise is not chance.
     ratio = np.where(middle == 0, 0.0, np.abs(middle) / np.maximum(spread, np.finfo(float).tiny))
-    return np.where(without, np.nan, 2 * student.sf(ratio, blocks - 1))
+    return np.where(without, np.nan, 2 * stdtr(blocks - 1, -ratio))
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from cpfls_cli.artifacts.scores import JudgedGroup
 from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.export import Sheet, expected
 from cpfls_cli.fuzzy import InputRange, breakpoints
-from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.regressor import Motion, StructureSettings, model_structure
 
 MEASURES = ("mse", "max_error", "relative_error", "r2", "r2_body")

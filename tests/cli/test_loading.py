@@ -66,3 +66,9 @@ def test_no_command_and_no_page_loads_plotting_before_it_draws():
     assert len(names) > 20
     code = f"import sys, {', '.join(names)}; print('matplotlib' in sys.modules)"
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "False\n"
+
+
+def test_a_report_loads_neither_compiled_loops_nor_what_of_scipy_is_slow_to_load():
+    slow = "{'numba', 'scipy.signal', 'scipy.stats'}"
+    code = f"import sys, cpfls_cli.commands.report; print(sorted({slow} & set(sys.modules)))"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "[]\n"

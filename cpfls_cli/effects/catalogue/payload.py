@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.signal import savgol_filter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
@@ -52,6 +50,8 @@ def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -
     ----------
     Equation of the spherical pendulum with a moving pivot.
     """
+    from scipy.interpolate import CubicSpline
+
     stride = max(1, round(_STEP_S / signals.period))
     felt = _felt_acceleration(signals, depth)
     nodes = felt[::stride].tolist()
@@ -75,6 +75,8 @@ def _felt_acceleration(signals: Signals, depth: float) -> Array:
 
 
 def _smooth_derivative(signals: Signals, values: Array) -> Array:
+    from scipy.signal import savgol_filter
+
     samples = max(5, 2 * round(_SMOOTHING_S / signals.period) + 1)
     return np.asarray(savgol_filter(values, samples, 2, 1, signals.period, axis=0))
 

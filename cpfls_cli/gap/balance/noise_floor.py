@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import nnls
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Columns
@@ -135,6 +134,8 @@ def _energy(windows: Windows) -> float:
 
 def _extrapolated(terms: Array, power: Array, window_terms: Array) -> float:
     """Fit a flat and a rising spectrum, white unless coloured ones fit clearly better; evaluate them for a window."""
+    from scipy.optimize import nnls
+
     if not power.min() > 0:
         return 0.0
     # Dividing by the power makes relative errors of equal weight.

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import wilcoxon
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
@@ -116,6 +115,9 @@ def chance_beside_its_like(
         That the search tried.
     settings : GapSettings
     """
+    # Slow to load, and needed only here and where two effects explain almost the same.
+    from scipy.stats import wilcoxon
+
     together = system(flights, chosen)
     floor = best_floor(together)
     without = refined(flights, [other for place, other in enumerate(chosen) if place != index], floor)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
@@ -172,7 +172,7 @@ def wrong_numbers(
     if not wrong:
         return None
     share = float(max(removed[_CHANNEL[number.name]] for number in wrong))
-    p_value = min(2 * float(norm.sf(3.92 * abs(n.value) / (n.high - n.low))) if n.high > n.low else 0.0 for n in wrong)
+    p_value = min(2 * float(ndtr(-3.92 * abs(n.value) / (n.high - n.low))) if n.high > n.low else 0.0 for n in wrong)
     name, sentence = VEHICLE_NUMBERS.name, VEHICLE_NUMBERS.sentence
     return NamedEffect(name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, sentence)
 

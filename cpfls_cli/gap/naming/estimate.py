@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
@@ -192,7 +192,7 @@ def _interval(value: Array, left_out: Array) -> Array:
     if blocks < 2:
         return np.full(len(value), np.inf)
     error = np.sqrt((blocks - 1) / blocks * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0))
-    return np.asarray(student.ppf(0.975, blocks - 1) * error)
+    return np.asarray(stdtrit(blocks - 1, 0.975) * error)
 
 
 def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import gumbel_r
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
@@ -65,7 +64,8 @@ class SearchStep:
             return reached
         # By moments: a fit by likelihood is several times slower and no better in the tail.
         scale = max(float(np.std(self.chance)) * np.sqrt(6) / np.pi, 1e-12)
-        return float(min(reached, gumbel_r.sf(gain, np.mean(self.chance) - np.euler_gamma * scale, scale)))
+        mode = np.mean(self.chance) - np.euler_gamma * scale
+        return float(min(reached, -np.expm1(-np.exp(-(gain - mode) / scale))))
 
 
 def rank_effects(

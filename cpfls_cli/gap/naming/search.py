@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.stats import wilcoxon
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
@@ -210,6 +209,8 @@ def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) 
 
 
 def _beats(chosen: Scored, other: Scored, above_floor: float) -> bool:
+    from scipy.stats import wilcoxon
+
     margin = other.block_error - chosen.block_error
     if margin.sum() <= least_margin(above_floor, float(chosen.block_error.sum())) or len(margin) < 2:
         return False

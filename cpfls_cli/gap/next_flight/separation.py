@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
@@ -183,12 +183,12 @@ class Judgement:
     @property
     def sure(self) -> float:
         """Probability that the diagnosis then names the true effect and not its rival."""
-        return float(norm.cdf((self.apart - self._margin) / self._error))
+        return float(ndtr((self.apart - self._margin) / self._error))
 
     @property
     def wrong(self) -> float:
         """Probability that the diagnosis then names the rival."""
-        return float(norm.cdf((-self.apart - self._margin) / self._error))
+        return float(ndtr((-self.apart - self._margin) / self._error))
 
     @property
     def _error(self) -> float:
@@ -203,9 +203,9 @@ class Judgement:
     @property
     def enough(self) -> float:
         """What `apart` has to be for an answer of probability `SURE`."""
-        by_noise = 4 * self.noise * (_ERRORS + norm.ppf(SURE)) ** 2
+        by_noise = 4 * self.noise * (_ERRORS + ndtri(SURE)) ** 2
         # The root of apart - least = quantile * error, for errors of 2 sqrt(apart noise).
-        root = norm.ppf(SURE) * np.sqrt(self.noise)
+        root = ndtri(SURE) * np.sqrt(self.noise)
         return float(max(by_noise, (root + np.sqrt(root**2 + self.least)) ** 2))
 
     @property

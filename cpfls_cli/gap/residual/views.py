@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import binary_closing, find_objects, label, uniform_filter1d
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.gap.balance.resampling import about_flight_mean
@@ -208,7 +208,7 @@ def whiteness(residual: Array, flight_index: IntArray, stride: int = 2, lags: in
     pairs = np.array([sum(max(0, len(flight) - lag) for flight in centred) for lag in range(1, lags + 1)])
     correlation = np.divide(products, square, out=np.zeros_like(products), where=square > 0)
     statistic = used * (used + 2) * (correlation**2 / pairs[:, None]).sum(axis=0)
-    return Whiteness(correlation, statistic, chi2.sf(statistic, lags) if lags else np.ones_like(statistic), used)
+    return Whiteness(correlation, statistic, chdtrc(lags, statistic) if lags else np.ones_like(statistic), used)
 
 
 def _product(rows: list[Array], lag: int) -> Array:

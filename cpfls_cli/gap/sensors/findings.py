@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtr, stdtrit
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
@@ -124,7 +124,7 @@ def _chance(fault: CheckedFault, period: float) -> Array:
     fit = fault.fit
     floor = fit.pull + _SHARE_EXCEEDED * fault.smallest(period)
     excess = np.maximum(np.abs(fit.value) - floor, 0.0) / np.maximum(fit.error, np.finfo(float).tiny)
-    return np.asarray(2 * stats.t.sf(excess, fit.blocks - 1))
+    return np.asarray(2 * stdtr(fit.blocks - 1, -excess))
 
 
 def _holm(p_values: Array) -> Array:
@@ -137,7 +137,7 @@ def _holm(p_values: Array) -> Array:
 
 def _finding(fault: CheckedFault, p_values: Array, period: float) -> AuditFinding:
     fit, test = fault.fit, fault.test
-    reach = float(stats.t.ppf(0.975, fit.blocks - 1)) * fit.error + fit.pull
+    reach = float(stdtrit(fit.blocks - 1, 0.975)) * fit.error + fit.pull
     named = fit.known & (p_values < _SIGNIFICANCE) & (np.abs(fit.value) > fault.smallest(period))
     numbers = tuple(
         FaultNumber(

@@ -7,11 +7,11 @@ import pytest
 
 from cpfls_cli.identification import data
 from cpfls_cli.identification.chromosome import uniform_chromosome
-from cpfls_cli.identification.excitation import visited_cells
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.identification.visited import visited_cells
 from cpfls_cli.regressor import uniform_breakpoints
 from cpfls_cli.validation.bootstrap import MissedTorque, bootstrap
 from cpfls_cli.validation.curves import SimulatedTorque, curves, round_trip

@@ -5,8 +5,8 @@ import pytest
 
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.identification.chromosome import decode
-from cpfls_cli.identification.excitation import visited_cells
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.visited import visited_cells
 from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure
 
 STRUCTURES = {

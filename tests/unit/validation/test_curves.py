@@ -5,9 +5,9 @@ import pytest
 
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.excitation import visited_cells
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.settings import IdentificationSettings
+from cpfls_cli.identification.visited import visited_cells
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor import Motion, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.validation.bands import inertia_band
