@@ -19,8 +19,8 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.sheet import DO_NOT_USE
 from cpfls_cli.export.vehicle_sheet import VehicleSheet
-from cpfls_cli.identification.excitation import CELLS
 from cpfls_cli.identification.model import Model
+from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.pages.extended import worth_in_words
 from cpfls_cli.playback.model import VehicleModel
