@@ -285,7 +285,7 @@ class Model:
         name : str, optional
             Prefix of names in C, name in JSON; without it, from the name of the file.
         force : bool
-            Replace existing files, and export a model whose search was stopped.
+            Replace existing files, and export a model whose search was stopped or whose verdict is do-not-use.
 
         Returns
         -------
