@@ -8,7 +8,7 @@ from importlib import import_module
 
 import numpy as np
 
-from cpfls_cli.errors import InputError
+from cpfls_cli.errors import InputError, install_command
 from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held, Holds, Missing, missing, together
 from cpfls_cli.export.simulators.functions import casadi_text, fly_casadi, fly_jax, jax_text, whole
@@ -125,5 +125,5 @@ def require_package(form: str) -> None:
         import_module(package or "cpfls_cli")
     except ImportError:
         raise InputError(
-            f'--format {form}: flying it needs the package {package}; pip install "cpfls[simulators]"'
+            f"--format {form}: flying it needs the package {package}; {install_command('simulators')}"
         ) from None
