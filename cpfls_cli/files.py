@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from typing_extensions import Buffer
+if TYPE_CHECKING:
+    import hashlib
+
+    from typing_extensions import Buffer
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _SEAL = b"cpfls sha256 "
-_SEAL_BYTES = len(_SEAL) + 2 * hashlib.sha256().digest_size + 1
+_SEAL_BYTES = len(_SEAL) + 64 + 1
 _BLOCK = 1 << 20
 
 
@@ -47,7 +49,7 @@ def is_sealed(path: Path) -> bool:
 
 def seal_of(content: Buffer) -> bytes:
     """Make the line that an artifact ends in: the SHA-256 of all that stands before it."""
-    return _line(hashlib.sha256(content).hexdigest())
+    return _line(_sha256(content).hexdigest())
 
 
 def read_content(path: Path) -> Content:
@@ -73,7 +75,7 @@ def state_of(path: Path) -> State:
 
 @lru_cache(maxsize=256)
 def _read_content(state: State) -> Content:
-    digest, left, block = hashlib.sha256(), max(0, state.size - _SEAL_BYTES), memoryview(bytearray(_BLOCK))
+    digest, left, block = _sha256(), max(0, state.size - _SEAL_BYTES), memoryview(bytearray(_BLOCK))
     with state.path.open("rb", buffering=0) as stream:
         while left and (count := stream.readinto(block[: min(left, _BLOCK)])):
             digest.update(block[:count])
@@ -96,7 +98,14 @@ def text_sha256(text: str) -> str:
     str
         Hexadecimal SHA-256 of its UTF-8 bytes.
     """
-    return hashlib.sha256(text.encode()).hexdigest()
+    return _sha256(text.encode()).hexdigest()
+
+
+def _sha256(content: Buffer = b"") -> hashlib._Hash:
+    # The command line knows this module before it knows whether there is anything to hash, and OpenSSL loads slowly.
+    import hashlib
+
+    return hashlib.sha256(content)
 
 
 def _line(sha256: str) -> bytes:
