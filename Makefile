@@ -282,7 +282,7 @@ lint: $(INSTALLED_DEV)
 # Every table is also written to benchmarks/results, as JSON.
 STUDY := configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
 bench: $(INSTALLED_DEV)
-	$(PIP) -e ".[bench,dask]"
+	$(PIP) -e ".[bench,dask,simulators]"
 	$(BIN)/python benchmarks/evaluation.py
 	$(BIN)/python benchmarks/whole_run.py
 	$(BIN)/python benchmarks/workers.py
@@ -306,6 +306,7 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python benchmarks/band_coverage.py
 	$(BIN)/python benchmarks/tracking.py
 	$(BIN)/python benchmarks/export_speed.py
+	$(BIN)/python benchmarks/simulators.py
 	$(BIN)/python benchmarks/fuzzy_fitting.py
 	$(MAKE) data/paper/report.html
 	$(BIN)/python benchmarks/report_cost.py configs/paper.yaml data/paper/*.h5

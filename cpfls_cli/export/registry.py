@@ -56,7 +56,7 @@ class Target:
 TARGETS = {
     "mjcf": Target("MuJoCo", ".xml", "mujoco", 1e-3, 4, mjcf_held, mjcf_text, fly_mjcf),
     "sdf": Target("Gazebo's motor model", ".sdf", "", 1e-3, 4, sdf_held, sdf_text, fly_sdf),
-    "rotorpy": Target("RotorPy", ".py", "rotorpy", np.inf, 3, rotorpy_held, rotorpy_text, fly_rotorpy),
+    "rotorpy": Target("RotorPy", ".py", "rotorpy", np.inf, 4, rotorpy_held, rotorpy_text, fly_rotorpy),
     "casadi": Target("CasADi", ".py", "casadi", np.inf, 0, whole, casadi_text, fly_casadi),
     "jax": Target("JAX", ".py", "jax", np.inf, 0, whole, jax_text, fly_jax),
 }

@@ -19,7 +19,8 @@ from cpfls_cli.playback.replay import Player, free_runs
 AGREES = 1e-6
 """Largest distance in SI at which the equations of a target are those that were exported."""
 
-_FINE = 32
+_FINE = 16
+"""Steps of the library between two samples, and twice as many, from which steps of no length follow."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def verified(
     else:
         finer = 1 if np.isinf(target.step_s) else ceil(flight.motion.period / target.step_s - 1e-9)
         flown, limit = _limit(form, exported.text, course, finer)
-        fine = _fine(held, course, _FINE * finer)
+        fine = _fine(held, course)
     if not flight.translates:
         for errors in (replayed, same, flown, limit, fine):
             errors[:, :, :3] = 0.0
@@ -136,10 +137,10 @@ def _limit(form: str, text: str, course: Course, finer: int) -> tuple[Array, Arr
     return once, found[0]
 
 
-def _fine(held: Held, course: Course, finer: int) -> Array:
+def _fine(held: Held, course: Course) -> Array:
     """Play what was exported back with steps of no length: those of the midpoint rule leave ``b h^2``."""
     found = []
-    for steps in (finer, 2 * finer):
+    for steps in (_FINE, 2 * _FINE):
         flight = replace(course, finer=steps).finer_flight
         runs = free_runs(held.player(flight), flight, course.starts * steps, course.horizon * steps)
         found.append(runs.errors[:, steps - 1 :: steps])

@@ -1,0 +1,168 @@
+"""Vehicles exported for simulators and libraries: flown along flights beside the library, and what a step takes.
+
+    python benchmarks/simulators.py [playback] [steps] [batch]
+
+Flights: the example's kind (a vehicle with lag, damping, drag and flapping, noise in its log), RotorPy's with its own
+hidden effects, and a real Crazyflie with motor commands and a gyroscope alone, by the vehicle that its config states
+with the lag of its motors; the last two are read from CPFLS_FLIGHTS. Times are processor times, in turn.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+from time import process_time
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import in_turn, pin_threads, table
+
+pin_threads()
+
+import numpy as np
+
+from cpfls_cli.config.load import load_study
+from cpfls_cli.export.course import Course
+from cpfls_cli.export.registry import TARGETS, exported
+from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_python
+from cpfls_cli.export.verify import verified
+from cpfls_cli.flights.playback import flights_to_play
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.replay import player_of
+from cpfls_cli.playback.rotors import RotorResponse
+from tests.builders.exported_vehicles import sheet_of_vehicle
+from tests.builders.playback_flights import MIDDLING, ROTORPY, ROTORPY_HIDDEN, flown, rotorpy_flight, truth
+from tests.builders.recorded_flights import FLIGHTS
+
+ROOT = Path(__file__).resolve().parents[1]
+WINDOWS, BATCH = 4, 1000
+MOTORS_S = 0.072
+LOOP = """
+#include "vehicle.h"
+void steps(double *state, const double *rotor, long n)
+{
+    for (long i = 0; i < n; ++i)
+        vehicle_step((vehicle_state *)state, rotor, 0.001);
+}
+"""
+
+
+def main(*asked: str) -> None:
+    for name in asked or PARTS:
+        print(f"\n{name}:\n")
+        PARTS[name]()
+
+
+def flights():
+    """Models with the flights that they are flown along."""
+    model = truth()
+    yield "example", model, flown(model, ("multisine",), noise=MIDDLING, hold="linear", duration_s=12.0)[0]
+    for name in ("com", "drag"):
+        yield f"RotorPy, {name}", VehicleModel(vehicle=ROTORPY, effects=ROTORPY_HIDDEN[name]), rotorpy_flight(name)
+    study = load_study(ROOT / "configs" / "gap" / "arpl.yaml")
+    (logged,) = flights_to_play([FLIGHTS / "real" / "arpl_crazyflie_1khz" / "log15_55_90s.csv"], study)
+    yield "real Crazyflie", VehicleModel(vehicle=study.vehicle, response=RotorResponse(lag_s=MOTORS_S)), logged.playback
+
+
+def playback() -> None:
+    rows = []
+    for name, model, flight in flights():
+        for form in TARGETS:
+            made = exported(sheet_of_vehicle(model), form, "vehicle.py")
+            horizon = round(0.5 / flight.motion.period)
+            found = verified(form, made, flight, (flight, player_of(model, flight)), horizon, WINDOWS)
+            off = [f"{value:.2g}" for value in (*found.errors[:, 3], found.missing[3], found.step[3])]
+            rows.append((name, TARGETS[form].title, *off, f"{found.equations.max():.1g}"))
+    columns = ("flight", "target", "playback - measured", "target - measured", "target - playback", "not held", "step")
+    print("Body rate after 0.5 s, rad/s, mean; what is not held and the step: largest; equations: largest, SI.\n")
+    table("simulators_playback", (*columns, "equations"), rows)
+
+
+def steps() -> None:
+    """One step of 1 ms of the vehicle of the example in each target, beside one in C."""
+    model = truth()
+    flight = flown(model, ("multisine",), hold="linear", duration_s=2.0, rate_hz=1000.0)[0]
+    course = Course(flight, np.array([0]), 400)
+    state = np.concatenate([part[0].ravel() for part in course.start])
+    rotor = model.rotor_terms(flight.speed, 0.001, "linear")[0]
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        call = in_c(model, Path(folder))
+        count = 100_000
+        for form in TARGETS:
+            text = exported(sheet_of_vehicle(model), form, "v.py").text
+            # The second flight less the first: what does not grow with the steps is left out.
+            short = Course(flight, course.starts, 100)
+            TARGETS[form].fly(text, short)
+            times = []
+            for _ in range(3):
+                fast = seconds(lambda: call(state, rotor, count)) / count
+                long, brief = (seconds(partial(TARGETS[form].fly, text, one)) for one in (course, short))
+                times.append(((long - brief) / 300, fast))
+            own, c = np.median(times, axis=0)
+            rows.append((TARGETS[form].title, f"{1e6 * own:.3g}", f"{1e6 * c:.3g}", f"{own / c:.3g}"))
+    table("simulators_step", ("target, through Python", "us a step", "C, us a step", "ratio"), rows)
+
+
+def seconds(work) -> float:
+    start = process_time()
+    work()
+    return process_time() - start
+
+
+def in_c(model, folder):
+    """Compile the C of a vehicle, and give a call of many steps."""
+    written = vehicle_c(sheet_of_vehicle(model), "vehicle")
+    (folder / "vehicle.c").write_text(written.source)
+    (folder / "vehicle.h").write_text(written.header)
+    (folder / "loop.c").write_text(LOOP)
+    flags = ["gcc", "-std=c99", "-O2", "-shared", "-fPIC", "-o", "v.so", "vehicle.c", "loop.c", "-lm"]
+    subprocess.run(flags, cwd=folder, check=True)
+    steps = ctypes.CDLL(str(folder / "v.so")).steps
+    pointer = ctypes.POINTER(ctypes.c_double)
+
+    def call(state, rotor, count):
+        own = state.copy()
+        steps(own.ctypes.data_as(pointer), rotor.ctypes.data_as(pointer), ctypes.c_long(count))
+
+    return call
+
+
+def ready(step, *given):
+    return step(*given).block_until_ready()
+
+
+def batch() -> None:
+    """Take one step of a thousand vehicles at once in JAX, compiled, beside the NumPy module."""
+    import jax
+
+    model, rng = truth(), np.random.default_rng(0)
+    numpy_form, jax_form = {"__name__": "n"}, {"__name__": "j"}
+    exec(vehicle_python(sheet_of_vehicle(model), "v.py"), numpy_form)
+    exec(exported(sheet_of_vehicle(model), "jax", "v.py").text, jax_form)
+    rotor = np.tile(numpy_form["steady"](np.full(4, 570.0)), (BATCH, 1))
+    rate = rng.normal(size=(BATCH, 3))
+    parts = np.zeros((BATCH, 3)), rng.normal(size=(BATCH, 3)), np.tile(np.eye(3), (BATCH, 1, 1)), rate
+    state = np.hstack([part.reshape(BATCH, -1) for part in parts])
+    rows = []
+    for exact in (True, False):
+        with jax.enable_x64(exact):
+            step = jax.jit(jax.vmap(lambda s, r: jax_form["step"](s, r, 0.01)))
+            given = jax.numpy.array(state), jax.numpy.array(rotor)
+            call = partial(ready, step, *given)
+            begin = seconds(call)
+            ratio = in_turn(partial(numpy_form["step"], *parts, rotor, 0.01), call, 9, process_time)
+        bits = 64 if exact else 32
+        rows.append((bits, f"{1e3 * ratio.slow_s:.3g}", f"{1e3 * ratio.fast_s:.3g}", ratio.range, f"{begin:.2g}"))
+    columns = ("bits of JAX", "NumPy, ms", "JAX, ms", "NumPy over JAX (range)", "JAX compiles in, s")
+    table("simulators_batch", columns, rows)
+
+
+PARTS = {"playback": playback, "steps": steps, "batch": batch}
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
