@@ -31,11 +31,11 @@ PARTS = {
     "errors over the training part": ("samples.py", "errors"),
     "residuals and lowest directions, once more": ("samples.py", "projected"),
     "eigendecompositions": ("_linalg.py", "eigh"),
-    "Cholesky decompositions": ("normal_equations.py", "quick_solution"),
-    "trust region (SciPy), without what it calls above": ("local_search.py", "refine"),
-    "breeding, ranking, reinsertion, migration": ("engine.py", "_breed"),
+    "Cholesky decompositions": ("least_squares.py", "quick_solution"),
+    "damped steps": ("evaluator.py", "stepped"),
+    "decoding": ("chromosome.py", "decode"),
+    "breeding": ("engine.py", "_breed"),
 }
-INSIDE_REFINE = ("products of the regressor with itself", "derivatives by the breakpoints")
 
 
 def main() -> None:
@@ -88,17 +88,8 @@ def profile(learned: TorqueData, population: int, generations: int) -> dict[str,
         part: sum(v[3] for k, v in stats.items() if k[0].endswith(file) and k[2] == name)
         for part, (file, name) in PARTS.items()
     }
-    callers = {part: inside(stats, *PARTS[part]) for part in INSIDE_REFINE}
-    trust = "trust region (SciPy), without what it calls above"
-    spent[trust] -= sum(callers.values()) + spent["Cholesky decompositions"]
     spent["the rest"] = whole - sum(spent.values())
     return {part: f"{100 * value / whole:.1f}" for part, value in spent.items()}
-
-
-def inside(stats, file: str, name: str) -> float:
-    """Time of a function in calls by the local search."""
-    entry = next(v for k, v in stats.items() if k[0].endswith(file) and k[2] == name)
-    return sum(times[3] for caller, times in entry[4].items() if caller[2] in ("equations", "_linearise"))
 
 
 if __name__ == "__main__":
