@@ -19,6 +19,8 @@ from cpfls_cli.arrays import Array, IntArray
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+_ALWAYS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
 
 def compiled(function: Function, **options: Any) -> Function:
     """Compile at the first call on a machine; other threads run meanwhile, and dividing by zero gives infinity.
@@ -34,20 +36,22 @@ def compiled(function: Function, **options: Any) -> Function:
     callable
         Compiled anew in each process where no folder can be written that would keep it.
     """
-    options |= {"nogil": True, "error_model": "numpy"}
+    options |= _ALWAYS
     try:
         return cast(Function, numba.njit(cache=True, **options)(function))
     except RuntimeError:
         return cast(Function, numba.njit(**options)(function))
 
 
-def _compiled(function: Function) -> Function:
-    return compiled(function)
+def part(function: Function, **options: Any) -> Function:
+    """Compile into what calls it, and only there: ways for Python to call each part took a fifth of the compiling."""
+    options |= _ALWAYS | {"no_cpython_wrapper": True}
+    return cast(Function, numba.njit(**options)(function))
 
 
-def _compiled_sum(function: Function) -> Function:
+def _part_sum(function: Function) -> Function:
     """Compile, and let the processor take the terms of a sum in the order that suits its registers."""
-    return compiled(function, fastmath={"reassoc", "contract"})
+    return part(function, fastmath={"reassoc", "contract"})
 
 
 # Columns of `Table.blocks` and of `Table.partitions`.
@@ -129,19 +133,19 @@ _DEGREE, _SLOPE, _POSITION, _OF_PARTITION = 58, 2, 4, 5
 _BOTH = 2
 
 
-@_compiled
+@part
 def _features_at(table: Table, kind: int) -> int:
     """Find the first line of the features of a kind."""
     single = 1 + table.single
     return _DEGREE + _OF_PARTITION * len(table.partitions) + 3 * single * kind
 
 
-@_compiled
+@part
 def _fours(count: int) -> int:
     return (count + 3) // 4 * 4
 
 
-@_compiled
+@part
 def _new_batch(table: Table) -> Array:
     """Make room for a batch, with what is the same for all: features that are constant, functions that always fire."""
     single = 1 + table.single
@@ -153,19 +157,19 @@ def _new_batch(table: Table) -> Array:
     return at
 
 
-@_compiled
+@part
 def _space(table: Table, dense: int) -> Array:
     """Make room for the rows of a batch."""
     return np.zeros(_fours(table.active + dense) * 3 * _BATCH)
 
 
-@_compiled
+@part
 def _wrap(angle: float) -> float:
     turns: float = np.floor((angle + np.pi) / (2.0 * np.pi))
     return angle - 2.0 * np.pi * turns
 
 
-@_compiled
+@part
 def _seesaw(angle: float) -> tuple[float, float]:
     wrapped = _wrap(angle)
     if abs(wrapped) > 0.5 * np.pi:
@@ -173,7 +177,7 @@ def _seesaw(angle: float) -> tuple[float, float]:
     return wrapped * (2.0 / np.pi), 2.0 / np.pi
 
 
-@_compiled
+@part
 def _map_input(table: Table, axis: int, angle: float) -> tuple[float, float, float, float]:
     """Antecedent and consequent of an angle with their slopes; see `cpfls_cli.fuzzy.inputs.map_input`."""
     if table.data_range:
@@ -190,7 +194,7 @@ def _map_input(table: Table, axis: int, angle: float) -> tuple[float, float, flo
     return turns, 0.5 / np.pi, turns, 0.5 / np.pi
 
 
-@_compiled
+@part
 def _see(table: Table, attitude: Array) -> Array:
     """Map the angles of all samples to antecedent and consequent with their slopes, shape (8, samples).
 
@@ -206,7 +210,7 @@ def _see(table: Table, attitude: Array) -> Array:
     return seen
 
 
-@_compiled
+@part
 def _cells(table: Table, breakpoints: Array, seen: Array) -> IntArray:
     """Count out the cells that all breakpoints cut roll and pitch into, and find that of each sample."""
     cell = np.zeros(seen.shape[1], np.int64)
@@ -225,7 +229,7 @@ def _cells(table: Table, breakpoints: Array, seen: Array) -> IntArray:
     return cell
 
 
-@_compiled
+@part
 def _sorted(cell: IntArray) -> IntArray:
     """Put samples in the order of their cells, those of one cell in the order of time."""
     first = np.zeros(np.max(cell) + 2, np.int64)
@@ -240,7 +244,7 @@ def _sorted(cell: IntArray) -> IntArray:
     return order
 
 
-@_compiled
+@part
 def _z_function(u: float) -> tuple[float, float, float]:
     """Zadeh's z-function with its first and second derivative: the copy of `cpfls_cli.fuzzy.membership.z_function`."""
     first, rest = u < 0.5, 1.0 - u
@@ -248,7 +252,7 @@ def _z_function(u: float) -> tuple[float, float, float]:
     return value, -4.0 * (u if first else rest), -4.0 if first else 4.0
 
 
-@_compiled
+@part
 def _end_of_run(cell: IntArray, label: IntArray, order: IntArray, start: int) -> int:
     """Find where samples stop to fire the same rules under the same label, a batch after the start at the latest."""
     first, stop = order[start], start + 1
@@ -259,7 +263,7 @@ def _end_of_run(cell: IntArray, label: IntArray, order: IntArray, start: int) ->
     return stop
 
 
-@_compiled
+@part
 def _take(chunk: Chunk, scale: Array, seen: Array, sample: IntArray, active: int, rows: Array, at: Array) -> None:
     """Take the samples of a batch out of a chunk, with their dense columns."""
     for n in range(len(sample)):
@@ -274,7 +278,7 @@ def _take(chunk: Chunk, scale: Array, seen: Array, sample: IntArray, active: int
                 rows[active + d, axis, n] = chunk.dense[i, axis, d] * scale[axis]
 
 
-@_compiled
+@part
 def _find_features(table: Table, count: int, at: Array) -> None:
     """Find the consequent features of each angle, and their products."""
     single, order, joint = 1 + table.single, table.single // 2, _features_at(table, _BOTH)
@@ -300,7 +304,7 @@ def _find_features(table: Table, count: int, at: Array) -> None:
                 at[joint + 3 * f + 2, n] = at[roll, n] * at[pitch + 2, n]
 
 
-@_compiled
+@part
 def _fire(partitions: IntArray, index: int, breakpoints: Array, count: int, at: Array) -> int:
     """Find the two functions of a partition that fire; see `cpfls_cli.fuzzy.membership.memberships`.
 
@@ -324,7 +328,7 @@ def _fire(partitions: IntArray, index: int, breakpoints: Array, count: int, at: 
     return left
 
 
-@_compiled
+@part
 def _find_firing(block: IntArray, partitions: IntArray, count: int, at: Array) -> int:
     """Find how strongly the rules of a block fire, and their slopes by roll and pitch; give their number."""
     rule, slots, others = 0, partitions[block[_ROLL], _FIRING_TOGETHER], partitions[block[_PITCH], _FIRING_TOGETHER]
@@ -342,7 +346,7 @@ def _find_firing(block: IntArray, partitions: IntArray, count: int, at: Array) -
     return rule
 
 
-@_compiled
+@part
 def _carry(block: IntArray, scale: Array, count: int, at: Array) -> None:
     """Find how an inertia function enters the torque; method.md section 2."""
     row, column = block[_ROW], block[_COLUMN]
@@ -360,7 +364,7 @@ def _carry(block: IntArray, scale: Array, count: int, at: Array) -> None:
                 at[_CARRIED + 3 * axis + 1 + angle, n] = acts * moved - energy * at[_WORK, n]
 
 
-@_compiled
+@part
 def _put(features: int, feature: int, slots: int, first: int, count: int, at: Array, rows: Array) -> None:
     """Write the columns of a block whose rules have fired, from the line of its first feature."""
     for rule in range(slots):
@@ -382,7 +386,7 @@ def _put(features: int, feature: int, slots: int, first: int, count: int, at: Ar
                     rows[a, axis, n] = at[along, n] * at[value, n] + at[fired, n] * at[_BESIDE, n]
 
 
-@_compiled
+@part
 def _fill(
     table: Table,
     breakpoints: Array,
@@ -415,13 +419,13 @@ def _fill(
     return rows.reshape(width, 3 * count)
 
 
-@_compiled
+@part
 def _rule(circular: bool, functions: int, interval: int, right: int) -> int:
     """Find the rule of one of the two functions of a partition that fire in an interval."""
     return 0 if circular and interval + 1 + right == functions else interval + right
 
 
-@_compiled
+@part
 def _columns(table: Table, interval: IntArray, column: IntArray) -> None:
     """Find which columns those of a batch are that are not zero."""
     a, blocks, partitions, circular = 0, table.blocks, table.partitions, table.circular
@@ -436,7 +440,7 @@ def _columns(table: Table, interval: IntArray, column: IntArray) -> None:
                     a += 1
 
 
-@_compiled_sum
+@_part_sum
 def _multiply(left: Array, right: Array, count: int, upper: bool, out: Array) -> None:
     """Set ``out = left right^T`` over the first rows, four columns by two; of a symmetric product the upper triangle.
 
@@ -458,7 +462,7 @@ def _multiply(left: Array, right: Array, count: int, upper: bool, out: Array) ->
             out[a + 2, b], out[a + 2, b + 1], out[a + 3, b], out[a + 3, b + 1] = s20, s21, s30, s31
 
 
-@_compiled
+@part
 def _combine(rows: Array, column: IntArray, coefficients: Array, dense_weights: Array, count: int, out: Array) -> None:
     """Set the residual ``dense D - Q c`` of the first rows, four columns at a time."""
     weights = np.zeros(len(rows))
@@ -474,7 +478,7 @@ def _combine(rows: Array, column: IntArray, coefficients: Array, dense_weights: 
             out[r] += half + (w2 * rows[a + 2, r] + w3 * rows[a + 3, r])
 
 
-@_compiled
+@part
 def _add(rows: IntArray, columns: IntArray, part: Array, upper: bool, total: Array) -> None:
     """Add products to the sums over all by the places of their columns; a negative place is none."""
     for a in range(len(rows)):
@@ -484,7 +488,7 @@ def _add(rows: IntArray, columns: IntArray, part: Array, upper: bool, total: Arr
                     total[rows[a], columns[b]] += part[a, b]
 
 
-@_compiled
+@compiled
 def add_gram(
     table: Table, breakpoints: Array, chunk: Chunk, scale: Array, label: IntArray, gram: Array, moment: Array
 ) -> None:
@@ -523,7 +527,7 @@ def add_gram(
         start = stop
 
 
-@_compiled
+@compiled
 def add_errors(
     table: Table,
     breakpoints: Array,
@@ -569,7 +573,7 @@ def add_errors(
         start = stop
 
 
-@_compiled
+@compiled
 def add_combined(
     table: Table,
     breakpoints: Array,
@@ -621,7 +625,7 @@ def add_combined(
         start = stop
 
 
-@_compiled
+@part
 def _step(
     table: Table, block: IntArray, input_index: int, coefficients: Array, interval: IntArray, count: int, at: Array
 ) -> None:
@@ -653,7 +657,7 @@ def _step(
             at[_STEP + 3, n] += at[degree + _SLOPE, n] * at[_WORK, n]
 
 
-@_compiled
+@part
 def _move(table: Table, index: int, interval: int, breakpoints: Array, count: int, at: Array, moved: Array) -> None:
     """Differentiate the torque of an inertia function by the breakpoints around one of its inputs, of known step."""
     angle, functions = table.partitions[index, _ANGLE], table.partitions[index, _FUNCTIONS]
@@ -689,7 +693,7 @@ def _move(table: Table, index: int, interval: int, breakpoints: Array, count: in
                 moved[row, axis, n] = at[by_value, n] * at[_WORK, n] + by_slopes
 
 
-@_compiled
+@part
 def _move_all(
     table: Table,
     breakpoints: Array,
@@ -718,7 +722,7 @@ def _move_all(
     return moved.reshape(width, 3 * count)
 
 
-@_compiled
+@part
 def _inner(table: Table, interval: IntArray, places: IntArray) -> None:
     """Find which inner breakpoints those at both ends of the intervals of a batch are; negative for none."""
     for index in range(len(table.partitions)):
@@ -728,7 +732,7 @@ def _inner(table: Table, interval: IntArray, places: IntArray) -> None:
             places[2 * index + end] = table.partitions[index, _FIRST_INNER] + k - 1 if inner else -1
 
 
-@_compiled
+@compiled
 def add_moved(
     table: Table,
     breakpoints: Array,
