@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -34,14 +35,15 @@ def beside_its_like(chosen: Sequence[Candidate], index: int) -> bool:
 def moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: SearchStep) -> Sequence[Scored]:
     """Score anew, with all shapes moved, what lies between command and rotors and comes near the best, if that does.
 
-    Between the points of a grid an effect with more shapes comes closer to what one with fewer is.
+    Between the points of a grid an effect with more shapes comes closer to what one with fewer is. The candidates stay
+    where they are: what is chosen is refined together with all others.
     """
     best = step.ranking[0]
     near = [s for s in step.ranking if late([s.candidate]) and s.gain > NEAR * best.gain]
     if best not in near or len(near) < 2:
         return step.ranking
-    settled_there = [_rescored(refined(flights, [*chosen, s.candidate], step.floor), step) for s in near]
-    return sorted(settled_there, key=lambda scored: -scored.gain)
+    there = [(_rescored(refined(flights, [*chosen, s.candidate], step.floor), step), s.candidate) for s in near]
+    return sorted((replace(scored, candidate=own) for scored, own in there), key=lambda scored: -scored.gain)
 
 
 def parted(refitted: System, step: SearchStep) -> System:

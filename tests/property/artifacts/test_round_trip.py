@@ -22,24 +22,34 @@ names = st.text("abcdefghijklmnopqrstuvwxyz.-_ ", min_size=1, max_size=12)
 
 @st.composite
 def artifacts(draw):
-    spec = draw(st.sampled_from([record.spec() for record in RECORDS]))
+    record = draw(st.sampled_from(RECORDS))
+    spec = record.spec()
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     labels = {label for dataset in spec.datasets for label in dataset.dimensions if not label.isdigit()}
     lengths = {label: FIXED.get(label) or draw(st.integers(0, 5), label) for label in sorted(labels)}
-    data = {}
+    # A path has two samples at least.
+    lengths |= {
+        label: 2 + lengths[label] for dataset in spec.datasets if dataset.path == "time" for label in dataset.dimensions
+    }
+    whole = {}
     for dataset in spec.datasets:
-        if not dataset.required and draw(st.booleans()):
-            continue
         shape = tuple(int(label) if label.isdigit() else lengths[label] for label in dataset.dimensions)
         if dataset.units == "text":
             size = int(np.prod(shape, dtype=int))
-            data[dataset.path] = np.array(draw(st.lists(words, min_size=size, max_size=size)), dtype="U").reshape(shape)
+            whole[dataset.path] = np.array(draw(st.lists(words, min_size=size, max_size=size)), dtype="U").reshape(
+                shape
+            )
         elif dataset.path == "time":
-            data[dataset.path] = np.cumsum(rng.uniform(0.1, 1.0, shape))
+            whole[dataset.path] = np.cumsum(rng.uniform(0.1, 1.0, shape))
         else:
-            data[dataset.path] = rng.normal(size=shape)
-            if dataset.gaps and data[dataset.path].size:
-                data[dataset.path] = np.where(rng.random(shape) < 0.5, np.nan, data[dataset.path])
+            whole[dataset.path] = rng.normal(size=shape)
+            if dataset.gaps and whole[dataset.path].size:
+                whole[dataset.path] = np.where(rng.random(shape) < 0.5, np.nan, whole[dataset.path])
+    optional = [dataset.path for dataset in spec.datasets if not dataset.required]
+    data = {name: values for name, values in whole.items() if name not in optional or draw(st.booleans())}
+    # A group is there whole or not at all.
+    while lacking := record.lacking(data):
+        data |= {name: whole[name] for name in lacking}
     inputs = {role: InputFile(draw(names), draw(names), draw(names)) for role in spec.inputs if draw(st.booleans())}
     header = Header(draw(names), draw(st.integers(0, 2**63 - 1)), draw(words) + "\n", inputs)
     return Artifact(spec, header, data)

@@ -11,6 +11,7 @@ from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.store import write_record
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
+from cpfls_cli.files import seal_of
 from cpfls_cli.flights import flight_source as sources
 
 SAMPLES = 30
@@ -43,9 +44,10 @@ def another_size(path):
 
 
 def another_length(path):
-    size = path.stat().st_size
+    size, sealed = path.stat().st_size, len(seal_of(b""))
     write(path, SAMPLES - 3)
-    path.write_bytes(path.read_bytes().ljust(size, b"\0"))
+    content = path.read_bytes()[:-sealed].ljust(size - sealed, b"\0")
+    path.write_bytes(content + seal_of(content))
 
 
 @pytest.mark.parametrize(
