@@ -4,11 +4,12 @@
 PYTHON ?= python3
 BIN := .venv/bin
 CPFLS := $(BIN)/cpfls
-# Python compiles what it imports; to compile all that is installed takes as long as the rest of the installation.
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 INSTALLED := .venv/.installed
 INSTALLED_DEV := .venv/.installed-dev
 export OPENBLAS_NUM_THREADS := 1
+# The tests start hundreds of processes: what they import is compiled once, whatever the environment says.
+export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
