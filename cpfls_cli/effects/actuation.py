@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import exp, pi, tan
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Columns, stack
+from cpfls_cli.effects.hooks import Link, RotorMotion
 from cpfls_cli.effects.signals import Signals
 
 _NODES = 8
@@ -170,3 +171,44 @@ def wrench_change(before: Signals, after: Signals) -> Columns:
         One column.
     """
     return Columns(stack(after.wrench - before.wrench))
+
+
+@dataclass(frozen=True)
+class CommandFilter:
+    """A second-order filter between command and rotors, with the functions that an effect is made of.
+
+    Attributes
+    ----------
+    damping : str
+        Name of the shape that is zeta; the other one is ``frequency_hz``.
+    upper : tuple of float
+        (a, b, c) of `SecondOrder`.
+    """
+
+    damping: str
+    upper: tuple[float, float, float]
+
+    def _passing(self, shape: Mapping[str, float], period: float) -> SecondOrder:
+        return SecondOrder.of(shape["frequency_hz"], shape[self.damping], period, self.upper)
+
+    def apply(self, signals: Signals, shape: Mapping[str, float]) -> Signals:
+        """Filter what drives the rotors of a flight."""
+        return with_actuation(signals, self._passing(shape, signals.period).along)
+
+    def columns(self, signals: Signals, shape: Mapping[str, float]) -> Columns:
+        """Compute the change of wrench by the filter."""
+        return wrench_change(signals, self.apply(signals, shape))
+
+    def link(self, values: Mapping[str, float], step: float) -> Link:
+        """Filter speeds and accelerations of the rotors, which were settled before the first step."""
+        passing = self._passing(values, step)
+        state: list[Array] = []
+
+        def link(rotors: RotorMotion) -> RotorMotion:
+            now = np.concatenate([rotors.speed, rotors.acceleration])
+            if not state:
+                state.append(passing.settled(np.concatenate([rotors.speed, np.zeros_like(rotors.acceleration)])))
+            passed, state[0] = passing.step(now, state[0])
+            return RotorMotion(*np.split(passed, 2))
+
+        return link

@@ -2,43 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from cpfls_cli.effects.actuation import CommandFilter
+from cpfls_cli.effects.effect import Effect, Shape
+from cpfls_cli.effects.hooks import Actuation
 
-import numpy as np
-
-from cpfls_cli.arrays import Array
-from cpfls_cli.effects.actuation import SecondOrder, with_actuation, wrench_change
-from cpfls_cli.effects.effect import Columns, Effect, Shape
-from cpfls_cli.effects.hooks import Actuation, Link, RotorMotion
-from cpfls_cli.effects.signals import Signals
-
-
-def _filter(shape: Mapping[str, float], period: float) -> SecondOrder:
-    return SecondOrder.of(shape["frequency_hz"], shape["width"], period, (1.0, 0.0, 1.0))
-
-
-def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
-    return with_actuation(signals, _filter(shape, signals.period).along)
-
-
-def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    return wrench_change(signals, _apply(signals, shape))
-
-
-def _link(values: Mapping[str, float], step: float) -> Link:
-    """Filter speeds and accelerations of the rotors, which were settled before the first step."""
-    passing = _filter(values, step)
-    state: list[Array] = []
-
-    def link(rotors: RotorMotion) -> RotorMotion:
-        now = np.concatenate([rotors.speed, rotors.acceleration])
-        if not state:
-            state.append(passing.settled(np.concatenate([rotors.speed, np.zeros_like(rotors.acceleration)])))
-        passed, state[0] = passing.step(now, state[0])
-        return RotorMotion(*np.split(passed, 2))
-
-    return link
-
+_FILTER = CommandFilter("width", (1.0, 0.0, 1.0))
 
 EFFECT = Effect(
     name="notch_filter",
@@ -55,12 +23,12 @@ EFFECT = Effect(
         "motor_lag": "sweep the torque through the notch and beyond: behind the notch the motion follows again",
     },
     source="second-order notch; ArduPilot NotchFilter.cpp, PX4 NotchFilter.hpp (bilinear transform, frequency kept)",
-    columns=_columns,
+    columns=_FILTER.columns,
     shapes=(
         Shape("frequency_hz", "Hz", (2.0, 2.8, 4.0, 5.5, 8.0, 12.0), "middle of the band that is taken out"),
         Shape("width", "1", (0.2, 0.7, 1.5), "half of the band's width over its middle", first=0.7),
     ),
     unit_coefficient=True,
-    apply=_apply,
-    actuation=Actuation(link=_link),
+    apply=_FILTER.apply,
+    actuation=Actuation(link=_FILTER.link),
 )
