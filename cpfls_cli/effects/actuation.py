@@ -49,7 +49,7 @@ def lagged(values: Array, period: float, time_constant: float) -> Array:
     # A constant stays what it is, however short the lag is beside a sample.
     taps *= (1 - decay) / taps.sum()
     extended = _extended(values)
-    driven = np.sum([tap * extended[first : len(values) - 1 + first] for first, tap in enumerate(taps)], axis=0)
+    driven = sum(tap * extended[first : len(values) - 1 + first] for first, tap in enumerate(taps))
     rest = lfilter([1.0], [1.0, -decay], driven, axis=0, zi=decay * values[:1])[0]
     return np.concatenate([values[:1], rest])
 
@@ -123,8 +123,8 @@ def delayed(values: Array, time: Array, delay: float) -> Array:
     weights = _cubic(np.clip(place - rows, 0.0, 1.0))
     extended = _extended(values)
     across = (-1, *[1] * (values.ndim - 1))
-    moved = [extended[rows + first] * weight.reshape(across) for first, weight in enumerate(weights.T)]
-    return np.asarray(np.sum(moved, axis=0))
+    moved = (extended[rows + first] * weight.reshape(across) for first, weight in enumerate(weights.T))
+    return np.asarray(sum(moved))
 
 
 def _extended(values: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,6 +16,12 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 _SHORTEST = 8
 """Samples up to which a signal is taken as it is."""
+
+_OF_MOTION = (
+    *("rotation", "ground_velocity", "air_velocity"),
+    *("hubs", "spins", "radii", "hub_velocity", "hub_height"),
+)
+"""Cached properties that no rotor speed changes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,6 +172,11 @@ class Signals:
         return self.ground_velocity if self.wind is None else self.ground_velocity - self.wind @ self.rotation
 
     @cached_property
+    def of_motion(self) -> dict[Hashable, Array]:
+        """What effects derive from the motion alone, kept for the same flight with other rotor speeds."""
+        return {}
+
+    @cached_property
     def hubs(self) -> Array:
         """Hub positions relative to the centre of mass, shape (rotor, 3), m, body frame."""
         return np.array([rotor.position_m for rotor in self.vehicle.rotors])
@@ -205,7 +217,11 @@ class Signals:
         ----------
         rotor_speed : array, shape (time, rotor), rad/s
         """
-        return replace(self, rotor_speed=rotor_speed)
+        changed = replace(self, rotor_speed=rotor_speed)
+        # What the motion alone gives is not computed again for each of a search's thousand lags.
+        changed.__dict__.update({name: getattr(self, name) for name in _OF_MOTION if name in self.__dict__})
+        changed.__dict__["of_motion"] = self.of_motion
+        return changed
 
 
 def fused(values: Array, rate: Array | None, period: float) -> Array:

@@ -16,6 +16,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _COUPLING = slice(3, 6)
+_THRUST_SCALE = 6
 _BOUNDS = (-0.9, 3.0)
 _MEASURING_POINT = ("reference_x", "reference_y", "reference_z")
 
@@ -139,12 +140,19 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     momentum[:, :3, :3] = -turning
     direct[:, :3, :3] = -np.cross(signals.body_rate[:, :, None], turning, axis=1)
     direct[:, :3, 3:6] = -_coupling(signals.body_rate, moments)[:, :, None] * np.eye(3)
-    direct[:, 5, 6] = signals.wrench[:, 5]
+    direct[:, 5, _THRUST_SCALE] = signals.wrench[:, 5]
     # A point at r moves with omega' x r + omega x (omega x r) beyond the centre of mass.
     levers = np.cross(signals.body_rate[:, :, None], signals.vehicle.mass_kg * np.eye(3), axis=1)
     momentum[:, 3:, 7:] = levers
     direct[:, 3:, 7:] = np.cross(signals.body_rate[:, :, None], levers, axis=1)
     return Columns(direct, momentum)
+
+
+def with_thrust(rows: Array, thrust: Array) -> Array:
+    """Exchange the thrust in averaged columns, shape (window, 6, 10), for another one in N, shape (window,)."""
+    rows = rows.copy()
+    rows[:, 5, _THRUST_SCALE] = thrust
+    return rows
 
 
 def _coupling(body_rate: Array, moments: Array) -> Array:

@@ -100,7 +100,7 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
     -------
     array, shape (time, 2)
     """
-    driven = swing(signals, length, damping, depth)[:, :2]
+    driven = _driven_swing(signals, length, damping, depth)
     if signals.acceleration is None or signals.thrust is None or signals.attitude is None:
         return driven
     mass = signals.vehicle.mass_kg
@@ -118,6 +118,14 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
     if np.abs(start).max() > _LARGEST_START:
         return driven
     return np.asarray(driven + np.column_stack([free @ start[:2], free @ start[2:]]))
+
+
+def _driven_swing(signals: Signals, length: float, damping: float, depth: float) -> Array:
+    """Integrate the swing of a motion once, whatever the rotors do, shape (time, 2)."""
+    key = ("swing", length, damping, depth)
+    if key not in signals.of_motion:
+        signals.of_motion[key] = swing(signals, length, damping, depth)[:, :2]
+    return signals.of_motion[key]
 
 
 def _free_swing(signals: Signals, length: float, damping: float) -> Array:

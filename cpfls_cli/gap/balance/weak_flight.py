@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
-from cpfls_cli.effects.catalogue.parameter_error import shown
+from cpfls_cli.effects.catalogue.parameter_error import shown, with_thrust
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
@@ -105,11 +105,16 @@ class WeakFlight:
         -------
         array, shape (window, 6, coefficient)
         """
-        if signals is not self.signals:
+        of_vehicle = candidate.effect.kind == "parameter"
+        if signals is not self.signals and not of_vehicle:
             return self._rows(candidate, signals)
         if candidate.key not in self.seen:
-            self.seen[candidate.key] = self._rows(candidate, signals)
-        return self.seen[candidate.key]
+            self.seen[candidate.key] = self._rows(candidate, self.signals)
+        rows = self.seen[candidate.key]
+        if signals is self.signals:
+            return rows
+        # Of the vehicle's numbers only the scale of the thrust meets what the rotors do; the motion stays.
+        return with_thrust(rows, self.windows.average(signals.wrench[:, 5]) * self.known[5])
 
     def _rows(self, candidate: Candidate, signals: Signals) -> Array:
         rows = self.averaged(columns_of(candidate, signals))
