@@ -4,7 +4,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 CPFLS := $(BIN)/cpfls
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# What is never imported is never compiled; what is, at its first import.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 INSTALLED := .venv/.installed
 INSTALLED_DEV := .venv/.installed-dev
 export OPENBLAS_NUM_THREADS := 1
@@ -271,8 +272,10 @@ docs/api.md: FORCE | $(INSTALLED_DEV)
 docs/notebook.ipynb: FORCE | $(INSTALLED_DEV)
 	$(BIN)/python docs/run_notebook.py > $@.new && mv $@.new $@
 
+# Rewriting assertions for their messages takes longer than most tests; what failed runs again with them.
+PYTEST := $(BIN)/python -m pytest
 test: $(INSTALLED_DEV)
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(PYTEST) -n 2 --dist worksteal --assert=plain || { $(PYTEST) --last-failed; exit 1; }
 
 lint: $(INSTALLED_DEV)
 	$(BIN)/ruff check .
