@@ -53,11 +53,23 @@ class AlternativeGroup:
         gaps=True,
     )
     separated_by: tuple[str, ...] = dataset("separated_by", "the flight, or the signal, that would tell", "alternative")
+    beside: tuple[str, ...] | None = dataset(
+        "beside",
+        "another effect that is not named and without which it would not do; empty for none",
+        "alternative",
+        default=None,
+    )
 
     @classmethod
     def of(cls, rivals: Sequence[Alternative]) -> Self:
         """Arrange effects that could be named instead."""
         return columns_of(cls, rivals)
+
+    def rows(self) -> list[Alternative]:
+        """List effects that could be named instead."""
+        from cpfls_cli.gap.naming.results import Alternative
+
+        return [Alternative(**row) for row in rows_of(self)]
 
 
 @record

@@ -290,6 +290,7 @@ def rows_of(group: object) -> list[dict[str, Any]]:
     columns = {
         entry.field.name: getattr(group, entry.field.name)
         for entry in _entries(type(group))  # type: ignore[arg-type]  # classes are hashable
+        if getattr(group, entry.field.name) is not None
     }
     listed = [values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values()]
     return [dict(zip(columns, row, strict=True)) for row in zip(*listed, strict=True)]

@@ -13,7 +13,6 @@ from cpfls_cli.artifacts.diagnosis import DiagnosisRecord
 from cpfls_cli.artifacts.gap_flights import TRAINING
 from cpfls_cli.artifacts.job import Job, begin, check_outputs, finish
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.trajectory import QuestionGroup, TrajectoryRecord
 from cpfls_cli.commands.trajectory import figure_paths
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -203,7 +202,8 @@ def _open_effects(
     Nothing where the config names effects that the diagnosis did not weigh.
     """
     asked = _effects(study)
-    rivals = [Alternative(**row) for row in rows_of(record.alternative)]
+    # Between an effect and two that together do the same no path decides: the log has to.
+    rivals = [each for each in record.alternative.rows() if not each.beside]
     told = [name for name, effect in CATALOGUE.items() if effect.columns is not None and effect.kind != "parameter"]
     rivals = [each for each in rivals if each.name in told and each.instead_of in record.effects_of_motion]
     if asked:

@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.gap_effects import PlaybackChangeGroup
 from cpfls_cli.artifacts.gap_flights import HELD_OUT, TRAINING
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.naming.results import GapVerdict
+from cpfls_cli.gap.naming.results import Alternative, GapVerdict
 from cpfls_cli.pages.effects import (
     capitalised,
     closest_sentence,
@@ -111,7 +111,7 @@ def _blame(record: DiagnosisRecord) -> Iterator[str]:
 
 def _ambiguous(record: DiagnosisRecord) -> str:
     rivals = _by_named(record)
-    parts = [f"{effect_title(named)} from {joined(titles(others), 'or')}" for named, others in rivals.items()]
+    parts = [f"{effect_title(named)} from {joined(others, 'or')}" for named, others in rivals.items()]
     certain = [name for name in record.effects.names() if name not in rivals]
     besides = f" Besides, the model misses {joined(titles(certain))}." if certain else ""
     return f"These flights cannot tell {joined(parts)}.{besides}"
@@ -177,15 +177,20 @@ def _rivals(record: DiagnosisRecord) -> Iterator[str]:
     """Say which effects would explain it as well; AMBIGUOUS says so in its headline."""
     if record.verdict != GapVerdict.AMBIGUOUS:
         for instead_of, rivals in _by_named(record).items():
-            yield f"It could be {joined(titles(rivals), 'or')} instead of {effect_title(instead_of)}"
+            yield f"It could be {joined(rivals, 'or')} instead of {effect_title(instead_of)}"
 
 
 def _by_named(record: DiagnosisRecord) -> dict[str, list[str]]:
-    """Gather the rivals of each named effect."""
+    """Gather what people call the rivals of each named effect."""
     rivals: dict[str, list[str]] = {}
-    for name, instead_of in zip(record.alternative.name, record.alternative.instead_of, strict=True):
-        rivals.setdefault(instead_of, []).append(name)
+    for rival in record.alternative.rows():
+        rivals.setdefault(rival.instead_of, []).append(_rival_title(rival))
     return rivals
+
+
+def _rival_title(rival: Alternative) -> str:
+    """Say what people call a rival, with the effect that it needs beside it."""
+    return effect_title(rival.name) + (f" with {effect_title(rival.beside)}" if rival.beside else "")
 
 
 def _where(record: DiagnosisRecord) -> str:
@@ -217,16 +222,16 @@ def next_steps(record: DiagnosisRecord) -> list[str]:
         return ["Correct the section `import` of the config, and run this again."]
     usual = _NEXT.get(record.verdict)
     first = [f"to tell {flight}" for flight in _telling_flights(record)]
-    # A rival that was not tried wants a signal; for the others a flight is planned.
-    plan = [_PLAN] if np.isfinite(record.alternative.relative_gain).any() else []
+    # A rival that was not tried wants a signal, and two that do what one does another log; else a flight is planned.
+    rivals = record.alternative.rows()
+    plan = [_PLAN] if any(np.isfinite(rival.relative_gain) and not rival.beside for rival in rivals) else []
     told = [*first, *plan] if record.verdict == GapVerdict.AMBIGUOUS else []
     return [sentence(step) for step in (*told, usual) if step]
 
 
 def _telling_flights(record: DiagnosisRecord) -> Iterator[str]:
-    rivals = record.alternative
-    for name, named, flight in zip(rivals.name, rivals.instead_of, rivals.separated_by, strict=True):
-        yield f"{effect_title(name)} from {effect_title(named)}: {flight}"
+    for rival in record.alternative.rows():
+        yield f"{_rival_title(rival)} from {effect_title(rival.instead_of)}: {rival.separated_by}"
 
 
 def _held_out_table(record: DiagnosisRecord, index: int) -> Table:

@@ -85,6 +85,8 @@ def test_what_no_catalogue_lists_is_never_called_found(judged):
         (["com_offset"], "NAMED", ["com_offset", "inflow"], EXTRA),
         (["com_offset"], "NAMED", ["inflow"], WRONG),
         (["com_offset"], "AMBIGUOUS", ["inflow"], RIVAL),
+        (["motor_lag", "command_delay"], "AMBIGUOUS", ["low_pass_filter"], RIVAL),
+        (["motor_lag"], "AMBIGUOUS", ["low_pass_filter"], WRONG),
         (["com_offset", "wind"], "NAMED", ["com_offset", "inflow"], SOME),
         (["wind", "rotor_drag"], "NAMED", ["wind"], RIGHT),
         (["wind", "rotor_drag"], "NAMED", ["rotor_drag"], SOME),
@@ -104,7 +106,10 @@ def test_answers_are_told_apart(truth, verdict, names, expected):
         "only": "",
         "residual_rms_n_m": {"held_out_1": [torque, 0.0, 0.0], "train_1": [9.0, 9.0, 9.0]},
     }
-    rivals = [{"name": "com_offset", "instead_of": "inflow"}]
+    rivals = [
+        {"name": "com_offset", "instead_of": "inflow"},
+        {"name": "motor_lag", "instead_of": "low_pass_filter", "beside": "command_delay"},
+    ]
     said = {
         "verdict": verdict,
         "effects": [{"name": name} for name in names],

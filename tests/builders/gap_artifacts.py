@@ -192,7 +192,7 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
         "share": 0.973,
         "split": np.array("no flight was held out by name"),
         **effects(*named),
-        **table("alternative", ("'name", "'instead_of", "relative_gain", "'separated_by"), alternatives),
+        **table("alternative", ("'name", "'instead_of", "relative_gain", "'separated_by", "'beside"), alternatives),
         **table(
             "unexplained", ("'axis", "floors", "'signal", "share", "frequency", "'energy"), unexplained
         ),

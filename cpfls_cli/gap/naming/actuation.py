@@ -78,7 +78,7 @@ def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: i
     if _stands_for_two(chosen, index):
         pairs = _pairs(flights, others, step)
         own = _rescored(system(flights, [*others, chosen[index]]), step)
-        return [own, *(_rescored(pair, step, last) for pair in pairs for last in (1, 2)), *ranked[1:]]
+        return [own, *(_as_one(pair, step) for pair in pairs), *ranked[1:]]
     if not beside_its_like(chosen, index):
         return ranked
     names = {each.effect.name for each in chosen}
@@ -150,10 +150,15 @@ def _pairs(flights: Sequence[WeakFlight], others: Sequence[Candidate], step: Sea
     return [refined(flights, [*others, *pair], step.floor) for pair in combinations(single, 2)]
 
 
-def _rescored(refitted: System, step: SearchStep, last: int = 1) -> Scored:
-    """Score the last effect of a hypothesis, or the one before, by what that leaves of each block."""
+def _as_one(pair: System, step: SearchStep) -> Scored:
+    """Score the last two effects of a hypothesis, which together can do what one does."""
+    return replace(_rescored(pair, step), beside=pair.chosen[-2].effect)
+
+
+def _rescored(refitted: System, step: SearchStep) -> Scored:
+    """Score the last effect of a hypothesis by what that leaves of each block."""
     plain = system(refitted.flights)
     square = weighted_residual(refitted, step.floor, plain.rotor_wrench) ** 2
     error = np.bincount(step.block, square.sum(axis=1)).astype(float)
     gain = step.above_floor + rows(plain) - error.sum()
-    return Scored(refitted.chosen[-last], np.zeros(0, dtype=int), float(gain), error, np.zeros(0))
+    return Scored(refitted.chosen[-1], np.zeros(0, dtype=int), float(gain), error, np.zeros(0))

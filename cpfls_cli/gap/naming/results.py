@@ -108,12 +108,15 @@ class Alternative:
         flights lack a signal.
     separated_by : str
         The flight, or the signal, that would tell.
+    beside : str
+        Another effect that is not named and without which this one would not do; empty for none.
     """
 
     name: str
     instead_of: str
     relative_gain: float
     separated_by: str
+    beside: str = ""
 
 
 @dataclass(frozen=True)

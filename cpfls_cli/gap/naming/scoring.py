@@ -36,6 +36,8 @@ class Scored:
         What is left on each block.
     coefficients : array, shape (coefficient,)
         Linear, of a fit on all blocks; 0 where a bound took one out.
+    beside : Effect or None
+        Another effect that was added with it.
     """
 
     candidate: Candidate
@@ -43,6 +45,7 @@ class Scored:
     gain: float
     block_error: Array
     coefficients: Array
+    beside: Effect | None = None
 
 
 class PlacedCandidate(NamedTuple):

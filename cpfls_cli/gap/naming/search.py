@@ -202,6 +202,7 @@ def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) 
             effect.name,
             float(scored.gain / chosen.gain),
             effect.rivals.get(other.name) or other.rivals.get(effect.name) or effect.excitation,
+            "" if scored.beside is None else scored.beside.name,
         )
         for scored in unbeaten(chosen, ranking, above_floor)
         if effect.name not in (other := scored.candidate.effect).holds

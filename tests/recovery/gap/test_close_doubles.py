@@ -8,6 +8,7 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.actuation import chance_beside_its_like, settled
 from cpfls_cli.gap.naming.ranking import rank_effects
@@ -169,6 +170,17 @@ def test_a_low_pass_is_no_lag_and_delay():
     (chosen,) = found(flights, (*STILL, "low_pass_filter"))
     assert chosen.effect.name == "low_pass_filter"
     assert chosen.shape == {"frequency_hz": pytest.approx(3.0, rel=0.05), "damping": pytest.approx(0.7, rel=0.05)}
+
+
+def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
+    """Slow waves cannot tell it from a low-pass; neither lag nor delay would do alone."""
+    flights = [late(seed, lambda s: lag(s) * np.exp(-0.012 * s)) for seed in (1, 2)]
+    low = Candidate(CATALOGUE["low_pass_filter"], {"frequency_hz": 6.0, "damping": 1.2})
+    effects = [CATALOGUE[each] for each in (*STILL, "low_pass_filter")]
+    step = rank_effects(flights, (), effects, SETTINGS, None, also=(low,))
+    own, *ranking = settled(flights, refined(flights, [low], step.floor).chosen, 0, step)
+    pairs = {frozenset((rival.name, rival.beside)) for rival in alternatives(own, ranking, step.above_floor)}
+    assert pairs == {frozenset(("motor_lag", "command_delay"))}
 
 
 def test_a_delay_that_is_not_there_is_chance_beside_a_lag():

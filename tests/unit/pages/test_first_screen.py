@@ -8,7 +8,7 @@ from cpfls_cli.pages.first_screen import counted_notes, first_screen, model_word
 from cpfls_cli.report.content import Box, Facts, Table, Text
 from tests.builders import gap_artifacts as made
 
-RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust")]
+RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust", "")]
 USE = "Take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write"
 WRONG = "the inertia about z would have to be 29 times that of the config"
 
@@ -98,11 +98,19 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tell
     _, facts, _, _, below = screen(diagnosis("AMBIGUOUS", alternatives=RIVALS))
     planned = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight."
     assert facts["Next"] == f"To tell {told}. {planned} Until then t{USE[1:]}."
-    untried = diagnosis("AMBIGUOUS", alternatives=[("wind", "com_offset", np.nan, "log velocity")])
+    untried = diagnosis("AMBIGUOUS", alternatives=[("wind", "com_offset", np.nan, "log velocity", "")])
     assert planned not in next_steps(untried)
     assert next_steps(untried)[0] == "To tell steady wind from offset of the centre of mass: log velocity."
     assert facts["How sure"] == "Of the held-out gap above the noise, 97 % is gone."
     assert "To tell" not in dict(below)
+
+
+def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tells_them():
+    pair = [("motor_lag", "low_pass_filter", 1.0, "log the speeds of the rotors", "command_delay")]
+    told = diagnosis("AMBIGUOUS", named=({"name": "low_pass_filter"},), alternatives=pair)
+    box, facts, *_ = screen(told)
+    assert "from motor lag with delay of the command" in str(box)
+    assert "trajectory" not in facts["Next"]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from tests.builders.forms import in_all_forms, phrases, source_of_record, words
 
 GREW = {"gap/after_floors": np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2])}
 FAULT = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
-RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust")]
+RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust", "")]
 LEFT = [("torque z", 14.2, "yaw", 0.82, 3.21, "feeds"), ("force x", 2.0, "", 0.0, np.nan, "neither")]
 BROKEN = made.texts("rotor 2 looks saturated")
 
