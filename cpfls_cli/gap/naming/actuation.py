@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import compensation, refined, weighted_residual
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.ranking import NEAR, SearchStep, best_floor, block_index, rows
+from cpfls_cli.gap.naming.ranking import NEAR, SearchStep, best_floor, block_index, least_gain, rows, surely_less
 from cpfls_cli.gap.naming.scoring import (
     Scored,
     layout,
@@ -47,11 +47,43 @@ def moved(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], step: Sear
 
 
 def parted(refitted: System, step: SearchStep) -> System:
-    """Take two effects with a shape each for a last one with two, where they leave less."""
+    """Take two effects for a last one with two shapes, where they leave less, or enough less with a number more."""
     others, last = refitted.chosen[:-1], len(refitted.chosen) - 1
     if not _stands_for_two(refitted.chosen, last):
         return refitted
-    return max([refitted, *_pairs(refitted.flights, others, step)], key=lambda each: _rescored(each, step).gain)
+    pairs = _pairs(refitted.flights, others, step)
+    best = max([refitted, *pairs], key=lambda each: _rescored(each, step).gain)
+    for wider in _wider_pairs(refitted.flights, others, refitted.chosen[last], step):
+        if _is_needed(_rescored(wider, step), _rescored(best, step), step):
+            best = wider
+    return best
+
+
+def without_companion(refitted: System, step: SearchStep) -> System:
+    """Take two effects for one with two shapes, where beside them what was added last is not needed.
+
+    What one filter leaves of another one and a lag is small, and follows the motion as much as the effects do that
+    would fill it.
+
+    Parameters
+    ----------
+    refitted : System
+        With what was added.
+    step : SearchStep
+        The look that added it.
+    """
+    *before, newest = refitted.chosen
+    for index, candidate in enumerate(before):
+        if newest.effect.actuation is not None or not _stands_for_two(before, index):
+            continue
+        others = [other for other in before if other is not candidate]
+        one = _rescored(system(refitted.flights, before), step)
+        for pair in _wider_pairs(refitted.flights, others, candidate, step):
+            together = _rescored(refined(refitted.flights, [*pair.chosen, newest], step.floor), step)
+            two = _rescored(pair, step)
+            if surely_less(two, one) and not _is_needed(together, two, step):
+                return pair
+    return refitted
 
 
 def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: SearchStep) -> list[Scored]:
@@ -78,7 +110,9 @@ def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: i
     if _stands_for_two(chosen, index):
         pairs = _pairs(flights, others, step)
         own = _rescored(system(flights, [*others, chosen[index]]), step)
-        return [own, *(_as_one(pair, step) for pair in pairs), *ranked[1:]]
+        wider = _wider_pairs(flights, others, chosen[index], step)
+        less = [pair for pair in wider if surely_less(_rescored(pair, step), own)]
+        return [own, *(_as_one(pair, step) for pair in (*pairs, *less)), *ranked[1:]]
     if not beside_its_like(chosen, index):
         return ranked
     names = {each.effect.name for each in chosen}
@@ -148,6 +182,22 @@ def _pairs(flights: Sequence[WeakFlight], others: Sequence[Candidate], step: Sea
     tried = [scored.candidate for scored in step.ranking if np.isfinite(scored.gain)]
     single = [candidate for candidate in late(tried) if len(candidate.effect.shapes) == 1]
     return [refined(flights, [*others, *pair], step.floor) for pair in combinations(single, 2)]
+
+
+def _wider_pairs(
+    flights: Sequence[WeakFlight], others: Sequence[Candidate], own: Candidate, step: SearchStep
+) -> list[System]:
+    """Fit another effect between command and rotors that has two shapes with each one that has one shape."""
+    tried = late([scored.candidate for scored in step.ranking if np.isfinite(scored.gain)])
+    double = [each for each in tried if len(each.effect.shapes) > 1 and each.effect.name != own.effect.name]
+    single = [each for each in tried if len(each.effect.shapes) == 1]
+    return [refined(flights, [*others, *pair], step.floor) for pair in product(double, single)]
+
+
+def _is_needed(more: Scored, less: Scored, step: SearchStep) -> bool:
+    """Tell whether a hypothesis with more numbers is worth them beside one with fewer."""
+    enough = least_gain(max(step.above_floor - less.gain, 0.0), len(step.hypothesis.residual))
+    return more.gain - less.gain >= enough and surely_less(more, less)
 
 
 def _as_one(pair: System, step: SearchStep) -> Scored:

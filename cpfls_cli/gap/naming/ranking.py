@@ -12,7 +12,7 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.resampling import blocks_of, mirror_shifted
-from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.scoring import (
     Layout,
     Scored,
@@ -26,6 +26,18 @@ from cpfls_cli.gap.settings import GapSettings
 
 NEAR = 0.6
 """Share of what the best one explains from which on another one is compared with it."""
+
+LEAST_SHARE = 0.05
+"""Share of the remaining gap above the floor that an effect has to explain."""
+
+CLOSE = 0.01
+"""Share of the gap by which two explanations are as good as each other."""
+
+_LEAST_IN_FLOORS = 0.3
+"""Root mean square that an effect has to explain of one channel, in floors."""
+_VISIBLE = 0.25
+_ERRORS = 2.0
+_CHANCE = 0.02
 
 
 @dataclass(frozen=True)
@@ -163,3 +175,43 @@ def _each_once(ranking: Sequence[Scored]) -> tuple[Scored, ...]:
 def rows(hypothesis: System) -> int:
     """Count the residuals of a hypothesis, over windows and known channels."""
     return sum(len(flight) * int(flight.known.sum()) for flight in hypothesis.flights)
+
+
+def surely_less(one: Scored, other: Scored) -> bool:
+    """Tell whether one explanation leaves less than another, by more than the scatter over blocks."""
+    # Slow to load, and needed only where two explain almost the same.
+    from scipy.stats import wilcoxon
+
+    margin = other.block_error - one.block_error
+    if len(margin) < 2 or margin.sum() <= 0:
+        return False
+    spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin)))
+    # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
+    return bool(margin.sum() > _ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
+
+
+def least_gain(above_floor: float, windows: int) -> float:
+    """Compute what an effect has to explain to be worth a name, in squared floors.
+
+    Parameters
+    ----------
+    above_floor : float
+        The gap, in squared floors.
+    windows : int
+    """
+    return max(LEAST_SHARE * above_floor, _LEAST_IN_FLOORS**2 * windows)
+
+
+def least_margin(above_floor: float, left: float) -> float:
+    """Compute the difference of two explanations up to which they are as good as each other.
+
+    It is next to nothing of a large gap, or next to nothing beside what the better one leaves itself.
+
+    Parameters
+    ----------
+    above_floor : float
+        The gap, in squared floors.
+    left : float
+        What the better one leaves, in squared floors.
+    """
+    return min(CLOSE * above_floor, _VISIBLE * left / len(CHANNELS))

@@ -10,13 +10,18 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import fit, refined, weighted_residual
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
-from cpfls_cli.gap.naming.actuation import late, moved, parted
+from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.actuation import late, moved, parted, without_companion
 from cpfls_cli.gap.naming.ranking import (
+    CLOSE,
+    LEAST_SHARE,
     NEAR,
     SearchStep,
+    least_gain,
+    least_margin,
     rank_effects,
     rows,
+    surely_less,
 )
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.scoring import (
@@ -24,16 +29,6 @@ from cpfls_cli.gap.naming.scoring import (
     Scored,
 )
 from cpfls_cli.gap.settings import GapSettings
-
-_LEAST_SHARE = 0.05
-"""Share of the remaining gap above the floor that an effect has to explain."""
-
-_LEAST_IN_FLOORS = 0.3
-"""Root mean square that an effect has to explain of one channel, in floors."""
-_CLOSE = 0.01
-_VISIBLE = 0.25
-_ERRORS = 2.0
-_CHANCE = 0.02
 
 
 def forward_selection(
@@ -73,6 +68,7 @@ def forward_selection(
         refitted = parted(refined(flights, [*chosen, best.candidate], step.floor), step)
         if not quiet_enough(best.gain, step, refitted):
             return chosen, steps
+        refitted = without_companion(refitted, step)
         kept = exchanged(flights, refitted.chosen, effects, settings) if len(refitted.chosen) > 1 else refitted.chosen
         names = frozenset(candidate.effect.name for candidate in kept)
         # An exchange can undo what was added; a set that was there before would come round again for ever.
@@ -129,7 +125,7 @@ def exchanged(
         others = [other for other in kept if other is not candidate]
         step = rank_effects(flights, others, effects, settings, None, also=(candidate,))
         scored = next((each for each in step.ranking if each.candidate.effect.name == candidate.effect.name), None)
-        small = scored is None or scored.gain < _LEAST_SHARE * step.above_floor
+        small = scored is None or scored.gain < LEAST_SHARE * step.above_floor
         if scored is None or small or len(late(others)) > 1:
             without = _do_without(flights, others, kept, step.floor)
             kept = kept if without is None else without
@@ -162,7 +158,7 @@ def _do_without(
         float((weighted_residual(there, floor, plain.rotor_wrench) ** 2).sum())
         for there in (without, system(flights, kept))
     )
-    return list(without.chosen) if left - before < _LEAST_SHARE * max(left - rows(plain), 0.0) else None
+    return list(without.chosen) if left - before < LEAST_SHARE * max(left - rows(plain), 0.0) else None
 
 
 def unbeaten(chosen: Scored, ranking: Sequence[Scored], above_floor: float) -> list[Scored]:
@@ -189,7 +185,7 @@ def simplest(ranking: Sequence[Scored], above_floor: float) -> Scored:
     above_floor : float
     """
     best = ranking[0]
-    rivals = [other for other in unbeaten(best, ranking, above_floor) if other.gain > (1 - _CLOSE) * best.gain]
+    rivals = [other for other in unbeaten(best, ranking, above_floor) if other.gain > (1 - CLOSE) * best.gain]
     return min([best, *rivals], key=lambda scored: (_numbers(scored), -scored.gain))
 
 
@@ -210,41 +206,8 @@ def alternatives(chosen: Scored, ranking: Sequence[Scored], above_floor: float) 
 
 
 def _beats(chosen: Scored, other: Scored, above_floor: float) -> bool:
-    from scipy.stats import wilcoxon
-
-    margin = other.block_error - chosen.block_error
-    if margin.sum() <= least_margin(above_floor, float(chosen.block_error.sum())) or len(margin) < 2:
-        return False
-    spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin)))
-    # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
-    return bool(margin.sum() > _ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
-
-
-def least_gain(above_floor: float, windows: int) -> float:
-    """Compute what an effect has to explain to be worth a name, in squared floors.
-
-    Parameters
-    ----------
-    above_floor : float
-        The gap, in squared floors.
-    windows : int
-    """
-    return max(_LEAST_SHARE * above_floor, _LEAST_IN_FLOORS**2 * windows)
-
-
-def least_margin(above_floor: float, left: float) -> float:
-    """Compute the difference of two explanations up to which they are as good as each other.
-
-    It is next to nothing of a large gap, or next to nothing beside what the better one leaves itself.
-
-    Parameters
-    ----------
-    above_floor : float
-        The gap, in squared floors.
-    left : float
-        What the better one leaves, in squared floors.
-    """
-    return min(_CLOSE * above_floor, _VISIBLE * left / len(CHANNELS))
+    margin = float((other.block_error - chosen.block_error).sum())
+    return margin > least_margin(above_floor, float(chosen.block_error.sum())) and surely_less(chosen, other)
 
 
 def _numbers(scored: Scored) -> int:
