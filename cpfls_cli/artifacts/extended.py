@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -9,16 +11,40 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gap_effects import GapChangeGroup, NamedEffectsGroup, PlaybackChangeGroup, effect_summary
 from cpfls_cli.artifacts.gap_flights import AuditGroup, BaseGroup
-from cpfls_cli.artifacts.spec import BODY, Format, Record, dataset, group, record
+from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record
 from cpfls_cli.artifacts.vehicle_model import VehicleGroup
 from cpfls_cli.inertia import six_parameters, symmetric
 
 if TYPE_CHECKING:
+    from cpfls_cli.gap.balance.windows import Recording
     from cpfls_cli.gap.extended import ExtendedModel, Refit
     from cpfls_cli.vehicle.settings import VehicleSettings
 
 FUZZY_INERTIA = "inertia over attitude"
 """Part of an extended model that no table of polynomials holds."""
+
+
+@record
+class LeftOutGroup:
+    """Effects that no vehicle for other programs holds, and what they do along the held-out flights."""
+
+    name: tuple[str, ...] = dataset("name", "identifier, see `cpfls effects`", "left_out")
+    wrench: Array = dataset(
+        "wrench",
+        "root mean square of torque (x y z, N m) and force (x y z, N)",
+        "left_out",
+        "6",
+        units="SI",
+        frame=BODY,
+    )
+    ends: Array = dataset(
+        "ends",
+        "how far half a second of playback ends off without it: position (m), velocity (m/s), attitude (rad), body "
+        "rate (rad/s)",
+        "left_out",
+        "4",
+        units="SI",
+    )
 
 
 @record
@@ -42,6 +68,7 @@ class ExtendedRecord(Record):
     audit: AuditGroup = group("")
     base: BaseGroup = group("base")
     vehicle: VehicleGroup | None = group("vehicle", default=None)
+    left_out: LeftOutGroup | None = group("left_out", default=None)
 
     @classmethod
     def of(cls, refit: Refit, vehicle: VehicleSettings, playback: PlaybackChangeGroup, base: BaseGroup) -> Self:
@@ -71,6 +98,14 @@ class ExtendedRecord(Record):
             base=base,
             vehicle=_vehicle(model, vehicle, base),
         )
+
+    def sized(self, model: ExtendedModel, held: Sequence[Recording]) -> Self:
+        """Measure along held-out flights what `vehicle` does not hold."""
+        from cpfls_cli.gap.playback import left_out
+
+        assert self.vehicle is not None, "just made"
+        names = [name for name in self.vehicle.not_held if name in self.effects.names()]
+        return replace(self, left_out=columns_of(LeftOutGroup, left_out(model, names, held))) if names else self
 
     def rebuilt(self, path: object) -> ExtendedModel:
         """Rebuild the model with its effects.

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.parameters import Parameter, parameters_of
 from cpfls_cli.artifacts.replay import HeldOutGroup, better_to
-from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
+from cpfls_cli.artifacts.spec import BODY, WORLD, Format, Record, columns_of, dataset, group, record, rows_of
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 
 if TYPE_CHECKING:
@@ -211,6 +211,14 @@ class VehicleGroup:
     not_held: tuple[str, ...] = dataset(
         "not_held", "parts of the model that stand elsewhere in the file, being no polynomials", "part_not_held"
     )
+    wind: Array | None = dataset(
+        "steady_wind",
+        "of its flights; no part of the vehicle",
+        "3",
+        units="m/s",
+        frame=WORLD,
+        default=None,
+    )
 
     @classmethod
     def of(cls, model: VehicleModel, not_held: Sequence[str] = ()) -> Self:
@@ -231,6 +239,7 @@ class VehicleGroup:
             effect=EffectsGroup.of(model.effects),
             remainder=None if model.remainder is None else RemainderGroup.of(model.remainder),
             not_held=tuple(not_held),
+            wind=np.array(model.wind) if any(model.wind) else None,
         )
 
     def vehicle(self) -> VehicleSettings:
@@ -262,6 +271,7 @@ class VehicleGroup:
             thrust_linear=self.rotor.thrust_linear,
             effects=self.effect.effects(),
             remainder=None if self.remainder is None else self.remainder.remainder(),
+            wind=(0.0, 0.0, 0.0) if self.wind is None else tuple(self.wind.tolist()),
         )
 
     @property
@@ -282,6 +292,7 @@ class VehicleGroup:
             },
             "effects": {name: self.effect.linear_of(name).tolist() for name in self.effect.name},
             "remainder": None if self.remainder is None else self.remainder.rows.tolist(),
+            "steady_wind_m_s": [0.0, 0.0, 0.0] if self.wind is None else self.wind.tolist(),
             "not_held": list(self.not_held),
         }
 

@@ -11,18 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.extended import FUZZY_INERTIA
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.output import write_texts
-from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.commands.vehicle_sheets import require_usable, sheet_of, whole_of
-from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
+from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import reference_points
-from cpfls_cli.export.registry import TARGETS, exported
+from cpfls_cli.export.registry import TARGETS, exported, tabled
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.export.text import checked_identifier, identifier
@@ -34,6 +32,7 @@ from cpfls_cli.pages.export import export_answer, vehicle_export_answer
 from cpfls_cli.report.outcome import Outcome
 
 _SEED = 1
+_LANGUAGES = {"json": "JSON", "c": "C", "python": "Python"}
 ENDINGS = {"json": ".json", "c": ".c", "python": ".py"} | {form: target.ending for form, target in TARGETS.items()}
 # What the module imports: under such a name it would import itself.
 _IMPORTED = ("casadi", "jax", "math", "numpy", "rotorpy", "sys", "warnings")
@@ -59,44 +58,59 @@ def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
     check_outputs(job, *reversed(outputs))
     if form in TARGETS:
         return _for_target(job, sheet_of(model, prefix, source, force=job.force), form)
-    given = whole_of(model)
-    sheet = _sheet(model, prefix, source.sha256, job) if given is None else _vehicle(model, prefix, source, job)
-    texts = _texts(sheet, form, outputs) if isinstance(sheet, Sheet) else _vehicle_texts(sheet, form, outputs)
-    if not job.dry_run:
-        write_texts(texts)
-    sizes = {str(path): len(text.encode()) for path, text in texts.items()}
-    summary = {
-        "dry_run": job.dry_run,
-        "format": form,
-        "name": sheet.name,
-        "output": list(sizes),
-        "bytes": sum(sizes.values()),
-    }
-    if isinstance(sheet, VehicleSheet):
-        return Outcome(summary | _vehicle_summary(sheet), tuple(vehicle_export_answer(sheet.told, sizes, job.dry_run)))
-    return Outcome(summary | _summary(sheet), tuple(export_answer(sheet.record, model, sizes, dry_run=job.dry_run)))
+    if whole_of(model) is not None:
+        sheet, missing = tabled(sheet_of(model, prefix, source, force=job.force), _LANGUAGES[form])
+        return _of_vehicle(job, sheet, form, _vehicle_texts(sheet, form, outputs), sheet.told, missing)
+    identified = _sheet(model, prefix, source.sha256, job)
+    sizes = _written(job, _texts(identified, form, outputs))
+    summary = _summary(job, form, prefix, sizes) | _of_model(identified)
+    return Outcome(summary, tuple(export_answer(identified.record, model, sizes, dry_run=job.dry_run)))
 
 
 def _for_target(job: Job, sheet: VehicleSheet, form: str) -> Outcome:
     """Write a vehicle for a simulator or a library."""
     made = exported(sheet, form, job.output.name)
-    if not job.dry_run:
-        write_texts({job.output: made.text})
-    size = len(made.text.encode())
+    return _of_vehicle(job, sheet, form, {job.output: made.text}, [*sheet.told, *made.told], made.missing)
+
+
+def _of_vehicle(
+    job: Job,
+    sheet: VehicleSheet,
+    form: str,
+    texts: dict[Path, str],
+    told: Sequence[str],
+    missing: Sequence[Missing],
+) -> Outcome:
+    sizes = _written(job, texts)
     summary = {
+        **_summary(job, form, sheet.name, sizes),
+        "rotors": sheet.model.rotors,
+        "weights": len(sheet.weights),
+        "effects": [effect.name for effect in sheet.model.effects],
+        "learned": sheet.remainder is not None,
+        "missing": [asdict(each) for each in missing],
+    }
+    return Outcome(summary, tuple(vehicle_export_answer(told, sizes, job.dry_run)))
+
+
+def _written(job: Job, texts: dict[Path, str]) -> dict[str, int]:
+    """Write files, and give the bytes of each."""
+    if not job.dry_run:
+        write_texts(texts)
+    return {str(path): len(text.encode()) for path, text in texts.items()}
+
+
+def _summary(job: Job, form: str, name: str, sizes: dict[str, int]) -> dict[str, Any]:
+    return {
         "dry_run": job.dry_run,
         "format": form,
-        "name": sheet.name,
-        "output": [str(job.output)],
-        "bytes": size,
-        **_vehicle_summary(sheet),
-        "missing": [asdict(each) for each in made.missing],
+        "name": name,
+        "output": list(sizes),
+        "bytes": sum(sizes.values()),
     }
-    told = [*sheet.told, *made.told]
-    return Outcome(summary, tuple(vehicle_export_answer(told, {str(job.output): size}, job.dry_run)))
 
 
-def _summary(sheet: Sheet) -> dict[str, Any]:
+def _of_model(sheet: Sheet) -> dict[str, Any]:
     return {
         "complete": sheet.record.complete,
         "verdict": sheet.record.verdict_label,
@@ -104,15 +118,6 @@ def _summary(sheet: Sheet) -> dict[str, Any]:
         "fuzzy": sheet.fuzzy,
         "rigid_body": sheet.rigid,
         "region_share": sheet.region_share,
-    }
-
-
-def _vehicle_summary(sheet: VehicleSheet) -> dict[str, Any]:
-    return {
-        "rotors": sheet.model.rotors,
-        "weights": len(sheet.weights),
-        "effects": [effect.name for effect in sheet.model.effects],
-        "learned": sheet.remainder is not None,
     }
 
 
@@ -125,28 +130,6 @@ def _sheet(path: Path, name: str, sha256: str, job: Job) -> Sheet:
         )
     require_usable(path, record.verdict_label, force=job.force)
     return Sheet(name, _usable(record.rebuilt(path), path), record, path.name, sha256)
-
-
-def _vehicle(path: Path, name: str, file: InputFile, job: Job) -> VehicleSheet:
-    """Read a whole vehicle, and refuse one that is more than its table of weights."""
-    sheet = sheet_of(path, name, file, force=job.force)
-    if sheet.outside:
-        raise InputError(f"{path}: {_not_exported(sheet.outside)}")
-    return sheet
-
-
-def _not_exported(parts: Sequence[str]) -> str:
-    """Name what an export cannot hold, and say what to do about each."""
-    effects = [part for part in parts if part in CATALOGUE]
-    advice = []
-    if effects:
-        ignored = ", ".join(effects)
-        advice.append(f'`cpfls diagnose --set "gap.ignore=[{ignored}]"`, then `cpfls extend`, make a model without')
-    if FUZZY_INERTIA in parts:
-        advice.append("without --model they extend the vehicle of the config, whose inertia is constant")
-    if set(parts) - {*effects, FUZZY_INERTIA}:
-        advice.append("flights that turn about all axes tell the inertia better")
-    return f"export cannot write {', '.join(parts)}: no polynomial of motion and rotor speeds; {'; '.join(advice)}"
 
 
 def _usable(model: Model, path: Path) -> Model:

@@ -110,4 +110,4 @@ def extended(
     extension = extend(training, held, named_effects(diagnosis), diagnosis.audit.audit(), study.gap, model)
     played = played_pairs(held, extension.model, plain(model))
     playback = PlaybackChangeGroup.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))
-    return ExtendedRecord.of(extension, study.vehicle, playback, base)
+    return ExtendedRecord.of(extension, study.vehicle, playback, base).sized(extension.model, held)

@@ -11,17 +11,19 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.extended import FUZZY_INERTIA, ExtendedRecord
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.spec import InputFile, rows_of
 from cpfls_cli.artifacts.store import holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
+from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import DO_NOT_USE
 from cpfls_cli.export.vehicle_sheet import VehicleSheet
 from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.visited import CELLS
-from cpfls_cli.inertia import INERTIA_ENTRIES
+from cpfls_cli.inertia import INERTIA_ENTRIES, six_parameters
 from cpfls_cli.pages.extended import worth_in_words
 from cpfls_cli.playback.model import VehicleModel
 
@@ -95,8 +97,39 @@ def _whole(
         model = record.vehicle.vehicle_model()
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    outside = record.vehicle.not_held
-    return VehicleSheet(name, model, worth, record.origin, path.name, file.sha256, outside, floor, mark)
+    wind, model = model.wind, replace(model, wind=(0.0, 0.0, 0.0))
+    outside = _outside(record)
+    if isinstance(record, ExtendedRecord) and FUZZY_INERTIA in record.vehicle.not_held:
+        model = _over_attitude(path, record, model)
+    return VehicleSheet(name, model, worth, record.origin, path.name, file.sha256, outside, wind, floor, mark)
+
+
+def _outside(record: VehicleRecord | ExtendedRecord) -> tuple[Missing, ...]:
+    """List the parts of a model that no table of weights holds, with their sizes along the held-out flights."""
+    assert record.vehicle is not None, "refused before"
+    group = record.left_out if isinstance(record, ExtendedRecord) else None
+    found = {} if group is None else {row["name"]: row for row in rows_of(group)}
+    listed = []
+    for name in record.vehicle.not_held:
+        title = CATALOGUE[name].title if name in CATALOGUE else name
+        if name in found and isinstance(record, ExtendedRecord):
+            size, ends = (np.array(found[name][key]) for key in ("wrench", "ends"))
+            listed.append(sized(title, size, record.gap.floor, Off.of(ends), "along its held-out flights"))
+        elif name != FUZZY_INERTIA:
+            listed.append(Missing(title, np.nan, np.nan, np.nan, None))
+    return tuple(listed)
+
+
+def _over_attitude(path: Path, record: ExtendedRecord, model: VehicleModel) -> VehicleModel:
+    """Put an identified inertia under what the refit adds to it."""
+    identified = record.base.rebuilt(path)
+    assert identified is not None, "the inertia of a vehicle is constant"
+    source = f"{path.name}: /config"
+    stated = validate(parse_config(record.origin.config, source), source).vehicle
+    vehicles = (model.vehicle, stated)
+    refitted, given = (np.array(six_parameters(vehicle.inertia_kg_m2), dtype=float) for vehicle in vehicles)
+    fuzzy = replace(identified, rigid_body=identified.rigid_body + (refitted - given))
+    return replace(model, vehicle=replace(model.vehicle, inertia_kg_m2=_mean_inertia(path, fuzzy)), fuzzy=fuzzy)
 
 
 def _identified(path: Path, name: str, file: InputFile, force: bool) -> VehicleSheet:

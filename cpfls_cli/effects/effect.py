@@ -178,6 +178,8 @@ class Effect:
     exact : Effect or None
         What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
         would do as well, or with those that others depend on as shapes, under the same names.
+    still : str
+        Effect with the same linear coefficients that it is in still air; empty for an effect that is no air.
     lever : callable or None
         ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
         possible, a torque being no larger than its force on a lever as long as the body.
@@ -213,6 +215,7 @@ class Effect:
     accounts: Callable[[str, Mapping[str, float]], float] | None = None
     vehicle: Callable[[VehicleSettings, Mapping[str, float]], VehicleSettings] | None = None
     exact: Effect | None = None
+    still: str = ""
     lever: Callable[[Array, Array, VehicleSettings], BoolArray] | None = None
 
     def form(self, coefficients: int, shapes: Collection[str]) -> Effect:

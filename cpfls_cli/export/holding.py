@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Self
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
-from cpfls_cli.effects.polynomial import STATE_TERMS, state_terms
+from cpfls_cli.effects.polynomial import STATE_TERMS
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, Motion
-from cpfls_cli.playback.model import Remainder, VehicleModel, remainder_terms, wrench_of
-from cpfls_cli.playback.replay import Player, free_runs, player_of, rotor_terms_along
+from cpfls_cli.playback.model import Remainder, VehicleModel
+from cpfls_cli.playback.replay import Player, apart, free_runs, player_of, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rotations import rotation_matrix
 
@@ -32,6 +32,7 @@ _LINEAR = "part of the thrust that is linear in the speed"
 _ROTORS = "what differs between rotors, and their places"
 _LEARNED = "what is learned, without a name"
 _NO_BODY = "inertia with a moment larger than the sum of the others, which no body has: the nearest that one has"
+_WIND = "wind of its flights, {:.3g} and {:.3g} m/s along x and y of the world, which is no part of a vehicle"
 FUZZY = "inertia that depends on the attitude"
 
 Holds = Callable[[Array], Array]
@@ -45,6 +46,11 @@ class Off(NamedTuple):
     attitude: float
     velocity: float
     position: float
+
+    @classmethod
+    def of(cls, ends: Array) -> Self:
+        """Take what runs end apart by, in the order of playback: position, velocity, attitude, rate."""
+        return cls(*ends[::-1].tolist())
 
     @property
     def sentence(self) -> str:
@@ -63,11 +69,13 @@ class Missing:
     ----------
     title : str
     torque, force : float, N m and N
-        Root mean square of the largest axis along runs about hover; NaN for what is no sum of weights.
+        Root mean square of the largest axis; NaN where nobody measured it.
     floors : float
         The same in noise floors of the flights that the model was made with; NaN where the model holds none.
     off : Off or None
-        How far half a second without it ends from the whole model; None for what depends on a flight.
+        How far half a second without it ends from the whole model; None where nobody measured that.
+    where : str
+        Along what both were measured.
     """
 
     title: str
@@ -75,19 +83,18 @@ class Missing:
     force: float
     floors: float
     off: Off | None
+    where: str = "about hover"
 
     @property
     def sentence(self) -> str:
         """What is missing, and its size."""
         if self.off is None:
-            return (
-                f"Not held: {self.title}, which is no sum of motion and rotor speeds; its size depends on the flight."
-            )
+            return f"Not held: {self.title}; its size depends on the flight, and was not measured along one."
         if not (self.torque or self.force):
             return f"Not held, or not whole: {self.title}; half a second without it ends {self.off.sentence} off."
         floors = "" if np.isnan(self.floors) else f", {self.floors:.3g} noise floors"
         return (
-            f"Not held, or not whole: {self.title}: {self.torque:.3g} N m and {self.force:.3g} N about hover{floors}; "
+            f"Not held, or not whole: {self.title}: {self.torque:.3g} N m and {self.force:.3g} N {self.where}{floors}; "
             f"half a second without it ends {self.off.sentence} off."
         )
 
@@ -174,7 +181,9 @@ def of_a_body(body: Body, margin: float = 0.0) -> Body:
     return body._replace(inertia=inertia, inverse=np.asarray(np.linalg.inv(inertia), dtype=float))
 
 
-def missing(model: VehicleModel, held: Held, holds: Holds, floor: Array, outside: Sequence[str]) -> list[Missing]:
+def missing(
+    model: VehicleModel, held: Held, holds: Holds, floor: Array, wind: tuple[float, float, float]
+) -> list[Missing]:
     """List what a target does not hold, each with its size.
 
     Parameters
@@ -185,18 +194,16 @@ def missing(model: VehicleModel, held: Held, holds: Holds, floor: Array, outside
         That `held` was made with.
     floor : array, shape (6,), N m and N
         Noise floors; NaN where unknown.
-    outside : sequence of str
-        Names of effects that are no sum of weights, so that no target holds them.
+    wind : tuple of float, m/s
+        Of the flights that the model was made with.
     """
     flight = probe_flight(model)
     whole = player_of(model, flight)
-    found = [_of_table(name, left, whole, flight, floor) for name, left in _left(model, holds)]
+    found = [_of_table(name, left, whole, flight, floor) for name, left in _left(model, holds) if left.any()]
     found += [_of_player(name, other, whole, flight, floor) for name, other in _others(model, held, whole, flight)]
-    unknown = float("nan")
-    found += [
-        Missing(CATALOGUE[name].title if name in CATALOGUE else name, unknown, unknown, unknown, None)
-        for name in outside
-    ]
+    if any(wind):
+        blown = replace(whole, wind=wind)
+        found.append(_of_player(_WIND.format(*wind), whole, blown, flight, floor))
     return [each for each in found if each.off is None or max(each.off) > _NOTHING]
 
 
@@ -239,35 +246,35 @@ def _others(model: VehicleModel, held: Held, whole: Player, flight: PlaybackFlig
 
 def _of_table(name: str, left: Array, whole: Player, flight: PlaybackFlight, floor: Array) -> Missing:
     without = replace(whole, table=whole.table - left)
-    return _sized(name, _wrench(replace(whole, table=left), flight), floor, _apart(whole, without, flight))
+    return _sized(name, replace(whole, table=left).wrench(flight), floor, _apart(whole, without, flight))
 
 
 def _of_player(name: str, other: Player, whole: Player, flight: PlaybackFlight, floor: Array) -> Missing:
-    difference = _wrench(whole, flight) - _wrench(other, flight)
+    difference = whole.wrench(flight) - other.wrench(flight)
     return _sized(name, difference, floor, _apart(whole, other, flight))
 
 
 def _sized(name: str, wrench: Array, floor: Array, off: Off) -> Missing:
-    size = np.sqrt((wrench**2).mean(axis=0))
+    return sized(name, np.sqrt((wrench**2).mean(axis=0)), floor, off)
+
+
+def sized(title: str, size: Array, floor: Array, off: Off, where: str = Missing.where) -> Missing:
+    """Tell the size of a part.
+
+    Parameters
+    ----------
+    size, floor : array, shape (6,), N m and N
+        Root mean square of the part, and noise floors, NaN where unknown.
+    """
     floors = size / floor
     largest = float(np.nanmax(floors)) if np.isfinite(floors).any() else float("nan")
-    return Missing(name, float(size[:3].max()), float(size[3:].max()), largest, off)
-
-
-def _wrench(player: Player, flight: PlaybackFlight) -> Array:
-    """Evaluate torque and force along the measured motion, shape (time, 6)."""
-    motion = flight.motion
-    air = np.einsum("tji,tj->ti", motion.rotation, motion.velocity)
-    terms = np.hstack([state_terms(air, motion.rate), remainder_terms(player.remainder, air)])
-    return wrench_of(player.table, terms, player.rotor)
+    return Missing(title, float(size[:3].max()), float(size[3:].max()), largest, off, where)
 
 
 def _apart(first: Player, second: Player, flight: PlaybackFlight) -> Off:
     horizon = len(flight) // len(flight.stretches) - 1
     starts = flight.starts(horizon, 1)
-    ends = [free_runs(player, flight, starts, horizon).errors[:, -1] for player in (first, second)]
-    position, velocity, attitude, rate = np.linalg.norm(ends[1] - ends[0], axis=2).mean(axis=0).tolist()
-    return Off(rate, attitude, velocity, position)
+    return Off.of(apart(*(free_runs(player, flight, starts, horizon) for player in (first, second))))
 
 
 def probe_flight(model: VehicleModel) -> PlaybackFlight:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 
 import numpy as np
@@ -103,13 +103,38 @@ def exported(sheet: VehicleSheet, form: str, file: str) -> Exported:
         held, holds = target.held(sheet.model)
     except InputError as error:
         raise InputError(f"{sheet.file}: {error}") from None
-    left = tuple(missing(sheet.model, held, holds, np.array(sheet.floor), sheet.outside))
-    told = tuple(each.sentence for each in left)
-    if sum(each.off is not None for each in left) > 1:
-        off = together(sheet.model, held).sentence
-        told = (*told, f"{target.title} ends {off} off in all after half a second about hover.")
-    told = told or (f"{target.title} holds all of it.",)
+    left, told = _left(sheet, held, holds, target.title)
     return Exported(target.write(sheet, held, [*sheet.facts, "", *told], file), held, left, told)
+
+
+def tabled(sheet: VehicleSheet, title: str) -> tuple[VehicleSheet, tuple[Missing, ...]]:
+    """Take what a table of weights holds of a vehicle.
+
+    Parameters
+    ----------
+    title : str
+        Of the language that it is written in.
+
+    Returns
+    -------
+    sheet : VehicleSheet
+        That says what is left out.
+    missing : tuple of Missing
+    """
+    model = replace(sheet.model, fuzzy=None)
+    left, told = _left(sheet, Held.whole(model), lambda weights: weights, title)
+    return replace(sheet, model=model, worth=(*sheet.worth, *told)), left
+
+
+def _left(sheet: VehicleSheet, held: Held, holds: Holds, title: str) -> tuple[tuple[Missing, ...], tuple[str, ...]]:
+    """List what is left of a vehicle, and say so."""
+    about_hover = missing(sheet.model, held, holds, np.array(sheet.floor), sheet.wind)
+    left = (*about_hover, *sheet.outside)
+    told = tuple(each.sentence for each in left)
+    if len(about_hover) - any(sheet.wind) > 1:
+        off = together(sheet.model, held).sentence
+        told = (*told, f"{title} ends {off} off in all after half a second about hover.")
+    return left, told or (f"{title} holds all of it.",)
 
 
 def require_package(form: str) -> None:

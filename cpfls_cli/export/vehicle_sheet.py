@@ -16,6 +16,7 @@ from cpfls_cli.config.load import parse_config
 from cpfls_cli.effects.polynomial import STATE_TERMS, state_terms
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.export.holding import Missing
 from cpfls_cli.export.sheet import EXPORTER
 from cpfls_cli.playback.model import Remainder, VehicleModel, remainder_terms
 from cpfls_cli.playback.motion import State, step
@@ -115,8 +116,10 @@ class VehicleSheet:
         Of the artifact that it was read from.
     file, sha256 : str
         Name, without its folder, and hash of the artifact.
-    outside : tuple of str
+    outside : tuple of Missing
         Parts of the artifact that the model does not hold: effects that are no sums of weights.
+    wind : tuple of float, m/s, world frame
+        Of the flights that it was made with; the model is in still air.
     floor : tuple of float, length 6, N m and N
         Noise floors of the flights that it was made with; NaN where unknown.
     mark : str
@@ -129,7 +132,8 @@ class VehicleSheet:
     origin: Header
     file: str
     sha256: str
-    outside: tuple[str, ...] = ()
+    outside: tuple[Missing, ...] = ()
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
     floor: tuple[float, ...] = (np.nan,) * 6
     mark: str = ""
 

@@ -14,7 +14,7 @@ from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held
 from cpfls_cli.export.registry import TARGETS, Exported
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.replay import Player, free_runs
+from cpfls_cli.playback.replay import Player, free_runs, in_the_air
 
 AGREES = 1e-6
 """Largest distance in SI at which the equations of a target are those that were exported."""
@@ -69,7 +69,7 @@ def verified(
     flight : PlaybackFlight
         As logged, faults of sensors taken out.
     model : tuple of PlaybackFlight and Player
-        What `cpfls replay` plays back along the flight.
+        What `cpfls replay` plays back along the flight, in the wind that it says; the export flies in the same.
     horizon : int
         Samples.
     windows : int
@@ -81,6 +81,7 @@ def verified(
         If the flight does not say what the vehicle needs to be flown.
     """
     _require(flight, exported.held)
+    flight = in_the_air(flight, model[1].wind)
     found = flight.starts(horizon, 1)
     starts = found[np.unique(np.linspace(0, len(found) - 1, windows).round().astype(int))]
     target, held = TARGETS[form], exported.held

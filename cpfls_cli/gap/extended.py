@@ -14,6 +14,7 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, scatter_size, scatter_variance, system
@@ -56,6 +57,14 @@ class FittedEffect(NamedTuple):
 
     candidate: Candidate
     linear: Array
+
+    @property
+    def in_still_air(self) -> FittedEffect:
+        """The effect that a wind is on a vehicle in still air; any other effect itself."""
+        effect = self.candidate.effect
+        if not (effect.still and effect.apply):
+            return self
+        return FittedEffect(Candidate(CATALOGUE[effect.still], {}), self.linear)
 
 
 @dataclass(frozen=True)

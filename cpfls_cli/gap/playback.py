@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,13 +22,15 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import Corrected, ExtendedModel, FittedEffect, instantaneous
 from cpfls_cli.playback.flight import PlaybackFlight, playback_flight
-from cpfls_cli.playback.model import VehicleModel, body_of, rotor_weights
+from cpfls_cli.playback.model import ModelEffect, VehicleModel, body_of, lever_weights, rotor_weights
 from cpfls_cli.playback.replay import (
+    MODEL,
     STATED,
     Played,
     Player,
     Replay,
     Runs,
+    apart,
     drawn_runs,
     free_runs,
     replay,
@@ -38,7 +41,7 @@ from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _EVERY = 5
-_STRETCH_S, _RUN_S = 2.0, 1.0
+_STRETCH_S, _RUN_S, _LEFT_S = 2.0, 1.0, 0.5
 _ROUNDING = 1e-9
 _COUPLED = ("qr", "pr", "pq")
 _PRODUCTS = tuple(STATE_TERMS.index(name) for name in _COUPLED)
@@ -51,16 +54,19 @@ class _Parts:
     Attributes
     ----------
     table : array, shape (6, terms, 1 + 4 rotors)
-        Of the rotors, the effects that are polynomials, and the vehicle's own numbers.
+        Of the rotors, the effects that are polynomials, the vehicle's own numbers, and the levers of all these forces.
     inertia : array, shape (3, 3), kg m^2
         Of the effects that are nothing else.
     along : list of FittedEffect
         That are evaluated along the measured motion.
+    centre : array, shape (3,), m
+        Of mass, from where all forces have their levers from.
     """
 
     table: Array
     inertia: Array
     along: list[FittedEffect]
+    centre: Array
 
 
 def extended_player(
@@ -69,7 +75,7 @@ def extended_player(
     """Make a model with effects ready for a flight.
 
     Lag and delay act on the rotors as logged; effects that are polynomials of motion and rotor speeds are simulated
-    with the state; all others, such as the wind or a payload, are evaluated along the measured motion.
+    with the state, in the wind; all others, such as a payload, are evaluated along the measured motion.
 
     Parameters
     ----------
@@ -91,7 +97,7 @@ def extended_player(
     late = any(now is not part for now, part in zip(moved, parts, strict=True))
     flight = playback_flight(name, moved, "linear" if late else hold)
     vehicle, response = moved[0].vehicle, RotorResponse()
-    by_kind = _sorted(model, vehicle, speeds=flight.wrench is None, windy=moved[0].wind is not None)
+    by_kind = _sorted(model, vehicle, speeds=flight.wrench is None)
     along = _along(by_kind.along, moved)
     stated = stated_along(flight, response)
     if stated is not None:
@@ -101,10 +107,19 @@ def extended_player(
         table=by_kind.table,
         rotor=rotor_terms_along(flight, response),
         body=body_of(vehicle, tensor),
-        along=_sum(along, stated),
+        along=_sum(along, stated, by_kind.centre),
         fuzzy=fuzzy,
+        wind=wind_of(moved[0]),
     )
     return flight, player
+
+
+def wind_of(signals: Signals) -> tuple[float, float, float]:
+    """Give the wind that signals are in, world frame."""
+    if signals.wind is None:
+        return 0.0, 0.0, 0.0
+    x, y, z = signals.wind.tolist()
+    return x, y, z
 
 
 def _require(candidate: Candidate, signals: Signals, name: str) -> None:
@@ -125,7 +140,7 @@ def _number(model: ExtendedModel, name: str) -> float:
     return float(model.parameters[names.index(name)])
 
 
-def _sorted(model: ExtendedModel, vehicle: VehicleSettings, *, speeds: bool, windy: bool) -> _Parts:
+def _sorted(model: ExtendedModel, vehicle: VehicleSettings, *, speeds: bool) -> _Parts:
     table = VehicleModel(vehicle=vehicle).weights.copy()
     table[5, 0] += _number(model, "thrust_scale") * rotor_weights(vehicle, 0.0, RotorResponse())[5]
     moments = np.array(vehicle.inertia_kg_m2[:3])
@@ -133,13 +148,16 @@ def _sorted(model: ExtendedModel, vehicle: VehicleSettings, *, speeds: bool, win
         # What multiplies the coupling of two rates is the mean of their moments; see the catalogue.
         mean = 0.5 * (moments.sum() - moments[axis])
         table[axis, term, 0] -= _number(model, f"coupling_{'xyz'[axis]}") * mean
-    probe, inertia, along = Probe.of(vehicle), np.zeros((3, 3)), []
-    for fitted in model.effects:
+    probe, inertia, along, centre = Probe.of(vehicle), np.zeros((3, 3)), [], np.zeros(3)
+    for fitted in (each.in_still_air for each in model.effects):
         effect, shape = fitted.candidate
         if effect.kind != "wrench":
             continue
+        if ModelEffect(effect.name, shape, fitted.linear).is_lever:
+            centre = fitted.linear
+            continue
         added = _as_inertia(fitted, probe)
-        weights = None if windy and "velocity" in effect.needs else polynomial(effect, probe, shape)
+        weights = polynomial(effect, probe, shape)
         # Without rotor speeds the terms of the rotors are 0, and the thrust is what the log states.
         if weights is not None and (speeds or not weights[..., 1:].any()):
             width = weights.shape[3]
@@ -148,7 +166,7 @@ def _sorted(model: ExtendedModel, vehicle: VehicleSettings, *, speeds: bool, win
             inertia += added
         else:
             along.append(fitted)
-    return _Parts(table, inertia, along)
+    return _Parts(table + lever_weights(centre, table), inertia, along, centre)
 
 
 def _as_inertia(fitted: FittedEffect, probe: Probe) -> Array | None:
@@ -194,9 +212,12 @@ def _by_step(values: Array) -> Array:
     return np.asarray(0.5 * (values + np.concatenate([values[1:], values[-1:]])))
 
 
-def _sum(first: Array | None, second: Array | None) -> Array | None:
+def _sum(first: Array | None, second: Array | None, centre: Array) -> Array | None:
     known = [values for values in (first, second) if values is not None]
-    return np.asarray(sum(known)) if known else None
+    if not known:
+        return None
+    total = np.asarray(sum(known))
+    return np.asarray(total + lever_weights(centre, total.T).T)
 
 
 @dataclass(frozen=True)
@@ -241,6 +262,53 @@ def _pair(name: str, signals: Signals, model: ExtendedModel, given: ExtendedMode
         return PlayedPair(flight, player, player, flight)
     logged, stated = extended_player(given, name, [given.repaired(signals)], hold)
     return PlayedPair(flight, player, stated, logged)
+
+
+class LeftOut(NamedTuple):
+    """What one effect of a model does along flights.
+
+    Attributes
+    ----------
+    name : str
+    wrench : array, shape (6,), N m and N
+        Root mean square.
+    ends : array, shape (4,)
+        How far half a second of playback ends off without it: means of the norms of position, velocity, attitude and
+        rate, SI.
+    """
+
+    name: str
+    wrench: Array
+    ends: Array
+
+
+def left_out(model: ExtendedModel, names: Sequence[str], recordings: Sequence[Recording]) -> list[LeftOut]:
+    """Play a model back along flights, as it is and without single effects.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of effects.
+
+    Raises
+    ------
+    InputError
+        If a flight lacks a signal that an effect needs.
+    """
+    return [_left_out(model, name, recordings) for name in names]
+
+
+def _left_out(model: ExtendedModel, name: str, recordings: Sequence[Recording]) -> LeftOut:
+    others = tuple(fitted for fitted in model.effects if fitted.candidate.effect.name != name)
+    squares, ends, runs, samples = np.zeros(6), np.zeros(4), 0, 0
+    for pair in played_pairs(recordings, model, replace(model, effects=others)):
+        difference = pair.model.wrench(pair.flight) - pair.stated.wrench(pair.logged)
+        squares, samples = squares + (difference**2).sum(axis=0), samples + len(difference)
+        horizon = min(max(1, round(_LEFT_S / pair.flight.motion.period)), len(pair.flight) - 1)
+        starts = pair.flight.starts(horizon, _EVERY)
+        both = [pair.runs(prediction, starts, horizon) for prediction in (MODEL, STATED)]
+        ends, runs = ends + len(starts) * apart(*both), runs + len(starts)
+    return LeftOut(name, np.sqrt(squares / samples), ends / runs)
 
 
 def errors_by_horizon(pairs: Sequence[PlayedPair], horizon_s: float) -> Replay:

@@ -12,12 +12,13 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.catalogue.parameter_error import coupling, inertia_correction
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.polynomial import Probe, polynomial
-from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.balance.weak_flight import Candidate, actuated
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
+from cpfls_cli.gap.playback import wind_of
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
@@ -52,7 +53,8 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Ar
     corrected = inertia + inertia_correction(extended.parameters, vehicle)
     effects = list(_numbers(extended.parameters, vehicle, corrected))
     probe, times, not_held = Probe.of(vehicle), {"delay_s": 0.0, "lag_s": 0.0}, []
-    for (known, shape), linear in acting:
+    for fitted in acting:
+        (known, shape), linear = fitted.in_still_air
         hooks = known.actuation
         if known.vehicle is not None:
             vehicle = known.vehicle(vehicle, shape)
@@ -62,8 +64,7 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Ar
             times |= {"lag_s": hooks.lag(shape)} if hooks.lag else {}
             times |= {"delay_s": hooks.delay(shape)} if hooks.delay else {}
         elif known.carried is None and polynomial(known, probe, shape) is not None:
-            # Of the thrust alone an effect knows no more than before it was chosen.
-            effects.append(ModelEffect(known.name, dict(shape), linear[: len(CATALOGUE[known.name].coefficients)]))
+            effects.append(ModelEffect(known.name, dict(shape), linear))
         else:
             not_held.append(known.name)
     xx, yy, zz, xy, xz, yz = (float(corrected[entry]) for entry in INERTIA_ENTRIES)
@@ -72,7 +73,13 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Ar
     else:
         not_held.append("inertia, which is not positive definite")
     return WholeVehicle(
-        VehicleModel(vehicle=vehicle, response=RotorResponse(**times), effects=tuple(effects)), tuple(not_held)
+        VehicleModel(
+            vehicle=vehicle,
+            response=RotorResponse(**times),
+            effects=tuple(effects),
+            wind=wind_of(actuated(probe.signals, extended.chosen)),
+        ),
+        tuple(not_held),
     )
 
 

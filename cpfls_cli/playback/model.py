@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial, state_terms
-from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
+from cpfls_cli.effects.registry import CENTRE_OF_MASS, VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.fuzzy.basis import Consequents
@@ -24,6 +24,8 @@ from cpfls_cli.playback.rotors import Hold, RotorResponse, rotor_terms_at_sample
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+_AXES = 3
+
 
 class ModelEffect(NamedTuple):
     """An effect of the catalogue in a model.
@@ -33,12 +35,17 @@ class ModelEffect(NamedTuple):
     name : str
     shape : mapping of str to float
     coefficients : array, shape (coefficient,)
-        Linear ones, SI.
+        Linear ones, SI. An offset of the centre of mass with three has a lever for all forces, with two for the thrust.
     """
 
     name: str
     shape: Mapping[str, float]
     coefficients: Array
+
+    @property
+    def is_lever(self) -> bool:
+        """Whether it has a lever for the forces of all other parts."""
+        return self.name == CENTRE_OF_MASS.name and len(self.coefficients) == _AXES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +89,8 @@ class VehicleModel:
     remainder : Remainder or None
     fuzzy : InertiaModel or None
         Inertia that depends on the attitude; it then stands in the place of the vehicle's.
+    wind : tuple of float, m/s, world frame
+        Of its flights, steady; no part of the vehicle.
     """
 
     vehicle: VehicleSettings
@@ -90,6 +99,7 @@ class VehicleModel:
     effects: tuple[ModelEffect, ...] = ()
     remainder: Remainder | None = None
     fuzzy: InertiaModel | None = None
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def rotors(self) -> int:
@@ -120,12 +130,16 @@ class VehicleModel:
         parts["rotors"][:, 0] = rotor_weights(self.vehicle, self.thrust_linear, self.response)
         probe = Probe.of(self.vehicle)
         for known in self.effects:
+            if known.is_lever:
+                continue
             weights = np.tensordot(known.coefficients, effect_weights(known.name, known.shape, probe), axes=1)
             more = np.zeros((6, self.term_count - len(STATE_TERMS), weights.shape[2]))
             parts[known.name] = np.concatenate([weights, more], axis=1)
         if self.remainder is not None:
             parts["remainder"] = remainder_weights(self.remainder, self.rotors)
-        return parts
+        levers = [known for known in self.effects if known.is_lever]
+        forces = sum(parts.values()) if levers else np.zeros(6)
+        return parts | {known.name: lever_weights(known.coefficients, np.asarray(forces)) for known in levers}
 
     @property
     def airflow(self) -> Airflow:
@@ -266,6 +280,25 @@ def rotor_weights(vehicle: VehicleSettings, thrust_linear: float, response: Roto
     table[:, 1 + rotors : 1 + 2 * rotors] = wrench
     slow = response.slow_roll_pitch, response.slow_roll_pitch, response.slow_yaw
     table[:3, 1 + 3 * rotors :] = np.array(slow)[:, None] * wrench[:3]
+    return table
+
+
+def lever_weights(centre: Array, forces: Array) -> Array:
+    """Weigh the torque ``-c x F`` of forces about a centre of mass.
+
+    Parameters
+    ----------
+    centre : array, shape (3,), m
+        Where it is, from where the forces have their levers from.
+    forces : array, shape (6, ...)
+        Weights of torque and force.
+
+    Returns
+    -------
+    array, shape (6, ...)
+    """
+    table = np.zeros_like(forces)
+    table[:3] = -np.cross(centre, forces[3:], axisb=0, axisc=0)
     return table
 
 

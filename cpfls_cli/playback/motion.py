@@ -58,7 +58,7 @@ def accelerations(model: VehicleModel, state: State, rotor: Array) -> tuple[Arra
     angular : array, shape (samples, 3), rad/s^2, body frame
     """
     body = model.body
-    air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
+    air = np.einsum("nji,nj->ni", state.rotation, state.velocity - model.wind)
     wrench = model.wrench(air, state.rate, rotor)
     linear = np.einsum("nij,nj->ni", state.rotation, wrench[:, 3:]) / body.mass
     linear[:, 2] -= body.gravity

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from cpfls_cli.playback.model import (
     remainder_terms,
     used_terms,
     weights_by_step,
+    wrench_of,
 )
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.motion import step as step_of_rigid_body
@@ -76,6 +77,7 @@ class Player:
     remainder : Remainder or None
     fuzzy : InertiaModel or None
         Stands in the place of the inertia of `body`.
+    wind : tuple of float, m/s, world frame
     """
 
     table: Array
@@ -84,6 +86,7 @@ class Player:
     along: Array | None = None
     remainder: Remainder | None = None
     fuzzy: InertiaModel | None = None
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def feels_air(self) -> bool:
@@ -107,6 +110,14 @@ class Player:
             weights[:, :, 0] += self.along[part]
         return used, weights
 
+    def wrench(self, flight: PlaybackFlight) -> Array:
+        """Evaluate torque and force along the measured motion, shape (time, 6), N m and N, body frame."""
+        motion = flight.motion
+        air = np.einsum("tji,tj->ti", motion.rotation, motion.velocity - self.wind)
+        terms = np.hstack([state_terms(air, motion.rate), remainder_terms(self.remainder, air)])
+        wrench = wrench_of(self.table, terms, self.rotor)
+        return wrench if self.along is None else wrench + self.along
+
 
 def player_of(model: VehicleModel, flight: PlaybackFlight) -> Player:
     """Make a model ready for a flight.
@@ -123,6 +134,7 @@ def player_of(model: VehicleModel, flight: PlaybackFlight) -> Player:
         along=stated_along(flight, model.response),
         remainder=model.remainder,
         fuzzy=model.fuzzy,
+        wind=model.wind,
     )
 
 
@@ -162,6 +174,12 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
     """
     if model.fuzzy is None:
         return step_of_rigid_body(model, state, rotor, period)
+    if any(model.wind):
+        # Seen from the air there is no wind.
+        wind = np.array(model.wind)
+        still = replace(model, wind=(0.0, 0.0, 0.0))
+        after = one_step(still, state._replace(velocity=state.velocity - wind), rotor, period)
+        return after._replace(position=after.position + period * wind, velocity=after.velocity + wind)
     player = Player(table=model.weights, rotor=rotor, body=model.body, remainder=model.remainder, fuzzy=model.fuzzy)
     used, weights = player.step_weights(slice(None))
     return _FuzzyRuns(player, model.fuzzy, Motion(*state, period), used, weights, translates=True).one_step()
@@ -182,6 +200,11 @@ class Runs(NamedTuple):
     diverged: IntArray
 
 
+def apart(first: Runs, second: Runs) -> Array:
+    """Compute how far runs end from each other: mean norms of position, velocity, attitude and rate, shape (4,), SI."""
+    return np.asarray(np.linalg.norm(second.errors[:, -1] - first.errors[:, -1], axis=2).mean(axis=0))
+
+
 def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon: int) -> Runs:
     """Play a model back from samples of a flight.
 
@@ -193,7 +216,7 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
         Samples.
     """
     first, part = int(starts[0]), slice(int(starts[0]), int(starts[-1]) + horizon + 1)
-    motion = _part(flight.motion, part)
+    motion = _part(in_the_air(flight, player.wind).motion, part)
     used, weights = player.step_weights(part)
     errors = np.empty((len(starts), horizon, 4, 3))
     if player.fuzzy is None:
@@ -201,6 +224,17 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
         return Runs(errors, moved)
     runs = _FuzzyRuns(player, player.fuzzy, motion, used, weights, flight.translates)
     return Runs(errors, runs.written(starts - first, errors))
+
+
+def in_the_air(flight: PlaybackFlight, wind: tuple[float, float, float]) -> PlaybackFlight:
+    """See a flight from the air, which moves with a steady wind: the errors of runs are the same there."""
+    if not any(wind):
+        return flight
+    motion = flight.motion
+    gone = motion.period * np.arange(len(flight))[:, None] * wind
+    return replace(
+        flight, motion=motion._replace(position=motion.position - gone, velocity=motion.velocity - np.array(wind))
+    )
 
 
 def still_runs(flight: PlaybackFlight, starts: IntArray, horizon: int, *, rate_stays: bool) -> Runs:

@@ -40,7 +40,7 @@ def read(form, output):
 def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form):
     header = Header("0", 1, "seed: 1\n", {"flight": InputFile("flight.h5", "0" * 64, "cpfls/flight")})
     path = tmp_path / ("x--" + "' \"; raise SystemExit(8)\n#-->.h5")
-    write_record(path, record_of(truth(), ("wind",)).with_header(header))
+    write_record(path, record_of(truth(), ("payload",)).with_header(header))
     with edited(path) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
     output = tmp_path / f"uav{TARGETS[form].ending}"
@@ -50,14 +50,14 @@ def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form
     summary = json.loads(result.stdout)
     assert (summary["format"], summary["rotors"], summary["bytes"]) == (form, 4, output.stat().st_size)
     assert summary["missing"][-1] == {
-        "title": "steady wind", "torque": None, "force": None, "floors": None, "off": None
+        "title": "load on a cable", "torque": None, "force": None, "floors": None, "off": None, "where": "about hover"
     }  # fmt: skip
     read(form, output)
     first = output.read_bytes()
     said = cpfls(*words, "--force").stdout
     assert output.read_bytes() == first
-    assert "Not held: steady wind" in said
-    assert "Not held: steady wind" in output.read_text()
+    assert "Not held: load on a cable" in said
+    assert "Not held: load on a cable" in output.read_text()
     if form in ("casadi", "jax"):
         assert len(summary["missing"]) == 1
     else:

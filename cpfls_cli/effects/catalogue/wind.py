@@ -83,5 +83,6 @@ _EXACT = replace(
     physical=None,
     linear=None,
     apply=_blowing,
+    still="rotor_drag",
 )
 EFFECT = replace(_EFFECT, exact=_EXACT)

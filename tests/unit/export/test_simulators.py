@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import FUZZY, of_a_body, probe_flight
+from cpfls_cli.export.holding import FUZZY, Missing, Off, of_a_body, probe_flight, sized
 from cpfls_cli.export.registry import TARGETS, exported, require_package
 from cpfls_cli.export.verify import AGREES, verified
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -101,11 +101,34 @@ def test_sizes_are_those_of_what_is_missing():
 
 
 def test_an_effect_outside_the_weights_is_named():
-    made = exported(sheet_of_vehicle(truth(), outside=("wind",)), "casadi", "v.py")
-    assert [each.title for each in made.missing] == ["steady wind"]
-    (sentence,) = made.told
-    assert sentence.startswith("Not held: steady wind, which is no sum of motion and rotor speeds")
-    assert "Not held: steady wind" in made.text
+    outside = (
+        Missing("payload", np.nan, np.nan, np.nan, None),
+        sized("sag", np.array([0.0, 0.2, 0.1, 0.0, 0.0, 3.0]), np.full(6, 0.1), Off.of(np.arange(1.0, 5.0)), "here"),
+    )
+    made = exported(sheet_of_vehicle(truth(), outside=outside), "casadi", "v.py")
+    assert made.missing == outside
+    assert made.told == (
+        "Not held: payload; its size depends on the flight, and was not measured along one.",
+        "Not held, or not whole: sag: 0.2 N m and 3 N here, 30 noise floors; half a second without it ends 4 rad/s, "
+        "172 degrees, 2 m/s and 1 m off.",
+    )
+    assert "Not held: payload" in made.text
+
+
+@pytest.mark.parametrize("form", ["sdf", "mjcf", "casadi"])
+def test_an_export_flies_in_the_wind_of_its_flights(form):
+    require(form)
+    model = replace(truth(), response=RotorResponse())
+    flight, windy = probe_flight(model), replace(model, wind=(3.0, -2.0, 0.0))
+    made = exported(sheet_of_vehicle(model, wind=windy.wind), form, "vehicle.py")
+    assert made.missing[-1].title.startswith("wind of its flights, 3 and -2 m/s along x and y of the world")
+    assert made.missing[-1].off.velocity > 0.1
+    found = verified(form, made, flight, (flight, player_of(windy, flight)), 8, 3)
+    assert found.agrees
+    if form == "casadi":
+        assert found.errors[2].max() < 1e-12
+    still = verified(form, made, flight, (flight, player_of(model, flight)), 8, 3)
+    assert np.abs(still.errors[0] - found.errors[0]).max() > 1e-3
 
 
 def test_an_inertia_that_depends_on_the_attitude_is_named():

@@ -9,11 +9,13 @@ from cpfls_cli.effects.catalogue.parameter_error import coupling
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.weak_flight import Candidate, columns_of, nuisance
+from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, nuisance
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
+from cpfls_cli.gap.playback import extended_player, left_out
 from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.replay import free_runs, player_of
 from tests.builders import vehicle_models
 from tests.builders.vehicle_models import QUAD
 
@@ -76,6 +78,41 @@ def test_what_is_no_polynomial_is_named():
     whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD, STATED)
     assert whole.not_held == ("wind", "battery_sag")
     assert [one.name for one in whole.model.effects] == ["torque_bias"]
+
+
+def test_playback_of_the_whole_vehicle_is_that_of_its_effects_height_of_the_mass_and_wind_included():
+    wind, offset = effect("wind").exact, effect("com_offset").exact
+    effects = (
+        FittedEffect(Candidate(wind, {"W_x": 4.0, "W_y": -1.5}), np.array([3e-5])),
+        FittedEffect(Candidate(offset, {}), np.array([0.004, -0.003, 0.02])),
+        fitted("parasitic_drag", 0.02, 0.03, 0.04, 0.0, 0.001, 0.0),
+    )
+    extended = ExtendedModel(None, parameters(thrust_scale=0.05), effects)
+    whole = whole_vehicle(extended, QUAD, STATED)
+    assert (whole.not_held, whole.model.wind) == ((), (4.0, -1.5, 0.0))
+    flight, player = extended_player(extended, "flight", [signals()], "linear")
+    starts = np.arange(0, 40, 8)
+    runs = [free_runs(each, flight, starts, 12).errors for each in (player, player_of(whole.model, flight))]
+    np.testing.assert_allclose(runs[1], runs[0], atol=1e-10)
+    lower = replace(whole.model, effects=tuple(e for e in whole.model.effects if not e.is_lever))
+    for changed in (lower, replace(whole.model, wind=(0.0, 0.0, 0.0))):
+        assert np.abs(free_runs(player_of(changed, flight), flight, starts, 12).errors - runs[0]).max() > 1e-3
+    # The height alone has a lever for the forces across the rotors, which the thrust is none of.
+    table, centre = whole.model.part_weights()["com_offset"], np.array([0.004, -0.003, 0.02])
+    forces = whole.model.weights[3:]
+    np.testing.assert_allclose(table[:3], -np.cross(centre, forces, axisb=0, axisc=0), atol=1e-15)
+
+
+def test_what_is_left_out_is_measured_along_flights():
+    sag = fitted("battery_sag", exponent=1.5)
+    steady = np.full((60, 4), 1000.0)
+    flown = replace(signals(), voltage=np.linspace(1.0, 0.8, 60), commanded=True, rotor_speed=steady)
+    extended = replace(plain(None), effects=(fitted("torque_bias", 0.01, 0.0, 0.0), sag))
+    (left,) = left_out(extended, ["battery_sag"], [Recording("flight", flown)])
+    assert left.name == "battery_sag"
+    lost = (1.0 - actuated(flown, extended.chosen).speed ** 2 / flown.speed**2) * flown.thrust[:, None]
+    assert left.wrench[5] == pytest.approx(np.sqrt((lost[:, 0] ** 2).mean()), rel=0.02)
+    assert left.ends[1] > 0.1
 
 
 def test_a_plain_model_is_the_vehicle():
