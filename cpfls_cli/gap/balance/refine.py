@@ -22,6 +22,8 @@ _SETTLED = 1e-2
 """Change of the sum of squares, in variances, below which a fit stands still: a tenth of a standard error."""
 _ON_BOUND = 1e-6
 """Share of its range that a coefficient is from its bound at most to be on it."""
+_SEEN = 1.0
+"""Standard deviations by which a coefficient on its bound moves all windows together at least, if it is to be found."""
 
 
 def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> System:
@@ -81,7 +83,7 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
     -------
     linear : array, shape (column,)
     held : array of bool, shape (column,)
-        Coefficients on a bound.
+        Coefficients on a bound, and those that nothing shows, which are 0.
     """
     linear = fit(hypothesis, weight)
     matrix = (hypothesis.base / weight[:, None]).reshape(-1, len(linear))
@@ -89,13 +91,14 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
     least = np.zeros(3, dtype=bool)
     change = _change(hypothesis, length > 0, least if of_vehicle else None)
     at = np.linalg.lstsq(change.matrix, linear - change.offset, rcond=None)[0]
-    if ((at >= change.low) & (at <= change.high)).all() and _without_lever(hypothesis, linear) is None:
+    out = _unseen(hypothesis, change, length)
+    within = ((at >= change.low) & (at <= change.high)).all()
+    if within and not out.any() and _without_lever(hypothesis, linear) is None:
         return linear, np.zeros(len(linear), dtype=bool)
     scale = np.where(length > 0, length, 1.0)
     orthogonal, triangle = np.linalg.qr(matrix / scale)
     right = orthogonal.T @ (hypothesis.residual / weight).reshape(-1)
     triangle = triangle * scale
-    out = np.zeros(len(linear), dtype=bool)
     while True:
         at, linear = _bounded(triangle, right, change, out)
         leverless = _without_lever(hypothesis, linear)
@@ -105,6 +108,15 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
         out |= leverless if leverless is not None else False
         least = least | light
         change = _change(hypothesis, length > 0, least if of_vehicle else None)
+
+
+def _unseen(hypothesis: System, change: Change, length: Array) -> BoolArray:
+    """Mark coefficients of effects that even on a bound would move all windows together by less than noise does."""
+    own = hypothesis.columns(hypothesis.free[0]).shape[2]
+    most = np.maximum(np.abs(change.low), np.abs(change.high))
+    unseen = np.where(np.isfinite(most), most, 1.0) * length < _SEEN
+    unseen[:own] = False
+    return np.asarray(unseen & np.isfinite(most) & (length > 0))
 
 
 def _bounded(triangle: Array, right: Array, change: Change, out: BoolArray) -> tuple[Array, Array]:

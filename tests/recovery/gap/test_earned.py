@@ -190,3 +190,17 @@ def test_a_larger_drag_factor_explains_nothing_by_being_larger():
     """The inertia is free, so that the torque may grow as it likes; what is left stays what it was."""
     step = rank_effects(flights(), (), [CATALOGUE["drag_factor_error"]], SETTINGS, np.random.default_rng(0))
     assert np.median(step.chance) < 0.05 * len(step.hypothesis.residual)
+
+
+def test_a_height_of_the_mass_that_no_force_shows_is_left_open():
+    """What rounding says of a coefficient is no number to print, nor one to fly with."""
+    known = flights(OFFSET)
+    exact = Candidate(CATALOGUE["com_offset"].exact, {})
+    hypothesis = system(known, [exact])
+    floor, columns = best_floor(hypothesis), hypothesis.columns(exact).copy()
+    for size, seen in ((1e-9, False), (1e-2, True)):
+        columns[:, 0, -1] = size * np.sin(np.arange(len(columns)))
+        linear, held = fit_within_bounds(replace(hypothesis, cache={exact.key: columns}), floor)
+        assert (linear[-1] != 0.0) == seen
+        assert held[-1] or seen
+        np.testing.assert_allclose(linear[-3:-1], OFFSET[1], atol=3e-4)
