@@ -111,13 +111,24 @@ def _outside(record: VehicleRecord | ExtendedRecord) -> tuple[Missing, ...]:
     found = {} if group is None else {row["name"]: row for row in rows_of(group)}
     listed = []
     for name in record.vehicle.not_held:
-        title = CATALOGUE[name].title if name in CATALOGUE else name
         if name in found and isinstance(record, ExtendedRecord):
             size, ends = (np.array(found[name][key]) for key in ("wrench", "ends"))
+            title = _in_numbers(record, name)
             listed.append(sized(title, size, record.gap.floor, Off.of(ends), "along its held-out flights"))
         elif name != FUZZY_INERTIA:
+            title = CATALOGUE[name].title if name in CATALOGUE else name
             listed.append(Missing(title, np.nan, np.nan, np.nan, None))
     return tuple(listed)
+
+
+def _in_numbers(record: ExtendedRecord, name: str) -> str:
+    """Say what an effect is and which numbers it has, so that others can add it."""
+    (effect,) = (each for each in record.effects.named if each.name == name)
+    units = {"": "", "1": ""}
+    numbers = ", ".join(
+        f"{each.name} = {each.value:.4g}{units.get(each.unit, f' {each.unit}')}" for each in effect.coefficients
+    )
+    return f"{CATALOGUE[name].title} ({CATALOGUE[name].formula}; {numbers})"
 
 
 def _over_attitude(path: Path, record: ExtendedRecord, model: VehicleModel) -> VehicleModel:

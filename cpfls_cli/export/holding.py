@@ -32,7 +32,7 @@ _LINEAR = "part of the thrust that is linear in the speed"
 _ROTORS = "what differs between rotors, and their places"
 _LEARNED = "what is learned, without a name"
 _NO_BODY = "inertia with a moment larger than the sum of the others, which no body has: the nearest that one has"
-_WIND = "wind of its flights, {:.3g} and {:.3g} m/s along x and y of the world, which is no part of a vehicle"
+_WIND = "wind of its flights, {:.3g} and {:.3g} m/s along x and y of the world, which its world has to blow"
 FUZZY = "inertia that depends on the attitude"
 
 Holds = Callable[[Array], Array]

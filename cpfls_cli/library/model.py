@@ -199,7 +199,7 @@ class Model:
         return State(place.copy(), speed.copy(), rotation_matrix(angles), rate.copy())
 
     def step(self, state: State, rotor_speed: ArrayLike, period: float) -> State:
-        """Move vehicles on by one step of the midpoint rule, with rotors that keep their speeds.
+        """Move vehicles on by one midpoint step, in the wind of the model, with rotors that keep their speeds.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class Model:
         Raises
         ------
         InputError
-            If the model holds an effect that no state alone gives, such as a wind.
+            If the model holds an effect that no state alone gives, such as a load on a cable.
         """
         import numpy as np
 

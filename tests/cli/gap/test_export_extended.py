@@ -4,13 +4,15 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.extended import ExtendedRecord
+from cpfls_cli.artifacts.extended import FUZZY_INERTIA, ExtendedRecord, LeftOutGroup
+from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.store import read_record, write_record
 from tests.builders.artifacts import edited
 
 
@@ -18,7 +20,8 @@ def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
     record = read_record(extended, ExtendedRecord)
     vehicle = record.vehicle.vehicle_model()
     effects = {one.name: one.coefficients for one in vehicle.effects}
-    assert effects["com_offset"] == pytest.approx([0.008, -0.005], rel=0.05)
+    # The height, which the thrust alone does not show, is left open.
+    assert effects["com_offset"] == pytest.approx([0.008, -0.005, 0.0], rel=0.05)
     assert record.vehicle.not_held == ()
     np.testing.assert_allclose(record.vehicle.inertia, record.inertia, rtol=1e-12)
 
@@ -39,6 +42,38 @@ def test_it_is_exported(cpfls, extended, tmp_path):
     thrust = 4 * 121.5e-6 * 350.0**2
     np.testing.assert_allclose(torque[:2], [-offset[1] * thrust, offset[0] * thrust], rtol=1e-9)
     assert force[2] == pytest.approx(thrust, rel=0.02)
+
+
+def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extended, tmp_path):
+    record = read_record(extended, ExtendedRecord)
+    size, ends = np.array([[0.0, 0.4, 0.0, 0.0, 0.0, 0.0]]), np.array([[0.1, 0.2, 0.3, 0.4]])
+    outside = replace(record.vehicle, not_held=("com_offset",))
+    path, output = tmp_path / "outside.h5", tmp_path / "m.c"
+    sizes = LeftOutGroup(name=("com_offset",), wrench=size, ends=ends)
+    write_record(path, replace(record, vehicle=outside, left_out=sizes))
+    said = cpfls("export", path, "-o", output).stdout.splitlines()[-1]
+    assert said.startswith(
+        "Not held, or not whole: offset of the centre of mass (M = -c x F,  F the force without weight, as measured, "
+        "or else the thrust; c_x = 0.00"
+    )
+    floors = 0.4 / record.gap.floor[1]
+    assert said.endswith(
+        f" m): 0.4 N m and 0 N along its held-out flights, {floors:.3g} noise floors; half a second without it ends "
+        "0.4 rad/s, 17.2 degrees, 0.2 m/s and 0.1 m off."
+    )
+    assert "along its held-out flights" in " ".join(output.read_text().split())
+
+
+def test_an_identified_inertia_under_effects(cpfls, extended, pipeline, tmp_path):
+    record, identified = read_record(extended, ExtendedRecord), read_record(pipeline.model, ModelRecord)
+    path = tmp_path / "over.h5"
+    vehicle = replace(record.vehicle, not_held=(FUZZY_INERTIA,))
+    write_record(path, replace(record, base=BaseGroup.of(identified), vehicle=vehicle))
+    said = cpfls("export", path, "--format", "casadi", "-o", tmp_path / "over_casadi.py").stdout
+    assert said.splitlines()[-1] == "CasADi holds all of it."
+    assert cpfls("export", path, "-o", tmp_path / "over.json").exit_code == 0
+    document = json.loads((tmp_path / "over.json").read_text())
+    assert any("Not held, or not whole: inertia that depends on the attitude" in each for each in document["worth"])
 
 
 def test_one_of_before_is_refused(refuse, extended, tmp_path):
