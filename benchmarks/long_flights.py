@@ -1,4 +1,4 @@
-"""Time per sample and peak memory of reduction and identification, from 5e3 to 5e6 samples.
+"""Time per sample and peak memory of reduction, identification and prediction, from 5e3 to 5e6 samples.
 
 python benchmarks/long_flights.py [--most 5000000] [--plot docs/long-flights.svg]
 
@@ -44,6 +44,7 @@ SIZES = (5_000, 50_000, 500_000, 5_000_000)
 NOISE = 0.01
 EVALUATIONS = 3
 BUDGET = 4
+SMALL = ("--set", "identification.population=10", "--set", "identification.generations=2")
 
 
 def main() -> None:
@@ -57,13 +58,19 @@ def main() -> None:
         return
     rows = []
     with tempfile.TemporaryDirectory() as folder:
+        flight, model = Path(folder) / "flight.h5", Path(folder) / "model.h5"
+        write_tiled(flight, SIZES[0])
+        # A model with bands; the loops of all commands are compiled then.
+        by_command("identify", model, flight, *SMALL)
         for samples in (size for size in SIZES if size <= asked.most):
-            flight = Path(folder) / "flight.h5"
             write_tiled(flight, samples)
             one = in_own_process(flight)
-            reduced = by_command("reduce", flight, Path(folder) / "selection.h5")
-            rows.append((samples, one["evaluation"], one["search"], one["memory"], *reduced))
-            flight.unlink()
+            reduced = by_command("reduce", Path(folder) / "selection.h5", flight)
+            prediction = Path(folder) / "prediction.h5"
+            predicted = by_command("predict", prediction, model, flight)
+            size = prediction.stat().st_size / 2**20
+            rows.append((samples, one["evaluation"], one["search"], one["memory"], *reduced, *predicted, size))
+            prediction.unlink()
     columns = (
         "samples",
         "evaluation, us per sample",
@@ -71,6 +78,9 @@ def main() -> None:
         "peak memory, MB",
         "`cpfls reduce` to 685, s",
         "its peak memory, MB",
+        "`cpfls predict`, s",
+        "its peak memory, MB ",
+        "its file, MB",
     )
     table("long_flights", columns, rows)
     if asked.plot:
@@ -137,16 +147,17 @@ def in_own_process(path: Path) -> dict[str, float]:
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
-def by_command(command: str, flight: Path, output: Path) -> tuple[float, float]:
-    """Run a command of the program on a flight: seconds, and peak memory in MB."""
+def by_command(command: str, output: Path, *words: Path | str) -> tuple[float, float]:
+    """Run a command of the program: seconds of processor time, and peak memory in MB."""
     code = (
         "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
-        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)"
+        "own = resource.getrusage(resource.RUSAGE_CHILDREN);"
+        "print(own.ru_utime + own.ru_stime, own.ru_maxrss / 1024)"
     )
-    full = [sys.executable, "-m", "cpfls_cli", command, str(CONFIG), str(flight), "-o", str(output), "--force"]
-    start = perf_counter()
-    done = subprocess.run([sys.executable, "-c", code, *full], check=True, capture_output=True, text=True)
-    return perf_counter() - start, float(done.stdout)
+    full = [sys.executable, "-m", "cpfls_cli", command, CONFIG, *words, "-o", output, "--force"]
+    call = [sys.executable, "-c", code, *map(str, full)]
+    seconds, memory = subprocess.run(call, check=True, stdout=subprocess.PIPE, text=True).stdout.split()
+    return float(seconds), float(memory)
 
 
 def plot(rows, path: Path) -> None:

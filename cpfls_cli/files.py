@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import hashlib
+    import io
 
     from typing_extensions import Buffer
 
@@ -50,6 +51,14 @@ def is_sealed(path: Path) -> bool:
 def seal_of(content: Buffer) -> bytes:
     """Make the line that an artifact ends in: the SHA-256 of all that stands before it."""
     return _line(_sha256(content).hexdigest())
+
+
+def seal_of_file(file: io.FileIO) -> bytes:
+    """Make the line that a file ends in, some of its bytes at a time."""
+    import hashlib
+
+    file.seek(0)
+    return _line(hashlib.file_digest(file, "sha256").hexdigest())
 
 
 def read_content(path: Path) -> Content:

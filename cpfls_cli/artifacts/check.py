@@ -158,14 +158,20 @@ def opened(path: Path, *wanted: ArtifactSpec) -> Iterator[Stored]:
     try:
         with h5py.File(path, "r") as file:
             _refuse_links(file)
-            spec = _identify(path, file)
-            if wanted and spec not in wanted:
+            stored = stored_of(path, file)
+            if wanted and stored.spec not in wanted:
                 asked = " or ".join(f"{w.format} (made by {w.makers})" for w in wanted)
-                raise InputError(f"{path}: is a {spec.format}; this command needs a {asked}")
-            data = {d.path: own for d in spec.datasets if (own := _dataset(file, d.path))}
-            yield Stored(spec, _read_header(file), data)
+                raise InputError(f"{path}: is a {stored.spec.format}; this command needs a {asked}")
+            yield stored
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
         raise InputError(f"{path}: damaged: {one_line(error)}") from None
+
+
+def stored_of(path: Path, file: h5py.File) -> Stored:
+    """Look up what an open file holds; the path is for messages."""
+    spec = _identify(path, file)
+    data = {d.path: own for d in spec.datasets if (own := _dataset(file, d.path))}
+    return Stored(spec, _read_header(file), data)
 
 
 def _require_sealed(path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Protocol, TypeVar
 
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.artifacts.spec import Header, InputFile, Record
-from cpfls_cli.artifacts.store import file_sha256, format_name, write_record
+from cpfls_cli.artifacts.store import file_sha256, format_name, write_parts, write_record
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.version import __version__
@@ -126,6 +126,12 @@ def finish(job: Job, record: R, inputs: Mapping[str, InputFile]) -> R:
     whole = record.with_header(header_of(job.study, inputs))
     write_record(job.output, whole)
     return whole
+
+
+def finish_parts(job: Job, parts: Iterable[Record], samples: int, inputs: Mapping[str, InputFile]) -> None:
+    """Write the record of a job of which no more than a part is in memory, as `write_parts`."""
+    header = header_of(job.study, inputs)
+    write_parts(job.output, (part.with_header(header) for part in parts), samples)
 
 
 def header_of(study: Study, inputs: Mapping[str, InputFile]) -> Header:

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import glob
+import io
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cpfls_cli.errors import InputError, OutputError
+from cpfls_cli.files import seal_of_file
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
 
 try:
     import fcntl
@@ -163,6 +169,93 @@ def atomic_path(path: Path) -> Iterator[Path]:
         yield temporary
     finally:
         temporary.unlink(missing_ok=True)
+
+
+class EnduringFile(io.RawIOBase):
+    """A file that keeps a failure to write for `require_written`: HDF5 crashes the program where a disk fills up.
+
+    What is written after a failure is lost, and read as zeros.
+    """
+
+    def __init__(self, file: io.FileIO) -> None:
+        """Take a file without a buffer."""
+        self._file, self._at, self._end = file, 0, 0
+        self._failure: OSError | None = None
+
+    def write(self, content: Buffer) -> int:
+        """Write all of it, as far as can be seen."""
+        view = memoryview(content).cast("B")
+        self._attempt(lambda: self._write(view))
+        self._at += len(view)
+        self._end = max(self._end, self._at)
+        return len(view)
+
+    def readinto(self, content: Buffer) -> int:
+        """Read up to the end."""
+        view = memoryview(content).cast("B")[: max(0, self._end - self._at)]
+        self._file.seek(self._at)
+        count = self._file.readinto(view) or 0
+        view[count:] = bytes(len(view) - count)
+        self._at += len(view)
+        return len(view)
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Go to another place."""
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._end}[whence]
+        return self._at
+
+    def truncate(self, size: int | None = None) -> int:
+        """Cut the file off, or lengthen it."""
+        self._end = self._at if size is None else size
+        self._attempt(lambda: self._file.truncate(self._end))
+        return self._end
+
+    def require_written(self) -> None:
+        """Make sure that all has been written.
+
+        Raises
+        ------
+        OSError
+            The first failure.
+        """
+        if self._failure is not None:
+            raise self._failure
+
+    def _write(self, view: memoryview) -> None:
+        self._file.seek(self._at)
+        while view:
+            view = view[self._file.write(view) :]
+
+    def _attempt(self, work: Callable[[], object]) -> None:
+        if self._failure is None:
+            try:
+                work()
+            except OSError as error:
+                self._failure = error
+
+
+@contextmanager
+def sealed_output(path: Path) -> Iterator[EnduringFile]:
+    """Give a file to write under a temporary name; in the end it gets its seal and is moved in place.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    with atomic_path(path) as temporary, _writing(path), temporary.open("r+b", buffering=0) as raw:
+        file = EnduringFile(raw)
+        try:
+            yield file
+        finally:
+            # What went wrong first is said, whatever HDF5 made of it.
+            file.require_written()
+        seal = seal_of_file(raw)
+        file.seek(0, os.SEEK_END)
+        file.write(seal)
+        file.require_written()
+        os.fsync(raw.fileno())
+        os.replace(temporary, path)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.artifacts.spec import BODY, EULER, Format, Record, dataset, record
+from cpfls_cli.artifacts.spec import BODY, EULER, PART, Format, Record, dataset, record
 
 if TYPE_CHECKING:
     from cpfls_cli.identification.judge import Score
@@ -26,6 +27,7 @@ class PredictionRecord(Record):
         "torque, inertia matrix and Coriolis matrix of a model along a flight",
         "predict",
         ("model", "flight"),
+        compressed=True,
     )
 
     time: Array = dataset("time", "time from the first sample", "time", units="s")
@@ -103,12 +105,15 @@ class PredictionRecord(Record):
         draws : Draws or None
             Of the bootstrap; None for a model without bands.
         """
+        from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
         from cpfls_cli.rotations import body_torque
         from cpfls_cli.validation.bands import inertia_band, torque_band
 
-        torque = model.torque(motion)
-        inertia_low, inertia_high = (None, None) if draws is None else inertia_band(model, draws, motion.attitude)
-        torque_low, torque_high = (None, None) if draws is None else torque_band(model, draws, motion)
+        torque, inertia = model.torque(motion), model.inertia(motion.attitude)
+        inertia_low = inertia_high = torque_low = torque_high = None
+        if draws is not None:
+            inertia_low, inertia_high = inertia_band(model, draws, motion.attitude, inertia.value)
+            torque_low, torque_high = torque_band(model, draws, motion, torque)
         return cls(
             time=time,
             attitude=motion.attitude,
@@ -116,74 +121,107 @@ class PredictionRecord(Record):
             body_torque=body_torque(motion.attitude, torque),
             measured_torque=measured,
             error=None if measured is None else measured - torque,
-            inertia=model.inertia(motion.attitude).value,
+            inertia=inertia.value,
             inertia_low=inertia_low,
             inertia_high=inertia_high,
             torque_low=torque_low,
             torque_high=torque_high,
-            coriolis=model.coriolis(motion.attitude, motion.rate),
+            coriolis=coriolis_matrix(inertia, motion.rate),
             outside=model.outside(motion.attitude),
         )
 
-    @property
-    def outside_count(self) -> int:
-        """Samples outside the attitudes that training visited."""
-        return int(np.sum(self.outside))
-
-    @property
-    def vertical_count(self) -> int:
-        """Samples near a vertical pitch, at which body torque is not judged."""
-        from cpfls_cli.dynamics.rigid_body import vertical
-
-        return int(np.sum(vertical(self.attitude)))
-
     @cached_property
-    def not_positive_definite(self) -> int:
-        """Samples at which no body has the inertia matrix."""
-        from cpfls_cli.dynamics.rigid_body import not_positive_definite
+    def findings(self) -> Findings:
+        """How well the flight is predicted, and where the model is not to be trusted."""
+        findings = Findings()
+        for start in range(0, len(self.time), PART):
+            findings.add(self._part(slice(start, start + PART)))
+        return findings
 
-        return int(np.sum(not_positive_definite(self.inertia, self.attitude)))
-
-    @cached_property
-    def score(self) -> Score | None:
-        """How well the torque of the flight is predicted; None where the flight holds none."""
-        from cpfls_cli.identification.data import TorqueData
-        from cpfls_cli.identification.judge import score
-        from cpfls_cli.regressor.motion import Motion
-
-        if self.measured_torque is None:
-            return None
-        # A score looks at attitude and torque only.
-        nothing = np.zeros_like(self.attitude)
-        return score(TorqueData(self.time, Motion(self.attitude, nothing, nothing), self.measured_torque), self.torque)
-
-    @property
-    def body_torque_rms(self) -> Array | None:
-        """Root mean square error of the torque about the body axes, shape (3,), N m; None where nothing is known."""
-        from cpfls_cli.dynamics.rigid_body import vertical
-        from cpfls_cli.rotations import body_torque
-
-        if self.error is None:
-            return None
-        usable = ~vertical(self.attitude)
-        return _rms(body_torque(self.attitude[usable], self.error[usable]))
-
-    @property
-    def force_rms(self) -> Array | None:
-        """The same of the force, N."""
-        if self.force is None or self.measured_force is None:
-            return None
-        return _rms(self.measured_force - self.force)
+    def _part(self, samples: slice) -> Self:
+        own = {name: value[samples] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        changes: dict[str, Any] = own
+        return replace(self, **changes)
 
     @property
     def summary(self) -> dict[str, Any]:
         """The prediction for machines."""
+        return self.findings.summary
+
+
+class Findings:
+    """What is found along a flight, part by part.
+
+    Attributes
+    ----------
+    samples : int
+    outside : int
+        Samples outside the attitudes that training visited.
+    vertical : int
+        Samples near a vertical pitch, at which body torque is not judged.
+    not_positive_definite : int
+        Samples at which no body has the inertia matrix.
+    held_against : str or None
+        As in the record.
+    """
+
+    def __init__(self) -> None:
+        """Begin with no samples."""
+        from cpfls_cli.identification.judge import ScoreSums
+
+        self.samples = self.outside = self.vertical = self.not_positive_definite = 0
+        self.held_against: str | None = None
+        self._score, self._judged = ScoreSums(), False
+        self._body_torque, self._force = _Squares(), _Squares()
+
+    def add(self, part: PredictionRecord) -> None:
+        """Add the samples that follow."""
+        from cpfls_cli.dynamics.rigid_body import not_positive_definite, vertical
+        from cpfls_cli.identification.data import TorqueData
+        from cpfls_cli.regressor.motion import Motion
+        from cpfls_cli.rotations import body_torque
+
+        steep = vertical(part.attitude)
+        self.held_against = part.held_against
+        self.samples += len(part.time)
+        self.outside += int(np.sum(part.outside))
+        self.vertical += int(np.sum(steep))
+        self.not_positive_definite += int(np.sum(not_positive_definite(part.inertia, part.attitude)))
+        if part.measured_torque is not None:
+            # A score looks at attitude and torque only.
+            nothing = np.zeros_like(part.attitude)
+            data = TorqueData(part.time, Motion(part.attitude, nothing, nothing), part.measured_torque)
+            self._score.add(data, part.torque)
+            self._judged = True
+        if part.error is not None:
+            self._body_torque.add(body_torque(part.attitude[~steep], part.error[~steep]))
+        if part.force is not None and part.measured_force is not None:
+            self._force.add(part.measured_force - part.force)
+
+    @property
+    def score(self) -> Score | None:
+        """How well the torque of the flight is predicted; None where the flight holds none."""
+        return self._score.score() if self._judged else None
+
+    @property
+    def body_torque_rms(self) -> Array | None:
+        """Root mean square error of the torque about the body axes, shape (3,), N m; None where nothing is known."""
+        return self._body_torque.root_mean
+
+    @property
+    def force_rms(self) -> Array | None:
+        """The same of the force, N."""
+        return self._force.root_mean
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What is found, for machines."""
         score = self.score
         summary: dict[str, Any] = {
-            "samples": len(self.time),
+            "samples": self.samples,
             "mse": None if score is None else float(np.mean(score.mse)),
             "relative_error": None if score is None else score.worst_relative_error,
-            "outside": self.outside_count,
+            "outside": self.outside,
             "not_positive_definite": self.not_positive_definite,
         }
         if score is not None:
@@ -198,5 +236,16 @@ class PredictionRecord(Record):
         return summary
 
 
-def _rms(values: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
+class _Squares:
+    """Sums for a root mean square by axis, part by part."""
+
+    def __init__(self) -> None:
+        self._sum, self._count = np.zeros(3), 0
+
+    def add(self, values: Array) -> None:
+        self._sum = self._sum + np.sum(values**2, axis=0)
+        self._count += len(values)
+
+    @property
+    def root_mean(self) -> Array | None:
+        return np.asarray(np.sqrt(self._sum / self._count)) if self._count else None

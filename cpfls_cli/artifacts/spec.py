@@ -29,6 +29,9 @@ BODY = "body (FLU)"
 WORLD = "world (z up)"
 NO_FRAME = "none"
 
+PART = 8192
+"""Samples of a compressed artifact that are written at a time, each such part compressed on its own."""
+
 _TEXT = "text"
 _PATH, _GROUP = "dataset", "group"
 
@@ -63,14 +66,23 @@ class DatasetSpec:
     required: bool = True
     gaps: bool = False
 
+    @property
+    def by_sample(self) -> bool:
+        """Whether it holds a value for each sample."""
+        return self.dimensions[:1] == ("time",)
+
 
 class Format(NamedTuple):
-    """Name of an artifact format, what it holds, the commands that write it, and the roles of their inputs."""
+    """Name of an artifact format, what it holds, the commands that write it, and the roles of their inputs.
+
+    One that is compressed is written some samples at a time.
+    """
 
     name: str
     description: str
     made_by: str
     inputs: tuple[str, ...] = ()
+    compressed: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,6 +101,8 @@ class ArtifactSpec:
         In the order in which they are written, which shows in the bytes of a file.
     inputs : tuple of str
         Roles of the files it was made from.
+    compressed : bool
+        Whether what has a value for each sample is compressed.
     """
 
     format: str
@@ -96,6 +110,7 @@ class ArtifactSpec:
     made_by: str
     datasets: tuple[DatasetSpec, ...]
     inputs: tuple[str, ...] = ()
+    compressed: bool = False
 
     @property
     def makers(self) -> str:
@@ -341,7 +356,8 @@ def _specs(cls: Any, prefix: str, optional: bool) -> Iterator[DatasetSpec]:
 @cache
 def _artifact_spec(cls: Any) -> ArtifactSpec:
     own = cls.FORMAT
-    return ArtifactSpec(own.name, own.description, own.made_by, tuple(_specs(cls, "", False)), own.inputs)
+    datasets = tuple(_specs(cls, "", False))
+    return ArtifactSpec(own.name, own.description, own.made_by, datasets, own.inputs, own.compressed)
 
 
 def _data(owner: Any, prefix: str) -> Iterator[tuple[str, Any]]:

@@ -5,9 +5,7 @@ What is not a good artifact is refused with one message.
 
 from __future__ import annotations
 
-import io
-import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,20 +23,22 @@ from cpfls_cli.artifacts.check import (
     opened,
     refuse,
     require_all,
+    stored_of,
 )
 from cpfls_cli.artifacts.formats import record_of_format
-from cpfls_cli.artifacts.output import atomic_path
+from cpfls_cli.artifacts.output import EnduringFile, sealed_output
 from cpfls_cli.artifacts.spec import (
     CONFIG,
     INPUTS,
+    PART,
     SCHEMA_VERSION,
     ArtifactSpec,
     DatasetSpec,
     Header,
     Record,
 )
-from cpfls_cli.errors import ComputationError, InputError, OutputError
-from cpfls_cli.files import read_content, seal_of, text_sha256
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.files import read_content, text_sha256
 
 R = TypeVar("R", bound=Record)
 
@@ -280,29 +280,62 @@ def write_artifact(path: Path, artifact: Artifact) -> None:
     OutputError
         If the file cannot be written.
     """
-    findings = check_artifact(artifact)
+    _refuse_result(path, check_artifact(artifact))
+    with sealed_output(path) as output:
+        _write(output, _parts(artifact), len(artifact.data["time"]) if artifact.spec.compressed else 0)
+
+
+def write_parts(path: Path, parts: Iterable[Record], samples: int) -> None:
+    """Write a record of a compressed format, no more than a part of it in memory; the bytes are those of the whole.
+
+    Parameters
+    ----------
+    parts : iterable of Record
+        `PART` samples each, but for the last.
+    samples : int
+        Of all parts.
+
+    Raises
+    ------
+    ComputationError, OutputError
+        As `write_artifact`.
+    """
+    with sealed_output(path) as output:
+        _write(output, map(artifact_of, parts), samples)
+        with h5py.File(output, "r") as file:
+            _refuse_result(path, check_artifact(stored_of(path, file)))
+
+
+def _refuse_result(path: Path, findings: Sequence[str]) -> None:
     if findings:
         raise ComputationError("\n".join(f"{path}: not written: {finding}" for finding in findings))
-    image = _image(artifact)
-    with atomic_path(path) as temporary:
-        try:
-            with temporary.open("wb") as file:
-                file.write(image)
-                file.write(seal_of(image))
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, path)
-        except OSError as error:
-            raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-def _image(artifact: Artifact) -> memoryview:
-    """Make the file in memory: HDF5 crashes the program where a disk fills up under it."""
-    image = io.BytesIO()
-    with h5py.File(image, "w") as file:
-        _write_header(file, artifact)
-        _write_data(file, artifact)
-    return image.getbuffer()
+def _parts(artifact: Artifact) -> Iterator[Artifact]:
+    if not artifact.spec.compressed:
+        yield artifact
+        return
+    single = {spec.path for spec in artifact.spec.datasets if not spec.by_sample}
+    for start in range(0, len(artifact.data["time"]), PART):
+        part = {name: own if name in single else own[start : start + PART] for name, own in artifact.data.items()}
+        yield Artifact(artifact.spec, artifact.header, part)
+
+
+def _write(output: EnduringFile, parts: Iterable[Artifact], samples: int) -> None:
+    with h5py.File(output, "w") as file:
+        done = 0
+        for part in parts:
+            if not done:
+                _write_header(file, part)
+                _write_data(file, part, samples)
+            for name in (spec.path for spec in part.spec.datasets if spec.path in part.data and _in_parts(part, spec)):
+                file[name][done : done + len(part.data[name])] = part.data[name]
+            done += PART
+            output.require_written()
+
+
+def _in_parts(artifact: Artifact, spec: DatasetSpec) -> bool:
+    return artifact.spec.compressed and spec.by_sample
 
 
 def _write_header(file: h5py.File, artifact: Artifact) -> None:
@@ -319,7 +352,8 @@ def _write_header(file: h5py.File, artifact: Artifact) -> None:
             group.attrs[key] = getattr(source, key)
 
 
-def _write_data(file: h5py.File, artifact: Artifact) -> None:
+def _write_data(file: h5py.File, artifact: Artifact, samples: int) -> None:
+    """Write all but what comes in parts, and make room for that."""
     # In the order of the format, because the order of writing shows in the bytes of a file.
     specs = {spec.path: spec for spec in artifact.spec.datasets}
     unknown = artifact.data.keys() - specs.keys()
@@ -327,14 +361,23 @@ def _write_data(file: h5py.File, artifact: Artifact) -> None:
         raise KeyError(f"{artifact.spec.format} has no dataset {min(unknown)}")
     for path, spec in specs.items():
         if path in artifact.data:
-            _write_dataset(file, spec, artifact.data[path])
+            array = np.asarray(artifact.data[path])
+            _describe(
+                _empty(file, path, array, samples) if _in_parts(artifact, spec) else _whole(file, path, array), spec
+            )
 
 
-def _write_dataset(file: h5py.File, spec: DatasetSpec, value: Any) -> None:
-    array = np.asarray(value)
+def _whole(file: h5py.File, path: str, array: np.ndarray) -> h5py.Dataset:
     # Text of fixed length: variable-length text lives in a heap whose bytes are not reproducible.
-    stored = np.char.encode(array, "utf-8") if array.dtype.kind == "U" else array
-    dataset = file.create_dataset(spec.path, data=stored)
+    return file.create_dataset(path, data=np.char.encode(array, "utf-8") if array.dtype.kind == "U" else array)
+
+
+def _empty(file: h5py.File, path: str, part: np.ndarray, samples: int) -> h5py.Dataset:
+    shape, chunk = (samples, *part.shape[1:]), (min(samples, PART), *part.shape[1:])
+    return file.create_dataset(path, shape, part.dtype, chunks=chunk, compression="gzip", shuffle=True)
+
+
+def _describe(dataset: h5py.Dataset, spec: DatasetSpec) -> None:
     dataset.attrs["units"] = spec.units
     dataset.attrs["frame"] = spec.frame
     dataset.attrs["description"] = spec.description

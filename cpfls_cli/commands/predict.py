@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.extended import ExtendedRecord
-from cpfls_cli.artifacts.flight import MOTION, FlightRecord
-from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.job import Job, Progress, begin, finish, finish_parts
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.prediction import PredictionRecord
-from cpfls_cli.artifacts.store import holds, read_record
+from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
+from cpfls_cli.artifacts.spec import PART
+from cpfls_cli.artifacts.store import count_rows, holds, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
@@ -23,17 +26,21 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.flights.same_vehicle import other_vehicles, read_of_vehicle, read_vehicle
 from cpfls_cli.gap.extended import ExtendedModel, inertial_force
 from cpfls_cli.gap.whole_vehicle import of_vehicle, with_effects
+from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.model import Model
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
-from cpfls_cli.pages.source import source_of
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
+
+if TYPE_CHECKING:
+    from cpfls_cli.validation.bootstrap import Draws
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:
@@ -52,17 +59,30 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         prediction = predicted(model, flight, job.study)
         if job.dry_run:
             return nothing_written(job)
-        record = finish(job, prediction, inputs)
-        return Outcome(record.summary, tuple(answer(source_of(job, record))))
+        found = finish(job, prediction, inputs).findings
+        return Outcome(found.summary, tuple(answer(found)))
     identified = read_record(model, ModelRecord)
     rebuilt = identified.rebuilt(model)
-    flown = read_record(flight, FlightRecord, "time", *MOTION)
+    torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
+    flown = flight_source(flight, torque=torque)
     if job.dry_run:
         return nothing_written(job)
-    prediction = PredictionRecord.of(rebuilt, flown.time, flown.motion, flown.torque, identified.draws())
-    record = finish(job, prediction, inputs)
+    found = Findings()
+    finish_parts(job, _along(rebuilt, identified.draws(), flown, torque, found, job.progress), len(flown), inputs)
     notes = (*trust_notes(identified, model), *(Text(n, "warning") for n in other_vehicles([flight], job.study)))
-    return Outcome(record.summary, (*notes, *answer(source_of(job, record), identified)))
+    return Outcome(found.summary, (*notes, *answer(found, identified)))
+
+
+def _along(
+    model: Model, draws: Draws | None, flown: TorqueSource, torque: bool, found: Findings, progress: Progress
+) -> Iterator[PredictionRecord]:
+    """Predict part by part, and take note of what is found."""
+    for data in flown.chunks():
+        for some in (data[start : start + PART] for start in range(0, len(data), PART)):
+            part = PredictionRecord.of(model, some.time, some.motion, some.torque if torque else None, draws)
+            found.add(part)
+            progress(found.samples, len(flown))
+            yield part
 
 
 def _with_effects(path: Path, flight: Path, study: Study) -> PredictionRecord:

@@ -62,7 +62,7 @@ def score(data: TorqueData, predicted: Array) -> Score:
     predicted : array, shape (samples, 3), N m
         Generalised torque.
     """
-    sums = _Sums()
+    sums = ScoreSums()
     sums.add(data, predicted)
     return sums.score()
 
@@ -76,7 +76,7 @@ def score_of(source: TorqueSource, torque: Callable[[Motion], Array]) -> Score:
     torque : callable
         Predicts the generalised torque of a motion.
     """
-    sums = _Sums()
+    sums = ScoreSums()
     for data in source.chunks():
         sums.add(data, torque(data.motion))
     return sums.score()
@@ -132,14 +132,16 @@ class _AboutMean:
         self._mean, self.count = self._mean + apart * (count / both), both
 
 
-class _Sums:
-    """Sums over samples that a score is made of."""
+class ScoreSums:
+    """Sums over samples that a score is made of, chunk by chunk."""
 
     def __init__(self) -> None:
+        """Begin with no samples."""
         self._largest, self._largest_error = np.zeros(3), np.zeros(3)
         self._euler, self._body = Explained(), Explained()
 
     def add(self, data: TorqueData, predicted: Array) -> None:
+        """Add samples, and the torque predicted for them."""
         error, attitude = data.torque - predicted, data.motion.attitude
         self._euler.add(data.torque, error)
         known = ~vertical(attitude)
@@ -148,6 +150,7 @@ class _Sums:
         self._largest_error = np.maximum(self._largest_error, np.max(np.abs(error), axis=0))
 
     def score(self) -> Score:
+        """Give the score of all samples so far."""
         return Score(
             mse=self._euler.mean_squared_error,
             max_error=self._largest_error,

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.spec import Record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
@@ -30,7 +30,7 @@ _AGAINST = {
 _INERTIA_PANELS = (("D22", "D33"), ("D13", "D23"))
 
 
-def answer(prediction: Source[PredictionRecord], model: Record | None = None) -> Iterator[Text]:
+def answer(found: Findings, model: Record | None = None) -> Iterator[Text]:
     """Say how well a model explains a flight, and where it cannot be trusted.
 
     Parameters
@@ -38,35 +38,33 @@ def answer(prediction: Source[PredictionRecord], model: Record | None = None) ->
     model : Record or None
         That predicted; None where it is not at hand.
     """
-    record = prediction.record
-    samples = len(record.time)
-    if record.held_against is None:
-        yield Text(f"{samples} samples, {record.outside_count} outside the region that the training data visited")
+    if found.held_against is None:
+        yield Text(f"{found.samples} samples, {found.outside} outside the region that the training data visited")
     else:
-        yield Text(f"{samples} samples; torque of the whole vehicle, held against {_AGAINST[record.held_against]}")
-    score = record.score
+        against = _AGAINST[found.held_against]
+        yield Text(f"{found.samples} samples; torque of the whole vehicle, held against {against}")
+    score = found.score
     if score is None:
         yield Text("the flight holds no torque, so there is no error to show")
     else:
         error = f"MSE {score.mse.mean():.4g} (N m)^2, relative error {score.worst_relative_error:.3%} (worst axis)"
         r2 = " ".join(f"{value:.4f}" for value in score.r2_body)
-        left_out = record.vertical_count
-        without = f" (without {left_out} samples near a vertical pitch)" if left_out else ""
+        without = f" (without {found.vertical} samples near a vertical pitch)" if found.vertical else ""
         yield from (Text(error), Text(f"R2 of body torque, roll pitch yaw: {r2}{without}"))
-    yield from _errors_of_vehicle(record)
-    yield from trust_along(record.outside_count, record.not_positive_definite, samples, model)
+    yield from _errors_of_vehicle(found)
+    yield from trust_along(found.outside, found.not_positive_definite, found.samples, model)
 
 
-def _errors_of_vehicle(record: PredictionRecord) -> Iterator[Text]:
+def _errors_of_vehicle(found: Findings) -> Iterator[Text]:
     """Say how far torque and force of a whole vehicle are off at a sample, and what that does not tell."""
-    if record.held_against is None:
+    if found.held_against is None:
         return
-    rows = (("torque about", "N m", record.body_torque_rms), ("force along", "N", record.force_rms))
+    rows = (("torque about", "N m", found.body_torque_rms), ("force along", "N", found.force_rms))
     for name, unit, rms in rows:
         if rms is not None:
             values = " ".join(number(value, 3) for value in rms.tolist())
             yield Text(f"rms error of the {name} x, y, z of the body: {values} {unit}")
-    if record.force_rms is None:
+    if found.force_rms is None:
         yield Text("the flight knows neither acceleration nor velocity, so there is no force to hold the model against")
     yield Text("a torque that is right at each sample may still predict nothing; `cpfls replay` says what it predicts")
 
@@ -123,7 +121,7 @@ def _prediction(prediction: Source[PredictionRecord], index: int, sources: Sourc
     model = sources.by_hash(prediction.made_from("model"))
     yield Heading(prediction.label)
     yield Text(_seen(prediction, model))
-    yield from answer(prediction, None if model is None else model.record)
+    yield from answer(prediction.record.findings, None if model is None else model.record)
     if prediction.record.error is not None:
         yield error_figure(f"figure-7-error-{index}", prediction)
     yield torques_figure(f"torques-{index}", prediction)
@@ -277,5 +275,5 @@ def _shade(axes: Axes, time: Array, outside: BoolArray) -> None:
 
 
 def _shaded(prediction: Source[PredictionRecord]) -> str:
-    outside, samples = prediction.record.outside_count, len(prediction.record.time)
+    outside, samples = prediction.record.findings.outside, len(prediction.record.time)
     return f" Shaded: {outside} of {samples} samples outside the region that training visited." if outside else ""

@@ -47,7 +47,7 @@ def band(estimate: Array, drawn: Array, blocks: int) -> tuple[Array, Array]:
     return estimate - half, estimate + half
 
 
-def inertia_band(model: Model, draws: Draws, attitude: Array) -> tuple[Array, Array]:
+def inertia_band(model: Model, draws: Draws, attitude: Array, value: Array | None = None) -> tuple[Array, Array]:
     """Put a band around the inertia matrix of a model, entry by entry.
 
     Of a model without a ridge, attitudes that training did not visit have a band of what its structure does there, not
@@ -58,6 +58,8 @@ def inertia_band(model: Model, draws: Draws, attitude: Array) -> tuple[Array, Ar
     model : Model
     draws : Draws
     attitude : array, shape (samples, 3), rad
+    value : array, shape (samples, 3, 3), or None
+        The model's inertia matrix there, where it is at hand.
 
     Returns
     -------
@@ -69,14 +71,20 @@ def inertia_band(model: Model, draws: Draws, attitude: Array) -> tuple[Array, Ar
         for (row, column), rows, columns in _inertia_rows(model, attitude[part]):
             half[part, row, column] = half[part, column, row] = _spread(rows, deviations[columns])
     half *= _quantile(draws.blocks)
-    value = model.inertia(attitude).value
+    if value is None:
+        value = model.inertia(attitude).value
     return value - half, value + half
 
 
-def torque_band(model: Model, draws: Draws, motion: Motion) -> tuple[Array, Array]:
+def torque_band(model: Model, draws: Draws, motion: Motion, value: Array | None = None) -> tuple[Array, Array]:
     """Put a band around the torque that a model predicts.
 
     It is the band of the prediction; a measured torque has its own noise beside it.
+
+    Parameters
+    ----------
+    value : array, shape (samples, 3), or None
+        The model's torque, where it is at hand.
 
     Returns
     -------
@@ -89,7 +97,8 @@ def torque_band(model: Model, draws: Draws, motion: Motion) -> tuple[Array, Arra
         matrix = Regressor(model.structure, some, model.ranges).matrix(model.partitions)
         half[part] = _spread(np.concatenate([rigid_columns(some), matrix], axis=2), deviations)
     half *= _quantile(draws.blocks)
-    value = model.torque(motion)
+    if value is None:
+        value = model.torque(motion)
     return value - half, value + half
 
 

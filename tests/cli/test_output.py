@@ -82,15 +82,16 @@ def test_full_disk_leaves_the_old_output(refuse, study, tmp_path, monkeypatch):
     assert line == f"{output}: cannot be written: No space left on device"
 
 
-@pytest.mark.parametrize("limit", [100, 60_000])
-def test_output_larger_than_the_system_allows(study, tmp_path, limit):
+@pytest.mark.parametrize(("command", "limit"), [("trajectory", 100), ("trajectory", 60_000), ("predict", 60_000)])
+def test_output_larger_than_the_system_allows(pipeline, study, tmp_path, command, limit):
     """A real refusal by the system, in the first and in a later block; HDF5 must not crash when the program ends."""
     limited = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0})); "
     code = limited.format(limit) + "from cpfls_cli.cli.main import run; sys.argv[0] = 'cpfls'; run()"
-    words = ["trajectory", str(study), "-o", str(tmp_path / "trajectory.h5")]
-    result = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True)
+    inputs = (pipeline.model, pipeline.flight) if command == "predict" else ()
+    words = [command, study, *inputs, "-o", tmp_path / "out.h5"]
+    result = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True)
     assert (result.returncode, result.stdout) == (1, "")
-    assert result.stderr == f"cpfls: error: {tmp_path / 'trajectory.h5'}: cannot be written: File too large\n"
+    assert result.stderr == f"cpfls: error: {tmp_path / 'out.h5'}: cannot be written: File too large\n"
     assert list(tmp_path.iterdir()) == []
 
 

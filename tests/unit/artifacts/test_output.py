@@ -1,10 +1,14 @@
 """Outputs are refused before anything is computed, and never half written."""
 
+import contextlib
+import io
 import os
 
+import h5py
+import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.output import atomic_path, check_output, filled_folder, locked, write_texts
+from cpfls_cli.artifacts.output import EnduringFile, atomic_path, check_output, filled_folder, locked, write_texts
 from cpfls_cli.errors import InputError, OutputError
 
 
@@ -82,3 +86,23 @@ def test_files_in_a_folder_of_an_earlier_run_go(tmp_path):
     fill(folder)
     assert {path.name: path.read_text() for path in folder.iterdir()} == {"a.txt": "new", "mine.txt": "mine"}
     assert list(tmp_path.iterdir()) == [folder]
+
+
+@pytest.mark.parametrize("room", range(0, 66_000, 2_797))
+def test_hdf5_meets_a_full_disk(tmp_path, room):
+    """Whatever HDF5 writes last, and however it closes the file, the failure is kept and nothing crashes."""
+
+    class Disk(io.FileIO):
+        def write(self, content):
+            if self.tell() + len(content) > room:
+                raise OSError(28, "No space left on device")
+            return super().write(content)
+
+    with Disk(tmp_path / "full.h5", "w+") as raw:
+        file = EnduringFile(raw)
+        with contextlib.suppress(OSError, RuntimeError), h5py.File(file, "w") as written:
+            for name in "abc":
+                written.create_dataset(name, (1000, 3), float, chunks=(100, 3), compression="gzip")
+                written[name][...] = np.random.default_rng(1).random((1000, 3))
+        with pytest.raises(OSError, match="No space left"):
+            file.require_written()
