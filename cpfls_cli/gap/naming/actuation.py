@@ -59,7 +59,7 @@ def parted(refitted: System, step: SearchStep) -> System:
     return best
 
 
-def without_companion(refitted: System, step: SearchStep) -> System:
+def without_companion(refitted: System, step: SearchStep, settings: GapSettings) -> System:
     """Take two effects for one with two shapes, where beside them what was added last is not needed.
 
     What one filter leaves of another one and a lag is small, and follows the motion as much as the effects do that
@@ -71,6 +71,7 @@ def without_companion(refitted: System, step: SearchStep) -> System:
         With what was added.
     step : SearchStep
         The look that added it.
+    settings : GapSettings
     """
     *before, newest = refitted.chosen
     for index, candidate in enumerate(before):
@@ -79,9 +80,10 @@ def without_companion(refitted: System, step: SearchStep) -> System:
         others = [other for other in before if other is not candidate]
         one = _rescored(system(refitted.flights, before), step)
         for pair in _wider_pairs(refitted.flights, others, candidate, step):
-            together = _rescored(refined(refitted.flights, [*pair.chosen, newest], step.floor), step)
-            two = _rescored(pair, step)
-            if surely_less(two, one) and not _is_needed(together, two, step):
+            together = refined(refitted.flights, [*pair.chosen, newest], step.floor)
+            # It has more numbers than the pair, so blocks that no fit saw decide.
+            gained = (_unseen(pair, step.floor, settings) - _unseen(together, step.floor, settings)).sum()
+            if surely_less(_rescored(pair, step), one) and gained < _enough(step, one):
                 return pair
     return refitted
 
@@ -196,8 +198,12 @@ def _wider_pairs(
 
 def _is_needed(more: Scored, less: Scored, step: SearchStep) -> bool:
     """Tell whether a hypothesis with more numbers is worth them beside one with fewer."""
-    enough = least_gain(max(step.above_floor - less.gain, 0.0), len(step.hypothesis.residual))
-    return more.gain - less.gain >= enough and surely_less(more, less)
+    return more.gain - less.gain >= _enough(step, less) and surely_less(more, less)
+
+
+def _enough(step: SearchStep, beside: Scored) -> float:
+    """Compute the least gain, in squared floors, of what is added to a hypothesis."""
+    return least_gain(max(step.above_floor - beside.gain, 0.0), len(step.hypothesis.residual))
 
 
 def _as_one(pair: System, step: SearchStep) -> Scored:

@@ -68,7 +68,7 @@ def forward_selection(
         refitted = parted(refined(flights, [*chosen, best.candidate], step.floor), step)
         if not quiet_enough(best.gain, step, refitted):
             return chosen, steps
-        refitted = without_companion(refitted, step)
+        refitted = without_companion(refitted, step, settings)
         kept = exchanged(flights, refitted.chosen, effects, settings) if len(refitted.chosen) > 1 else refitted.chosen
         names = frozenset(candidate.effect.name for candidate in kept)
         # An exchange can undo what was added; a set that was there before would come round again for ever.
