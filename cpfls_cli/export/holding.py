@@ -26,7 +26,7 @@ HORIZON_S = 0.5
 _RUNS, _PERIOD = 24, 0.01
 _FREQUENCIES = (0.7, 2.0, 5.0)
 _SPEED_SPREAD, _VELOCITY, _RATE, _TILT = 0.05, 1.5, 1.0, 0.25
-_NOTHING = 1e-9
+_NOTHING, _ROUNDING = 1e-9, 1e-12
 _LAG, _DELAY, _SLOW = "lag of the rotors", "delay of the rotors", "slow actuation"
 _LINEAR = "part of the thrust that is linear in the speed"
 _ROTORS = "what differs between rotors, and their places"
@@ -268,7 +268,8 @@ def sized(title: str, size: Array, floor: Array, off: Off, where: str = Missing.
     """
     floors = size / floor
     largest = float(np.nanmax(floors)) if np.isfinite(floors).any() else float("nan")
-    return Missing(title, float(size[:3].max()), float(size[3:].max()), largest, off, where)
+    torque, force = (float(np.where(part < _ROUNDING, 0.0, part).max()) for part in (size[:3], size[3:]))
+    return Missing(title, torque, force, largest, off, where)
 
 
 def _apart(first: Player, second: Player, flight: PlaybackFlight) -> Off:

@@ -109,17 +109,9 @@ def extended_player(
         body=body_of(vehicle, tensor),
         along=_sum(along, stated, by_kind.centre),
         fuzzy=fuzzy,
-        wind=wind_of(moved[0]),
+        wind=moved[0].steady_wind,
     )
     return flight, player
-
-
-def wind_of(signals: Signals) -> tuple[float, float, float]:
-    """Give the wind that signals are in, world frame."""
-    if signals.wind is None:
-        return 0.0, 0.0, 0.0
-    x, y, z = signals.wind.tolist()
-    return x, y, z
 
 
 def _require(candidate: Candidate, signals: Signals, name: str) -> None:

@@ -18,7 +18,6 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
-from cpfls_cli.gap.playback import wind_of
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
@@ -77,7 +76,7 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings, inertia: Ar
             vehicle=vehicle,
             response=RotorResponse(**times),
             effects=tuple(effects),
-            wind=wind_of(actuated(probe.signals, extended.chosen)),
+            wind=actuated(probe.signals, extended.chosen).steady_wind,
         ),
         tuple(not_held),
     )
