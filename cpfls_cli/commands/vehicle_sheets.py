@@ -25,6 +25,7 @@ from cpfls_cli.identification.model import Model
 from cpfls_cli.identification.visited import CELLS
 from cpfls_cli.inertia import INERTIA_ENTRIES, six_parameters
 from cpfls_cli.pages.extended import worth_in_words
+from cpfls_cli.pages.vehicle_model import worth_in_words as vehicle_worth
 from cpfls_cli.playback.model import VehicleModel
 
 _STEEP = 0.1
@@ -92,7 +93,7 @@ def _whole(
     if isinstance(record, ExtendedRecord):
         worth, floor = tuple(worth_in_words(record)), tuple(record.gap.floor.tolist())
     else:
-        mark = require_usable(path, record.verdict, force=force)
+        mark, worth = require_usable(path, record.verdict, force=force), tuple(vehicle_worth(record))
     try:
         model = record.vehicle.vehicle_model()
     except InputError as error:

@@ -56,6 +56,12 @@ _TONES: dict[str, Tone] = {
 }
 _REMAINDER, _ROTORS = "remainder", "rotors"
 _AXES = ("x", "y", "z")
+_ENDS = (
+    ("body_rate", "rad/s", 1.0),
+    ("attitude", "degrees", 180.0 / np.pi),
+    ("velocity", "m/s", 1.0),
+    ("position", "m", 1.0),
+)
 _TURNS = ("x (roll to the right)", "y (nose down)", "z (yaw to the left)")
 _PUSHES = ("x (ahead)", "y (left)", "z (up)")
 _KINDS = {"torque": ("N m", {0, 1, 2}), "force": ("N", {3, 4, 5})}
@@ -127,6 +133,16 @@ def _verdict(record: VehicleRecord) -> Iterator[str]:
     else:
         yield "Do not use it: held out, its errors of the body rate add up to more than those of what knows no model."
     yield from beside_rivals(held)
+
+
+def worth_in_words(record: VehicleRecord) -> Iterator[str]:
+    """Say what a vehicle that is used elsewhere is worth, and how far off it is itself."""
+    yield next(_verdict(record))
+    held = record.held_out
+    if held is not None:
+        last = {name: group.mae[0, -1] for name, group in held.errors.items() if group is not None}
+        ends = joined(f"{number(last[name] * scale, 3)} {unit}" for name, unit, scale in _ENDS if name in last)
+        yield f"Held out, it ends {ends} off what was measured after {held.horizon_s[-1]:.3g} s, mean."
 
 
 def _where(held: HeldOutGroup) -> str:

@@ -111,6 +111,13 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert replayed.exit_code == 0, replayed.stderr
     model = json.loads(replayed.stdout)["models"]["model"]
     assert model["body_rate"]["sum"] == found.told["held_out"]["models"]["model"]["body_rate"]["sum"]
+    worth = cpfls("export", found.output, "-o", tmp_path / "vehicle.json").stdout.splitlines()[-3:]
+    assert worth[0].startswith("Good for simulation and for control to ")
+    rate, horizon = model["body_rate"]["mae"][-1], json.loads(replayed.stdout)["horizon_s"]
+    last = horizon[-1] if isinstance(horizon, list) else horizon
+    assert worth[1].startswith(f"Held out, it ends {rate:.3g} rad/s, ")
+    assert worth[1].endswith(f" m off what was measured after {last:.3g} s, mean.")
+    assert worth[2] == "JSON holds all of it."
     predicted = cpfls("predict", config, found.output, flights[1], "-o", tmp_path / "prediction.h5", "--json")
     assert predicted.exit_code == 0, predicted.stderr
     assert json.loads(predicted.stdout)["held_against"] == "motion"
