@@ -14,7 +14,7 @@ Project = Callable[[Array, Array], tuple[Array, Array]]
 SMALLEST_SINGULAR_SHARE = 3e-7
 """Products square the singular values, so below this share of the largest one they are rounding."""
 # Up to here the squares have digits enough; above, the lowest directions are multiplied out once more.
-_WELL_CONDITIONED = 1e4
+_WELL_CONDITIONED = 3e3
 _LOWEST_DIRECTIONS = 3
 # Columns from which Lanczos is worth its calls; its steps at most, and the residual at which an eigenvalue is exact.
 _MANY = 200

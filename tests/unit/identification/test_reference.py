@@ -65,7 +65,7 @@ def test_objectives_are_those_of_the_plain_evaluator(settings, every, learned):
     np.testing.assert_array_equal(found.genes, genes)
     well = expected.objectives[:, 2] < WELL_CONDITIONED
     assert well.sum() >= 10
-    np.testing.assert_allclose(found.objectives[well], expected.objectives[well], rtol=1e-6)
+    np.testing.assert_allclose(found.objectives[well], expected.objectives[well], rtol=1e-9)
     assert np.isfinite(found.objectives[~well]).all()
     assert np.min(found.objectives[~well, 2], initial=np.inf) > np.max(found.objectives[well, 2])
 
