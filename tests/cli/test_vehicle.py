@@ -111,7 +111,7 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert replayed.exit_code == 0, replayed.stderr
     model = json.loads(replayed.stdout)["models"]["model"]
     assert model["body_rate"]["sum"] == found.told["held_out"]["models"]["model"]["body_rate"]["sum"]
-    worth = cpfls("export", found.output, "-o", tmp_path / "vehicle.json").stdout.splitlines()[-3:]
+    worth = cpfls("export", found.output, "-o", tmp_path / "worth.json").stdout.splitlines()[-3:]
     assert worth[0].startswith("Good for simulation and for control to ")
     rate, horizon = model["body_rate"]["mae"][-1], json.loads(replayed.stdout)["horizon_s"]
     last = horizon[-1] if isinstance(horizon, list) else horizon
