@@ -93,8 +93,12 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
     callable
         Takes steps done, steps in all, and a note; does nothing where standard error is not a terminal.
     """
-    if common.quiet or not sys.stderr.isatty():
-        yield _log_progress(title) if common.verbose and not common.quiet else _silent
+    if common.quiet or not (common.verbose or sys.stderr.isatty()):
+        yield _silent
+        return
+    if not sys.stderr.isatty():
+        with _log_shown(title):
+            yield _log_progress(title)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -108,13 +112,28 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
         # What is left of the line; a longer note is cut, so that bar and time stay whole.
         TextColumn("{task.fields[note]}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as bar:
+    with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as bar, _log_shown(title):
         task = bar.add_task(title, total=None, note="")
 
         def show(done: float, total: int, note: str = "") -> None:
             bar.update(task, completed=done, total=total, note=note)
 
         yield show
+
+
+@contextmanager
+def _log_shown(title: str) -> Iterator[None]:
+    """Show what the program logs as lines on standard error, above a bar."""
+    import logging
+
+    log, lines = logging.getLogger("cpfls_cli"), logging.StreamHandler(sys.stderr)
+    lines.setFormatter(logging.Formatter(f"{title}: %(message)s"))
+    log.addHandler(lines)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(lines)
 
 
 def _silent(done: float, total: int, note: str = "") -> None:

@@ -133,7 +133,7 @@ def _found(
         If there is nothing to take yet.
     """
     study, watch = job.study, Watch(job, None)
-    job.progress(0.0, 1, "loads compiled loops; at the first use on a machine compiles them")
+    job.progress(0.0, 1, "loads compiled loops")
 
     def progress(judged: Sequence[Judged], total: int) -> None:
         best = min(each.error for each in judged)

@@ -9,17 +9,39 @@ All loops stand in one module because the cache of compiled code follows its fil
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core import event
 
 from cpfls_cli.arrays import Array, IntArray
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _ALWAYS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+
+class _Compiling(event.Listener):
+    """Told when something is compiled that no folder keeps."""
+
+    def on_start(self, event: object) -> None:  # noqa: ARG002
+        _say_compiling()
+
+    def on_end(self, event: object) -> None:
+        pass
+
+
+@cache
+def _say_compiling() -> None:
+    """Tell once in a process why nothing happens for a while."""
+    logging.getLogger("cpfls_cli").info("compiling for this processor, which takes half a minute and is kept")
+
+
+event.register("numba:compile", _Compiling())  # type: ignore[no-untyped-call]
 
 
 def compiled(function: Function, **options: Any) -> Function:
