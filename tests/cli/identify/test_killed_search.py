@@ -220,7 +220,9 @@ def test_full_disk_leaves_the_checkpoint_before(program, whole, tmp_path, call, 
 def test_folder_that_vanishes(program, tmp_path):
     folder = tmp_path / "folder"
     folder.mkdir()
-    result = program(folder / "model.h5", patch=at_call(3, store, "sealed_output", lambda: shutil.rmtree(folder))).wait()
+    result = program(
+        folder / "model.h5", patch=at_call(3, store, "sealed_output", lambda: shutil.rmtree(folder))
+    ).wait()
     assert (result.returncode, result.stdout) == (1, "")
     assert result.stderr == (
         f"cpfls: error: {folder / 'model.h5.checkpoint'}: cannot write into the folder {folder}: "
