@@ -16,11 +16,13 @@ from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
 
 if TYPE_CHECKING:
     from cpfls_cli.identification.identify import Identification
+    from cpfls_cli.identification.judge import Score
 
 ALL_SAMPLES = "all"
 """The criterion of a setting that learns from all samples."""
 
 _NO_GENE = -1
+_SETTLED = 0.05
 _MEASURES = ("mse", "max_error", "relative_error")
 
 
@@ -38,6 +40,17 @@ class SettingGroup:
     )
     population: IntArray = dataset("population", "chromosomes in the population", "setting")
     generations: IntArray = dataset("generations", "generations bred at most", "setting")
+    judged_on: tuple[str, ...] | None = dataset(
+        "judged_on", "what the search took its errors from: training or learned", "setting", default=None
+    )
+    ranking: tuple[str, ...] | None = dataset("ranking", "how the search ranked chromosomes", "setting", default=None)
+    uniform_condition_number: Array | None = dataset(
+        "uniform_condition_number",
+        "of the samples learned from, at uniform partitions; not known below the rank of all",
+        "setting",
+        gaps=True,
+        default=None,
+    )
 
 
 @record
@@ -66,6 +79,30 @@ class RunGroup:
     chromosome: npt.NDArray[np.int32] = dataset(
         "chromosome", "chosen 16-bit weights; -1 beyond those of the setting", "run", "gene"
     )
+    learned_mse: Array | None = dataset(
+        "learned_mse",
+        "mean squared torque error over the samples learned from",
+        "run",
+        units="(N m)^2",
+        gaps=True,
+        default=None,
+    )
+    learned_max_error: Array | None = dataset(
+        "learned_max_error", "largest torque error of them", "run", units="N m", gaps=True, default=None
+    )
+    learned_relative_error: Array | None = dataset(
+        "learned_relative_error",
+        "largest error over largest torque of them, worst axis",
+        "run",
+        gaps=True,
+        default=None,
+    )
+    settled: IntArray | None = dataset(
+        "settled",
+        "generation from which on the smallest first objective is within 5 % of the last one",
+        "run",
+        default=None,
+    )
 
     def __len__(self) -> int:
         """Count the finished runs."""
@@ -93,12 +130,21 @@ class RunGroup:
             relative_error=scores,
             condition_number=np.zeros(0),
             chromosome=np.zeros((0, genes), dtype=np.int32),
+            learned_mse=np.zeros(0),
+            learned_max_error=np.zeros(0),
+            learned_relative_error=np.zeros(0),
+            settled=whole,
         )
 
     def followed_by(self, other: Self) -> Self:
         """Add runs after these."""
         pairs = {f.name: (getattr(self, f.name), getattr(other, f.name)) for f in fields(self)}
-        return type(self)(**{name: np.concatenate(pair) for name, pair in pairs.items()})
+        # What one of them lacks, an older sweep, is lacking in both together.
+        joined: dict[str, Any] = {
+            name: None if one is None or two is None else np.concatenate([one, two])
+            for name, (one, two) in pairs.items()
+        }
+        return type(self)(**joined)
 
     def with_run(self, setting: int, seed: int, parts: Sequence[str], result: Identification | None) -> Self:
         """Add a run.
@@ -113,12 +159,14 @@ class RunGroup:
             None where no chromosome gave a finite model.
         """
         chromosome = np.full(self.chromosome.shape[1], _NO_GENE, dtype=np.int32)
-        condition_number, generations, evaluations = np.nan, 0, 0
+        condition_number, generations, evaluations, settled = np.nan, 0, 0, 0
         if result is not None:
             chosen = result.front.chromosomes[result.front.chosen]
             chromosome[: len(chosen)] = chosen
             condition_number = result.system.condition_number
             generations, evaluations = len(result.history.evaluations) - 1, int(result.history.evaluations[-1])
+            settled = int(np.argmax(result.history.best[:, 0] <= (1.0 + _SETTLED) * result.history.best[-1, 0]))
+        learned = _errors(None if result is None else result.learned)
         mse, max_error, relative_error = np.array([_scores(result, part) for part in parts]).T
         run = type(self)(
             setting=np.array([setting]),
@@ -130,15 +178,22 @@ class RunGroup:
             relative_error=relative_error[None],
             condition_number=np.array([condition_number]),
             chromosome=chromosome[None],
+            learned_mse=np.array(learned[:1]),
+            learned_max_error=np.array(learned[1:2]),
+            learned_relative_error=np.array(learned[2:]),
+            settled=np.array([settled]),
         )
         return self.followed_by(run)
 
 
 def _scores(result: Identification | None, part: str) -> tuple[float, float, float]:
     """Mean squared, largest and relative error of a model on a part; NaN where it was not judged."""
-    if result is None or part not in result.scores:
+    return _errors(None if result is None or part not in result.scores else result.scores[part]["model"])
+
+
+def _errors(score: Score | None) -> tuple[float, float, float]:
+    if score is None:
         return np.nan, np.nan, np.nan
-    score = result.scores[part]["model"]
     return float(np.mean(score.mse)), float(np.max(score.max_error)), score.worst_relative_error
 
 
@@ -192,6 +247,14 @@ class SettingRuns:
     mse, max_error, relative_error : array, shape (runs, parts)
         Not finite where a run found no model.
     condition_number : array, shape (runs,)
+    judged_on, ranking : str
+        What the search took its errors from, and how it ranked chromosomes.
+    uniform_condition_number : float
+        Of the samples learned from, at uniform partitions; NaN where it is not known.
+    learned : array, shape (runs, 3), or None
+        Mean squared, largest and relative error over the samples learned from.
+    settled : array of int, shape (runs,), or None
+        Generation from which on the smallest first objective is within 5 % of the last one.
     """
 
     name: str
@@ -206,6 +269,18 @@ class SettingRuns:
     max_error: Array
     relative_error: Array
     condition_number: Array
+    judged_on: str = "training"
+    ranking: str = "quantity-dominance"
+    uniform_condition_number: float = float("nan")
+    learned: Array | None = None
+    settled: IntArray | None = None
+
+    @property
+    def errors(self) -> Array:
+        """Mean squared, largest and relative error of each run, over what its search judged on; shape (runs, 3)."""
+        if self.judged_on == "learned" and self.learned is not None:
+            return self.learned
+        return np.stack([self.mse[:, 0], self.max_error[:, 0], self.relative_error[:, 0]], axis=1)
 
     @property
     def runs(self) -> int:
@@ -229,6 +304,16 @@ class SettingRuns:
     def spreads(self, part: int) -> dict[str, dict[str, float]]:
         """Mean, variance and smallest value of each error over the runs, on a part by its index."""
         return {name: _spread(getattr(self, name)[:, part]) for name in _MEASURES}
+
+
+def _same(one: Any, two: Any) -> bool:
+    """Tell whether two columns hold the same, also where both hold no number."""
+    floats = isinstance(one, np.ndarray) and one.dtype.kind == "f" and two is not None
+    return bool(np.array_equal(one, two, equal_nan=floats))
+
+
+def _known(values: Array | None, index: int) -> float:
+    return float("nan") if values is None else float(values[index])
 
 
 def _spread(values: Array) -> dict[str, float]:
@@ -272,6 +357,8 @@ class SweepRecord(Record):
     def _setting(self, index: int) -> SettingRuns:
         setting, run = self.setting, self.run
         chosen = run.setting == index
+        learned = (run.learned_mse, run.learned_max_error, run.learned_relative_error)
+        known = [values[chosen] for values in learned if values is not None]
         return SettingRuns(
             setting.name[index],
             setting.structure[index],
@@ -285,13 +372,18 @@ class SweepRecord(Record):
             run.max_error[chosen],
             run.relative_error[chosen],
             run.condition_number[chosen],
+            judged_on="training" if setting.judged_on is None else setting.judged_on[index],
+            ranking="quantity-dominance" if setting.ranking is None else setting.ranking[index],
+            uniform_condition_number=_known(setting.uniform_condition_number, index),
+            learned=np.stack(known, axis=1) if len(known) == len(learned) else None,
+            settled=None if run.settled is None else run.settled[chosen],
         )
 
     def differing_settings(self, other: SweepRecord) -> list[str]:
         """List the datasets in which its settings are not those of another sweep."""
         names = [f.name for f in fields(SettingGroup)]
         one, two = self.setting, other.setting
-        return [f"setting/{name}" for name in names if not np.array_equal(getattr(one, name), getattr(two, name))]
+        return [f"setting/{name}" for name in names if not _same(getattr(one, name), getattr(two, name))]
 
     def joins(self, other: SweepRecord) -> bool:
         """Tell whether another sweep does the same from the same inputs, with none of these seeds."""

@@ -195,8 +195,8 @@ class Evaluator:
     ----------
     solver : Solver
     judge : Samples
-        The whole training part, not only the samples learned from: a membership function that falls between two of
-        them costs nothing there and everything beside them.
+        The whole training part where `judged_on` does not say otherwise: a membership function that falls between two
+        samples learned from costs nothing there and everything beside them.
     local_search : LocalSearchSettings
     cross_validated : bool
         Take the solver's cross-validated error for the first objective, not the training part's.
@@ -271,7 +271,8 @@ class Evaluator:
             refined = refine(Problem(self.solver, fit), chromosome, products, self.local_search.evaluations)
             better = self._fit(refined.genes, refined.products) if refined.products is not products else None
             after = NOT_DEFINED if better is None else self.objectives(refined.genes, better)
-            if after[0] < objectives[0]:
+            always = self.local_search.reinsert == "always" and np.isfinite(after).all()
+            if always or after[0] < objectives[0]:
                 return refined.genes, after
         return chromosome, objectives
 

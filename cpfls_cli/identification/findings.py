@@ -50,6 +50,8 @@ class FitDiagnostics:
         training part comes first.
     scores : mapping of str to mapping of str to Score
         By part, then by model.
+    learned : Score
+        Of the model, on the samples learned from.
     """
 
     fit: Fit
@@ -63,6 +65,7 @@ class FitDiagnostics:
     outside: Mapping[str, int]
     vertical: Mapping[str, int]
     scores: Mapping[str, Mapping[str, Score]]
+    learned: Score
 
     @property
     def training_scores(self) -> Mapping[str, Score]:

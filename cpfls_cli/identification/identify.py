@@ -109,13 +109,13 @@ def identify(
     """
     evaluator = model_evaluator(training, learned, settings)
     result = search(evaluator, settings, rng, run, kept)
-    solved = _solve(evaluator, result.front.chromosomes[result.front.chosen])
+    solved = _solve(evaluator, training, result.front.chromosomes[result.front.chosen])
     if solved is None:
         raise ComputationError("no chromosome gave a finite model; the data may not move at all")
     model, fit, system = solved
     baselines = fit_baselines(learned, fit.row_scale, settings.rank_tolerance)
     predictors = {"model": model.torque} | {baseline.name: baseline.torque for baseline in baselines}
-    uniform = _solve(evaluator, uniform_chromosome(model.structure))
+    uniform = _solve(evaluator, training, uniform_chromosome(model.structure))
     if uniform is not None and model.structure.genes > 0:
         predictors[UNIFORM] = uniform[0].torque
     parts = {TRAINING: training, **held_out}
@@ -132,6 +132,7 @@ def identify(
         outside={part: _count(data, model.outside) for part, data in parts.items()},
         vertical={part: _count(data, vertical) for part, data in parts.items()},
         scores=scores,
+        learned=scores[TRAINING]["model"] if len(learned) == len(training) else score_of(learned, model.torque),
     )
     return Identification(
         **vars(diagnostics),
@@ -149,7 +150,7 @@ def model_evaluator(training: TorqueSource, learned: TorqueSource, settings: Ide
     Parameters
     ----------
     training : TorqueSource
-        Judges, and gives the input ranges.
+        Gives the input ranges, and judges where the settings do not say otherwise.
     learned : TorqueSource
         Solves.
     settings : IdentificationSettings
@@ -165,14 +166,17 @@ def model_evaluator(training: TorqueSource, learned: TorqueSource, settings: Ide
     ranges = joined_ranges(data_ranges(structure, data.motion.attitude) for data in training.chunks())
     whole = Samples.of(Ready(training, over_rigid_body), structure, ranges)
     part = whole if len(learned) == len(training) else Samples.of(Ready(learned, over_rigid_body), structure, ranges)
+    judge = part if settings.judged_on == "learned" else whole
     ridge = None
     if over_rigid_body:
         scale = 1.0 / axis_scale(learned)
         part, ridge = with_folds(replace(part, scale=scale), replace(whole, scale=scale), settings.ridge)
-    return Evaluator(Solver(part, ridge, settings.rank_tolerance), whole, settings.local_search, over_rigid_body)
+    return Evaluator(Solver(part, ridge, settings.rank_tolerance), judge, settings.local_search, over_rigid_body)
 
 
-def _solve(evaluator: Evaluator, chromosome: IntArray) -> tuple[Model, Fit, LeastSquares] | None:
+def _solve(
+    evaluator: Evaluator, training: TorqueSource, chromosome: IntArray
+) -> tuple[Model, Fit, LeastSquares] | None:
     """Solve one chromosome in full precision; None where it has no finite model."""
     fit = evaluator.fit(chromosome)
     if fit is None:
@@ -180,7 +184,7 @@ def _solve(evaluator: Evaluator, chromosome: IntArray) -> tuple[Model, Fit, Leas
     learned = evaluator.solver.learned
     partitions = decode(learned.structure, chromosome.astype(float))
     exact, system = evaluator.solver.exact(partitions, fit)
-    visited = visited_cells(data.motion.attitude for data in evaluator.judge.ready.source.chunks())
+    visited = visited_cells(data.motion.attitude for data in training.chunks())
     model = Model(learned.structure, learned.ranges, partitions, exact.coefficients, exact.rigid_body, visited)
     return model, exact, system
 

@@ -48,6 +48,7 @@ PRESETS: Final[Mapping[Preset, Mapping[str, int | float | str | None]]] = Mappin
 
 
 Base = Literal["none", "rigid-body"]
+JudgedOn = Literal["training", "learned"]
 Choice = Literal["mse-below-median-condition", "mse", "max-error", "held-out"]
 
 
@@ -75,6 +76,10 @@ class LocalSearchSettings(Settings):
         True
     )
     evaluations: Annotated[int, Ge(1), Le(1000), Doc("model evaluations that one local search may spend")] = 4
+    reinsert: Annotated[
+        Literal["improved", "always"],
+        Doc("which refined chromosomes replace the bred ones: those of a smaller first objective; always: the paper"),
+    ] = "improved"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,6 +127,10 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         Choice,
         Doc("which member of the Pareto front becomes the model; held-out: the best on the flights of --choose-on"),
     ] = "mse-below-median-condition"
+    judged_on: Annotated[
+        JudgedOn,
+        Doc("what the search takes its errors from: the whole training part, or the samples learned from alone"),
+    ] = "training"
     start: Annotated[
         Literal["random", "with-uniform"],
         Doc("initial population: all random, or random with the equidistant partitions among them"),

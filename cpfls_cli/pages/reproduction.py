@@ -269,8 +269,7 @@ def _reduction_compared(sources: Sources) -> ComparedFigure:
     agrees = abs(grown - _DRAWN.change) < PRINTED_RELATIVE_ERROR
     why = (
         "The curve falls to a level and stays there; the level is another than the paper's, because the path and "
-        "so the full set is, and because the choice exchanges samples and is not bound to the rule of section 8, "
-        "which does not start."
+        "so the full set is, and because the choice exchanges samples and is not bound to the rule of section 8."
     )
     return ComparedFigure(title, printed, f"{number(condition, 5)}, {change(grown)}", _agreement(agrees), why)
 

@@ -71,7 +71,7 @@ def paired_ratio(setting: SettingRuns, reference: SettingRuns) -> PairedRatio:
     ``exp(mean d +- t_{n-1, 0.975} s_d / sqrt n)``.
     """
     both, runs, others = np.intersect1d(setting.seeds, reference.seeds, return_indices=True)
-    ours, theirs = setting.mse[runs, 0], reference.mse[others, 0]
+    ours, theirs = setting.errors[runs, 0], reference.errors[others, 0]
     known, known_theirs = np.isfinite(ours), np.isfinite(theirs)
     logs = np.log(ours[known & known_theirs]) - np.log(theirs[known & known_theirs])
     failed = int(np.sum(~known)), int(np.sum(~known_theirs))
@@ -199,8 +199,7 @@ def _reduced_claim(column: PrintedColumn) -> Claim:
             pairs,
             lambda _: f"a sweep over {share} and all of them, of equal searches",
             "make reproduce",
-            "the error is that of the structure, which least squares keeps small where it has samples, and the reduced "
-            "set is chosen for its condition number alone.",
+            "least squares keeps the error small where it has samples.",
         ),
     )
 

@@ -18,6 +18,7 @@ _BOUND_VECTORS = (6, 24)
 _REFRESH_STEPS = 100
 # A rise below this fraction is rounding.
 _SMALLEST_RISE = 1e-12
+_ROWS = 3
 EXCHANGE_INFORMATION: dict[str, float] = {"K-exchange": 0.0, "KD-exchange": 2.0}
 """Weight of the information kept, for the criteria that choose by exchange. Without it models come out several times
 worse than from random samples; with 2 no worse; with 3, the condition number of 80 samples of the paper's path is not
@@ -198,27 +199,26 @@ def variance_reduction(K: Array, M: Array) -> Array:
 
 
 class PrintedRule:
-    """Raise the smallest singular value most; where no sample raises it, raise the largest one most.
+    """Take the largest smallest singular value; where no sample raises it, raise the largest one most.
+
+    The smallest one is that of the thin decomposition: of as many values as there are rows, up to the columns. While
+    rows are fewer, no sample can raise it, and the one that leaves it largest is taken, as long as that is not zero.
 
     Parameters
     ----------
     rows : array, shape (samples, 3, columns)
     rank_tolerance : float
         Singular values below this fraction of the largest count as zero.
-    full_column_rank : bool
-        Whether all samples together determine every parameter. If not, the smallest singular value over all
-        parameters is zero whatever is chosen.
     """
 
-    def __init__(self, rows: Array, rank_tolerance: float, *, full_column_rank: bool) -> None:
+    def __init__(self, rows: Array, rank_tolerance: float) -> None:
         self._rows = rows
         self._tolerance = rank_tolerance
-        self._full_column_rank = full_column_rank
         self._smallest = SmallestSingularValue(rows)
         self._lengths = np.einsum("nij,nij->n", rows, rows)
 
     def next_sample(self, factor: TriangularFactor, available: BoolArray) -> int:
-        """Name the sample that raises ``sigma_min`` most, else the one that raises ``sigma_max`` most.
+        """Name the sample with the largest thin ``sigma_min``, else the one that raises ``sigma_max`` most.
 
         Parameters
         ----------
@@ -229,17 +229,32 @@ class PrintedRule:
         ----------
         Paper, section 8, step 1.
         """
-        if self._full_column_rank and factor.rank >= factor.columns - 3:
-            index = self._smallest.next_sample(factor, available)
-            if self._raises(factor, index):
-                return index
-        return self._largest(factor, available)
+        rows = _ROWS * (1 + int(np.count_nonzero(~available)))
+        if factor.rank + _ROWS < min(rows, factor.columns):
+            return self._largest(factor, available)
+        if rows < factor.columns:
+            index, least = self._thin(factor, available, rows), 0.0
+        else:
+            index, least = self._smallest.next_sample(factor, available), factor.singular_value_min
+        return index if self._reaches(factor, index, rows, least) else self._largest(factor, available)
 
-    def _raises(self, factor: TriangularFactor, index: int) -> bool:
+    def _reaches(self, factor: TriangularFactor, index: int, rows: int, least: float) -> bool:
         stacked = np.vstack([np.diag(factor.singular_values), self._rows[index] @ factor.singular_vectors])
-        values = np.linalg.svd(stacked, compute_uv=False)
+        values = np.linalg.svd(stacked, compute_uv=False)[:rows]
         nonzero = values[-1] > self._tolerance * values[0]
-        return bool(nonzero and values[-1] > factor.singular_value_min * (1.0 + _SMALLEST_RISE))
+        return bool(nonzero and values[-1] > least * (1.0 + _SMALLEST_RISE))
+
+    def _thin(self, factor: TriangularFactor, available: BoolArray, rows: int) -> int:
+        """Name the sample with the largest of the eigenvalues of ``G + R_i^T R_i`` that is the last of the rows'."""
+        eigenvalues, beyond = factor.singular_values**2, factor.columns - rows
+        # By interlacing a sample leaves no more than there was; the first has no more than its length.
+        bounds = self._lengths if rows == _ROWS else np.full(len(self._rows), eigenvalues[rows - _ROWS - 1])
+
+        def exceeds(projections: Array, level: float) -> BoolArray:
+            return np.asarray(eigenvalues_below(eigenvalues, projections, level) <= beyond)
+
+        bounds, zero = np.where(available, bounds, -np.inf), self._tolerance**2 * float(self._lengths.max())
+        return lazy_best(self._rows, factor.singular_vectors, bounds, zero, exceeds)
 
     def _largest(self, factor: TriangularFactor, available: BoolArray) -> int:
         eigenvalues, vectors = factor.singular_values**2, factor.singular_vectors
@@ -283,9 +298,9 @@ def make_criterion(space: RowSpace, name: CriterionName) -> Criterion:
     Parameters
     ----------
     space : RowSpace
-    name : {"sigma_min", "A", "D", "paper-literal"}
+    name : {"sigma_min", "A", "D", "even", "paper-literal"}
+        For `even` the rule is never asked: the start is the whole choice.
     """
     if name == "paper-literal":
-        full_column_rank = space.rank == space.parameters
-        return PrintedRule(space.rows, space.rank_tolerance, full_column_rank=full_column_rank)
+        return PrintedRule(space.rows, space.rank_tolerance)
     return SmallestSingularValue(space.rows) if name == "sigma_min" else OptimalDesign(space.rows, name)

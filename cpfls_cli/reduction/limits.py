@@ -36,7 +36,7 @@ def sample_limit(space: RowSpace, settings: ReductionSettings) -> int:
 
 
 def starting_samples(space: RowSpace, criterion: CriterionName, limit: int) -> IntArray:
-    """Choose the samples that a criterion begins with: of full rank, but for the printed rule.
+    """Choose the samples that a criterion begins with: of full rank, but for the printed rule and for `even`, all.
 
     Parameters
     ----------
@@ -50,6 +50,8 @@ def starting_samples(space: RowSpace, criterion: CriterionName, limit: int) -> I
     SettingError
         If the limit is too small for the rank.
     """
+    if criterion == "even":
+        return every_nth(space.samples, limit)
     if criterion == "paper-literal":
         return np.zeros(0, dtype=np.int64)
     start = rank_growing_start(space)
@@ -108,6 +110,16 @@ def rank_growing_start(space: RowSpace) -> IntArray:
         residuals.remove(index)
         chosen.append(index)
     return np.array(chosen, dtype=np.int64)
+
+
+def every_nth(samples: int, size: int) -> IntArray:
+    """Choose samples as evenly as whole numbers allow, the first one among them.
+
+    Returns
+    -------
+    array of int, shape (size,)
+    """
+    return np.asarray(np.arange(size, dtype=np.int64) * samples // size)
 
 
 class _Residuals:

@@ -11,7 +11,7 @@ from typing_extensions import Doc
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
 
-CriterionName = Literal["KD-exchange", "K-exchange", "sigma_min", "A", "D", "paper-literal"]
+CriterionName = Literal["KD-exchange", "K-exchange", "sigma_min", "A", "D", "even", "paper-literal"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,8 +30,8 @@ class ReductionSettings(Settings):
         Doc(
             "KD-exchange (small condition number and much information, by exchanging samples), K-exchange (smallest "
             "condition number, whatever is lost), or what the next sample must improve most: sigma_min (smallest "
-            "singular value), A (sum of the parameter variances), D (their volume), paper-literal (the printed rule, "
-            "which stalls below full rank)"
+            "singular value), A (sum of the parameter variances), D (their volume); even (every n-th sample); "
+            "paper-literal (the printed rule, with the smallest value of the thin decomposition)"
         ),
     ] = "KD-exchange"
     rank_tolerance: Annotated[
@@ -47,3 +47,5 @@ class ReductionSettings(Settings):
             raise SettingError("pool", f"expected at least size = {self.size}: samples are chosen from the pool")
         if self.size is None and self.condition_number is None:
             raise SettingError("size", "give a size, a condition_number or both: nothing would stop the reduction")
+        if self.criterion == "even" and (self.size is None or self.condition_number is not None):
+            raise SettingError("criterion", "even needs a size and no condition_number: a part of it would not be even")

@@ -12,7 +12,7 @@ from cpfls_cli.errors import ComputationError
 from cpfls_cli.reduction.criteria import EXCHANGE_INFORMATION, make_criterion
 from cpfls_cli.reduction.exchange import exchange_samples
 from cpfls_cli.reduction.factor import TriangularFactor
-from cpfls_cli.reduction.limits import sample_limit, starting_samples, stop_reason
+from cpfls_cli.reduction.limits import every_nth, sample_limit, starting_samples, stop_reason
 from cpfls_cli.reduction.selection import Run, Selection, Subset
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.reduction.survey import RowSpace, Survey, row_space, space_of, survey
@@ -29,9 +29,9 @@ _WAITING_SAMPLES = 256
 def reduce(Q: Array, settings: ReductionSettings, progress: Progress | None = None) -> Selection:
     """Choose samples one by one, each the best next one by the criterion, or all of them by exchanges.
 
-    All criteria but the printed rule begin with the fewest samples that reach the full rank. Where all samples
-    together are rank deficient, the selection works in their row space. Samples chosen by exchanges are returned, and
-    traced, in the order in which the criterion D takes them.
+    All criteria but `even` and the printed rule begin with the fewest samples that reach the full rank. Where all
+    samples together are rank deficient, the selection works in their row space. Samples chosen by exchanges are
+    returned, and traced, in the order in which the criterion D takes them.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def reduce_streamed(
     ----------
     method.md, section 6.
     """
-    pool = draw_pool(surveyed, settings.pool, rng)
+    pool = _pool(surveyed, settings, rng)
     selection = choose(pool.space, settings, progress)
     exhausted = selection.stop_reason == "all-samples" and len(pool.indices) < surveyed.samples
     reason = "pool" if exhausted else selection.stop_reason
@@ -252,7 +252,20 @@ def check_streamed(surveyed: Survey, settings: ReductionSettings, rng: np.random
     ComputationError, SettingError
         See `reduce_streamed`.
     """
-    check_space(draw_pool(surveyed, settings.pool, rng).space, settings)
+    check_space(_pool(surveyed, settings, rng).space, settings)
+
+
+def _pool(surveyed: Survey, settings: ReductionSettings, rng: np.random.Generator) -> Pool:
+    """Hold what there is to choose from; every n-th of all samples is no choice from a pool."""
+    if settings.criterion != "even" or settings.size is None or settings.size > surveyed.samples:
+        return draw_pool(surveyed, settings.pool, rng)
+    wanted = every_nth(surveyed.samples, settings.size)
+    blocks, first = [], 0
+    for rows in surveyed.projected():
+        begin, end = np.searchsorted(wanted, [first, first + len(rows)])
+        blocks.append(rows[wanted[begin:end] - first])
+        first += len(rows)
+    return Pool(wanted, space_of(surveyed, np.concatenate(blocks)))
 
 
 def random_selections(

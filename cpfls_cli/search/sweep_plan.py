@@ -46,10 +46,10 @@ class SweepSamples:
     def __init__(self, job: Job, flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> None:
         self._job, self._flights, self._inputs = job, flights, inputs
         self._splits: dict[Any, SplitFlights] = {}
-        self._data: dict[Any, TrainingData] = {}
+        self._data: dict[Any, tuple[TrainingData, float]] = {}
 
-    def of(self, variant: Variant) -> TrainingData:
-        """Choose the samples of a setting, as `cpfls reduce` would.
+    def of(self, variant: Variant) -> tuple[TrainingData, float]:
+        """Choose the samples of a setting, as `cpfls reduce` would, and give their condition number.
 
         Raises
         ------
@@ -61,27 +61,33 @@ class SweepSamples:
         if cut not in self._splits:
             self._splits[cut] = split_training(self._flights, study, self._inputs)
         split = self._splits[cut]
-        if not variant.reduced:
-            training = split.training
-            return TrainingData(training, training, split.rests, split.training_indices)
-        key = (*cut, study.reduction, *(getattr(study.identification, f.name) for f in fields(StructureSettings)))
+        key = (
+            *cut,
+            study.reduction if variant.reduced else None,
+            *(getattr(study.identification, f.name) for f in fields(StructureSettings)),
+        )
         if key not in self._data:
-            self._data[key] = self._reduced(split, study, variant.name)
+            self._data[key] = self._chosen(split, study, variant)
         return self._data[key]
 
     def _shown(self, name: str) -> Callable[[int, int], None]:
         """Show how many samples are chosen; the bar is for the searches."""
         return lambda done, most: self._job.progress(0, 1, f"choosing samples: {name}, {done} of {most}")
 
-    def _reduced(self, split: SplitFlights, study: Study, name: str) -> TrainingData:
+    def _chosen(self, split: SplitFlights, study: Study, variant: Variant) -> tuple[TrainingData, float]:
         training, settings, rng = split.training, study.reduction, generator(study, "reduce")
+        everything = TrainingData(training, training, split.rests, split.training_indices)
         with settings_of("reduction", study):
             surveyed = survey(uniform_regressor(training, study), settings.rank_tolerance)
+            if not variant.reduced:
+                return everything, surveyed.condition_number
             if self._job.dry_run:
                 check_streamed(surveyed, settings, rng)
-                return TrainingData(training, training, split.rests, split.training_indices)
-            chosen = np.sort(reduce_streamed(surveyed, settings, rng, self._shown(name)).indices)
-        return TrainingData(training, gathered(training, chosen), split.rests, split.training_indices[chosen])
+                return everything, surveyed.condition_number
+            selection = reduce_streamed(surveyed, settings, rng, self._shown(variant.name))
+        chosen, condition = np.sort(selection.indices), selection.condition_number
+        data = TrainingData(training, gathered(training, chosen), split.rests, split.training_indices[chosen])
+        return data, condition if np.isfinite(condition) else float("nan")
 
 
 @dataclass(frozen=True)
@@ -90,6 +96,8 @@ class SweptSetting:
 
     Attributes
     ----------
+    uniform_condition_number : float
+        Of the samples learned from, at uniform partitions; NaN below the rank of all.
     held_out : mapping of str to TorqueSource
         What is judged beside the training part, by name.
     kept : TorqueSource or None
@@ -98,6 +106,7 @@ class SweptSetting:
 
     variant: Variant
     data: TrainingData
+    uniform_condition_number: float
     held_out: Mapping[str, TorqueSource]
     kept: TorqueSource | None
 
@@ -173,6 +182,9 @@ class SweepPlan:
             selection=tuple(setting.selection.sha256 for setting in self.settings),
             population=np.array([study.identification.population for study in studies]),
             generations=np.array([study.identification.generations for study in studies]),
+            judged_on=tuple(study.identification.judged_on for study in studies),
+            ranking=tuple(study.identification.ranking for study in studies),
+            uniform_condition_number=np.array([setting.uniform_condition_number for setting in self.settings]),
         )
         return SweepRecord(setting=columns, part=self.parts, run=runs, complete=len(runs) == self.runs)
 
@@ -215,9 +227,9 @@ def sweep_plan(
     samples, settings, kept = SweepSamples(job, flights, inputs), [], choosing_source(choose_on, inputs)
     for variant in variants(job.study):
         with naming(f"sweep setting '{variant.name}'"):
-            data = samples.of(variant)
+            data, condition_number = samples.of(variant)
             held_out = held_out_parts(variant.study, data.rests, inputs, validate)
-            settings.append(SweptSetting(variant, data, held_out, _kept(variant, kept)))
+            settings.append(SweptSetting(variant, data, condition_number, held_out, _kept(variant, kept)))
     if kept is not None and all(setting.kept is None for setting in settings):
         raise InputError("--choose-on: no setting of the sweep has identification.choice: held-out; leave it out")
     parts = dict.fromkeys([TRAINING, *(part for setting in settings for part in setting.held_out)])

@@ -72,8 +72,9 @@ def test_quiet_prints_nothing(cpfls, pipeline, study, tmp_path, stage):
 
 
 def test_warnings_never_reach_standard_output(cpfls, pipeline, study, tmp_path):
-    # The printed rule stalls below full rank, which is worth a warning.
-    words = ("reduce", study, pipeline.flight, "--set", "reduction.criterion=paper-literal", "--json")
+    # A few samples, evenly spread, stay below full rank, which is worth a warning.
+    few = ("--set", "reduction.criterion=even", "--set", "reduction.size=40")
+    words = ("reduce", study, pipeline.flight, *few, "--json")
     result = cpfls(*words, "-o", tmp_path / "s.h5")
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["stalled"] is True

@@ -123,6 +123,34 @@ def test_local_search_leaves_no_more_than_differences_through_the_whole_solve_do
     assert np.mean(found <= expected * (1 + 1e-6)) >= 0.75
 
 
+def test_what_a_local_search_found_is_written_back_where_it_is_better_or_always():
+    """Learned on few samples, it can be worse on all."""
+    data = cube_diagonal()[::2]
+    plain = evaluators(data, data[::12], membership_functions=3)[0]
+    genes = np.random.default_rng(38).integers(0, LARGEST_GENE + 1, (12, plain.structure.genes))
+    unrefined = plain(genes)
+    improved, always = (
+        evaluators(data, data[::12], membership_functions=3, local_search=LocalSearchSettings(reinsert=kind))[0](genes)
+        for kind in ("improved", "always")
+    )
+    assert np.all(improved.objectives[:, 0] <= unrefined.objectives[:, 0])
+    worse = always.objectives[:, 0] > unrefined.objectives[:, 0]
+    assert worse.any()
+    np.testing.assert_array_equal(improved.genes[worse], genes[worse])
+    np.testing.assert_array_equal(improved.genes[~worse], always.genes[~worse])
+    assert not np.any((always.genes == genes).all(axis=1))
+
+
+def test_a_search_can_be_judged_on_what_it_learns_from():
+    data, learned = cube_diagonal(), cube_diagonal()[::9]
+    settings = {"input_map": "full-circle", "membership_functions": 3}
+    on_these, on_all = (evaluators(data, learned, **settings, judged_on=kind)[0] for kind in ("learned", "training"))
+    genes = chromosomes(on_these.structure, 6, 39)
+    alone = evaluators(learned, learned, **settings)[0](genes).objectives
+    np.testing.assert_array_equal(on_these(genes).objectives, alone)
+    assert not np.any(on_all(genes).objectives[:, 0] == alone[:, 0])
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_local_search_ends_in_the_minimum_beside_its_start(seed):
     """Near the partitions that made the torque both methods end in the same minimum."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.errors import SettingError
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.reduction.training_set import reduce
 
@@ -15,12 +16,6 @@ def problem(seed, samples=40, columns=8):
 
 def rows_of(Q, indices):
     return Q[indices].reshape(-1, Q.shape[2])
-
-
-def singular_values(Q, indices):
-    """All `columns` singular values, with zeros where there are fewer rows than columns."""
-    gram = rows_of(Q, indices).T @ rows_of(Q, indices)
-    return np.sqrt(np.clip(np.linalg.eigvalsh(gram)[::-1], 0, None))
 
 
 def start_score(Q, chosen, index):
@@ -51,11 +46,10 @@ def printed_brute_force(Q, size):
     chosen = []
     while len(chosen) < size:
         left = [i for i in range(len(Q)) if i not in chosen]
-        smallest = np.array([singular_values(Q, [*chosen, i])[-1] for i in left])
-        now = singular_values(Q, chosen)[-1] if chosen else 0.0
-        largest = [singular_values(Q, [*chosen, i])[0] for i in left]
-        rises = smallest.max() > max(now * (1 + 1e-9), 1e-6)
-        chosen.append(left[int(np.argmax(smallest if rises else largest))])
+        thin = np.array([np.linalg.svd(rows_of(Q, [*chosen, i]), compute_uv=False) for i in left])
+        now = np.linalg.svd(rows_of(Q, chosen), compute_uv=False)[-1] if 3 * len(chosen) >= Q.shape[2] else 0.0
+        rises = thin[:, -1].max() > max(now * (1 + 1e-9), 1e-6)
+        chosen.append(left[int(np.argmax(thin[:, -1] if rises else thin[:, 0]))])
     return chosen
 
 
@@ -77,9 +71,17 @@ def test_few_parameters(criterion, columns):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_printed_rule_chooses_what_brute_force_chooses(seed):
-    Q = problem(seed, samples=25, columns=5)
+    Q = problem(seed, samples=25, columns=11)
     selection = reduce(Q, ReductionSettings(criterion="paper-literal", size=16))
     assert selection.indices.tolist() == printed_brute_force(Q, 16)
+
+
+def test_every_nth_sample():
+    Q = problem(1, samples=40, columns=5)
+    selection = reduce(Q, ReductionSettings(criterion="even", size=16))
+    assert selection.indices.tolist() == [0, 2, 5, 7, 10, 12, 15, 17, 20, 22, 25, 27, 30, 32, 35, 37]
+    with pytest.raises(SettingError, match="even needs a size and no condition_number"):
+        ReductionSettings(criterion="even", size=16, condition_number=5.0)
 
 
 def test_long_selection_stays_exact_across_refreshes():
@@ -92,7 +94,7 @@ def test_long_selection_stays_exact_across_refreshes():
         assert chosen[step] == best
 
 
-@pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "sigma_min", "A", "D", "paper-literal"])
+@pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "sigma_min", "A", "D", "even", "paper-literal"])
 def test_trace_is_recomputed_condition_number(criterion):
     Q = problem(3)
     selection = reduce(Q, ReductionSettings(criterion=criterion, size=20))
