@@ -29,8 +29,8 @@ import numpy as np
 from benchmarks.shared.studies import paper_flight, paper_study
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
-from cpfls_cli.reduction.survey import Survey, space_of, survey
-from cpfls_cli.reduction.training_set import Pool, choose, draw_pool
+from cpfls_cli.reduction.survey import Survey, survey
+from cpfls_cli.reduction.training_set import Pool, choose, draw_pool, pool_of
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 
 NOISE = 0.01
@@ -77,13 +77,7 @@ def _extremes(attitude: Array) -> Array:
 
 
 def uniform_pool(surveyed: Survey, size: int, rng: np.random.Generator) -> Pool:
-    indices = np.sort(rng.choice(surveyed.samples, size, replace=False))
-    rows, first = [], 0
-    for block in surveyed.projected():
-        begin, end = np.searchsorted(indices, [first, first + len(block)])
-        rows.append(block[indices[begin:end] - first])
-        first += len(block)
-    return Pool(indices, space_of(surveyed, np.concatenate(rows)))
+    return pool_of(surveyed, np.sort(rng.choice(surveyed.samples, size, replace=False)))
 
 
 def predictions(surveyed: Survey, rows: Array, reference: Pool) -> tuple[float, float]:

@@ -259,7 +259,18 @@ def _pool(surveyed: Survey, settings: ReductionSettings, rng: np.random.Generato
     """Hold what there is to choose from; every n-th of all samples is no choice from a pool."""
     if settings.criterion != "even" or settings.size is None or settings.size > surveyed.samples:
         return draw_pool(surveyed, settings.pool, rng)
-    wanted = every_nth(surveyed.samples, settings.size)
+    return pool_of(surveyed, every_nth(surveyed.samples, settings.size))
+
+
+def pool_of(surveyed: Survey, wanted: IntArray) -> Pool:
+    """Hold the rows of some samples of all.
+
+    Parameters
+    ----------
+    surveyed : Survey
+    wanted : array of int, shape (samples,)
+        Ascending.
+    """
     blocks, first = [], 0
     for rows in surveyed.projected():
         begin, end = np.searchsorted(wanted, [first, first + len(rows)])

@@ -18,6 +18,7 @@ _STEP_S = 0.04
 _SMOOTHING_S = 0.1
 _LARGEST_START = 0.5
 _LARGEST_ACROSS = 0.97
+_SWINGS_KEPT = 16
 
 _Vector = Sequence[float]
 _State = tuple[float, float, float, float, float, float]
@@ -122,10 +123,13 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
 
 def _driven_swing(signals: Signals, length: float, damping: float, depth: float) -> Array:
     """Integrate the swing of a motion once, whatever the rotors do, shape (time, 2)."""
-    key = ("swing", length, damping, depth)
-    if key not in signals.of_motion:
-        signals.of_motion[key] = swing(signals, length, damping, depth)[:, :2]
-    return signals.of_motion[key]
+    key, kept = ("swing", length, damping, depth), signals.of_motion
+    if key not in kept:
+        # All that a search tries, and no more: each is as long as the flight.
+        if len(kept) >= _SWINGS_KEPT:
+            del kept[next(iter(kept))]
+        kept[key] = swing(signals, length, damping, depth)[:, :2]
+    return kept[key]
 
 
 def _free_swing(signals: Signals, length: float, damping: float) -> Array:
