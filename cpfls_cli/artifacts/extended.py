@@ -40,10 +40,11 @@ class LeftOutGroup:
     ends: Array = dataset(
         "ends",
         "how far half a second of playback ends off without it: position (m), velocity (m/s), attitude (rad), body "
-        "rate (rad/s)",
+        "rate (rad/s); NaN for what a flight does not show",
         "left_out",
         "4",
         units="SI",
+        gaps=True,
     )
 
 

@@ -40,7 +40,10 @@ Holds = Callable[[Array], Array]
 
 
 class Off(NamedTuple):
-    """How far runs of half a second end apart: means of the norms of body rate, attitude, velocity and position, SI."""
+    """How far runs of half a second end apart: means of the norms of body rate, attitude, velocity and position, SI.
+
+    NaN for what a flight does not show; the body rate is always known.
+    """
 
     rate: float
     attitude: float
@@ -54,11 +57,11 @@ class Off(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """All four, with their units."""
-        return (
-            f"{self.rate:.3g} rad/s, {np.degrees(self.attitude):.3g} degrees, {self.velocity:.3g} m/s and "
-            f"{self.position:.3g} m"
-        )
+        """All that is known, with units."""
+        values = (self.rate, np.degrees(self.attitude), self.velocity, self.position)
+        pairs = zip(values, ("rad/s", "degrees", "m/s", "m"), strict=True)
+        *first, last = [f"{value:.3g} {unit}" for value, unit in pairs if np.isfinite(value)]
+        return f"{', '.join(first)} and {last}" if first else last
 
 
 @dataclass(frozen=True)

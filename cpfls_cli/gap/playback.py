@@ -266,7 +266,7 @@ class LeftOut(NamedTuple):
         Root mean square.
     ends : array, shape (4,)
         How far half a second of playback ends off without it: means of the norms of position, velocity, attitude and
-        rate, SI.
+        rate, SI; NaN for what a flight does not show.
     """
 
     name: str
@@ -299,7 +299,8 @@ def _left_out(model: ExtendedModel, name: str, recordings: Sequence[Recording]) 
         horizon = min(max(1, round(_LEFT_S / pair.flight.motion.period)), len(pair.flight) - 1)
         starts = pair.flight.starts(horizon, _EVERY)
         both = [pair.runs(prediction, starts, horizon) for prediction in (MODEL, STATED)]
-        ends, runs = ends + len(starts) * apart(*both), runs + len(starts)
+        off = np.where(pair.flight.shown, apart(*both), np.nan)
+        ends, runs = ends + len(starts) * off, runs + len(starts)
     return LeftOut(name, np.sqrt(squares / samples), ends / runs)
 
 

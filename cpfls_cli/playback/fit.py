@@ -141,8 +141,7 @@ def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
     flight : PlaybackFlight
     scale : array, shape (horizon, 4), m, m/s, rad, rad/s
     """
-    known = np.array([flight.translates, flight.translates, flight.has_attitude, True])
-    total = np.where(known & (scale.sum(axis=0) > 0), scale.sum(axis=0), np.inf)
+    total = np.where(flight.shown & (scale.sum(axis=0) > 0), scale.sum(axis=0), np.inf)
     delta = np.maximum(_ROBUST * np.maximum(scale, _LEAST * scale.mean(axis=0)), 1e-12)
     return Loss(np.array(_SIGNAL_WEIGHTS) / total / delta, delta)
 

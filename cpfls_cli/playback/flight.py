@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.kernels import Motion
@@ -58,6 +58,11 @@ class PlaybackFlight:
     def translates(self) -> bool:
         """Whether velocity is simulated."""
         return self.has_attitude and self.has_velocity
+
+    @property
+    def shown(self) -> BoolArray:
+        """Whether runs tell position, velocity, attitude and rate, shape (4,)."""
+        return np.array([self.translates, self.translates, self.has_attitude, True])
 
     def starts(self, horizon: int, every: int) -> IntArray:
         """List every n-th sample from which a horizon fits into its stretch.

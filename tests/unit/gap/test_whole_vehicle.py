@@ -9,6 +9,7 @@ from cpfls_cli.effects.catalogue.parameter_error import coupling
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.export.holding import Off
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, nuisance
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
@@ -113,6 +114,10 @@ def test_what_is_left_out_is_measured_along_flights():
     lost = (1.0 - actuated(flown, extended.chosen).speed ** 2 / flown.speed**2) * flown.thrust[:, None]
     assert left.wrench[5] == pytest.approx(np.sqrt((lost[:, 0] ** 2).mean()), rel=0.02)
     assert left.ends[1] > 0.1
+    still = replace(flown, velocity=None, acceleration=None, position=None)
+    (unseen,) = left_out(extended, ["battery_sag"], [Recording("flight", still)])
+    np.testing.assert_array_equal(np.isfinite(unseen.ends), [False, False, True, True])
+    assert Off.of(unseen.ends).sentence.endswith(" degrees")
 
 
 def test_a_plain_model_is_the_vehicle():
