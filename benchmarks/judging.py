@@ -1,8 +1,8 @@
 """Compare judging chromosomes on the selected samples with judging them on the whole training part.
 
-Run `cpfls trajectory`, `simulate` and `reduce` on configs/paper.yaml first (`make reproduce` does), then
+Run `make data/paper-gentle/selection.h5` first, then
 
-    python benchmarks/judging.py configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5
+    python benchmarks/judging.py configs/paper-gentle.yaml data/paper-gentle/flight.h5 data/paper-gentle/selection.h5
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor import Motion
 from cpfls_cli.trajectory.planning import plan
 
-CONFIG = Path(__file__).resolve().parents[1] / "configs" / "quick.yaml"
+CONFIG = Path(__file__).resolve().parents[1] / "configs" / "paper-gentle.yaml"
 CHANGES = (
     "trajectory.path=straight",
     "trajectory.direction=[1.0, -0.6, 0.2]",

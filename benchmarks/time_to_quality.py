@@ -1,9 +1,10 @@
 """Best mean squared error against time: our genetic algorithm beside other searches, on the paper's study.
 
-    python benchmarks/time_to_quality.py configs/paper.yaml data/paper/flight.h5 data/paper/selection.h5 [SEEDS]
+    STUDY=data/paper-gentle
+    python benchmarks/time_to_quality.py configs/paper-gentle.yaml $STUDY/flight.h5 $STUDY/selection.h5 [SEEDS]
 
-It needs the ``bench`` extra, and the study's files (``make data/paper/selection.h5``). All searches use the same
-evaluator with the same local search inside, in one thread. Time is CPU time of the process, so that other work on
+It needs the ``bench`` extra, and the study's files (``make data/paper-gentle/selection.h5``). All searches use the
+same evaluator with the same local search inside, in one thread. Time is CPU time of the process, so that other work on
 the machine counts little.
 """
 

@@ -1,4 +1,4 @@
-"""The paper's study in memory: its flight, and the samples worth learning from."""
+"""The paper's study on its gentle path in memory: its flight, and the samples worth learning from."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cpfls_cli.reduction.training_set import reduce
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure, uniform_breakpoints
 from cpfls_cli.trajectory.planning import plan
 
-CONFIG = Path(__file__).resolve().parents[2] / "configs" / "paper.yaml"
+CONFIG = Path(__file__).resolve().parents[2] / "configs" / "paper-gentle.yaml"
 
 
 @lru_cache

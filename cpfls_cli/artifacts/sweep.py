@@ -255,6 +255,8 @@ class SettingRuns:
         Mean squared, largest and relative error over the samples learned from.
     settled : array of int, shape (runs,), or None
         Generation from which on the smallest first objective is within 5 % of the last one.
+    largest_torque : float, N m
+        Of the training part; NaN where it is not known.
     """
 
     name: str
@@ -274,6 +276,7 @@ class SettingRuns:
     uniform_condition_number: float = float("nan")
     learned: Array | None = None
     settled: IntArray | None = None
+    largest_torque: float = float("nan")
 
     @property
     def errors(self) -> Array:
@@ -291,6 +294,11 @@ class SettingRuns:
     def size(self) -> tuple[int, int]:
         """Population and generations."""
         return self.population, self.generations
+
+    @property
+    def chromosomes(self) -> int:
+        """Chromosomes of a search, counted as the paper does."""
+        return self.population * self.generations
 
     @property
     def best(self) -> int | None:
@@ -343,6 +351,9 @@ class SweepRecord(Record):
     )
     run: RunGroup = group("run")
     complete: bool = dataset("complete", "1 where every run is finished, 0 where `--resume` goes on")
+    largest_torque: Array | None = dataset(
+        "largest_torque", "largest torque of the axis that has most", "part", units="N m", default=None
+    )
 
     @property
     def without_model(self) -> int:
@@ -377,6 +388,7 @@ class SweepRecord(Record):
             uniform_condition_number=_known(setting.uniform_condition_number, index),
             learned=np.stack(known, axis=1) if len(known) == len(learned) else None,
             settled=None if run.settled is None else run.settled[chosen],
+            largest_torque=_known(self.largest_torque, 0),
         )
 
     def differing_settings(self, other: SweepRecord) -> list[str]:

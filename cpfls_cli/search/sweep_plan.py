@@ -7,11 +7,13 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import Job
 from cpfls_cli.artifacts.selection import SelectionRecord
 from cpfls_cli.artifacts.spec import InputFile
@@ -186,7 +188,23 @@ class SweepPlan:
             ranking=tuple(study.identification.ranking for study in studies),
             uniform_condition_number=np.array([setting.uniform_condition_number for setting in self.settings]),
         )
-        return SweepRecord(setting=columns, part=self.parts, run=runs, complete=len(runs) == self.runs)
+        return SweepRecord(
+            setting=columns,
+            part=self.parts,
+            largest_torque=self._largest_torque,
+            run=runs,
+            complete=len(runs) == self.runs,
+        )
+
+    @cached_property
+    def _largest_torque(self) -> Array:
+        """Find the largest torque of each part, in the first setting that is judged on it; shape (parts,), N m."""
+        largest: dict[str, float] = {}
+        for setting in self.settings:
+            for part, source in {TRAINING: setting.data.training, **setting.held_out}.items():
+                if part not in largest:
+                    largest[part] = max(float(np.max(np.abs(data.torque))) for data in source.chunks())
+        return np.array([largest[part] for part in self.parts])
 
     def work(self, runs: int) -> int:
         """Tell roughly how long so many runs take."""
