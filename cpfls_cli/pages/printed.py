@@ -110,12 +110,16 @@ PRINTED_PEAKS = {
 }
 """Section 10: largest derivatives of the base move with P = 1 s, by name."""
 
+PRINTED_PERIOD_S = 1.0
 PRINTED_MOVE_S = 16.0
 PRINTED_JERK_INTEGRAL = 8.0
-"""Section 10: how long the base move takes, and the integral of its absolute jerk in m/s^2."""
+"""Section 10: P, how long the base move takes, and the integral of its absolute jerk in m/s^2."""
 
 PRINTED_RELATIVE_ERROR = 0.1
 """Sections 10 and 11: no relative torque error reaches it."""
+
+TYPICAL_MSE, TYPICAL_MAX_ERROR = 1e-3, 0.2
+"""Section 10: what the errors of a typical model stay below, (N m)^2 and N m."""
 
 PRINTED_CONTRIBUTION, PRINTED_SHARE = 0.8, 0.2
 """Section 10: what the chosen samples keep of the condition, and what share of all samples they are at most."""

@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.scores import MODEL, TRAINING
 from cpfls_cli.fuzzy.inputs import seesaw
 from cpfls_cli.fuzzy.membership import breakpoints
 from cpfls_cli.pages.claims import (
+    CONTINUITY_CLAIM,
     CONTRIBUTION_CLAIM,
     DECOMPOSITION_TIME_CLAIM,
     EVALUATION_TIME_CLAIM,
@@ -32,16 +33,30 @@ from cpfls_cli.pages.printed import (
     SMALLEST_MAX_ERROR,
     TABLE_4,
 )
-from cpfls_cli.pages.search_claims import CLASSIC_CLAIM, REDUCED_CLAIMS, SMALLER_SEARCH_CLAIM
+from cpfls_cli.pages.readings import readings_blocks
+from cpfls_cli.pages.search_claims import (
+    CLASSIC_CLAIM,
+    CONVERGENCE_CLAIM,
+    RANKING_CLAIM,
+    REDUCED_CLAIMS,
+    SMALLER_SEARCH_CLAIM,
+    TYPICAL_CONDITION_CLAIM,
+    TYPICAL_ERRORS_CLAIM,
+)
 from cpfls_cli.pages.source import Sources
 from cpfls_cli.report.content import Block, Cell, Folded, Section, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
 
 CLAIMS: tuple[Claim, ...] = (
     RELATIVE_ERROR_CLAIM,
+    TYPICAL_ERRORS_CLAIM,
+    TYPICAL_CONDITION_CLAIM,
     *REDUCED_CLAIMS,
     SMALLER_SEARCH_CLAIM,
+    CONVERGENCE_CLAIM,
+    RANKING_CLAIM,
     CLASSIC_CLAIM,
+    CONTINUITY_CLAIM,
     EVALUATION_TIME_CLAIM,
     DECOMPOSITION_TIME_CLAIM,
     CONTRIBUTION_CLAIM,
@@ -84,6 +99,7 @@ def reproduction_section(sources: Sources) -> Section | None:
     blocks: list[Block] = [
         Text(_count(measured), "note"),
         _claims(measured),
+        *readings_blocks(sources, CLAIMS),
         _rules(),
         _figures(compared_figures(sources)),
         seesaw_figure("figure-1-seesaw"),
@@ -269,7 +285,7 @@ def _reduction_compared(sources: Sources) -> ComparedFigure:
     agrees = abs(grown - _DRAWN.change) < PRINTED_RELATIVE_ERROR
     why = (
         "The curve falls to a level and stays there; the level is another than the paper's, because the path and "
-        "so the full set is, and because the choice exchanges samples and is not bound to the rule of section 8."
+        "so the full set is, and because nothing keeps a reduced set from being better conditioned than the full one."
     )
     return ComparedFigure(title, printed, f"{number(condition, 5)}, {change(grown)}", _agreement(agrees), why)
 

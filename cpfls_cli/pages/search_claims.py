@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 
 import numpy as np
 from scipy.special import stdtrit
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
-from cpfls_cli.pages.claims import Claim, Measurement, decided, not_measured, undecided
-from cpfls_cli.pages.printed import TABLE_5, PrintedColumn
-from cpfls_cli.pages.source import Sources
-from cpfls_cli.pages.sweep import joined_sweeps
-from cpfls_cli.report.numbers import number
+from cpfls_cli.pages.claims import Claim, Measurement, Searches, Settings, decided, not_measured, searches, undecided
+from cpfls_cli.pages.printed import TABLE_5, TYPICAL_MAX_ERROR, TYPICAL_MSE, PrintedColumn
+from cpfls_cli.report.numbers import number, percent
 
 _CONFIDENCE = 0.95
 _FLS, _FULL, *_REDUCED, _SMALL = TABLE_5
@@ -142,45 +141,46 @@ def _sizes(setting: SettingRuns, reference: SettingRuns) -> str:
     return " against ".join(sizes)
 
 
-_Settings = Sequence[SettingRuns]
-_Pairs = Callable[[_Settings], Iterator[tuple[SettingRuns, SettingRuns]]]
+_Pairs = Callable[[Settings], Iterator[tuple[SettingRuns, SettingRuns]]]
+_Lacking = Callable[[Searches], str]
 
 
-def _measured(
-    pairs: _Pairs, lacking: Callable[[Sequence[_Settings]], str], command: str, reason: str
-) -> Callable[[Sources], Measurement]:
-    """Judge a claim on the first pair of settings that can; of several sweeps the one with the larger search does.
+def _claim(
+    name: str, words: str, paper: str, pairs: _Pairs, lacking: _Lacking, command: str, reason: str, rule: str = ""
+) -> Claim:
+    """State a claim about two settings, judged on the first pair that can; the larger search comes first.
 
     Parameters
     ----------
     lacking : callable
-        Names what is missing where no pair is found, from the settings of all sweeps.
+        Names what is missing where no pair is found.
     command : str
         What makes it.
     reason : str
         Of a failure.
+    rule : str
+        What is asked beside the rule for pairs.
     """
 
-    def measure(sources: Sources) -> Measurement:
-        sweeps = [sweep.record.settings for sweep in joined_sweeps(sources.sweeps)]
-        sweeps.sort(key=lambda settings: -max(_chromosomes(setting) for setting in settings))
-        for pair in chain.from_iterable(map(pairs, sweeps)):
+    def of_searches(found: Searches) -> Measurement:
+        for pair in chain.from_iterable(map(pairs, found)):
             if (measurement := _as_good(*pair, reason)) is not None:
                 return measurement
-        return not_measured(lacking(sweeps), command)
+        return not_measured(lacking(found), command)
 
-    return measure
+    return _of_searches(name, "Section 10", words, f"{_RULE} {rule}".strip(), paper, of_searches)
 
 
-def _chromosomes(setting: SettingRuns) -> int:
-    """Count the chromosomes of a search as the paper does."""
-    return setting.population * setting.generations
+def _of_searches(
+    name: str, where: str, words: str, rule: str, paper: str, measure: Callable[[Searches], Measurement]
+) -> Claim:
+    return Claim(name, where, words, rule, paper, lambda sources: measure(searches(sources)), measure)
 
 
 def _reduced_claim(column: PrintedColumn) -> Claim:
     """Fewer samples, each set of them beside all samples."""
 
-    def pairs(settings: _Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
+    def pairs(settings: Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
         for full in settings:
             for reduced in settings:
                 equal = reduced.structure == full.structure == "cpfls" and reduced.size == full.size
@@ -188,19 +188,15 @@ def _reduced_claim(column: PrintedColumn) -> Claim:
                     yield reduced, full
 
     share = f"{column.samples} of {_FULL.samples} samples"
-    return Claim(
+    return _claim(
         name=f"{column.samples} samples",
-        where="Section 10",
         words="In average there is no significant difference in the identification quality for any of the reduced or "
         "the full data set",
-        rule=_RULE,
         paper=_times(_printed_ratio(column, _FULL)),
-        measure=_measured(
-            pairs,
-            lambda _: f"a sweep over {share} and all of them, of equal searches",
-            "make reproduce",
-            "least squares keeps the error small where it has samples.",
-        ),
+        pairs=pairs,
+        lacking=lambda _: f"a sweep over {share} and all of them, of equal searches",
+        command="make reproduce",
+        reason="least squares keeps the error small where it has samples.",
     )
 
 
@@ -211,38 +207,40 @@ _TIMES_LARGER = 10.0
 """A search that is not ten times the other one tells nothing about the paper's, which is 53 times."""
 
 
-def _small_beside_large(settings: _Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
+def _alike(one: SettingRuns, other: SettingRuns) -> bool:
+    """Tell whether two settings search a periodic system on equally many samples."""
+    return one.structure == other.structure == "cpfls" and one.samples == other.samples
+
+
+def _small_beside_large(settings: Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
     for small in settings:
         for large in settings:
-            equal = small.structure == large.structure == "cpfls" and small.samples == large.samples
+            equal = _alike(small, large) and small.ranking == large.ranking
             is_small = small.size == (_SMALL.population, _SMALL.generations)
-            if equal and is_small and _chromosomes(large) >= _TIMES_LARGER * _chromosomes(small):
+            if equal and is_small and large.chromosomes >= _TIMES_LARGER * small.chromosomes:
                 yield small, large
 
 
-def _no_larger_search(sweeps: Sequence[_Settings]) -> str:
+def _no_larger_search(found: Searches) -> str:
     lacking = f"a search on equal samples with ten times the chromosomes of {_SMALL.population} × {_SMALL.generations}"
-    sizes = sorted({setting.size for settings in sweeps for setting in settings})
+    sizes = sorted({setting.size for settings in found for setting in settings})
     return f"{lacking}; here are {', '.join(f'{p} × {g}' for p, g in sizes)}" if sizes else lacking
 
 
-SMALLER_SEARCH_CLAIM = Claim(
+SMALLER_SEARCH_CLAIM = _claim(
     name="Smaller search",
-    where="Section 10",
     words="The identification result is still very good when reducing the population size to 75 and generations "
     "evaluated to 25",
-    rule=f"{_RULE} The other search must have ten times as many chromosomes (the paper's: 53 times).",
+    rule="The other search must have ten times as many chromosomes (the paper's: 53 times).",
     paper=_times(_printed_ratio(_SMALL, _LARGE)),
-    measure=_measured(
-        _small_beside_large,
-        _no_larger_search,
-        "make reproduce-full",
-        "the larger search still finds better partitions.",
-    ),
+    pairs=_small_beside_large,
+    lacking=_no_larger_search,
+    command="make reproduce-larger",
+    reason="the larger search still finds better partitions.",
 )
 
 
-def _periodic_beside_classic(settings: _Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
+def _periodic_beside_classic(settings: Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
     for periodic in settings:
         for classic in settings:
             kinds = (periodic.structure, classic.structure) == ("cpfls", "fls")
@@ -251,18 +249,126 @@ def _periodic_beside_classic(settings: _Settings) -> Iterator[tuple[SettingRuns,
                 yield periodic, classic
 
 
-CLASSIC_CLAIM = Claim(
+CLASSIC_CLAIM = _claim(
     name="cpFLS and FLS",
-    where="Section 10",
     words="There is neither significant quality, nor identification performance degradation when using the new "
     "cpFLS compared to the simple FLS method described in [14]",
-    rule=_RULE,
     paper=_times(_printed_ratio(_FULL, _FLS)),
-    measure=_measured(
-        _periodic_beside_classic,
-        lambda _: "a sweep over cpFLS and FLS, all samples, equal searches",
-        "make reproduce",
-        "closing the circle makes one rule of the first and the last, which leaves fewer coefficients for a path of "
-        "small angles. What it gains lies one period away, where this is not judged.",
-    ),
+    pairs=_periodic_beside_classic,
+    lacking=lambda _: "a sweep over cpFLS and FLS, all samples, equal searches",
+    command="make reproduce",
+    reason="closing the circle makes one rule of the first and the last, which leaves fewer coefficients for a path of "
+    "small angles. What it gains lies one period away, where this is not judged.",
+)
+
+
+def _quantity_beside_pareto(settings: Settings) -> Iterator[tuple[SettingRuns, SettingRuns]]:
+    for quantity in settings:
+        for pareto in settings:
+            rankings = quantity.ranking == "quantity-dominance" != pareto.ranking
+            if rankings and _alike(quantity, pareto) and quantity.size == pareto.size:
+                yield quantity, pareto
+
+
+RANKING_CLAIM = _claim(
+    name="Ranking by quantity",
+    words="The achieved quality of non-dominated individuals … is at least as good as for classical Pareto based "
+    "ranking method GAs",
+    paper="at least as good",
+    pairs=_quantity_beside_pareto,
+    lacking=lambda _: "a sweep over both rankings, equal samples and searches",
+    command="make reproduce",
+    reason="the classical ranking finds better models here.",
+)
+
+
+def _periodic(found: Searches) -> list[SettingRuns]:
+    return [setting for setting in chain.from_iterable(found) if setting.structure == "cpfls"]
+
+
+def _of_all_runs(values: Sequence[Array]) -> Array:
+    """Join the values of settings; a run without a model reaches nothing."""
+    gathered: Array = np.concatenate([np.zeros(0), *values])
+    return np.nan_to_num(gathered, nan=np.inf)
+
+
+_A_SWEEP = partial(not_measured, "a sweep over cpFLS", "make reproduce")
+
+
+def _typical_errors(found: Searches) -> Measurement:
+    mse, largest = (_of_all_runs([setting.errors[:, column] for setting in _periodic(found)]) for column in (0, 1))
+    if not len(mse):
+        return _A_SWEEP()
+    ours = f"{number(float(np.median(mse)), 2)} (N m)², {number(float(np.median(largest)), 2)} N m"
+    torque = max(setting.largest_torque for setting in _periodic(found))
+    why = f"Medians of {len(mse)} models."
+    if torque <= TYPICAL_MAX_ERROR:
+        return undecided(ours, f"{why} No model at all would pass: no torque is above {number(torque, 2)} N m.")
+    return decided(bool(np.median(mse) < TYPICAL_MSE and np.median(largest) < TYPICAL_MAX_ERROR), ours, why)
+
+
+TYPICAL_ERRORS_CLAIM = _of_searches(
+    "Typical errors",
+    "Section 10",
+    "the typical mean square error (MSE) is <1e-3, the typical maximum torque error (maxE) is <0.2 Nm",
+    f"Medians over all runs of cpFLS. Pass: both below, on a flight with torques above {TYPICAL_MAX_ERROR} N m.",
+    f"< {TYPICAL_MSE:g} (N m)², < {TYPICAL_MAX_ERROR:g} N m",
+    _typical_errors,
+)
+
+_PRINTED_CONDITIONS = [
+    float(condition)
+    for column in TABLE_5
+    for condition in (column.condition_number, column.condition_number_of_runs[0])
+]
+_LEAST_CONDITION, _LARGEST_CONDITION = min(_PRINTED_CONDITIONS), max(_PRINTED_CONDITIONS)
+
+
+def _typical_condition(found: Searches) -> Measurement:
+    conditions = _of_all_runs([setting.condition_number for setting in _periodic(found)])
+    if not len(conditions):
+        return _A_SWEEP()
+    median = float(np.median(conditions))
+    low, high = np.quantile(conditions, [0.25, 0.75])
+    why = f"{len(conditions)} models, half of them between {number(float(low), 3)} and {number(float(high), 3)}."
+    return decided(_LEAST_CONDITION <= median <= _LARGEST_CONDITION, number(median, 3), why)
+
+
+TYPICAL_CONDITION_CLAIM = _of_searches(
+    "Typical condition number",
+    "Section 10",
+    "the typical condition number (Cond) of … the matrix of linear equations is ~4-5000",
+    "Median condition number over all runs of cpFLS. Pass: between the smallest and the largest of Table 5, "
+    f"{number(_LEAST_CONDITION, 4)} and {number(_LARGEST_CONDITION, 4)}.",
+    "4000 to 5000",
+    _typical_condition,
+)
+
+_BEFORE_THE_END = 0.8
+
+
+def _convergence(found: Searches) -> Measurement:
+    sizes: dict[tuple[int, int], list[IntArray]] = {}
+    for setting in _periodic(found):
+        large = setting.population >= _SMALL.population and setting.generations >= _SMALL.generations
+        if large and setting.settled is not None:
+            sizes.setdefault(setting.size, []).append(setting.settled)
+    if not sizes:
+        return not_measured(f"a search of {_SMALL.population} × {_SMALL.generations} or more", "make reproduce")
+    medians = {size: float(np.median(np.concatenate(settled))) for size, settled in sorted(sizes.items())}
+    passed = all(median <= _BEFORE_THE_END * generations for (_, generations), median in medians.items())
+    ours = ", ".join(f"generation {number(median, 3)} of {generations}" for (_, generations), median in medians.items())
+    at_once = all(median == 0.0 for median in medians.values())
+    return decided(passed, ours, "The random start is there already: most of the error is noise." if at_once else "")
+
+
+CONVERGENCE_CLAIM = _of_searches(
+    "Convergence",
+    "Section 10",
+    "Convergence of applied multi objective GAs of population size … 200, (or 75) is achieved in <200, (or <25) "
+    "generation evaluations",
+    "Generation from which on the smallest mean squared error of a population is within 5 % of its last, median over "
+    f"the runs of a size. Pass: for each size at most {percent(_BEFORE_THE_END)} of its generations.",
+    "before 200 and 25",
+    _convergence,
 )

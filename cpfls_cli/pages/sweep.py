@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.sweep import SettingRuns, SweepRecord, spread
+from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns, SweepRecord, spread
 from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
 from cpfls_cli.pages.printed import RELATIVE_ERROR, TABLE_5, PrintedColumn
 from cpfls_cli.pages.source import Source, Sources
@@ -74,8 +74,20 @@ def replicates_section(sources: Sources) -> Section | None:
     if not sources.sweeps:
         return None
     sweeps, paper = joined_sweeps(sources.sweeps), sources.settings.paper
-    blocks = [block for index, sweep in enumerate(sweeps, start=1) for block in _sweep(sweep, index, paper)]
-    return Section("replicates", "Replicates of the search", blocks)
+    # Sweeps over readings of the paper stand beside its claims.
+    shown = [sweep for sweep in sweeps if not (paper and compares_readings(sweep.record.settings))]
+    blocks = [block for index, sweep in enumerate(shown, start=1) for block in _sweep(sweep, index, paper)]
+    return Section("replicates", "Replicates of the search", blocks) if blocks else None
+
+
+def reading_of(setting: SettingRuns) -> tuple[str, str]:
+    """Name what chose the samples of a setting, and on which of them it was judged."""
+    return setting.criterion, setting.judged_on
+
+
+def compares_readings(settings: Sequence[SettingRuns]) -> bool:
+    """Tell whether searches choose equally many samples in several ways, or judge on different ones."""
+    return len({reading_of(setting) for setting in settings if setting.criterion != ALL_SAMPLES}) > 1
 
 
 def joined_sweeps(sweeps: Sequence[Source[SweepRecord]]) -> list[Source[SweepRecord]]:

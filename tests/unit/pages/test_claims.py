@@ -1,4 +1,7 @@
-"""What counts as a pass, a failure, or neither, for each kind of claim."""
+"""What counts as a pass, a failure, or neither, for each kind of claim, and for each reading of the paper."""
+
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,14 +12,27 @@ from cpfls_cli.artifacts.spec import Header
 from cpfls_cli.artifacts.sweep import RunGroup, SettingGroup, SettingRuns, SweepRecord
 from cpfls_cli.config.study import EvaluationTime, ReportSettings
 from cpfls_cli.pages.claims import (
+    CONTINUITY_CLAIM,
     CONTRIBUTION_CLAIM,
     DECOMPOSITION_TIME_CLAIM,
     EVALUATION_TIME_CLAIM,
     FLOOR_CLAIM,
+    RELATIVE_ERROR_CLAIM,
     ClaimVerdict,
 )
-from cpfls_cli.pages.reproduction import partitions_compared, seesaw_compared
-from cpfls_cli.pages.search_claims import AS_GOOD, CLASSIC_CLAIM, REDUCED_CLAIMS, SMALLER_SEARCH_CLAIM, paired_ratio
+from cpfls_cli.pages.readings import readings, readings_blocks
+from cpfls_cli.pages.reproduction import CLAIMS, partitions_compared, seesaw_compared
+from cpfls_cli.pages.search_claims import (
+    AS_GOOD,
+    CLASSIC_CLAIM,
+    CONVERGENCE_CLAIM,
+    RANKING_CLAIM,
+    REDUCED_CLAIMS,
+    SMALLER_SEARCH_CLAIM,
+    TYPICAL_CONDITION_CLAIM,
+    TYPICAL_ERRORS_CLAIM,
+    paired_ratio,
+)
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -211,3 +227,130 @@ def test_the_printed_numbers_are_read_as_the_paper_means_them():
     assert partitions_compared().agreement == "read as printed"
     for figure in (seesaw_compared(), partitions_compared()):
         assert "how the paper is read, not of any model" in figure.why
+
+
+def verdict(claim, *settings):
+    return claim.of_searches([settings]).verdict
+
+
+@pytest.mark.parametrize(
+    ("mse", "largest", "torque", "expected"),
+    [
+        (9e-4, 0.19, 1.6, ClaimVerdict.PASS),
+        (1.1e-3, 0.19, 1.6, ClaimVerdict.FAIL),
+        (9e-4, 0.21, 1.6, ClaimVerdict.FAIL),
+        (9e-9, 0.01, 0.06, ClaimVerdict.UNDECIDED),
+        (np.nan, np.nan, 1.6, ClaimVerdict.FAIL),
+    ],
+)
+def test_typical_errors_need_torques_that_are_larger(mse, largest, torque, expected):
+    """Where no torque reaches 0.2 N m, a model of nothing passes too."""
+    ours = replace(setting([mse] * 3), max_error=np.full((3, 1), largest), largest_torque=torque)
+    assert verdict(TYPICAL_ERRORS_CLAIM, ours) == expected
+
+
+@pytest.mark.parametrize(("condition", "passes"), [(2600, False), (2800, True), (7300, True), (7400, False)])
+def test_a_typical_condition_number_lies_between_those_of_the_table(condition, passes):
+    ours = replace(setting(NOISE), condition_number=np.full(10, float(condition)))
+    assert (verdict(TYPICAL_CONDITION_CLAIM, ours) == ClaimVerdict.PASS) == passes
+    classic = replace(setting(NOISE, "fls"), condition_number=np.full(10, 1e9))
+    assert verdict(TYPICAL_CONDITION_CLAIM, ours, classic) == verdict(TYPICAL_CONDITION_CLAIM, ours)
+
+
+def test_a_search_has_converged_where_its_last_fifth_brings_nothing():
+    small, large = setting(NOISE, size=(75, 25)), setting(NOISE, size=(500, 200))
+    early = [replace(s, settled=np.full(10, generation)) for s, generation in ((small, 20), (large, 160))]
+    assert verdict(CONVERGENCE_CLAIM, *early) == ClaimVerdict.PASS
+    assert verdict(CONVERGENCE_CLAIM, replace(small, settled=np.full(10, 21)), early[1]) == ClaimVerdict.FAIL
+    assert verdict(CONVERGENCE_CLAIM, setting(NOISE), small) == ClaimVerdict.NOT_MEASURED
+    at_once = CONVERGENCE_CLAIM.of_searches([[replace(small, settled=np.zeros(10, dtype=int))]])
+    assert "The random start is there already" in at_once.why
+
+
+def test_ranking_by_quantity_beside_a_classical_one():
+    quantity, pareto = setting(NOISE, samples=685), replace(setting(NOISE, samples=685), ranking="pareto-fronts")
+    assert verdict(RANKING_CLAIM, quantity, pareto) == ClaimVerdict.PASS
+    assert verdict(RANKING_CLAIM, replace(quantity, mse=2 * quantity.mse), pareto) == ClaimVerdict.FAIL
+    assert verdict(RANKING_CLAIM, quantity, replace(pareto, samples=1170)) == ClaimVerdict.NOT_MEASURED
+    assert verdict(RANKING_CLAIM, quantity, replace(quantity, population=75)) == ClaimVerdict.NOT_MEASURED
+
+
+@pytest.mark.parametrize(("torque", "passes"), [(np.cos, True), (np.sin, True), (np.asarray, False)])
+def test_torque_goes_on_across_a_full_turn(torque, passes):
+    rebuilt = SimpleNamespace(torque=lambda motion: torque(motion.attitude))
+    record = SimpleNamespace(rebuilt=lambda _: rebuilt)
+    model = SimpleNamespace(record=record, label="m.h5", config={"identification": {"structure": "cpfls"}})
+    measured = CONTINUITY_CLAIM.measure(SimpleNamespace(models=[model]))
+    assert (measured.verdict == ClaimVerdict.PASS) == passes
+    assert CONTINUITY_CLAIM.measure(SimpleNamespace(models=[])).verdict == ClaimVerdict.NOT_MEASURED
+
+
+def chosen(criterion, judged_on, factor, condition, size=(20, 5)):
+    ours = setting(factor * NOISE, samples=685, size=size)
+    learned = np.stack([0.1 * NOISE] * 3, axis=1)
+    reading = {"criterion": criterion, "judged_on": judged_on, "learned": learned}
+    return replace(ours, uniform_condition_number=condition, **reading)
+
+
+def reading_sources(*flights):
+    """Sweeps over readings: noise of the torque, and the settings."""
+    path = {"path": "p", "legs": 3, "displacement_m": 64.0, "period_s": 1.0}
+    made = [
+        SimpleNamespace(
+            label="s.h5",
+            config={"trajectory": path, "simulation": {"relative_noise": {"torque": noise} if noise else {}}},
+            record=SimpleNamespace(settings=settings, joins=lambda _: False),
+            made_from=lambda _: "flown",
+        )
+        for noise, settings in flights
+    ]
+    noise = SimpleNamespace(signal=("body_rate", "torque"), std=np.array([[9.0, 9.0, 9.0], [0.01, 0.02, 0.03]]))
+    flight = SimpleNamespace(record=SimpleNamespace(noise=noise))
+    return SimpleNamespace(sweeps=made, by_hash=lambda _: flight)
+
+
+FULL = replace(setting(NOISE, size=(20, 5)), uniform_condition_number=100.0, largest_torque=1.9)
+
+
+def test_every_reading_is_judged_on_its_own_samples_and_errors():
+    settings = [FULL, chosen("even", "training", 1.0, 101.0), chosen("D", "training", 9.0, 60.0)]
+    found = readings(reading_sources((0.05, [*settings, chosen("D", "learned", 9.0, 60.0)]), (0.0, settings)))
+    assert [(r.noise, r.criterion, r.judged_on) for r in found] == [
+        (0.0, "even", "training"),
+        (0.0, "D", "training"),
+        (0.05, "even", "training"),
+        (0.05, "D", "training"),
+        (0.05, "D", "learned"),
+    ]
+    reduced = [r.measured([REDUCED_CLAIMS[2]])[0].verdict for r in found[2:]]
+    assert reduced == [ClaimVerdict.PASS, ClaimVerdict.FAIL, ClaimVerdict.PASS]
+    relative = [r.measured([RELATIVE_ERROR_CLAIM])[0].ours for r in found[3:]]
+    assert relative[0] != relative[1]
+    reduction = [[m.verdict for m in r.measured([CONTRIBUTION_CLAIM, FLOOR_CLAIM])] for r in found[2:4]]
+    assert reduction == [[ClaimVerdict.PASS, ClaimVerdict.PASS], [ClaimVerdict.PASS, ClaimVerdict.FAIL]]
+
+
+def test_the_flight_that_is_nearest_to_the_printed_numbers_is_named():
+    """Ten times the printed mean squared error on the chosen samples of one of two otherwise equal flights."""
+    printed = replace(FULL, mse=np.full((10, 1), 9e-4))
+    near, far = (
+        [printed, replace(chosen("D", "training", 1.0, 100.0), mse=np.full((10, 1), mse))] for mse in (1.2e-3, 1.2e-2)
+    )
+    given = reading_sources((0.0, far), (0.05, near))
+    answer = [block.text for block in readings_blocks(given, CLAIMS) if hasattr(block, "text")]
+    assert "3 × 64 m at P = 1 s with 5 % noise" in answer[1]
+    assert "Its noise alone has a mean square of 0.000467 (N" in answer[2]
+    far, near = readings(given)
+    assert far.factor / near.factor == pytest.approx(10 ** (1 / 8))
+
+
+def test_of_one_reading_in_two_sweeps_the_larger_search_stands():
+    large = [replace(s, population=40) for s in (FULL, chosen("even", "training", 1.0, 101.0))]
+    small = [FULL, chosen("even", "training", 1.0, 101.0), chosen("D", "training", 9.0, 60.0)]
+    for order in ([(0.0, small), (0.0, large)], [(0.0, large), (0.0, small)]):
+        found = {reading.criterion: reading.search for reading in readings(reading_sources(*order))}
+        assert found == {"even": "40 × 5", "D": "20 × 5"}
+
+
+def test_a_report_of_one_reading_compares_none():
+    assert not list(readings_blocks(reading_sources((0.0, [FULL, chosen("D", "training", 1.0, 9.0)])), CLAIMS))

@@ -1,0 +1,357 @@
+"""The paper in all the ways that its text can be read: each reading's numbers and claims beside what is printed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns, SweepRecord, spread
+from cpfls_cli.pages.claims import Claim, ClaimVerdict, Measurement, Settings
+from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
+from cpfls_cli.pages.printed import PRINTED_RELATIVE_ERROR, SMALLEST_MAX_ERROR, TABLE_4, TABLE_5, PrintedColumn
+from cpfls_cli.pages.search_claims import AS_GOOD, paired_ratio
+from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.sweep import compares_readings, joined_sweeps, reading_of
+from cpfls_cli.report.canvas import plot, style_of
+from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
+from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_BASES = {"training": "the whole flight", "learned": "the samples learned from"}
+_LEAST_TORQUE = SMALLEST_MAX_ERROR / PRINTED_RELATIVE_ERROR
+_RULE = (
+    "How far a reading is off: the geometric mean of the factors between its numbers and the printed ones, namely mean "
+    "squared error, largest error and condition number of FLS, of cpFLS and of cpFLS on the fewest samples (medians "
+    "over the seeds), condition numbers of all and of the fewest samples with uniform partitions, and the largest "
+    f"torque as far as it lies below {number(_LEAST_TORQUE, 3)} {TORQUE}."
+)
+
+
+Verdicts = Sequence[Sequence[Measurement]]
+"""What was measured, by reading and claim."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One way to read the paper, and the searches that follow it.
+
+    Attributes
+    ----------
+    flight : str
+        The path in words.
+    noise : float
+        Of the torque, as a share of its root mean square.
+    criterion : str
+        What chose the samples.
+    judged_on : str
+        What errors are taken over, as the config calls it.
+    settings : sequence of SettingRuns
+        All samples among them.
+    """
+
+    flight: str
+    noise: float
+    criterion: str
+    judged_on: str
+    settings: Settings
+
+    @property
+    def name(self) -> str:
+        """It in words."""
+        return f"{self.flight}, {_noise(self.noise)}, {self.criterion}, errors over {_BASES[self.judged_on]}"
+
+    @property
+    def places(self) -> list[str]:
+        """Its words for the first columns of a table."""
+        return [self.flight, _noise(self.noise), self.criterion, _BASES[self.judged_on]]
+
+    @property
+    def search(self) -> str:
+        """Sizes of its searches."""
+        return joined(dict.fromkeys(f"{setting.population} × {setting.generations}" for setting in self.settings))
+
+    @cached_property
+    def factor(self) -> float:
+        """How far its numbers are from the printed ones."""
+        return float(np.exp(np.mean(np.abs(np.log(list(self._factors()))))))
+
+    def _factors(self) -> Iterator[float]:
+        """Divide each of its numbers by the printed one, on all samples and on the fewest."""
+        for setting, condition in ((self.full, TABLE_4[0]), (self.fewest, TABLE_4[-1])):
+            if setting is not None and np.isfinite(setting.uniform_condition_number):
+                yield setting.uniform_condition_number / condition.condition_number
+        for setting, column in ((self.classic, TABLE_5[0]), (self.full, TABLE_5[1]), (self.fewest, TABLE_5[-2])):
+            if setting is not None:
+                yield from (ours / printed for ours, printed in _beside(setting, column))
+        if np.isfinite(self.fewest.largest_torque):
+            yield min(self.fewest.largest_torque / _LEAST_TORQUE, 1.0)
+
+    @property
+    def classic(self) -> SettingRuns | None:
+        """The classic system on all samples."""
+        return next((s for s in self.settings if s.structure == "fls" and s.criterion == ALL_SAMPLES), None)
+
+    @property
+    def full(self) -> SettingRuns | None:
+        """The periodic system on all samples."""
+        return next((s for s in self.settings if s.structure == "cpfls" and s.criterion == ALL_SAMPLES), None)
+
+    @property
+    def fewest(self) -> SettingRuns:
+        """The smallest set that was chosen; of several searches the first."""
+        return min((s for s in self.settings if s.criterion != ALL_SAMPLES), key=lambda setting: setting.samples)
+
+    def measured(self, claims: Sequence[Claim]) -> list[Measurement]:
+        """Judge claims on its searches alone."""
+        return [claim.of_searches([self.settings]) for claim in claims if claim.of_searches is not None]
+
+
+def _beside(setting: SettingRuns, column: PrintedColumn) -> Iterator[tuple[float, float]]:
+    """Pair medians over the runs with what is printed of ten."""
+    yield float(np.nanmedian(setting.errors[:, 0])), float(column.mse_of_runs[0])
+    yield float(np.nanmedian(setting.errors[:, 1])), float(column.max_error_of_runs[0])
+    yield float(np.nanmedian(setting.condition_number)), float(column.condition_number_of_runs[0])
+
+
+def readings(sources: Sources) -> list[Reading]:
+    """Tell the readings of the paper apart that the sweeps of a report follow.
+
+    Returns
+    -------
+    list of Reading
+        By flight, noise, criterion and what is judged on.
+    """
+    found: dict[tuple[str, float, str, str], Reading] = {}
+    for sweep in joined_sweeps(sources.sweeps):
+        for reading in _of_sweep(sweep):
+            key = (reading.flight, reading.noise, reading.criterion, reading.judged_on)
+            # Of two sweeps in one reading the larger searches tell more.
+            found[key] = max(found.get(key, reading), reading, key=_most)
+    return [found[key] for key in sorted(found, key=lambda key: (key[0], key[1]))]
+
+
+def _of_sweep(sweep: Source[SweepRecord]) -> Iterator[Reading]:
+    settings = sweep.record.settings
+    for key in dict.fromkeys(reading_of(setting) for setting in settings if setting.criterion != ALL_SAMPLES):
+        own = [setting for setting in settings if setting.criterion == ALL_SAMPLES or reading_of(setting) == key]
+        yield Reading(_flight(sweep.config), _noise_of(sweep.config), *key, own)
+
+
+def _most(reading: Reading) -> int:
+    return min(setting.chromosomes for setting in reading.settings)
+
+
+def _flight(config: Mapping[str, Any]) -> str:
+    path = config["trajectory"]
+    moves = f"{path['legs']} × {path['displacement_m']:g} m" if path["displacement_m"] else path["path"]
+    return moves if path["period_s"] is None else f"{moves} at P = {path['period_s']:g} s"
+
+
+def _noise_of(config: Mapping[str, Any]) -> float:
+    return float(config["simulation"]["relative_noise"].get("torque", 0.0))
+
+
+def _noise(share: float) -> str:
+    return f"{percent(share, 1)} noise" if share else "no noise"
+
+
+def readings_blocks(sources: Sources, claims: Sequence[Claim]) -> Iterator[Block]:
+    """Show how each claim fares in each reading, where a report has more than one.
+
+    Parameters
+    ----------
+    claims : sequence of Claim
+        Those about other things than searches are left out.
+    """
+    found = readings(sources)
+    if len(found) < 2:
+        return
+    about = [claim for claim in claims if claim.of_searches is not None]
+    verdicts = [reading.measured(about) for reading in found]
+    known = [
+        index for index in range(len(about)) if any(row[index].verdict != ClaimVerdict.NOT_MEASURED for row in verdicts)
+    ]
+    about, verdicts = [about[index] for index in known], [[row[index] for index in known] for row in verdicts]
+    yield from _answer(found, about, verdicts)
+    yield from _judged_above(sources)
+    yield _by_flight(found, about, verdicts)
+    yield readings_figure(found)
+    yield Folded("Every reading: its numbers, and each claim", [_numbers(found), _each(found, about, verdicts)])
+
+
+def _answer(found: Sequence[Reading], claims: Sequence[Claim], verdicts: Verdicts) -> Iterator[Text]:
+    groups: dict[str, list[str]] = {"in every reading": [], "in some": [], "in none": []}
+    for claim, judged in zip(claims, zip(*verdicts, strict=True), strict=True):
+        if any(measurement.verdict == ClaimVerdict.NOT_MEASURED for measurement in judged):
+            continue
+        passed = [measurement.verdict == ClaimVerdict.PASS for measurement in judged]
+        groups["in every reading" if all(passed) else "in some" if any(passed) else "in none"].append(claim.name)
+    shown = "; ".join(f"{where}: {joined(names)}" for where, names in groups.items() if names)
+    yield Text(
+        "The paper leaves open which path it flew, with what noise, how samples were chosen and what errors are taken "
+        f"over: {len(found)} readings of it are searched here. Of the claims that all of them can judge, these pass "
+        f"{shown}.",
+        "note",
+    )
+    nearest = min(found, key=lambda reading: reading.factor)
+    yield Text(
+        f"Nearest to the printed numbers are those of {nearest.flight} with {_noise(nearest.noise)}: off by a factor "
+        f"of {_span(_of_flight(found, nearest))}, whatever chose the samples. {_RULE}"
+    )
+
+
+def _judged_above(sources: Sources) -> Iterator[Text]:
+    single = [sweep for sweep in joined_sweeps(sources.sweeps) if not compares_readings(sweep.record.settings)]
+    names = [reading.name for sweep in single for reading in _of_sweep(sweep)]
+    noises = dict.fromkeys(noise for sweep in single if (noise := _mean_square_noise(sources, sweep)))
+    alone = f" Its noise alone has a mean square of {number(next(iter(noises)), 3)} {SQUARED_TORQUE}." if noises else ""
+    if names:
+        yield Text(f"The claims above are judged in this one: {'; '.join(dict.fromkeys(names))}.{alone}")
+
+
+def _mean_square_noise(sources: Sources, sweep: Source[SweepRecord]) -> float:
+    """Find the mean square of the noise that was put on the torque of a sweep's flight; 0 where none is known."""
+    flight = sources.by_hash(sweep.made_from("flight"))
+    noise = None if flight is None else flight.record.noise
+    if noise is None or "torque" not in noise.signal:
+        return 0.0
+    return float(np.mean(noise.std[noise.signal.index("torque")] ** 2))
+
+
+def _of_flight(found: Sequence[Reading], one: Reading) -> list[Reading]:
+    return [reading for reading in found if (reading.flight, reading.noise) == (one.flight, one.noise)]
+
+
+def _span(found: Sequence[Reading]) -> str:
+    factors = sorted(reading.factor for reading in found)
+    return " to ".join(dict.fromkeys(number(factor, 2) for factor in (factors[0], factors[-1])))
+
+
+def _by_flight(found: Sequence[Reading], claims: Sequence[Claim], verdicts: Verdicts) -> Table:
+    ones = list({(reading.flight, reading.noise): reading for reading in found}.values())
+    columns = []
+    for one in ones:
+        own = _of_flight(found, one)
+        judged = [row for reading, row in zip(found, verdicts, strict=True) if reading in own]
+        columns.append([str(len(own)), _span(own), *(_counted(column) for column in zip(*judged, strict=True))])
+    names = ["readings", "off by a factor of", *(claim.name for claim in claims)]
+    rows = [[name, *row] for name, *row in zip(names, *columns, strict=True)]
+    header = ("Passed in", *(f"{one.flight}, {_noise(one.noise)}" for one in ones))
+    caption = (
+        "In how many readings of each flight a claim passes (of those in which it could be measured and decided): the "
+        "choice of samples and what errors are taken over differ."
+    )
+    return Table("readings", caption, header, rows)
+
+
+def _counted(measured: Iterable[Measurement]) -> str:
+    counts = Counter(measurement.verdict for measurement in measured)
+    decided = counts[ClaimVerdict.PASS] + counts[ClaimVerdict.FAIL]
+    shown = [f"{counts[ClaimVerdict.PASS]} of {decided}"] if decided else []
+    if counts[ClaimVerdict.UNDECIDED]:
+        shown.append(f"{counts[ClaimVerdict.UNDECIDED]} undecided")
+    return ", ".join(shown) or UNKNOWN
+
+
+def _numbers(found: Sequence[Reading]) -> Table:
+    header = (
+        "Flight", "Noise", "Samples by", "Errors over", "Search", f"Largest torque, {TORQUE}", "Uniform condition: all",
+        "chosen", f"MSE, {SQUARED_TORQUE}: all", "chosen", f"Largest error, {TORQUE}", "Relative, whole flight",
+        "Condition number", "Off by a factor of",
+    )  # fmt: skip
+    printed, full = TABLE_5[-2], TABLE_5[1]
+    rows: list[list[str | Cell]] = [[*reading.places, *_numbers_of(reading)] for reading in found]
+    rows.append(
+        [
+            "the paper", UNKNOWN, UNKNOWN, UNKNOWN, f"{full.population} × {full.generations}",
+            f"> {number(_LEAST_TORQUE, 3)}", str(TABLE_4[0].condition_number), str(TABLE_4[-1].condition_number),
+            full.mse_of_runs[0], printed.mse_of_runs[0], printed.max_error_of_runs[0], "< 10 %",
+            printed.condition_number_of_runs[0], "1",
+        ]
+    )  # fmt: skip
+    caption = (
+        "The numbers of each reading beside the paper's. Chosen: the smallest set that was learned from. Errors and "
+        "condition numbers are means over the seeds."
+    )
+    return Table("readings-numbers", caption, header, rows, frozenset(range(5)))
+
+
+def _numbers_of(reading: Reading) -> list[str]:
+    full, fewest = reading.full, reading.fewest
+    whole = [UNKNOWN] * 2 if full is None else [number(full.uniform_condition_number, 4), number(_mean(full, 0), 3)]
+    return [
+        reading.search,
+        number(fewest.largest_torque, 3),
+        whole[0],
+        number(fewest.uniform_condition_number, 4),
+        whole[1],
+        number(_mean(fewest, 0), 3),
+        number(_mean(fewest, 1), 3),
+        percent(spread(fewest.relative_error[:, 0]).mean, 2),
+        number(spread(fewest.condition_number).mean, 3),
+        number(reading.factor, 2),
+    ]
+
+
+def _mean(setting: SettingRuns, column: int) -> float:
+    return spread(setting.errors[:, column]).mean
+
+
+def _each(found: Sequence[Reading], claims: Sequence[Claim], verdicts: Verdicts) -> Table:
+    rows: list[list[str | Cell]] = [
+        [*reading.places, *map(_verdict, row)] for reading, row in zip(found, verdicts, strict=True)
+    ]
+    header = ("Flight", "Noise", "Samples by", "Errors over", *(claim.name for claim in claims))
+    words = frozenset(range(len(header)))
+    caption = "Every claim about searches in every reading; the rules are those above."
+    return Table("readings-claims", caption, header, rows, words, words - frozenset(range(4)))
+
+
+def _verdict(measured: Measurement) -> Cell:
+    if measured.verdict == ClaimVerdict.NOT_MEASURED:
+        return Cell(UNKNOWN)
+    return Cell(f"{measured.verdict}: {measured.ours}", "plain" if measured.verdict == ClaimVerdict.PASS else "note")
+
+
+def readings_figure(found: Sequence[Reading]) -> Plot:
+    """Draw the error on the fewest samples over that on all, in a row for each flight, noise and what is judged on."""
+    rows = list(dict.fromkeys((r.flight, r.noise, r.judged_on) for r in found))
+    criteria = list(dict.fromkeys(reading.criterion for reading in found))
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        for index, criterion in enumerate(criteria):
+            own = [reading for reading in found if reading.criterion == criterion]
+            places = [rows[::-1].index((r.flight, r.noise, r.judged_on)) + 0.15 * (1.5 - index) for r in own]
+            ratios = np.array([_ratio(reading) for reading in own])
+            errors = np.abs(ratios[:, 1:] - ratios[:, :1]).T
+            style = {"color": style_of(index)["color"], "marker": "osD^v<>"[index % 7], "markerfacecolor": "none"}
+            axes.errorbar(ratios[:, 0], places, xerr=errors, linestyle="none", markersize=5, label=criterion, **style)
+        axes.axvline(AS_GOOD, color="#767676", linestyle="--", linewidth=1.2, label="4/3, the paper's largest")
+        axes.axvline(1.0, color="black", linewidth=0.6)
+        axes.set_yticks(range(len(rows)), [f"{f}, {_noise(n)}\n{_BASES[j]}" for f, n, j in reversed(rows)], fontsize=7)
+        axes.set_xscale("log")
+        axes.set_xlabel("MSE on the fewest samples over MSE on all of them, with 95 % intervals")
+        axes.grid(visible=False, axis="y")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.4, 1.12), ncols=5, frameon=False, fontsize=7)
+
+    caption = (
+        "How much worse models of the fewest samples are, by reading: left of the dashed line they are as good as "
+        "those of all samples, by the paper's own margin."
+    )
+    description = "Ratio of mean squared errors by flight, noise, choice of samples and what errors are taken over"
+    return plot("readings-ratios", caption, description, 1.2 + 0.42 * len(rows), draw)
+
+
+def _ratio(reading: Reading) -> tuple[float, float, float]:
+    if reading.full is None or reading.full.size != reading.fewest.size:
+        return np.nan, np.nan, np.nan
+    paired = paired_ratio(reading.fewest, reading.full)
+    return paired.ratio, paired.low, paired.high
