@@ -128,7 +128,7 @@ def _of(flights: Sequence[Path], error: ComputationError | ConfigError) -> Compu
 
 
 def _shown(job: Job) -> Callable[[SearchStep], None]:
-    """Show the progress of a search on that of its job; a new machine needs half a minute before the first step."""
+    """Show the progress of a search on that of its job; a new machine compiles before the first step."""
     job.progress(0.0, 1, "loads compiled loops")
     return lambda step: job.progress(step.generation + step.share, step.generations + 1, _note(step))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,7 @@ from cpfls_cli.regressor.kernels import Chunk, Table
 from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Breakpoints
 from cpfls_cli.regressor.structure import ModelStructure
-from cpfls_cli.regressor.table import padded_breakpoints, structure_table
+from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 
 # Samples that are kept ready for the compiled loops, 96 to 240 bytes each; more are made ready each time anew.
 _KEPT = 200_000
@@ -128,6 +128,10 @@ class Samples:
     label: IntArray
     labels: int
 
+    def __reduce__(self) -> tuple[type[Samples], tuple[object, ...]]:
+        """Pickle without what is kept for the compiled loops, as `Ready`."""
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
     @classmethod
     def of(cls, ready: Ready, structure: ModelStructure, ranges: tuple[InputRange, InputRange]) -> Samples:
         """Take samples as they are, all under one label."""
@@ -207,7 +211,7 @@ class Samples:
             kernels.add_combined(
                 self.table, breakpoints, chunk, self.scale, coefficients, weights, square, back, dense_back
             )
-        return square[1:, 1:], np.concatenate([dense_back[1:, 0], back[:, 0]])
+        return _mirrored(square)[1:, 1:], np.concatenate([dense_back[1:, 0], back[:, 0]])
 
     def moved(self, partitions: Breakpoints, coefficients: Array, rigid_body: Array) -> MovedProducts:
         """Add up the products with the derivatives of the torque by the inner breakpoints.
@@ -225,8 +229,7 @@ class Samples:
         breakpoints = padded_breakpoints(partitions)
         for chunk, _ in self._chunks():
             kernels.add_moved(self.table, breakpoints, chunk, self.scale, coefficients, weights, cross, dense, square)
-        square = square + square.T
-        square[np.diag_indices(B + 1)] *= 0.5
+        square = _mirrored(square)
         return MovedProducts(
             np.vstack([dense[1:, :B], cross[:, :B]]), square[:B, :B], square[:B, B], float(square[B, B])
         )
@@ -243,9 +246,17 @@ class Samples:
                 total[value] += rows.T @ rows
         return total
 
+    @cached_property
+    def _kept(self) -> list[Chunk]:
+        return list(self._mapped())
+
+    def _mapped(self) -> Iterator[Chunk]:
+        for chunk in self.ready:
+            yield chunk._replace(inputs=mapped_inputs(self.table, chunk.attitude))
+
     def _chunks(self) -> Iterator[tuple[Chunk, IntArray]]:
         start = 0
-        for chunk in self.ready:
+        for chunk in self._kept if len(self.ready.source) <= _KEPT else self._mapped():
             yield chunk, self.label[start : start + len(chunk.attitude)]
             start += len(chunk.attitude)
 
@@ -253,8 +264,15 @@ class Samples:
         return np.concatenate([[1.0], -rigid_body])[None] if self.ready.rigid else np.ones((1, 1))
 
 
+def _mirrored(triangle: Array) -> Array:
+    """Make a symmetric matrix of an upper triangle whose entries mean the sum with their mirror images."""
+    total = triangle + triangle.T
+    total[np.diag_indices(len(total))] *= 0.5
+    return total
+
+
 def _chunk(data: TorqueData, rigid: bool) -> Chunk:
     columns = [data.torque[:, :, None], rigid_columns(data.motion)] if rigid else [data.torque[:, :, None]]
     motion = data.motion
     attitude, rate, acceleration = map(np.ascontiguousarray, (motion.attitude, motion.rate, motion.acceleration))
-    return Chunk(attitude, rate, acceleration, np.concatenate(columns, axis=2))
+    return Chunk(attitude, rate, acceleration, np.concatenate(columns, axis=2), np.empty((8, 0)))

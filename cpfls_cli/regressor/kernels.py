@@ -4,7 +4,8 @@ A sample fires at most two membership functions per input, so most columns of it
 others are computed, for a few samples at a time, so that the inner loops run over samples. Samples are taken in the
 order of what they fire: those that fire the same rules have the same columns, and one product of matrices adds them up.
 An inner loop writes one array: of several the compiler cannot tell that they are apart, and takes them one by one.
-All loops stand in one module because the cache of compiled code follows its file.
+All loops stand in one module because the cache of compiled code follows its file, and behind one compiled function,
+`_add_up`, because what a function calls is compiled again for each that calls it.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class _Compiling(event.Listener):
 @cache
 def _say_compiling() -> None:
     """Tell once in a process why nothing happens for a while."""
-    logging.getLogger("cpfls_cli").info("compiling for this processor, which takes half a minute and is kept")
+    logging.getLogger("cpfls_cli").info("compiling for this processor, which takes up to half a minute and is kept")
 
 
 event.register("numba:compile", _Compiling())  # type: ignore[no-untyped-call]
@@ -69,6 +70,11 @@ def part(function: Function, **options: Any) -> Function:
     """Compile into what calls it, and only there: ways for Python to call each part took a fifth of the compiling."""
     options |= _ALWAYS | {"no_cpython_wrapper": True}
     return cast(Function, numba.njit(**options)(function))
+
+
+def _inlined(function: Function) -> Function:
+    """Copy into its one caller before anything is compiled: a part is compiled alone and then again in each caller."""
+    return part(function, inline="always")
 
 
 def _part_sum(function: Function) -> Function:
@@ -124,12 +130,15 @@ class Chunk(NamedTuple):
     attitude, rate, acceleration : array, shape (samples, 3)
     dense : array, shape (samples, 3, dense)
         Columns that no partition changes: the torque first, then those of the rigid body where it is free.
+    inputs : array, shape (8, samples)
+        See `cpfls_cli.regressor.table.mapped_inputs`; of the structure, so it is put in last.
     """
 
     attitude: Array
     rate: Array
     acceleration: Array
     dense: Array
+    inputs: Array
 
 
 _BATCH = 128
@@ -186,53 +195,6 @@ def _space(table: Table, dense: int) -> Array:
 
 
 @part
-def _wrap(angle: float) -> float:
-    turns: float = np.floor((angle + np.pi) / (2.0 * np.pi))
-    return angle - 2.0 * np.pi * turns
-
-
-@part
-def _seesaw(angle: float) -> tuple[float, float]:
-    wrapped = _wrap(angle)
-    if abs(wrapped) > 0.5 * np.pi:
-        return (np.copysign(np.pi, wrapped) - wrapped) * (2.0 / np.pi), -2.0 / np.pi
-    return wrapped * (2.0 / np.pi), 2.0 / np.pi
-
-
-@part
-def _map_input(table: Table, axis: int, angle: float) -> tuple[float, float, float, float]:
-    """Antecedent and consequent of an angle with their slopes; see `cpfls_cli.fuzzy.inputs.map_input`."""
-    if table.data_range:
-        value, slope = _seesaw(angle)
-        if not table.circular:
-            value, slope = _wrap(angle), 1.0
-        scaled, scaled_slope = (value - table.ranges[axis, 0]) / table.ranges[axis, 1], slope / table.ranges[axis, 1]
-        return scaled, scaled_slope, scaled, scaled_slope
-    if table.circular:
-        value, slope = _seesaw(angle)
-        turns = angle / (2.0 * np.pi)
-        return turns - np.floor(turns), 0.5 / np.pi, value, slope
-    turns = _wrap(angle) / (2.0 * np.pi) + 0.5
-    return turns, 0.5 / np.pi, turns, 0.5 / np.pi
-
-
-@part
-def _see(table: Table, attitude: Array) -> Array:
-    """Map the angles of all samples to antecedent and consequent with their slopes, shape (8, samples).
-
-    The slope of an antecedent beyond the partition is zero, as that of its membership functions is.
-    """
-    seen = np.empty((8, len(attitude)))
-    for axis in range(2):
-        for n in range(len(attitude)):
-            antecedent, slope, consequent, consequent_slope = _map_input(table, axis, attitude[n, axis])
-            inside = antecedent >= 0.0 and antecedent <= 1.0
-            seen[4 * axis, n], seen[4 * axis + 1, n] = antecedent, slope if inside else 0.0
-            seen[4 * axis + 2, n], seen[4 * axis + 3, n] = consequent, consequent_slope
-    return seen
-
-
-@part
 def _cells(table: Table, breakpoints: Array, seen: Array) -> IntArray:
     """Count out the cells that all breakpoints cut roll and pitch into, and find that of each sample."""
     cell = np.zeros(seen.shape[1], np.int64)
@@ -254,7 +216,10 @@ def _cells(table: Table, breakpoints: Array, seen: Array) -> IntArray:
 @part
 def _sorted(cell: IntArray) -> IntArray:
     """Put samples in the order of their cells, those of one cell in the order of time."""
-    first = np.zeros(np.max(cell) + 2, np.int64)
+    last = 0
+    for n in range(len(cell)):
+        last = max(last, cell[n])
+    first = np.zeros(last + 2, np.int64)
     for n in range(len(cell)):
         first[cell[n] + 1] += 1
     for k in range(1, len(first)):
@@ -387,7 +352,7 @@ def _carry(block: IntArray, scale: Array, count: int, at: Array) -> None:
 
 
 @part
-def _put(features: int, feature: int, slots: int, first: int, count: int, at: Array, rows: Array) -> None:
+def _put(features: int, feature: int, slots: int, count: int, at: Array, rows: Array) -> None:
     """Write the columns of a block whose rules have fired, from the line of its first feature."""
     for rule in range(slots):
         fired = _FIRING + 3 * rule
@@ -403,12 +368,12 @@ def _put(features: int, feature: int, slots: int, first: int, count: int, at: Ar
             for n in range(count):
                 at[_BESIDE, n] = at[carried + 1, n] * at[value + 1, n] + at[carried + 2, n] * at[value + 2, n]
             for rule in range(slots):
-                a, along, fired = first + rule * features + f, _ALONG + 3 * rule + axis, _FIRING + 3 * rule
+                a, along, fired = rule * features + f, _ALONG + 3 * rule + axis, _FIRING + 3 * rule
                 for n in range(count):
                     rows[a, axis, n] = at[along, n] * at[value, n] + at[fired, n] * at[_BESIDE, n]
 
 
-@part
+@_inlined
 def _fill(
     table: Table,
     breakpoints: Array,
@@ -436,7 +401,7 @@ def _fill(
         block = table.blocks[b]
         _carry(block, scale, count, at)
         slots = _find_firing(block, table.partitions, count, at)
-        _put(block[_FEATURES], _features_at(table, block[_KIND]), slots, first, count, at, rows)
+        _put(block[_FEATURES], _features_at(table, block[_KIND]), slots, count, at, rows[first:])
         first += slots * block[_FEATURES]
     return rows.reshape(width, 3 * count)
 
@@ -501,150 +466,56 @@ def _combine(rows: Array, column: IntArray, coefficients: Array, dense_weights: 
 
 
 @part
-def _add(rows: IntArray, columns: IntArray, part: Array, upper: bool, total: Array) -> None:
-    """Add products to the sums over all by the places of their columns; a negative place is none."""
-    for a in range(len(rows)):
-        if rows[a] >= 0:
-            for b in range(a if upper else 0, len(columns)):
-                if columns[b] >= 0:
-                    total[rows[a], columns[b]] += part[a, b]
+def _add_gram(rows: Array, column: IntArray, count: int, local: Array, gram: Array, moment: Array) -> None:
+    """Add the products of the columns of a run with each other and with the dense ones."""
+    active = len(column)
+    _multiply(rows, rows, count, True, local)
+    for a in range(active):
+        for b in range(a, active):
+            gram[column[a], column[b]] += local[a, b]
+        for d in range(moment.shape[1]):
+            moment[column[a], d] += local[a, active + d]
 
 
-@compiled
-def add_gram(
-    table: Table, breakpoints: Array, chunk: Chunk, scale: Array, label: IntArray, gram: Array, moment: Array
+@part
+def _add_errors(residual: Array, count: int, models: int, square: Array, largest: Array) -> None:
+    """Add the squares of the residuals of a run, and find the largest of all."""
+    for k in range(models):
+        for r in range(count):
+            square[k, 0] += residual[k, r] * residual[k, r]
+            largest[k, 0] = max(largest[k, 0], abs(residual[k, r]))
+
+
+@part
+def _add_square(right: Array, places: IntArray, count: int, local: Array, square: Array) -> None:
+    """Add the products of residuals or derivatives with each other by their places; a negative place is none."""
+    _multiply(right, right, count, True, local)
+    for a in range(len(places)):
+        if places[a] >= 0:
+            for b in range(a, len(places)):
+                if places[b] >= 0:
+                    square[places[a], places[b]] += local[a, b]
+
+
+@part
+def _add_cross(
+    rows: Array,
+    column: IntArray,
+    right: Array,
+    places: IntArray,
+    count: int,
+    local: Array,
+    cross: Array,
+    dense_cross: Array,
 ) -> None:
-    """Add ``Q^T Q`` and ``Q^T dense`` of the samples of a chunk to sums by label.
-
-    Parameters
-    ----------
-    table : Table
-    breakpoints : array, shape (partitions, most functions)
-    chunk : Chunk
-    scale : array, shape (3,)
-        Factor of the rows about each axis.
-    label : array of int, shape (samples,)
-        Sum that a sample adds to.
-    gram : array, shape (sums, parameters, parameters)
-        Changed in place. An entry off the diagonal is meant as the sum of it and its mirror image.
-    moment : array, shape (sums, parameters, dense)
-        Changed in place.
-    """
-    active, dense = table.active, chunk.dense.shape[2]
-    at, space, seen = _new_batch(table), _space(table, dense), _see(table, chunk.attitude)
-    cell, column = _cells(table, breakpoints, seen), np.zeros(active, np.int64)
-    interval = np.zeros(len(table.partitions), np.int64)
-    order, part, start = _sorted(cell), np.zeros((_fours(active + dense), _fours(active + dense))), 0
-    while start < len(order):
-        stop = _end_of_run(cell, label, order, start)
-        rows = _fill(table, breakpoints, chunk, scale, seen, order[start:stop], space, interval, at)
-        _multiply(rows, rows, 3 * (stop - start), True, part)
-        _columns(table, interval, column)
-        sums = label[order[start]]
-        for a in range(active):
-            for b in range(a, active):
-                gram[sums, column[a], column[b]] += part[a, b]
-            for d in range(dense):
-                moment[sums, column[a], d] += part[a, active + d]
-        start = stop
-
-
-@compiled
-def add_errors(
-    table: Table,
-    breakpoints: Array,
-    chunk: Chunk,
-    scale: Array,
-    label: IntArray,
-    coefficients: Array,
-    dense_weights: Array,
-    square: Array,
-    largest: Array,
-) -> None:
-    """Add the squared residuals ``dense D - Q c`` of a chunk by label, and find the largest of all.
-
-    Parameters
-    ----------
-    table, breakpoints, chunk, scale
-        See `add_gram`.
-    label : array of int, shape (samples,)
-        Sum that a sample adds to.
-    coefficients : array, shape (models, parameters)
-        c of several models.
-    dense_weights : array, shape (models, dense)
-        D.
-    square : array, shape (sums, models)
-        Sums of squares over samples and axes, changed in place.
-    largest : array, shape (sums, models)
-        Largest absolute residuals, changed in place.
-    """
-    at, space, seen = _new_batch(table), _space(table, chunk.dense.shape[2]), _see(table, chunk.attitude)
-    cell, column = _cells(table, breakpoints, seen), np.zeros(table.active, np.int64)
-    interval = np.zeros(len(table.partitions), np.int64)
-    order, residual, start = _sorted(cell), np.zeros(3 * _BATCH), 0
-    while start < len(order):
-        stop = _end_of_run(cell, label, order, start)
-        rows = _fill(table, breakpoints, chunk, scale, seen, order[start:stop], space, interval, at)
-        _columns(table, interval, column)
-        sums = label[order[start]]
-        for k in range(len(coefficients)):
-            _combine(rows, column, coefficients[k], dense_weights[k], 3 * (stop - start), residual)
-            for r in range(3 * (stop - start)):
-                square[sums, k] += residual[r] * residual[r]
-                largest[sums, k] = max(largest[sums, k], abs(residual[r]))
-        start = stop
-
-
-@compiled
-def add_combined(
-    table: Table,
-    breakpoints: Array,
-    chunk: Chunk,
-    scale: Array,
-    coefficients: Array,
-    dense_weights: Array,
-    square: Array,
-    back: Array,
-    dense_back: Array,
-) -> None:
-    """Add the products of residuals ``Y = dense D - Q c`` of a chunk for several c.
-
-    Parameters
-    ----------
-    table, breakpoints, chunk, scale
-        See `add_gram`.
-    coefficients : array, shape (models, parameters)
-    dense_weights : array, shape (models, dense)
-    square : array, shape (models, models)
-        ``Y^T Y``, changed in place.
-    back : array, shape (parameters, 1)
-        Q^T times the first residual, changed in place.
-    dense_back : array, shape (dense, 1)
-        The dense columns times the first residual, changed in place.
-    """
-    active, dense, models = table.active, chunk.dense.shape[2], len(coefficients)
-    at, space, seen = _new_batch(table), _space(table, dense), _see(table, chunk.attitude)
-    cell, column = _cells(table, breakpoints, seen), np.zeros(active, np.int64)
-    interval = np.zeros(len(table.partitions), np.int64)
-    order, residual, start = _sorted(cell), np.zeros((_fours(models), 3 * _BATCH)), 0
-    part, local, label = (
-        np.zeros((len(residual), len(residual))),
-        np.zeros((_fours(active + dense), 2)),
-        np.zeros_like(cell),
-    )
-    while start < len(order):
-        stop = _end_of_run(cell, label, order, start)
-        rows = _fill(table, breakpoints, chunk, scale, seen, order[start:stop], space, interval, at)
-        _columns(table, interval, column)
-        for k in range(models):
-            _combine(rows, column, coefficients[k], dense_weights[k], 3 * (stop - start), residual[k])
-        _multiply(residual, residual, 3 * (stop - start), False, part)
-        square += part[:models, :models]
-        _multiply(rows, residual[:2], 3 * (stop - start), False, local)
-        for a in range(active):
-            back[column[a], 0] += local[a, 0]
-        dense_back[:, 0] += local[active : active + dense, 0]
-        start = stop
+    """Add the products of all columns of a run with residuals or derivatives by their places."""
+    _multiply(rows, right, count, False, local)
+    for b in range(len(places)):
+        if places[b] >= 0:
+            for a in range(len(column)):
+                cross[column[a], places[b]] += local[a, b]
+            for d in range(len(dense_cross)):
+                dense_cross[d, places[b]] += local[len(column) + d, b]
 
 
 @part
@@ -715,7 +586,7 @@ def _move(table: Table, index: int, interval: int, breakpoints: Array, count: in
                 moved[row, axis, n] = at[by_value, n] * at[_WORK, n] + by_slopes
 
 
-@part
+@_inlined
 def _move_all(
     table: Table,
     breakpoints: Array,
@@ -723,15 +594,10 @@ def _move_all(
     scale: Array,
     interval: IntArray,
     count: int,
-    space: Array,
+    moved: Array,
     at: Array,
-) -> Array:
-    """Differentiate the torque of a batch by the breakpoints at both ends of the interval of each input.
-
-    Give the derivatives, room for the residual, and zeros up to fours, shape (columns, 3 * samples).
-    """
-    width = _fours(2 * len(table.partitions) + 1)
-    moved = space[: width * 3 * count].reshape(width, 3, count)
+) -> None:
+    """Differentiate the torque of a batch by the breakpoints at both ends of the interval of each input."""
     moved[:] = 0.0
     for b in range(len(table.blocks)):
         block = table.blocks[b]
@@ -741,7 +607,6 @@ def _move_all(
             if table.partitions[index, _FUNCTIONS] > 2:
                 _step(table, block, input_index, coefficients, interval, count, at)
                 _move(table, index, interval[index], breakpoints, count, at, moved)
-    return moved.reshape(width, 3 * count)
 
 
 @part
@@ -754,7 +619,154 @@ def _inner(table: Table, interval: IntArray, places: IntArray) -> None:
             places[2 * index + end] = table.partitions[index, _FIRST_INNER] + k - 1 if inner else -1
 
 
+_GRAM, _ERRORS, _COMBINED, _MOVED = range(4)
+
+
 @compiled
+def _add_up(
+    what: int,
+    table: Table,
+    breakpoints: Array,
+    chunk: Chunk,
+    scale: Array,
+    label: IntArray,
+    models: tuple[Array, Array],
+    sums: tuple[Array, Array, Array],
+) -> None:
+    """Go through a chunk, run by run of samples that fire the same rules, and add up what is asked for.
+
+    Parameters
+    ----------
+    models : tuple of array
+        Coefficients, shape (models, parameters), and dense weights, shape (models, dense).
+    sums : tuple of array
+        See what calls this. Shapes (sums, n, n), (sums, parameters, m) and (dense, m), changed in place.
+    """
+    coefficients, dense_weights = models
+    square, cross, dense_cross = sums
+    active, dense, moves = table.active, chunk.dense.shape[2], 2 * len(table.partitions)
+    at, space, seen = _new_batch(table), _space(table, dense), chunk.inputs
+    cell, column = _cells(table, breakpoints, seen), np.zeros(active, np.int64)
+    interval = np.zeros(len(table.partitions), np.int64)
+    order, start = _sorted(cell), 0
+    # Lines beside the columns: the derivatives and the residual, or the residual of each model.
+    beside = moves + 1 if what == _MOVED else len(coefficients)
+    crossed, high, width = 1 if what == _COMBINED else beside, _fours(active + dense), _fours(beside)
+    places, right_space = np.zeros(beside, np.int64), np.zeros(width * 3 * _BATCH)
+    local, local_square = np.zeros((high, high if what == _GRAM else width)), np.zeros((width, width))
+    for k in range(beside):
+        places[k] = table.breakpoints if what == _MOVED else k
+    while start < len(order):
+        stop = _end_of_run(cell, label, order, start)
+        count, own = 3 * (stop - start), label[order[start]]
+        rows = _fill(table, breakpoints, chunk, scale, seen, order[start:stop], space, interval, at)
+        _columns(table, interval, column)
+        if what == _GRAM:
+            _add_gram(rows, column, count, local, square[own], cross[own])
+        else:
+            right = right_space[: width * count].reshape(width, count)
+            if what == _MOVED:
+                moved = right.reshape(width, 3, stop - start)
+                _move_all(table, breakpoints, coefficients[0], scale, interval, stop - start, moved, at)
+                _inner(table, interval, places)
+            for k in range(len(coefficients)):
+                _combine(rows, column, coefficients[k], dense_weights[k], count, right[moves if what == _MOVED else k])
+            if what == _ERRORS:
+                _add_errors(right, count, len(coefficients), square[own], cross[own])
+            else:
+                _add_square(right, places, count, local_square, square[own])
+                some = right[: crossed + crossed % 2]
+                _add_cross(rows, column, some, places[:crossed], count, local, cross[own], dense_cross)
+        start = stop
+
+
+_NOTHING = np.zeros((0, 0))
+
+
+def add_gram(
+    table: Table, breakpoints: Array, chunk: Chunk, scale: Array, label: IntArray, gram: Array, moment: Array
+) -> None:
+    """Add ``Q^T Q`` and ``Q^T dense`` of the samples of a chunk to sums by label.
+
+    Parameters
+    ----------
+    table : Table
+    breakpoints : array, shape (partitions, most functions)
+    chunk : Chunk
+    scale : array, shape (3,)
+        Factor of the rows about each axis.
+    label : array of int, shape (samples,)
+        Sum that a sample adds to.
+    gram : array, shape (sums, parameters, parameters)
+        Changed in place. An entry off the diagonal is meant as the sum of it and its mirror image.
+    moment : array, shape (sums, parameters, dense)
+        Changed in place.
+    """
+    _add_up(_GRAM, table, breakpoints, chunk, scale, label, (_NOTHING, _NOTHING), (gram, moment, _NOTHING))
+
+
+def add_errors(
+    table: Table,
+    breakpoints: Array,
+    chunk: Chunk,
+    scale: Array,
+    label: IntArray,
+    coefficients: Array,
+    dense_weights: Array,
+    square: Array,
+    largest: Array,
+) -> None:
+    """Add the squared residuals ``dense D - Q c`` of a chunk by label, and find the largest of all.
+
+    Parameters
+    ----------
+    table, breakpoints, chunk, scale
+        See `add_gram`.
+    label : array of int, shape (samples,)
+        Sum that a sample adds to.
+    coefficients : array, shape (models, parameters)
+        c of several models.
+    dense_weights : array, shape (models, dense)
+        D.
+    square : array, shape (sums, models)
+        Sums of squares over samples and axes, changed in place.
+    largest : array, shape (sums, models)
+        Largest absolute residuals, changed in place.
+    """
+    models, sums = (coefficients, dense_weights), (square[:, :, None], largest[:, :, None], _NOTHING)
+    _add_up(_ERRORS, table, breakpoints, chunk, scale, label, models, sums)
+
+
+def add_combined(
+    table: Table,
+    breakpoints: Array,
+    chunk: Chunk,
+    scale: Array,
+    coefficients: Array,
+    dense_weights: Array,
+    square: Array,
+    back: Array,
+    dense_back: Array,
+) -> None:
+    """Add the products of residuals ``Y = dense D - Q c`` of a chunk for several c.
+
+    Parameters
+    ----------
+    table, breakpoints, chunk, scale
+        See `add_gram`.
+    coefficients : array, shape (models, parameters)
+    dense_weights : array, shape (models, dense)
+    square : array, shape (models, models)
+        ``Y^T Y``, upper triangle, changed in place.
+    back : array, shape (parameters, 1)
+        Q^T times the first residual, changed in place.
+    dense_back : array, shape (dense, 1)
+        The dense columns times the first residual, changed in place.
+    """
+    label, models = np.zeros(len(chunk.attitude), np.int64), (coefficients, dense_weights)
+    _add_up(_COMBINED, table, breakpoints, chunk, scale, label, models, (square[None], back[None], dense_back))
+
+
 def add_moved(
     table: Table,
     breakpoints: Array,
@@ -785,25 +797,5 @@ def add_moved(
     square : array, shape (inner breakpoints + 1, inner breakpoints + 1)
         ``[M, r]^T [M, r]``, upper triangle, changed in place; entries mean the sum with their mirror images.
     """
-    active, dense, moves = table.active, chunk.dense.shape[2], 2 * len(table.partitions)
-    at, space, seen = _new_batch(table), _space(table, dense), _see(table, chunk.attitude)
-    cell, column = _cells(table, breakpoints, seen), np.zeros(active, np.int64)
-    interval = np.zeros(len(table.partitions), np.int64)
-    order, start = _sorted(cell), 0
-    places, every, label = np.full(moves + 1, table.breakpoints), np.arange(dense), np.zeros_like(cell)
-    local = np.zeros((_fours(active + dense), _fours(moves + 1)))
-    local_square = np.zeros((_fours(moves + 1), _fours(moves + 1)))
-    moved_space = np.zeros(len(local_square) * 3 * _BATCH)
-    while start < len(order):
-        stop = _end_of_run(cell, label, order, start)
-        rows = _fill(table, breakpoints, chunk, scale, seen, order[start:stop], space, interval, at)
-        moved = _move_all(table, breakpoints, coefficients, scale, interval, stop - start, moved_space, at)
-        _columns(table, interval, column)
-        _combine(rows, column, coefficients, dense_weights, 3 * (stop - start), moved[moves])
-        _multiply(rows, moved, 3 * (stop - start), False, local)
-        _multiply(moved, moved, 3 * (stop - start), True, local_square)
-        _inner(table, interval, places)
-        _add(column, places, local[:active], False, cross)
-        _add(every, places, local[active : active + dense], False, dense_cross)
-        _add(places, places, local_square, True, square)
-        start = stop
+    label, models = np.zeros(len(chunk.attitude), np.int64), (coefficients[None], dense_weights[None])
+    _add_up(_MOVED, table, breakpoints, chunk, scale, label, models, (square[None], cross[None], dense_cross))

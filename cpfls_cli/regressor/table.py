@@ -46,6 +46,42 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
     )
 
 
+def mapped_inputs(table: Table, attitude: Array) -> Array:
+    """Map roll and pitch to antecedent and consequent with their slopes; see `cpfls_cli.fuzzy.inputs.map_input`.
+
+    Parameters
+    ----------
+    table : Table
+    attitude : array, shape (samples, 3), rad
+
+    Returns
+    -------
+    array, shape (8, samples)
+        Antecedent, its slope, consequent and its slope of roll, then of pitch. The slope of an antecedent beyond the
+        partition is zero, as that of its membership functions is.
+    """
+    angle = attitude.T[:2]
+    wrapped = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+    value, slope = wrapped, np.ones_like(angle)
+    if table.circular:
+        folded = np.abs(wrapped) > 0.5 * np.pi
+        value = np.where(folded, np.copysign(np.pi, wrapped) - wrapped, wrapped) * (2.0 / np.pi)
+        slope = np.where(folded, -2.0 / np.pi, 2.0 / np.pi)
+    if table.data_range:
+        minimum, width = table.ranges.T[:, :, None]
+        value, slope = (value - minimum) / width, slope / width
+        antecedent, antecedent_slope = value, slope
+    else:
+        turns = angle / (2.0 * np.pi)
+        antecedent = turns - np.floor(turns) if table.circular else wrapped / (2.0 * np.pi) + 0.5
+        antecedent_slope = np.full_like(angle, 0.5 / np.pi)
+        if not table.circular:
+            value, slope = antecedent, antecedent_slope
+    inside = (antecedent >= 0.0) & (antecedent <= 1.0)
+    lines = antecedent, np.where(inside, antecedent_slope, 0.0), value, slope
+    return np.stack(lines, axis=1).reshape(8, -1)
+
+
 def padded_breakpoints(partitions: Breakpoints) -> Array:
     """Stack the breakpoints of all partitions.
 

@@ -113,5 +113,5 @@ def test_first_use_says_that_it_compiles(capsys):
     # Nobody asked.
     kernels._say_compiling.cache_clear()
     kernels.compiled(function)(1.0)
-    said = "identify: compiling for this processor, which takes half a minute and is kept\n"
+    said = "identify: compiling for this processor, which takes up to half a minute and is kept\n"
     assert capsys.readouterr().err == said

@@ -21,7 +21,7 @@ from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback import kernels as playback
 from cpfls_cli.playback.model import Remainder, VehicleModel
 from cpfls_cli.regressor import Motion, Regressor, kernels
-from cpfls_cli.regressor.table import padded_breakpoints, structure_table
+from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.compiled_c import evaluate, require_gcc, written
 from tests.builders.exported_models import Case, model_of, sheet_of
@@ -86,9 +86,10 @@ def test_the_compiled_loops(case):
     structure, samples = case.model.structure, len(case.motion)
     gram = np.zeros((samples, structure.parameters, structure.parameters))
     rows = np.zeros((samples, structure.parameters, 3))
-    chunk = kernels.Chunk(*vars(case.motion).values(), np.tile(np.eye(3), (samples, 1, 1)))
     breakpoints = padded_breakpoints(case.model.partitions)
     table = structure_table(structure, case.model.ranges)
+    inputs = mapped_inputs(table, case.motion.attitude)
+    chunk = kernels.Chunk(*vars(case.motion).values(), np.tile(np.eye(3), (samples, 1, 1)), inputs)
     kernels.add_gram(table, breakpoints, chunk, np.ones(3), np.arange(samples), gram, rows)
     assert_same(rows.swapaxes(1, 2) @ case.model.coefficients, case)
     dense = Regressor(structure, case.motion, case.model.ranges).matrix(case.model.partitions)

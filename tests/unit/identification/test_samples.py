@@ -14,7 +14,7 @@ from cpfls_cli.identification.cross_validation import contiguous_blocks, with_fo
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, RidgeSettings
-from cpfls_cli.regressor import Regressor, data_ranges, model_structure, torque_sensitivity
+from cpfls_cli.regressor import Regressor, data_ranges, model_structure, torque_sensitivity, uniform_breakpoints
 from cpfls_cli.regressor.motion import RIGID
 from tests.builders.flights import no_torque, random_flight
 
@@ -160,3 +160,9 @@ def test_workers_are_sent_the_same_whether_or_not_samples_were_made_ready():
     assert pickle.dumps(ready) == before
     (again,) = pickle.loads(before)
     np.testing.assert_array_equal(again.dense, kept[0].dense)
+    attitude = flight_of_noise().motion.attitude
+    samples = Samples.of(ready, STRUCTURE, data_ranges(STRUCTURE, attitude))
+    before, partitions = pickle.dumps(samples), uniform_breakpoints(STRUCTURE)
+    square = samples.products(partitions).square
+    assert pickle.dumps(samples) == before
+    assert pickle.loads(before).products(partitions).square == square

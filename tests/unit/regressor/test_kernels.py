@@ -16,7 +16,7 @@ from cpfls_cli.regressor import (
     torque_sensitivity,
     uniform_breakpoints,
 )
-from cpfls_cli.regressor.table import padded_breakpoints, structure_table
+from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 
 SEESAW = {"consequents": "seesaw", "products": "additive"}
 UNEQUAL = (1, 2, 3, 4, 5, 2)
@@ -67,7 +67,7 @@ def case(request):
         arguments=(
             table,
             padded_breakpoints(partitions),
-            kernels.Chunk(motion.attitude, motion.rate, motion.acceleration, dense),
+            kernels.Chunk(motion.attitude, motion.rate, motion.acceleration, dense, mapped_inputs(table, attitude)),
             SCALE,
         ),
         label=np.sort(rng.integers(0, LABELS, SAMPLES)),
@@ -133,10 +133,12 @@ def test_neighbours_that_fire_other_rules_are_told_apart():
     regressor = Regressor(structure, motion, data_ranges(structure, motion.attitude))
     partitions = uniform_breakpoints(structure)
     gram, moment = np.zeros((1, structure.parameters, structure.parameters)), np.zeros((1, structure.parameters, 1))
+    table = structure_table(structure, regressor.ranges)
+    inputs = mapped_inputs(table, motion.attitude)
     kernels.add_gram(
-        structure_table(structure, regressor.ranges),
+        table,
         padded_breakpoints(partitions),
-        kernels.Chunk(motion.attitude, motion.rate, motion.acceleration, np.zeros((26, 3, 1))),
+        kernels.Chunk(motion.attitude, motion.rate, motion.acceleration, np.zeros((26, 3, 1)), inputs),
         np.ones(3),
         np.zeros(26, dtype=np.int64),
         gram,
@@ -153,7 +155,7 @@ def test_products_of_residuals(case, models):
     square, back, dense_back = np.zeros((models, models)), np.zeros((case.parameters, 1)), np.zeros((DENSE, 1))
     kernels.add_combined(*case.arguments, coefficients, weights, square, back, dense_back)
     residual = flat(case.dense @ weights.T - case.Q @ coefficients.T)
-    assert_close(square, residual.T @ residual)
+    assert_close(mirrored(square), residual.T @ residual)
     assert_close(back[:, 0], flat(case.Q).T @ residual[:, 0])
     assert_close(dense_back[:, 0], flat(case.dense).T @ residual[:, 0])
 
