@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cpfls_cli.cli.interrupts import deferred_interrupts
-from cpfls_cli.cli.options import Common, ConfigArgument, OutputOption, seconds, with_common
+from cpfls_cli.cli.options import Commands, Common, ConfigArgument, OutputOption, seconds, with_common
 from cpfls_cli.cli.terminal import Narration, messages_for_errors, progress_bar, tell
 from cpfls_cli.logs.formats import formats_in_words, suffixes_in_words
 from cpfls_cli.report.forms import Form
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="cpfls",
+    cls=Commands,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import difflib
 import functools
 import inspect
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
+from typer.core import TyperGroup
 from typer.models import ArgumentInfo
 
 if TYPE_CHECKING:
@@ -50,6 +53,29 @@ class Common:
         from cpfls_cli.config.load import load_study
 
         return load_study(config, self.overrides or (), self.seed, sweep=sweep)
+
+
+class Commands(TyperGroup):
+    """The commands, with messages on values of options that name the value, and the nearest one where there are few."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = _in_own_words(error)
+            raise
+
+
+def _in_own_words(error: typer.BadParameter) -> str:
+    message = error.message.removeprefix("Value error, ").removesuffix(".")
+    details: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
+    value = details[0]["input"] if details else None
+    if isinstance(value, str) and not message.startswith(repr(value)):
+        return f"{value!r}: {message[:1].lower()}{message[1:]}"
+    _, among, choices = message.partition(" is not one of ")
+    near = difflib.get_close_matches(str(value), re.findall(r"'([^']*)'", choices), n=1, cutoff=0.5) if among else []
+    return f"{message} (did you mean {near[0]!r}?)" if near else message
 
 
 def with_common(command: Callable[..., None]) -> Callable[..., None]:

@@ -158,8 +158,17 @@ def _mute_output() -> None:
 
 
 def _complain(text: str, kind: str = "error") -> None:
-    for line in text.splitlines() or [""]:
+    for line in _with_plain_names(text).splitlines() or [""]:
         print(f"cpfls: {kind}: {line}", file=sys.stderr)
+
+
+def _with_plain_names(text: str) -> str:
+    """Write control characters in names that were given as escapes: a line break in one would break a message."""
+    for given in sys.argv[1:]:
+        for name in (given, str(Path(given))):
+            if not name.isprintable():
+                text = text.replace(name, "".join(each if each.isprintable() else repr(each)[1:-1] for each in name))
+    return text
 
 
 @dataclass(frozen=True)
@@ -190,7 +199,7 @@ class Narration:
 
     def _say(self, text: str) -> None:
         if self.wanted:
-            print(f"{self.title}: {text}", file=sys.stderr)
+            print(f"{self.title}: {_with_plain_names(text)}", file=sys.stderr)
 
 
 def _size(path: Path) -> str:

@@ -12,7 +12,7 @@ from cpfls_cli.artifacts.evidence import CurvesGroup, RoundTripGroup, Uncertaint
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import BASELINE, band, legend_over, plain_ticks, plot, runs, style_of
+from cpfls_cli.report.canvas import BASELINE, band, legend_over, named, plain_ticks, plot, runs, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import number, percent, printed, with_interval
 from cpfls_cli.validation.bands import band as interval
@@ -206,9 +206,8 @@ def compared_curves_figure(name: str, models: Sequence[tuple[str, CurvesGroup]],
             plain_ticks(axes.yaxis)
         grid[-1, 1].set_xlabel(f"{word.removeprefix('over ')}, °")
         figure.supylabel("kg m²", fontsize=9.5)
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        named = [(handle, label) for handle, label in zip(handles, labels, strict=True) if _BAND not in label]
-        figure.legend(*zip(*named, strict=True), loc="outside upper left", ncols=3)
+        curves = [(handle, label) for handle, label in zip(*named(grid[0, 0]), strict=True) if _BAND not in label]
+        figure.legend(*zip(*curves, strict=True), loc="outside upper left", ncols=3)
 
     caption = (
         f"D(q) of {', '.join(label for label, _ in models)} {word}, each with its 95 % band, along the attitudes "

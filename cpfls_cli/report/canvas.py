@@ -19,6 +19,7 @@ from cpfls_cli.report.content import Panel, Plot
 from cpfls_cli.report.numbers import plain
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
@@ -28,6 +29,9 @@ WIDTH = 7.6
 # Both ends of a band are drawn at the samples that either of them keeps.
 _BAND_POINTS = 400
 GREY = "#767676"
+NOT_FIRST = "\N{WORD JOINER}"
+"""Stands before a name that matplotlib would take for one of its own, until the figure is drawn."""
+_OWN_LABEL = re.compile(r"_(child\d+|nolegend_|container\d+)")
 STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#1b4f8a", "linestyle": "-"},
     {"color": "#c4570a", "linestyle": (0, (5, 1.6))},
@@ -184,7 +188,7 @@ def stacked(figure: Figure, rows: int) -> list[Axes]:
 
 def legend_above(axes: Axes, columns: int = 4) -> None:
     """Put a legend above a plot, where it hides no curve."""
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1)
+    axes.legend(*named(axes), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1)
 
 
 def legend_over(figure: Figure, axes: Axes) -> None:
@@ -195,8 +199,17 @@ def legend_over(figure: Figure, axes: Axes) -> None:
     axes : matplotlib.axes.Axes
         With the curves.
     """
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=4)
+    figure.legend(*named(axes), loc="outside upper left", ncols=4)
+
+
+def named(axes: Axes) -> tuple[list[Artist], list[str]]:
+    """Find what a legend shows, and its names; matplotlib would leave out a file whose name begins with ``_``."""
+    artists: tuple[Any, ...] = (*axes.lines, *axes.patches, *axes.collections, *axes.containers)
+    for artist in artists:
+        label = str(artist.get_label())
+        if label.startswith("_") and not _OWN_LABEL.fullmatch(label):
+            artist.set_label(NOT_FIRST + label)
+    return axes.get_legend_handles_labels()
 
 
 def plain_ticks(axis: Axis) -> None:
@@ -281,7 +294,9 @@ def _show_as_written(figure: Figure) -> None:
     for text in figure.findobj(Text):
         # Ticks that are written out only when the figure is drawn are the library's own.
         if isinstance(text, Text) and (written := text.get_text()):
-            shown = (each if each.isprintable() or each == "\n" else "\N{REPLACEMENT CHARACTER}" for each in written)
+            # Invisible, but no font has to know of it.
+            own = written.replace(NOT_FIRST, "")
+            shown = (each if each.isprintable() or each == "\n" else "\N{REPLACEMENT CHARACTER}" for each in own)
             text.set_text("".join(shown))
             text.set_parse_math(False)
 

@@ -18,6 +18,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.report.canvas import NOT_FIRST
 from cpfls_cli.report.content import Panel, Series
 
 SPREAD = "_evenly_spread"
@@ -213,4 +214,4 @@ def _numbers(values: Any) -> Array:
 
 def _label(artist: Any) -> str:
     label = str(artist.get_label() or "")
-    return "" if label.startswith("_") else label
+    return "" if label.startswith("_") else label.removeprefix(NOT_FIRST)

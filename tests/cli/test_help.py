@@ -67,7 +67,7 @@ def test_version_loads_nothing_heavy():
     [
         (["trajectry"], "No such command 'trajectry'"),
         (["trajectory", "a.yaml"], "Missing option '--output'"),
-        (["trajectory", "a.yaml", "-o", "b.h5", "--seed", "-1"], "Invalid value for '--seed'"),
+        (["trajectory", "a.yaml", "-o", "b.h5", "--seed", "-1"], "Invalid value for '--seed': '-1': input should be"),
         (["trajectory", "a.yaml", "-o", "b.h5", "--frobnicate"], "No such option: --frobnicate"),
         (["simulate", "a.yaml", "-o", "b.h5"], "Missing argument"),
     ],

@@ -115,3 +115,12 @@ def test_first_use_says_that_it_compiles(capsys):
     kernels.compiled(function)(1.0)
     said = "identify: compiling for this processor, which takes up to half a minute and is kept\n"
     assert capsys.readouterr().err == said
+
+
+@pytest.mark.parametrize("name", ["a\nb.h5", "a\rcpfls: error: b.h5", "a\x1b[31mb.h5"])
+def test_a_name_with_control_characters_stays_on_its_line(refuse, tmp_path, monkeypatch, name):
+    path = tmp_path / name
+    monkeypatch.setattr(sys, "argv", ["cpfls", "info", str(path)])
+    (line,) = refuse("info", path)
+    assert line == f"{tmp_path}/{repr(name)[1:-1]}: no such file"
+    assert line.isprintable()

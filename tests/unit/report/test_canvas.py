@@ -3,10 +3,11 @@ from xml.etree import ElementTree
 
 import matplotlib
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.report.canvas import kept_samples, line, plot, runs
+from cpfls_cli.report.canvas import kept_samples, legend_above, legend_over, line, plot, runs
 
 
 def draw(figure):
@@ -41,6 +42,27 @@ def test_a_figure_is_well_formed_named_and_carries_no_style_sheet():
     tags = {element.tag.rsplit("}", 1)[-1] for element in root.iter()}
     assert not tags & {"style", "metadata", "script", "image"}
     assert "a < b & c" in "".join(root.itertext())
+
+
+@pytest.mark.parametrize("over", [False, True])
+def test_names_in_a_figure_are_shown_as_they_are_written(over):
+    """Neither as mathematics, which this would not even be, nor as one of matplotlib's own names, which are hidden."""
+    names = ["$\\frac{$", "_hidden", "_child", "__", "a$b$c"]
+
+    def draw(figure):
+        axes = figure.subplots()
+        for name in names:
+            axes.plot([0.0, 1.0], [0.0, 1.0], label=name)
+        axes.bar([0.0], [1.0], label="_bars")
+        axes.plot([0.0, 1.0], [1.0, 0.0])
+        axes.set_title("_$x_")
+        legend_over(figure, axes) if over else legend_above(axes)
+
+    picture = plot("one", "", "what", 2.0, draw).picture
+    shown = [text for text in ElementTree.fromstring(picture.svg).itertext() if text.strip()]
+    assert [text for text in shown if text in {*names, "_bars", "_$x_"}] == ["_$x_", *names, "_bars"]
+    (panel,) = picture.panels
+    assert {series.label for series in panel.series} == {*names, "_bars", ""}
 
 
 @given(samples=st.integers(2, 6000), largest=st.integers(4, 1500), seed=st.integers(0, 1000))
