@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
 
 _BEFORE_ALL = -1
 _NO_GENERATOR = "null"
-
-_Checkpoint = TypeVar("_Checkpoint", bound="CheckpointRecord | VehicleCheckpointRecord")
 
 
 @dataclass(frozen=True)
@@ -123,7 +120,6 @@ class CheckpointRecord(Record):
     archive: ArchiveGroup = group("archive")
     history: HistoryGroup = group("history")
     unfinished: UnfinishedGroup = group("unfinished")
-    sha256: str = dataset("sha256", "of the bytes of all datasets above, in this order")
 
     @classmethod
     def of_state(cls, state: EvolutionState) -> Self:
@@ -132,16 +128,14 @@ class CheckpointRecord(Record):
             genes=state.genes.astype(np.uint16), objectives=state.objectives, subpopulation=state.subpopulations
         )
         none, submitted, results = state.genes[:0], state.archive.submitted, state.archive.results
-        unsealed = cls(
+        return cls(
             generation=state.index,
             generator=json.dumps(state.rng.bit_generator.state),
             population=population,
             archive=ArchiveGroup(**_stored(submitted, results.genes, results.objectives)),
             history=HistoryGroup(**vars(state.history)),
             unfinished=UnfinishedGroup(**_stored(none, none, state.objectives[:0])),
-            sha256="",
         )
-        return _sealed(unsealed)
 
     @classmethod
     def of_nothing(cls, unfinished: Unfinished) -> Self:
@@ -156,7 +150,6 @@ class CheckpointRecord(Record):
             archive=ArchiveGroup(**_stored(none, none, objectives)),
             history=HistoryGroup(**vars(History.empty(objectives.shape[1]))),
             unfinished=UnfinishedGroup(**_stored(none, none, objectives)),
-            sha256="",
         )
         return empty.with_unfinished(unfinished)
 
@@ -164,17 +157,10 @@ class CheckpointRecord(Record):
         """Replace what was evaluated of the next generation."""
         evaluation = unfinished.evaluation
         stored = _stored(unfinished.submitted, evaluation.genes, evaluation.objectives)
-        return _sealed(replace(self, unfinished=UnfinishedGroup(**stored)))
+        return replace(self, unfinished=UnfinishedGroup(**stored))
 
     def stopped_search(self) -> StoppedSearch:
-        """Rebuild what the search left, equal to what was stored down to the last bit.
-
-        Raises
-        ------
-        ValueError
-            If the datasets are not those that were written.
-        """
-        _require_seal(self)
+        """Rebuild what the search left, equal to what was stored down to the last bit."""
         from cpfls_cli.identification.search import Unfinished
 
         unfinished = Unfinished(*_evaluated(self.unfinished))
@@ -235,35 +221,24 @@ class VehicleCheckpointRecord(Record):
     loss: Array = dataset("loss", "of the fit without each part of the flights", "structure", "part")
     values: Array = dataset("values", "numbers of all fits, one fit after another", "fitted", units="SI")
     hessian: Array = dataset("hessian", "their curvatures by rows, one fit after another", "curvature")
-    sha256: str = dataset("sha256", "of the bytes of all datasets above, in this order")
 
     @classmethod
     def of(cls, judged: Sequence[Judged]) -> Self:
         """Arrange the structures that were judged, at least one."""
         fits = [fitted for each in judged for fitted in each.fits]
-        return _sealed(
-            cls(
-                structure=StructuresKeptGroup(
-                    blocks=tuple(" ".join(each.structure.blocks) for each in judged),
-                    rules=np.array([each.structure.rules for each in judged], dtype=np.int64),
-                    numbers=np.array([each.numbers for each in judged], dtype=np.int64),
-                ),
-                loss=np.array([[fitted.loss for fitted in each.fits] for each in judged]),
-                values=np.concatenate([fitted.values for fitted in fits]),
-                hessian=np.concatenate([fitted.hessian.ravel() for fitted in fits]),
-                sha256="",
-            )
+        return cls(
+            structure=StructuresKeptGroup(
+                blocks=tuple(" ".join(each.structure.blocks) for each in judged),
+                rules=np.array([each.structure.rules for each in judged], dtype=np.int64),
+                numbers=np.array([each.numbers for each in judged], dtype=np.int64),
+            ),
+            loss=np.array([[fitted.loss for fitted in each.fits] for each in judged]),
+            values=np.concatenate([fitted.values for fitted in fits]),
+            hessian=np.concatenate([fitted.hessian.ravel() for fitted in fits]),
         )
 
     def kept(self) -> Kept:
-        """Rebuild what the search left, equal to what was stored down to the last bit.
-
-        Raises
-        ------
-        ValueError
-            If the datasets are not those that were written.
-        """
-        _require_seal(self)
+        """Rebuild what the search left, equal to what was stored down to the last bit."""
         from cpfls_cli.playback.structure import Rules, Solution, Structure
 
         counts = np.repeat(self.structure.numbers, self.loss.shape[1])
@@ -276,21 +251,3 @@ class VehicleCheckpointRecord(Record):
             ]
             for blocks, rules, losses in names
         }
-
-
-def _sealed(unsealed: _Checkpoint) -> _Checkpoint:
-    return replace(unsealed, sha256=_seal(unsealed))
-
-
-def _require_seal(kept: CheckpointRecord | VehicleCheckpointRecord) -> None:
-    if kept.sha256 != _seal(kept):
-        raise ValueError("its datasets were changed after it was written (sha256 differs)")
-
-
-def _seal(kept: CheckpointRecord | VehicleCheckpointRecord) -> str:
-    """Hash the datasets in the order of the format."""
-    digest, seal = hashlib.sha256(), kept.path("sha256")
-    for path, value in kept.data.items():
-        if path != seal:
-            digest.update(str(value).encode() if value.ndim == 0 else value.tobytes())
-    return digest.hexdigest()
