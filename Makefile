@@ -353,6 +353,7 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python benchmarks/full_circle.py
 	$(BIN)/python benchmarks/full_circle_limit.py
 	$(BIN)/python benchmarks/full_circle_noise.py
+	$(BIN)/python benchmarks/attitude_inertia.py
 	$(BIN)/python benchmarks/unseen_path.py
 	$(BIN)/python benchmarks/seam.py
 	$(BIN)/python benchmarks/band_coverage.py

@@ -33,6 +33,7 @@ from benchmarks.shared.full_circle import (
     random_flight,
     searched,
     uniform_model,
+    with_noise,
 )
 from cpfls_cli.identification.data import TorqueData, joined
 from cpfls_cli.identification.judge import fit_baselines
@@ -90,11 +91,6 @@ def fitted(model: IdentificationSettings | str, training: TorqueData, kept) -> C
     if model.population != SEARCH["population"]:
         return uniform_model(training, model).model.torque
     return searched(training, model, kept).held_out.model.torque
-
-
-def with_noise(flight: TorqueData, share: float, rng: np.random.Generator) -> TorqueData:
-    noise = share * np.std(flight.torque, axis=0) * rng.standard_normal(flight.torque.shape)
-    return replace(flight, torque=flight.torque + noise)
 
 
 def ring(sharpness: float | None) -> Callable[[Motion], np.ndarray]:

@@ -82,6 +82,12 @@ def random_flight(seed: int, inertia: Array = INERTIA) -> TorqueData:
     return flown(full_rotation(RotationSettings(), DURATION_S, np.random.default_rng(seed)), inertia)
 
 
+def with_noise(flight: TorqueData, share: float, rng: np.random.Generator) -> TorqueData:
+    """Add white noise to the torque, by axis a share of its standard deviation."""
+    noise = share * np.std(flight.torque, axis=0) * rng.standard_normal(flight.torque.shape)
+    return replace(flight, torque=flight.torque + noise)
+
+
 def optimised_flight(structure: StructureSettings, seed: int = 1) -> TorqueData:
     """Fly the path that conditions a structure best, with the program's own limits."""
     rng = np.random.default_rng(seed)

@@ -23,27 +23,28 @@ from cpfls_cli.regressor import Motion
 MASS_KG = 6.0
 """Of the paper's vehicle, without loads."""
 
-INNERMOST_M, OUTERMOST_M = 0.1, 0.4
-SHARPNESS = 3.0
+OUTERMOST_M, SHARPNESS = 0.4, 2.0
 ACROSS = np.array([0.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
 class SlidingLoads:
-    """Two loads on a rail, outermost upright and innermost upside down.
+    """Two loads on a rail, 0.4 m from the middle upright and one stroke nearer upside down.
 
-    ``s = innermost + (outermost - innermost) (1 + tanh(3 c) / tanh 3) / 2``, with c the cosine of roll, or of the tilt.
+    ``s = 0.4 m - stroke (1 - tanh(2 c) / tanh 2) / 2``, with c the cosine of roll, or of the tilt.
 
     Attributes
     ----------
     mass_share : float
         Of both loads together, of the vehicle's mass without them.
+    stroke : float, m
     by : {"roll", "tilt"}
         What moves the loads.
     held_by : {"cam", "servo"}
     """
 
     mass_share: float
+    stroke: float = 0.1
     by: Literal["roll", "tilt"] = "roll"
     held_by: Literal["cam", "servo"] = "cam"
 
@@ -70,6 +71,11 @@ class SlidingLoads:
             added += gradient * (2 * self.mass * (acceleration - place * np.sum(rate**2, axis=1)))[:, None]
         return np.asarray(added)
 
+    def own_motion(self, motion: Motion) -> Array:
+        """Compute the part of it on a cam that comes from ``m (ds/dt)^2``: ``2 m s'' grad s``."""
+        _, gradient, _, acceleration = self.place(motion)
+        return np.asarray(2 * self.mass * acceleration[:, None] * gradient)
+
     def place(self, motion: Motion) -> tuple[Array, Array, Array, Array]:
         """Follow a load along a motion: s, its gradient by the angles, speed and acceleration along the rail."""
         (roll, pitch, _), rate, turning = motion.attitude.T, motion.rate, motion.acceleration
@@ -82,8 +88,8 @@ class SlidingLoads:
             across = 2 * np.sin(roll) * np.sin(pitch) * rate[:, 0] * rate[:, 1] - cosine * rate[:, 1] ** 2
         speed = np.sum(gradient * rate, axis=1)
         acceleration = np.sum(gradient * turning, axis=1) - cosine * rate[:, 0] ** 2 + across
-        bent, half = np.tanh(SHARPNESS * cosine), 0.5 * (OUTERMOST_M - INNERMOST_M) / np.tanh(SHARPNESS)
-        place = 0.5 * (INNERMOST_M + OUTERMOST_M) + half * bent
+        bent, half = np.tanh(SHARPNESS * cosine), 0.5 * self.stroke / np.tanh(SHARPNESS)
+        place = OUTERMOST_M - 0.5 * self.stroke + half * bent
         first = half * SHARPNESS * (1 - bent**2)
         second = -2 * SHARPNESS * bent * first
         return place, first[:, None] * gradient, first * speed, first * acceleration + second * speed**2

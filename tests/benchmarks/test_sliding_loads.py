@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.shared.full_circle import INERTIA, torque_data
-from benchmarks.shared.sliding_loads import INNERMOST_M, OUTERMOST_M, SlidingLoads
+from benchmarks.shared.sliding_loads import SlidingLoads
 from cpfls_cli import rotations
 from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
 from cpfls_cli.regressor import Motion
@@ -19,12 +19,16 @@ def motion_at(seed, samples=200):
     return Motion(*(rng.uniform(-1, 1, (samples, 3)) * limit for limit in (np.pi, 3.0, 6.0)))
 
 
-def world_positions(loads, attitude):
-    """Both loads in the world, shape (2, samples, 3), with the place on the rail written out again."""
+def place(loads, attitude):
+    """The place on the rail, written out again for a stroke of 0.3 m."""
     roll, pitch, _ = attitude.T
     cosine = np.cos(roll) * (np.cos(pitch) if loads.by == "tilt" else 1.0)
-    open_share = 0.5 + 0.5 * np.tanh(3 * cosine) / np.tanh(3)
-    along = rotations.rotation_matrix(attitude)[:, :, 0] * ((1 - open_share) * 0.1 + open_share * 0.4)[:, None]
+    return 0.1 + 0.3 * (0.5 + 0.5 * np.tanh(2 * cosine) / np.tanh(2))
+
+
+def world_positions(loads, attitude):
+    """Both loads in the world, shape (2, samples, 3)."""
+    along = rotations.rotation_matrix(attitude)[:, :, 0] * place(loads, attitude)[:, None]
     return np.stack([along, -along])
 
 
@@ -43,16 +47,32 @@ def inertia_of(loads, attitude):
     return W.swapaxes(1, 2) @ INERTIA @ W + loads.mass * np.einsum("lnxi,lnxj->nij", moves, moves)
 
 
+def lagrangian_torque(inertia, motion):
+    gradient = np.moveaxis(central(inertia, motion.attitude, 1e-3), -1, 1)
+    values = InertiaValues(inertia(motion.attitude), gradient)
+    turning = np.einsum("nij,nj->ni", values.value, motion.acceleration)
+    return turning + np.einsum("nij,nj->ni", coriolis_matrix(values, motion.rate), motion.rate)
+
+
 @pytest.mark.parametrize("by", ["roll", "tilt"])
 def test_torque_on_a_cam_is_the_lagrangian_one(by):
-    loads, motion = SlidingLoads(0.3, by), motion_at(1)
-    gradient = np.moveaxis(central(lambda q: inertia_of(loads, q), motion.attitude, 1e-3), -1, 1)
-    values = InertiaValues(inertia_of(loads, motion.attitude), gradient)
-    lagrangian = np.einsum("nij,nj->ni", values.value, motion.acceleration)
-    lagrangian += np.einsum("nij,nj->ni", coriolis_matrix(values, motion.rate), motion.rate)
+    loads, motion = SlidingLoads(0.3, 0.3, by), motion_at(1)
+    lagrangian = lagrangian_torque(lambda q: inertia_of(loads, q), motion)
     torque = loads.on(torque_data(motion, INERTIA)).torque
     assert np.abs(torque - lagrangian).max() < 1e-7 * np.abs(torque).max()
     assert np.abs(loads.torque(motion)).max() > 0.05 * np.abs(torque).max()
+
+
+@pytest.mark.parametrize("by", ["roll", "tilt"])
+def test_part_of_the_loads_own_motion_is_that_of_their_speed_on_the_rail(by):
+    loads, motion = SlidingLoads(0.3, 0.3, by), motion_at(3)
+
+    def along_the_rail(attitude):
+        slope = central(lambda q: place(loads, q), attitude)
+        return 2 * loads.mass * slope[:, :, None] * slope[:, None]
+
+    part, lagrangian = loads.own_motion(motion), lagrangian_torque(along_the_rail, motion)
+    assert np.abs(part - lagrangian).max() < 1e-6 * np.abs(part).max()
 
 
 def energy(loads, attitude, rate):
@@ -62,7 +82,7 @@ def energy(loads, attitude, rate):
 @pytest.mark.parametrize("held_by", ["cam", "servo"])
 def test_power_is_the_change_of_the_energy(held_by):
     """Along ``q + t qd + t^2/2 qdd``; servos work on the loads besides: 2 m (s'' - s (omega_y^2 + omega_z^2)) ds/dt."""
-    loads, motion = SlidingLoads(0.3, "tilt", held_by), motion_at(2)
+    loads, motion = SlidingLoads(0.3, 0.3, "tilt", held_by), motion_at(2)
     q, qd, qdd = motion.attitude, motion.rate, motion.acceleration
     at = [energy(loads, q + t * qd + 0.5 * t**2 * qdd, qd + t * qdd) for t in (-2e-4, -1e-4, 1e-4, 2e-4)]
     change = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / 12e-4
@@ -74,8 +94,8 @@ def test_power_is_the_change_of_the_energy(held_by):
     assert np.abs(power - change).max() < 1e-6 * np.abs(change).max()
 
 
-def test_loads_stand_outermost_upright_and_innermost_upside_down():
+def test_loads_stand_outermost_upright_and_one_stroke_nearer_upside_down():
     upright = Motion(np.array([[0.0, 0.0, 1.0], [np.pi, 0.0, 1.0]]), np.zeros((2, 3)), np.zeros((2, 3)))
-    place, gradient, *_ = SlidingLoads(0.1, "tilt").place(upright)
-    assert place == pytest.approx([OUTERMOST_M, INNERMOST_M])
+    place, gradient, *_ = SlidingLoads(0.1, 0.3, "tilt").place(upright)
+    assert place == pytest.approx([0.4, 0.1])
     assert np.abs(gradient).max() < 1e-15
