@@ -27,9 +27,12 @@ from pymoo.indicators.hv import HV
 from benchmarks.shared.quality_plot import draw
 from benchmarks.shared.searches import Search, searches, spent
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.selection import SelectionRecord
+from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import load_study
 from cpfls_cli.evolution import pareto_front
 from cpfls_cli.flights.training import read_training
+from cpfls_cli.identification.chromosome import uniform_chromosome
 from cpfls_cli.identification.evaluator import Evaluator
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.search import choose
@@ -98,6 +101,7 @@ def main(config: Path, flight: Path, selection: Path, seeds: int = 10) -> None:
     data = read_training([flight], selection, study)
     evaluator = model_evaluator(data.training, data.learned, study.identification)
     evaluator(np.full((2, evaluator.structure.genes), 30000))
+    print_start(evaluator, selection)
     compared = searches(study.identification, DEFAULT)
     found: dict[str, list[Run]] = {name: [] for name in compared}
     # Seed by seed, so that every search has its share of whatever else the machine does.
@@ -107,6 +111,18 @@ def main(config: Path, flight: Path, selection: Path, seeds: int = 10) -> None:
             print(f"{name}, seed {seed}: {found[name][-1].best[-1]:.3g}", file=sys.stderr, flush=True)
     show(found)
     draw({name: [(run.seconds, run.best) for run in runs] for name, runs in found.items()}, PLOT)
+
+
+def print_start(evaluator: Evaluator, selection: Path) -> None:
+    """Print what the equidistant partitions have before and after their local search: it is that of the samples."""
+    uniform = uniform_chromosome(evaluator.structure)
+    before = evaluator.objectives(uniform, evaluator.fit(uniform))[0]
+    after = evaluator(uniform[None]).objectives[0, 0]
+    chosen = read_record(selection, SelectionRecord)
+    print(
+        f"Equidistant partitions, {len(chosen.indices)} samples by {chosen.criterion}: mean squared error "
+        f"{before:.4g} N^2 m^2, {after:.4g} after local search"
+    )
 
 
 def run(search: Search, evaluator: Evaluator, seed: int) -> Run:
