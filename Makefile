@@ -362,7 +362,7 @@ bench: $(INSTALLED_DEV)
 	$(BIN)/python benchmarks/simulators.py
 	$(BIN)/python benchmarks/fuzzy_fitting.py
 	$(MAKE) data/paper/report.html
-	$(BIN)/python benchmarks/report_cost.py configs/paper.yaml data/paper/*.h5
+	$(BIN)/python benchmarks/report_cost.py configs/paper.yaml $(ARTIFACTS:%=data/paper/%.h5) data/paper/sweep-*.h5
 
 # Stopped and started again it goes on where it was. SIZE takes more options: `python -m benchmarks.blind_study --help`.
 SEED := 2027

@@ -2,7 +2,7 @@
 
 Make the artifacts of a study first (`make reproduce` does), then
 
-    python benchmarks/report_cost.py configs/paper.yaml data/paper/*.h5
+    python benchmarks/report_cost.py configs/paper.yaml data/paper/{trajectory,flight,selection,model,prediction}.h5
 """
 
 from __future__ import annotations
