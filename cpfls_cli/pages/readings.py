@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BASES = {"training": "the whole flight", "learned": "the samples learned from"}
+_FAR = 2.0
 _LEAST_TORQUE = SMALLEST_MAX_ERROR / PRINTED_RELATIVE_ERROR
 _RULE = (
     "How far a reading is off: the geometric mean of the factors between its numbers and the printed ones, namely mean "
@@ -78,20 +79,26 @@ class Reading:
         return joined(dict.fromkeys(f"{setting.population} × {setting.generations}" for setting in self.settings))
 
     @cached_property
+    def numbers(self) -> list[tuple[str, float, float]]:
+        """Its numbers on all samples and on the fewest beside the printed ones, each with what it is."""
+        return list(self._numbers())
+
+    @property
     def factor(self) -> float:
         """How far its numbers are from the printed ones."""
-        return float(np.exp(np.mean(np.abs(np.log(list(self._factors()))))))
+        return float(np.exp(np.mean([abs(np.log(ours / printed)) for _, ours, printed in self.numbers])))
 
-    def _factors(self) -> Iterator[float]:
-        """Divide each of its numbers by the printed one, on all samples and on the fewest."""
-        for setting, condition in ((self.full, TABLE_4[0]), (self.fewest, TABLE_4[-1])):
+    def _numbers(self) -> Iterator[tuple[str, float, float]]:
+        for name, setting, table in (("all", self.full, TABLE_4[0]), ("the fewest", self.fewest, TABLE_4[-1])):
             if setting is not None and np.isfinite(setting.uniform_condition_number):
-                yield setting.uniform_condition_number / condition.condition_number
-        for setting, column in ((self.classic, TABLE_5[0]), (self.full, TABLE_5[1]), (self.fewest, TABLE_5[-2])):
+                yield f"uniform condition number, {name}", setting.uniform_condition_number, table.condition_number
+        columns = (("FLS", self.classic, TABLE_5[0]), ("cpFLS", self.full, TABLE_5[1]))
+        for name, setting, column in (*columns, ("cpFLS on the fewest", self.fewest, TABLE_5[-2])):
             if setting is not None:
-                yield from (ours / printed for ours, printed in _beside(setting, column))
+                for what, ours, printed in _beside(setting, column):
+                    yield f"{what} of {name}", ours, printed
         if np.isfinite(self.fewest.largest_torque):
-            yield min(self.fewest.largest_torque / _LEAST_TORQUE, 1.0)
+            yield "largest torque", min(self.fewest.largest_torque, _LEAST_TORQUE), _LEAST_TORQUE
 
     @property
     def classic(self) -> SettingRuns | None:
@@ -113,11 +120,11 @@ class Reading:
         return [claim.of_searches([self.settings]) for claim in claims if claim.of_searches is not None]
 
 
-def _beside(setting: SettingRuns, column: PrintedColumn) -> Iterator[tuple[float, float]]:
+def _beside(setting: SettingRuns, column: PrintedColumn) -> Iterator[tuple[str, float, float]]:
     """Pair medians over the runs with what is printed of ten."""
-    yield float(np.nanmedian(setting.errors[:, 0])), float(column.mse_of_runs[0])
-    yield float(np.nanmedian(setting.errors[:, 1])), float(column.max_error_of_runs[0])
-    yield float(np.nanmedian(setting.condition_number)), float(column.condition_number_of_runs[0])
+    yield "MSE", float(np.nanmedian(setting.errors[:, 0])), float(column.mse_of_runs[0])
+    yield "largest error", float(np.nanmedian(setting.errors[:, 1])), float(column.max_error_of_runs[0])
+    yield "condition number", float(np.nanmedian(setting.condition_number)), float(column.condition_number_of_runs[0])
 
 
 def readings(sources: Sources) -> list[Reading]:
@@ -162,28 +169,33 @@ def _noise(share: float) -> str:
     return f"{percent(share, 1)} noise" if share else "no noise"
 
 
-def readings_blocks(sources: Sources, claims: Sequence[Claim]) -> Iterator[Block]:
+def readings_blocks(sources: Sources, claims: Sequence[Claim]) -> tuple[list[Block], list[Block]]:
     """Show how each claim fares in each reading, where a report has more than one.
 
     Parameters
     ----------
     claims : sequence of Claim
         Those about other things than searches are left out.
+
+    Returns
+    -------
+    list of Block
+        The answer.
+    list of Block
+        Its grounds.
     """
     found = readings(sources)
     if len(found) < 2:
-        return
+        return [], []
     about = [claim for claim in claims if claim.of_searches is not None]
     verdicts = [reading.measured(about) for reading in found]
     known = [
         index for index in range(len(about)) if any(row[index].verdict != ClaimVerdict.NOT_MEASURED for row in verdicts)
     ]
     about, verdicts = [about[index] for index in known], [[row[index] for index in known] for row in verdicts]
-    yield from _answer(found, about, verdicts)
-    yield from _judged_above(sources)
-    yield _by_flight(found, about, verdicts)
-    yield readings_figure(found)
-    yield Folded("Every reading: its numbers, and each claim", [_numbers(found), _each(found, about, verdicts)])
+    answer: list[Block] = [*_answer(found, about, verdicts), *_judged_here(sources)]
+    details = Folded("Every reading: its numbers, and each claim", [_numbers(found), _each(found, about, verdicts)])
+    return answer, [_by_flight(found, about, verdicts), readings_figure(found), details]
 
 
 def _answer(found: Sequence[Reading], claims: Sequence[Claim], verdicts: Verdicts) -> Iterator[Text]:
@@ -207,13 +219,21 @@ def _answer(found: Sequence[Reading], claims: Sequence[Claim], verdicts: Verdict
     )
 
 
-def _judged_above(sources: Sources) -> Iterator[Text]:
-    single = [sweep for sweep in joined_sweeps(sources.sweeps) if not compares_readings(sweep.record.settings)]
-    names = [reading.name for sweep in single for reading in _of_sweep(sweep)]
-    noises = dict.fromkeys(noise for sweep in single if (noise := _mean_square_noise(sources, sweep)))
-    alone = f" Its noise alone has a mean square of {number(next(iter(noises)), 3)} {SQUARED_TORQUE}." if noises else ""
-    if names:
-        yield Text(f"The claims above are judged in this one: {'; '.join(dict.fromkeys(names))}.{alone}")
+def _judged_here(sources: Sources) -> Iterator[Text]:
+    """Name the reading that the report's own searches follow, and which of its numbers are far from the printed."""
+    for sweep in joined_sweeps(sources.sweeps):
+        if compares_readings(sweep.record.settings):
+            continue
+        noise = _mean_square_noise(sources, sweep)
+        alone = f" Its noise alone has a mean square of {number(noise, 3)} {SQUARED_TORQUE}." if noise else ""
+        for reading in _of_sweep(sweep):
+            far = [
+                f"{name} ({number(ours, 3)}, printed {number(printed, 3)})"
+                for name, ours, printed in reading.numbers
+                if abs(np.log(ours / printed)) > np.log(_FAR)
+            ]
+            off = f"Off by more than a factor of {_FAR:g}: {joined(far)}." if far else "No number is off by more."
+            yield Text(f"The claims below are judged in this one: {reading.name}.{alone} {off}")
 
 
 def _mean_square_noise(sources: Sources, sweep: Source[SweepRecord]) -> float:

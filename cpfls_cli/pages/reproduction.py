@@ -96,10 +96,12 @@ def reproduction_section(sources: Sources) -> Section | None:
     if not sources.settings.paper or sources.only_gap:
         return None
     measured = [(claim, claim.measure(sources)) for claim in CLAIMS]
+    answer, grounds = readings_blocks(sources, CLAIMS)
     blocks: list[Block] = [
         Text(_count(measured), "note"),
+        *answer,
         _claims(measured),
-        *readings_blocks(sources, CLAIMS),
+        *grounds,
         _rules(),
         _figures(compared_figures(sources)),
         seesaw_figure("figure-1-seesaw"),

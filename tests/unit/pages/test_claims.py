@@ -337,9 +337,11 @@ def test_the_flight_that_is_nearest_to_the_printed_numbers_is_named():
         [printed, replace(chosen("D", "training", 1.0, 100.0), mse=np.full((10, 1), mse))] for mse in (1.2e-3, 1.2e-2)
     )
     given = reading_sources((0.0, far), (0.05, near))
-    answer = [block.text for block in readings_blocks(given, CLAIMS) if hasattr(block, "text")]
+    answer = [block.text for block in readings_blocks(given, CLAIMS)[0]]
     assert "3 × 64 m at P = 1 s with 5 % noise" in answer[1]
     assert "Its noise alone has a mean square of 0.000467 (N" in answer[2]
+    assert "MSE of cpFLS on the fewest (0.0120, printed 0.00120)" in answer[2]
+    assert "MSE" not in answer[3]
     far, near = readings(given)
     assert far.factor / near.factor == pytest.approx(10 ** (1 / 8))
 
@@ -353,4 +355,5 @@ def test_of_one_reading_in_two_sweeps_the_larger_search_stands():
 
 
 def test_a_report_of_one_reading_compares_none():
-    assert not list(readings_blocks(reading_sources((0.0, [FULL, chosen("D", "training", 1.0, 9.0)])), CLAIMS))
+    given = reading_sources((0.0, [FULL, chosen("D", "training", 1.0, 9.0)]))
+    assert readings_blocks(given, CLAIMS) == ([], [])
