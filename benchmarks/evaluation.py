@@ -1,4 +1,4 @@
-"""One evaluation and one local search against the plain reference, and what starting the compiled code costs.
+"""One evaluation and one local search against plain references, decompositions, and what starting compiled code costs.
 
 python benchmarks/evaluation.py
 """
@@ -12,6 +12,9 @@ import tempfile
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from time import process_time
+from typing import Any
+from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -22,15 +25,23 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
+from cpfls_cli.identification import least_squares, reference
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode
+from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import Evaluator, Problem, refine
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.reference import ReferenceEvaluator
+from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
+from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure, uniform_breakpoints
 
 CHROMOSOMES = 80
 LARGEST_CONDITION = 1e6
 TIMED = 5
+# Membership functions of each partition, for 113, 241, 417 and 1233 columns.
+FUNCTIONS = (5, 7, 9, 15)
+TOLERANCE = 1e-6
+REPEATS = 5
 
 
 def main() -> None:
@@ -41,61 +52,139 @@ def main() -> None:
         ("685, judged on all 5487", flight, selection),
         ("5487", flight, flight),
     )
-    evaluations, searches = [], []
-    for name, training, learned in cases:
-        evaluations.append((name, *evaluation(training, learned, settings)))
-        searches.append((name, *local_search(training, learned, settings)))
     print("One evaluation, no local search:\n")
     table(
         "evaluation",
-        ("samples", "reference, ms", "compiled, ms", "times faster (range)", "compared", "largest relative difference"),
-        evaluations,
+        (
+            "samples",
+            "by singular values, ms",
+            "by Gram matrix, ms",
+            "compiled, ms",
+            "times faster than the first (range)",
+            "than the second (range)",
+            "compared",
+            "largest relative difference",
+        ),
+        [(name, *evaluation(training, learned, settings)) for name, training, learned in cases],
     )
     print("\nOne local search:\n")
     table(
         "local_search",
-        ("samples", "2-point, ms", "variable projection, ms", "times faster (range)", "MSE, ours over theirs"),
-        searches,
+        (
+            "samples",
+            "2-point, ms",
+            "variable projection, ms",
+            "times faster (range)",
+            "passes over the samples, theirs and ours",
+            "times fewer",
+            "times by code",
+            "MSE, ours over theirs",
+        ),
+        [(name, *local_search(training, learned, settings)) for name, training, learned in cases],
+    )
+    print("\nDecompositions of the Gram matrix of random attitudes:\n")
+    table(
+        "decompositions",
+        ("membership functions", "columns", "eigenvalues, ms", "Cholesky and Lanczos, ms", "times faster (range)"),
+        [decompositions(functions) for functions in FUNCTIONS],
     )
     print("\nStarting:\n")
     table("start", ("what", "seconds"), starting())
 
 
-def evaluation(training, learned, settings: IdentificationSettings) -> tuple[float, float, str, int, float]:
+def evaluation(training, learned, settings: IdentificationSettings) -> tuple[float, float, float, str, str, int, float]:
     """Time evaluations in turn, and compare the objectives of well-conditioned chromosomes."""
     plain = replace(settings, local_search=LocalSearchSettings(enabled=False))
-    fast, reference = model_evaluator(training, learned, plain), ReferenceEvaluator(training, learned, plain)
+    fast, slow = model_evaluator(training, learned, plain), ReferenceEvaluator(training, learned, plain)
     rng = np.random.default_rng(4)
     genes = rng.integers(1, 2**16, (CHROMOSOMES, fast.structure.genes))
-    ours, theirs = fast(genes).objectives, reference(genes).objectives
+    ours, theirs = fast(genes).objectives, slow(genes).objectives
     comparable = theirs[:, 2] < LARGEST_CONDITION
     difference = np.max(np.abs(ours[comparable] / theirs[comparable] - 1.0))
     some = genes[:TIMED]
-    timed = in_turn(lambda: reference(some), lambda: fast(some))
-    milliseconds = (1e3 * timed.slow_s / TIMED, 1e3 * timed.fast_s / TIMED)
-    return (*milliseconds, timed.range, int(comparable.sum()), float(difference))
+    by_values = in_turn(lambda: densely(slow, some, reference._solve), lambda: fast(some), REPEATS, process_time)
+    by_gram = in_turn(lambda: densely(slow, some, by_gram_matrix), lambda: fast(some), REPEATS, process_time)
+    milliseconds = (1e3 * spent / TIMED for spent in (by_values.slow_s, by_gram.slow_s, by_gram.fast_s))
+    return (*milliseconds, by_values.range, by_gram.range, int(comparable.sum()), float(difference))
 
 
-def local_search(training, learned, settings: IdentificationSettings) -> tuple[float, float, str, str]:
+def densely(evaluator: ReferenceEvaluator, genes: np.ndarray, solve) -> list[tuple[float, float, float]]:
+    """Evaluate as the reference does, with Q built once where the same samples teach and judge."""
+    found = []
+    for chromosome in genes:
+        partitions = evaluator._decode(chromosome)
+        Q = reference._matrix(evaluator._learned, partitions)
+        whole = Q if evaluator.training is evaluator.learned else reference._matrix(evaluator._whole, partitions)
+        coefficients, condition = solve(Q, evaluator.learned.torque.reshape(-1), TOLERANCE)
+        error = evaluator.training.torque.reshape(-1) - whole @ coefficients
+        found.append((float(np.mean(error**2)), float(np.max(np.abs(error))), condition))
+    return found
+
+
+def by_gram_matrix(Q: np.ndarray, torque: np.ndarray, rank_tolerance: float) -> tuple[np.ndarray, float]:
+    """Solve by the eigenvalues of ``Q^T Q``, as fast as NumPy alone can and without a refinement."""
+    eigenvalues, vectors = np.linalg.eigh(Q.T @ Q)
+    kept = eigenvalues > rank_tolerance**2 * eigenvalues[-1]
+    basis = vectors[:, kept]
+    coefficients = basis @ ((basis.T @ (Q.T @ torque)) / eigenvalues[kept])
+    return coefficients, float(np.sqrt(eigenvalues[-1] / eigenvalues[kept][0]))
+
+
+def local_search(training, learned, settings: IdentificationSettings) -> tuple[float | str, ...]:
     """Time local searches in turn from the same starts with the same budget, and compare where they end."""
-    fast, reference = model_evaluator(training, learned, settings), ReferenceEvaluator(training, learned, settings)
+    fast, theirs = model_evaluator(training, learned, settings), ReferenceEvaluator(training, learned, settings)
     plain = replace(fast, local_search=LocalSearchSettings(enabled=False))
     starts = well_conditioned(plain)
-    budget, times, ends = settings.local_search.evaluations, [], []
+    budget, times, ends, passes = settings.local_search.evaluations, [], [], []
     for start in starts:
         weights, fit = start / LARGEST_GENE, fast.fit(start)
         assert fit is not None
         problem = Problem(fast.solver, fit)
         products = fast.solver.products(decode(fast.structure, start.astype(float)))
-        found: list[np.ndarray] = []
-        slow = seconds(lambda: found.append(encode(reference.refine(weights))))  # noqa: B023
-        quick = seconds(lambda: found.append(refine(problem, start, products, budget).genes))  # noqa: B023
-        times.append((slow, quick))
-        theirs, ours = plain(np.array(found)).objectives[:, 0]
-        ends.append(ours / theirs)
-    timed = ratio_of(times)
+        before, slow_s, many = counted(partial(theirs.refine, weights), reference, "_matrix")
+        ours = partial(refine, problem, start, products, budget)
+        after, _, few = counted(ours, Samples, "products", "moved")
+        passes.append((many, few))
+        times.append((slow_s, seconds(ours, process_time)))
+        mse = plain(np.array([encode(before), after.genes])).objectives[:, 0]
+        ends.append(mse[1] / mse[0])
+    timed, (many, few) = ratio_of(times), np.median(passes, axis=0)
     quality = f"{np.median(ends):.3g} ({min(ends):.3g} to {max(ends):.3g})"
-    return 1e3 * timed.slow_s, 1e3 * timed.fast_s, timed.range, quality
+    told = f"{many:.0f} and {few:.0f}", many / few, timed.ratio * few / many
+    return 1e3 * timed.slow_s, 1e3 * timed.fast_s, timed.range, *told, quality
+
+
+def counted(work, where, *names: str) -> tuple[Any, float, int]:
+    """Give what comes of work, its seconds, and how often it calls functions that go through all samples."""
+    spies = [mock.patch.object(where, name, autospec=True, side_effect=getattr(where, name)) for name in names]
+    counters = [spy.start() for spy in spies]
+    start = process_time()
+    found = work()
+    spent = process_time() - start
+    mock.patch.stopall()
+    return found, spent, sum(counter.call_count for counter in counters)
+
+
+def decompositions(functions: int) -> tuple[int, int, float, float, str]:
+    """Time what turns a Gram matrix into parameters and a condition number, with and without Cholesky first."""
+    settings = StructureSettings(consequents="seesaw", products="additive", membership_functions=functions)
+    structure, rng = model_structure(settings), np.random.default_rng(7)
+    samples = 20 * structure.parameters
+    motion = Motion(rng.uniform(-np.pi, np.pi, (samples, 3)), *rng.standard_normal((2, samples, 3)))
+    data = TorqueData(0.01 * np.arange(samples), motion, rng.standard_normal((samples, 3)))
+    whole = Samples.of(Ready(data, rigid=False), structure, data_ranges(structure, motion.attitude))
+    gram = whole.products(uniform_breakpoints(structure)).gram[0]
+    size = np.sqrt(np.diag(gram))
+    matrix = gram / size / size[:, None]
+
+    def inverted(least: int) -> None:
+        with mock.patch.object(least_squares, "_MANY", least):
+            found = least_squares._inverted(matrix, TOLERANCE**2)
+        assert found is not None
+        found.apply(size)
+
+    timed = in_turn(partial(inverted, 10**6), partial(inverted, 1), REPEATS, process_time)
+    return functions, structure.parameters, 1e3 * timed.slow_s, 1e3 * timed.fast_s, timed.range
 
 
 def well_conditioned(plain: Evaluator) -> np.ndarray:

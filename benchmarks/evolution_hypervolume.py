@@ -16,13 +16,16 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
 import numpy as np
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.problem import Problem
 from pymoo.indicators.hv import HV
 from pymoo.optimize import minimize
 
-from benchmarks.shared.measure import table
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, pareto_front, start, step
 from cpfls_cli.identification.settings import PRESETS

@@ -15,13 +15,16 @@ from functools import cache
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.shared.measure import pin_threads, table
+
+pin_threads()
+
+import numpy as np
 
 from benchmarks.blind.vehicles import HUMMINGBIRD, SIXKG, XQUAD
 from benchmarks.gap import vehicle_of
-from benchmarks.shared.measure import table
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, SettingError
