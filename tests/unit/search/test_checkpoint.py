@@ -13,6 +13,7 @@ from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution import Evaluation, start, step
+from cpfls_cli.files import seal_of
 from cpfls_cli.identification.search import Unfinished
 from cpfls_cli.search.checkpoint import Checkpoint
 
@@ -159,6 +160,8 @@ def test_what_does_not_change_the_search_may_change(checkpoint, now):
 
 def test_every_bit_of_the_datasets_counts(checkpoint):
     checkpoint.add(unfinished())
+    content = checkpoint.path.read_bytes()
+    sealed = content[-len(seal_of(content)) :]
     artifact = read_artifact(checkpoint.path, CheckpointRecord.spec())
     for name, value in artifact.data.items():
         if np.asarray(value).dtype.kind == "U":
@@ -166,6 +169,8 @@ def test_every_bit_of_the_datasets_counts(checkpoint):
         changed = np.array(value)
         changed.reshape(-1).view(np.uint8)[-1] ^= 1
         write_artifact(checkpoint.path, replace(artifact, data={**artifact.data, name: changed}))
+        # A write of its own would seal the change; damage leaves the seal of before.
+        checkpoint.path.write_bytes(checkpoint.path.read_bytes()[: -len(sealed)] + sealed)
         with pytest.raises(InputError, match=r"model\.h5\.checkpoint: .*--force without --resume starts again"):
             checkpoint.read()
 
