@@ -21,7 +21,7 @@ help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
 	@echo "  make quick       the same study with one small search and without Table 5, in a minute"
 	@echo "  make reproduce-full   Table 5 and all readings from searches of full size; about fourteen hours on two cores"
-	@echo "  make reproduce-larger   of it only 75 x 25 beside 500 x 200 on 685 samples; about two hours"
+	@echo "  make reproduce-larger   of it only 75 x 25 beside 500 x 200 on 685 samples; about an hour and a half"
 	@echo "  make hexarotor   a six-rotor study with a rigid body under the fuzzy part"
 	@echo "  make full-circle full rotations of a held vehicle: the structure that wins, and a sweep over twelve others"
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
