@@ -193,14 +193,11 @@ data/%/prediction-unseen.h5: data/%/model.h5 data/%/unseen.h5
 
 ARTIFACTS := trajectory flight unseen selection model prediction prediction-unseen
 
-data/%/report.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
-	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) -o $@ --force $(TIMES)
-
-data/%/report-larger.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
-	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) -o $@ --force $(TIMES)
-
-data/%/report-full.html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
-	$(CPFLS) report configs/$*.yaml $(filter %.h5,$^) -o $@ --force $(TIMES)
+define made_page
+data/%/$(1).html: $(foreach name,$(ARTIFACTS),data/%/$(name).h5) data/%/.part/report.yaml
+	$$(CPFLS) report configs/$$*.yaml $$(filter %.h5,$$^) -o $$@ --force $$(TIMES)
+endef
+$(foreach page,report report-larger report-full,$(eval $(call made_page,$(page))))
 
 # Full rotations: one flight to choose models on, one that judges them; both random, of seeds of their own.
 CIRCLE := data/full-circle

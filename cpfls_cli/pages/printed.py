@@ -97,7 +97,7 @@ RELATIVE_ERROR = "< 10 %"
 """What the text says of the relative error of all columns."""
 
 SMALLEST_MAX_ERROR = 0.1531
-"""In N m; with a relative error below a tenth it tells how large the torques are at least."""
+"""In N m, of Table 5."""
 
 PRINTED_PEAKS = {
     "pop": 2.0 * math.pi,
@@ -117,6 +117,9 @@ PRINTED_JERK_INTEGRAL = 8.0
 
 PRINTED_RELATIVE_ERROR = 0.1
 """Sections 10 and 11: no relative torque error reaches it."""
+
+LEAST_TORQUE = SMALLEST_MAX_ERROR / PRINTED_RELATIVE_ERROR
+"""In N m; errors that are less than a tenth of the torques tell how large these are at least."""
 
 TYPICAL_MSE, TYPICAL_MAX_ERROR = 1e-3, 0.2
 """Section 10: what the errors of a typical model stay below, (N m)^2 and N m."""

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns, SweepRecord, spread
 from cpfls_cli.pages.claims import Claim, ClaimVerdict, Measurement, Settings
 from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
-from cpfls_cli.pages.printed import PRINTED_RELATIVE_ERROR, SMALLEST_MAX_ERROR, TABLE_4, TABLE_5, PrintedColumn
+from cpfls_cli.pages.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColumn
 from cpfls_cli.pages.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.pages.sweep import compares_readings, joined_sweeps, reading_of
-from cpfls_cli.report.canvas import plot, style_of
+from cpfls_cli.report.canvas import GREY, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent
 
@@ -26,12 +27,11 @@ if TYPE_CHECKING:
 
 _BASES = {"training": "the whole flight", "learned": "the samples learned from"}
 _FAR = 2.0
-_LEAST_TORQUE = SMALLEST_MAX_ERROR / PRINTED_RELATIVE_ERROR
 _RULE = (
     "How far a reading is off: the geometric mean of the factors between its numbers and the printed ones, namely mean "
     "squared error, largest error and condition number of FLS, of cpFLS and of cpFLS on the fewest samples (medians "
     "over the seeds), condition numbers of all and of the fewest samples with uniform partitions, and the largest "
-    f"torque as far as it lies below {number(_LEAST_TORQUE, 3)} {TORQUE}."
+    f"torque as far as it lies below {number(LEAST_TORQUE, 3)} {TORQUE}."
 )
 
 
@@ -48,7 +48,7 @@ class Reading:
     flight : str
         The path in words.
     noise : float
-        Of the torque, as a share of its root mean square.
+        Of the torque, as a share of its standard deviation.
     criterion : str
         What chose the samples.
     judged_on : str
@@ -65,7 +65,7 @@ class Reading:
 
     @property
     def name(self) -> str:
-        """It in words."""
+        """All of it in words."""
         return f"{self.flight}, {_noise(self.noise)}, {self.criterion}, errors over {_BASES[self.judged_on]}"
 
     @property
@@ -81,7 +81,7 @@ class Reading:
     @cached_property
     def numbers(self) -> list[tuple[str, float, float]]:
         """Its numbers on all samples and on the fewest beside the printed ones, each with what it is."""
-        return list(self._numbers())
+        return [number for number in self._numbers() if np.isfinite(number[1])]
 
     @property
     def factor(self) -> float:
@@ -90,15 +90,14 @@ class Reading:
 
     def _numbers(self) -> Iterator[tuple[str, float, float]]:
         for name, setting, table in (("all", self.full, TABLE_4[0]), ("the fewest", self.fewest, TABLE_4[-1])):
-            if setting is not None and np.isfinite(setting.uniform_condition_number):
+            if setting is not None:
                 yield f"uniform condition number, {name}", setting.uniform_condition_number, table.condition_number
         columns = (("FLS", self.classic, TABLE_5[0]), ("cpFLS", self.full, TABLE_5[1]))
         for name, setting, column in (*columns, ("cpFLS on the fewest", self.fewest, TABLE_5[-2])):
             if setting is not None:
                 for what, ours, printed in _beside(setting, column):
                     yield f"{what} of {name}", ours, printed
-        if np.isfinite(self.fewest.largest_torque):
-            yield "largest torque", min(self.fewest.largest_torque, _LEAST_TORQUE), _LEAST_TORQUE
+        yield "largest torque", min(self.fewest.largest_torque, LEAST_TORQUE), LEAST_TORQUE
 
     @property
     def classic(self) -> SettingRuns | None:
@@ -122,9 +121,15 @@ class Reading:
 
 def _beside(setting: SettingRuns, column: PrintedColumn) -> Iterator[tuple[str, float, float]]:
     """Pair medians over the runs with what is printed of ten."""
-    yield "MSE", float(np.nanmedian(setting.errors[:, 0])), float(column.mse_of_runs[0])
-    yield "largest error", float(np.nanmedian(setting.errors[:, 1])), float(column.max_error_of_runs[0])
-    yield "condition number", float(np.nanmedian(setting.condition_number)), float(column.condition_number_of_runs[0])
+    yield "MSE", _median(setting.errors[:, 0]), float(column.mse_of_runs[0])
+    yield "largest error", _median(setting.errors[:, 1]), float(column.max_error_of_runs[0])
+    yield "condition number", _median(setting.condition_number), float(column.condition_number_of_runs[0])
+
+
+def _median(runs: Array) -> float:
+    """Take the median of the runs that found a model; NaN for none."""
+    known = runs[np.isfinite(runs)]
+    return float(np.median(known)) if len(known) else float("nan")
 
 
 def readings(sources: Sources) -> list[Reading]:
@@ -291,7 +296,7 @@ def _numbers(found: Sequence[Reading]) -> Table:
     rows.append(
         [
             "the paper", UNKNOWN, UNKNOWN, UNKNOWN, f"{full.population} × {full.generations}",
-            f"> {number(_LEAST_TORQUE, 3)}", str(TABLE_4[0].condition_number), str(TABLE_4[-1].condition_number),
+            f"> {number(LEAST_TORQUE, 3)}", str(TABLE_4[0].condition_number), str(TABLE_4[-1].condition_number),
             full.mse_of_runs[0], printed.mse_of_runs[0], printed.max_error_of_runs[0], "< 10 %",
             printed.condition_number_of_runs[0], "1",
         ]
@@ -349,12 +354,14 @@ def readings_figure(found: Sequence[Reading]) -> Plot:
         axes = figure.subplots()
         for index, criterion in enumerate(criteria):
             own = [reading for reading in found if reading.criterion == criterion]
-            places = [rows[::-1].index((r.flight, r.noise, r.judged_on)) + 0.15 * (1.5 - index) for r in own]
-            ratios = np.array([_ratio(reading) for reading in own])
-            errors = np.abs(ratios[:, 1:] - ratios[:, :1]).T
-            style = {"color": style_of(index)["color"], "marker": "osD^v<>"[index % 7], "markerfacecolor": "none"}
-            axes.errorbar(ratios[:, 0], places, xerr=errors, linestyle="none", markersize=5, label=criterion, **style)
-        axes.axvline(AS_GOOD, color="#767676", linestyle="--", linewidth=1.2, label="4/3, the paper's largest")
+            heights = [rows[::-1].index((r.flight, r.noise, r.judged_on)) + 0.15 * (1.5 - index) for r in own]
+            # A ratio is not finite where nothing can be compared, or a seed found no model.
+            known = [(ratio, y) for r, y in zip(own, heights, strict=True) if np.isfinite((ratio := _ratio(r))[0])]
+            ratios, places = np.array([ratio for ratio, _ in known]).reshape(-1, 3), [y for _, y in known]
+            color, marker = style_of(index)["color"], "osD^v<>"[index % 7]
+            axes.hlines(places, ratios[:, 1], ratios[:, 2], color=color, linewidth=1.6)
+            axes.plot(ratios[:, 0], places, marker, markersize=5, markerfacecolor="none", color=color, label=criterion)
+        axes.axvline(AS_GOOD, color=GREY, linestyle="--", linewidth=1.2, label="4/3, the paper's largest")
         axes.axvline(1.0, color="black", linewidth=0.6)
         axes.set_yticks(range(len(rows)), [f"{f}, {_noise(n)}\n{_BASES[j]}" for f, n, j in reversed(rows)], fontsize=7)
         axes.set_xscale("log")

@@ -26,6 +26,7 @@ from cpfls_cli.pages.claims import (
 )
 from cpfls_cli.pages.fuzzy_part import seesaw_figure
 from cpfls_cli.pages.printed import (
+    LEAST_TORQUE,
     PRINTED_BREAKPOINTS,
     PRINTED_RELATIVE_ERROR,
     PRINTED_SEESAW,
@@ -260,14 +261,13 @@ def _attitude_compared(sources: Sources) -> ComparedFigure:
 
 def _torque_compared(sources: Sources) -> ComparedFigure:
     """Compare Figure 4: the torques."""
-    least = SMALLEST_MAX_ERROR / PRINTED_RELATIVE_ERROR
     title = "4: torques"
-    printed = f"more than {number(least, 2)} N m (an error of {SMALLEST_MAX_ERROR} N m is below 10 %)"
+    printed = f"more than {number(LEAST_TORQUE, 2)} N m (an error of {SMALLEST_MAX_ERROR} N m is below 10 %)"
     torques = [flight.record.torque for flight in sources.flights if flight.record.torque is not None]
     if not torques:
         return _not_shown(title, printed, "Missing: a flight.")
     largest = float(np.max(np.abs(torques[0])))
-    agrees = largest > least
+    agrees = largest > LEAST_TORQUE
     why = (
         "Along the printed path the vehicle of Table 3 tilts little and needs little torque; where the paper's larger "
         "torques come from it does not say, so only relative errors can be compared."

@@ -20,7 +20,7 @@ from cpfls_cli.pages.claims import (
     RELATIVE_ERROR_CLAIM,
     ClaimVerdict,
 )
-from cpfls_cli.pages.readings import readings, readings_blocks
+from cpfls_cli.pages.readings import readings, readings_blocks, readings_figure
 from cpfls_cli.pages.reproduction import CLAIMS, partitions_compared, seesaw_compared
 from cpfls_cli.pages.search_claims import (
     AS_GOOD,
@@ -357,3 +357,11 @@ def test_of_one_reading_in_two_sweeps_the_larger_search_stands():
 def test_a_report_of_one_reading_compares_none():
     given = reading_sources((0.0, [FULL, chosen("D", "training", 1.0, 9.0)]))
     assert readings_blocks(given, CLAIMS) == ([], [])
+
+
+def test_readings_are_drawn_where_a_search_found_nothing_too():
+    nothing = chosen("D", "training", np.nan, 60.0)
+    given = readings(reading_sources((0.0, [FULL, chosen("even", "training", 1.0, 101.0), nothing])))
+    drawn = readings_figure(given).picture.svg
+    assert all(name in drawn for name in ("4/3", "even", "no noise"))
+    assert np.isfinite([reading.factor for reading in given]).all()
