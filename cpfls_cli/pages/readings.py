@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 _BASES = {"training": "the whole flight", "learned": "the samples learned from"}
 _FAR = 2.0
+_RATIOS = (0.1, 0.2, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
 _RULE = (
     "How far a reading is off: the geometric mean of the factors between its numbers and the printed ones, namely mean "
     "squared error, largest error and condition number of FLS, of cpFLS and of cpFLS on the fewest samples (medians "
@@ -365,6 +366,10 @@ def readings_figure(found: Sequence[Reading]) -> Plot:
         axes.axvline(1.0, color="black", linewidth=0.6)
         axes.set_yticks(range(len(rows)), [f"{f}, {_noise(n)}\n{_BASES[j]}" for f, n, j in reversed(rows)], fontsize=7)
         axes.set_xscale("log")
+        low, high = axes.get_xlim()
+        ticks = [tick for tick in _RATIOS if low <= tick <= high]
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
         axes.set_xlabel("MSE on the fewest samples over MSE on all of them, with 95 % intervals")
         axes.grid(visible=False, axis="y")
         axes.legend(loc="upper center", bbox_to_anchor=(0.4, 1.12), ncols=5, frameon=False, fontsize=7)
