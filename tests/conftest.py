@@ -1,8 +1,13 @@
 """Fixtures of all packages of tests."""
 
+import signal
+
 import pytest
 
 from tests.builders import command_line
+
+# A shell without job control has what it starts in the background ignore interrupts, and all that this starts in turn.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture

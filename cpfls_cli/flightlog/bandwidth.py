@@ -187,8 +187,11 @@ def _cliff(octave: Array, level: Array, at: float) -> float:
     before, beyond = (octave >= at - 1) & (octave <= at), octave >= min(at + 1, octave[-1])
     if before.sum() < _FEWEST_BANDS or octave[-1] - at < _LEAST_OCTAVES_BEYOND:
         return 0.0
+    # Most spectra have no cliff, and need no trend for that to be seen.
+    if level[before].min() - level[beyond].max() < _CLEARANCE_DB:
+        return 0.0
     slope, offset = np.polyfit(octave[before], level[before], 1)
-    if slope < -_STEEPEST_BEFORE_DB or level[before].min() - level[beyond].max() < _CLEARANCE_DB:
+    if slope < -_STEEPEST_BEFORE_DB:
         return 0.0
     first = int(np.argmax(beyond))
     return float(offset + slope * at + min(slope, 0.0) * (octave[first] - at) - level[first])

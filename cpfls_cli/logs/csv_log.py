@@ -90,7 +90,11 @@ def _columns(path: Path, names: list[str], lines: Iterator[list[str]], wanted: s
             continue
         if len(row) != len(names):
             raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names")
-        rows.append([_number(row[index], path, number, names[index]) for index in kept])
+        fields = [row[index] for index in kept]
+        try:
+            rows.append(_plain_numbers(fields))
+        except ValueError:
+            rows.append([_number(row[index], path, number, names[index]) for index in kept])
     if not rows:
         raise InputError(f"{path}: holds column names but no samples")
     values = np.array(rows, dtype=float).reshape(len(rows), len(kept))
@@ -140,7 +144,12 @@ def _number(field: str, path: Path, row: int, column: str) -> float:
 
 
 def _value(text: str) -> float:
+    return _plain_numbers([text])[0]
+
+
+def _plain_numbers(fields: list[str]) -> list[float]:
     # Python's own numbers may hold underscores and digits of any script; no log means such a number.
-    if "_" in text or not text.isascii():
-        raise ValueError(text)
-    return float(text)
+    together = "".join(fields)
+    if "_" in together or not together.isascii():
+        raise ValueError(together)
+    return list(map(float, fields))

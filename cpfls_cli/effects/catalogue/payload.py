@@ -202,8 +202,10 @@ def _rate(state: Sequence[float], felt: _Vector, length: float, damping: float) 
     )
 
 
-def _moved(state: Sequence[float], rate: Sequence[float], step: float) -> tuple[float, ...]:
-    return tuple(value + step * change for value, change in zip(state, rate, strict=True))
+def _moved(state: Sequence[float], rate: Sequence[float], step: float) -> _State:
+    x, y, z, u, v, w = state
+    a, b, c, d, e, f = rate
+    return x + step * a, y + step * b, z + step * c, u + step * d, v + step * e, w + step * f
 
 
 def _unit(state: Sequence[float]) -> _State:
