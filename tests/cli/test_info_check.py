@@ -2,13 +2,17 @@
 
 import hashlib
 import json
+import os
 import shutil
+import subprocess
+import sys
 
 import h5py
 import numpy as np
 import pytest
 
 import cpfls_cli
+from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.formats import record_of_format
 from tests.builders.artifacts import edited
 
@@ -95,3 +99,23 @@ def test_check_says_what_is_wrong_and_ends_with_1(cpfls, pipeline, tmp_path, nam
     assert (summary["good"], summary["findings"]) == (False, [finding])
     quiet = cpfls("check", path, "-q")
     assert (quiet.exit_code, quiet.output) == (1, "")
+
+
+@pytest.mark.parametrize(("command", "exit_code"), [("info", 2), ("check", 1)])
+def test_a_flight_larger_than_memory_may_be(pipeline, tmp_path, command, exit_code):
+    path = tmp_path / "flight.h5"
+    shutil.copy(pipeline.flight, path)
+    with edited(path) as file:
+        for name in [dataset.path for dataset in FlightRecord.spec().datasets if dataset.path in file]:
+            kept = file[name]
+            if kept.ndim and kept.dims[0].label == "time":
+                del file[name]
+                # Nothing in the file: 80 MB of zeros for each column to those who read it.
+                file.create_dataset(name, (10**7, *kept.shape[1:]), "f8", chunks=(1 << 14, *kept.shape[1:]))
+    words = [sys.executable, "-m", "cpfls_cli", command, str(path)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        said = process.stdout.read()
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    assert (process.returncode, "time: does not ascend at index 1" in said) == (exit_code, True), said
+    assert used.ru_maxrss < 400e3

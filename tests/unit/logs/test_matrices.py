@@ -6,6 +6,7 @@ import pytest
 import scipy.io
 
 from cpfls_cli.errors import InputError
+from cpfls_cli.logs import matrices
 from cpfls_cli.logs.formats import log_contents
 
 TIME = np.arange(5) * 0.02
@@ -98,6 +99,16 @@ def test_what_cannot_be_read(tmp_path, name, content, message):
     with pytest.raises(InputError) as caught:
         log_contents(tmp_path / name)
     assert f"{name}: {message}" in str(caught.value)
+
+
+def test_what_keeps_hdf5_busy_for_ever(tmp_path, monkeypatch):
+    hdf5(tmp_path / "log.h5")
+    # As damage does, where HDF5 follows addresses in a circle.
+    monkeypatch.setattr(matrices, "_PROBE", "while True: pass")
+    monkeypatch.setattr(matrices, "_SECONDS", 0.3)
+    with pytest.raises(InputError, match=r"log\.h5: damaged: HDF5 does not come to an end with it within"):
+        log_contents(tmp_path / "log.h5")
+    assert not matrices.is_log(tmp_path / "log.h5")
 
 
 def test_a_file_without_columns(tmp_path):
