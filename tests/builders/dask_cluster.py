@@ -32,14 +32,20 @@ def running(folder, *words, announced=None):
 
 
 @contextmanager
-def dask_cluster(folder, workers):
-    """Give the address of a scheduler, its process, and the processes of its workers."""
+def dask_cluster(folder, workers, tls=()):
+    """Give the address of a scheduler, its process, and the processes of its workers.
+
+    `tls` holds more options of both, such as those that name certificates.
+    """
     from distributed import Client
 
-    scheduler = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show"]
+    scheduler = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show", *tls]
+    if tls:
+        scheduler += ["--protocol", "tls"]
     with ExitStack() as stack:
-        process, address = stack.enter_context(running(folder, *scheduler, announced=r"Scheduler at:\s+(tcp://\S+)"))
-        worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny"]
+        announced = r"Scheduler at:\s+(t\w+://\S+)"
+        process, address = stack.enter_context(running(folder, *scheduler, announced=announced))
+        worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", *tls]
         others = [stack.enter_context(running(folder, *worker))[0] for _ in range(workers)]
         if workers:
             with Client(address, set_as_default=False) as client:

@@ -3,7 +3,9 @@
 import importlib
 import logging
 import os
+import shutil
 import socket
+import subprocess
 
 import numpy as np
 import pytest
@@ -111,6 +113,25 @@ def test_a_scheduler_without_workers_is_an_error_in_words(tmp_path, capfd):
         cluster(EVALUATOR, address, patience_s=0.2),
     ):
         pass
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make a certificate with")
+def test_with_certificates_only_those_who_have_them_get_in(tmp_path, capfd):
+    dask = pytest.importorskip("dask")
+    key, own = str(tmp_path / "own-key.pem"), str(tmp_path / "own.pem")
+    made = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=localhost"]
+    subprocess.run([*made, "-keyout", key, "-out", own], check=True, stderr=subprocess.DEVNULL)
+    known = {"ca-file": own, "client.cert": own, "client.key": key}
+    given = {f"distributed.comm.tls.{name}": file for name, file in known.items()}
+    options = ("--tls-ca-file", own, "--tls-cert", own, "--tls-key", key)
+    with dask.config.set(given), dask_cluster(tmp_path, 1, options) as (address, _, _):
+        with employ(EVALUATOR) as one, employ(EVALUATOR, scheduler=address) as safe:
+            assert safe(GENES).objectives.tobytes() == one(GENES).objectives.tobytes()
+        with dask.config.set(dict.fromkeys(given)):
+            for reached, refused in ((address, "no connection with TLS"), (f"tcp{address[3:]}", "no Dask scheduler")):
+                with pytest.raises(ComputationError, match=refused), cluster(EVALUATOR, reached, patience_s=2.0):
+                    pass
     assert capfd.readouterr() == ("", "")
 
 
