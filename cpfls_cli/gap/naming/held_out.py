@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, floors, scatter_variance, system
 from cpfls_cli.gap.balance.refine import fit
@@ -43,6 +43,9 @@ class HeldOut:
     known : array of bool, shape (window, 6)
     noise : array, shape (window, 6)
         Floor of each window with the scatter that belongs to the effects.
+    unlearned : mapping of str to float
+        Effects of which these flights ask for a number that no flight learned from shows, such as that of a faster
+        descent, with the share of the windows that do; nothing is judged there.
     """
 
     before: Array
@@ -51,6 +54,7 @@ class HeldOut:
     floor: Array
     known: Array
     noise: Array
+    unlearned: Mapping[str, float]
 
     def size(self, residual: Array) -> GapSize:
         """Compute the root mean square of a residual by channel.
@@ -184,7 +188,9 @@ def held_out(
     raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
     if not all(full.can(candidate) for candidate in (*full.free, *full.chosen)):
         raise InputError("the held-out flights lack a signal that a named effect needs; hold out others")
+    beyond = {each.effect.name: _beyond(full.columns(each), fitted.columns(each)) for each in full.chosen}
     known = np.concatenate([np.tile(flight.known, (len(flight), 1)) for flight in repaired])
+    known &= ~np.any(list(beyond.values()) or np.zeros((1, *known.shape), dtype=bool), axis=0)
     floor = floors(full, linear)
     return HeldOut(
         raw.residual,
@@ -193,4 +199,10 @@ def held_out(
         floor,
         known,
         np.sqrt(floor**2 + scatter * scatter_variance(full)),
+        {name: share for name, there in beyond.items() if (share := float(there.any(axis=1).mean()))},
     )
+
+
+def _beyond(columns: Array, learned: Array) -> BoolArray:
+    """Mark what needs a coefficient whose column is zero in all that was learned from, shape (window, 6)."""
+    return np.asarray((columns[..., ~learned.any(axis=(0, 1))] != 0).any(axis=2))
