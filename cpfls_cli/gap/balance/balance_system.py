@@ -225,3 +225,17 @@ def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
     if not inside.any() or square[inside].mean() < _LEAST_RATIO * max(1.0, square[~inside].mean()):
         return 0.0
     return float(max(0.0, (square[inside] - 1).sum() / expected[inside].sum()))
+
+
+def window_noise(hypothesis: System, residual: Array, floor: Array) -> Array:
+    """Add to the floor of each window what the chosen effects do there at random, shape (window, 6), N m and N.
+
+    Parameters
+    ----------
+    hypothesis : System
+    residual : array, shape (window, 6)
+        Of a fit; the size of the random part is read from it.
+    floor : array, shape (6,)
+    """
+    variance = scatter_variance(hypothesis)
+    return np.asarray(np.sqrt(floor**2 + scatter_size(variance, residual, floor) * variance))

@@ -55,13 +55,13 @@ def fit(hypothesis: System, floor: Array) -> Array:
     Parameters
     ----------
     hypothesis : System
-    floor : array, shape (6,)
+    floor : array, shape (6,) or (window, 6)
 
     Returns
     -------
     array, shape (column,)
     """
-    matrix = (hypothesis.base / floor[:, None]).reshape(-1, hypothesis.base.shape[2])
+    matrix = (hypothesis.base / floor[..., None]).reshape(-1, hypothesis.base.shape[2])
     length = np.linalg.norm(matrix, axis=0)
     scale = 1.0 / np.where(length > 0, length, 1.0)
     right = (hypothesis.residual / floor).reshape(-1)
@@ -74,7 +74,7 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
     Parameters
     ----------
     hypothesis : System
-    weight : array, shape (6,), N m and N
+    weight : array, shape (6,) or (window, 6), N m and N
         Standard deviation of each channel.
     of_vehicle : bool
         Whether the vehicle's own numbers are bounded too; else one that no vehicle has says that the log is wrong.
@@ -86,7 +86,7 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
         Coefficients on a bound, and those that nothing shows, which are 0.
     """
     linear = fit(hypothesis, weight)
-    matrix = (hypothesis.base / weight[:, None]).reshape(-1, len(linear))
+    matrix = (hypothesis.base / weight[..., None]).reshape(-1, len(linear))
     length = np.linalg.norm(matrix, axis=0)
     least = np.zeros(3, dtype=bool)
     change = _change(hypothesis, length > 0, least if of_vehicle else None)
@@ -204,7 +204,7 @@ def refitted(hypothesis: System, weight: Array) -> System:
     Parameters
     ----------
     hypothesis : System
-    weight : array, shape (6,), N m and N
+    weight : array, shape (6,) or (window, 6), N m and N
         Standard deviation of each channel.
     """
     hypothesis = _exact(hypothesis, weight)
@@ -258,7 +258,7 @@ def _newton_step(hypothesis: System, weight: Array, rotor_wrench: Array) -> Arra
     weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
     linear, held = fit_within_bounds(hypothesis, weight)
     shapes = shape_columns(hypothesis, linear, rotor_wrench)
-    columns = np.concatenate([hypothesis.base[..., ~held], shapes], axis=2) / weight[:, None]
+    columns = np.concatenate([hypothesis.base[..., ~held], shapes], axis=2) / weight[..., None]
     matrix = columns.reshape(-1, columns.shape[2])
     length = np.linalg.norm(matrix, axis=0)
     scale = 1.0 / np.where(length > 0, length, 1.0)

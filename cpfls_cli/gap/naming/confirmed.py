@@ -92,7 +92,7 @@ class Judge:
         if harmful:
             name = max(harmful, key=lambda each: harmful[each].ratio(judgement.held_out))
             return Refusal(name, harmful[name].harm(judgement.held_out))
-        raised = {name: float(one.raised.max()) for name, one in compared.items()}
+        raised = {name: one.visibly for name, one in compared.items()}
         least = min(raised, key=lambda each: raised[each], default=None)
         if least is None:
             return None
@@ -137,6 +137,11 @@ class Without(NamedTuple):
     raised: Array
     error: Array
     left: Array
+
+    @property
+    def visibly(self) -> float:
+        """By how much the gap is larger without it, squared floors; what is below the floor without it is noise."""
+        return float(np.where(self.left > 1.0, self.raised, 0.0).max())
 
     def worse(self, unseen: HeldOut) -> Array:
         """Mark the channels that the effect makes visibly and surely worse."""

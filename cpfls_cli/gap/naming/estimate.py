@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.gap.balance.balance_system import System, is_free, system
+from cpfls_cli.gap.balance.balance_system import System, is_free, system, window_noise
 from cpfls_cli.gap.balance.refine import fit, fit_within_bounds, free_shapes, refitted, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.results import Estimate
@@ -52,7 +52,7 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     ----------
     hypothesis : System
         With refined shapes.
-    weight : array, shape (6,), N m and N
+    weight : array, shape (6,) or (window, 6), N m and N
         Standard deviation of each channel.
     block : array of int, shape (window,)
 
@@ -75,7 +75,7 @@ def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array
     values = np.concatenate([linear, shapes])
     moving_shapes = shape_columns(hypothesis, linear, system(hypothesis.flights).rotor_wrench if shapes else None)
     jacobian = np.concatenate([hypothesis.base, moving_shapes], axis=2)
-    rows = (jacobian / weight[:, None], (hypothesis.residual - hypothesis.base @ linear) / weight)
+    rows = (jacobian / weight[..., None], (hypothesis.residual - hypothesis.base @ linear) / weight)
     moving = np.concatenate([~held, np.ones(len(shapes), dtype=bool)])
     left_out = np.tile(values, (len(np.unique(block)), 1))
     left_out[:, moving] += _one_step(rows[0][..., moving], rows[1], block)
@@ -109,7 +109,7 @@ def weighted_estimates(hypothesis: System, floor: Array, block: IntArray) -> tup
     estimates : Estimates
     """
     there = refitted(hypothesis, channel_weight(hypothesis, floor))
-    if (channel_weight(there, floor) > CLEAR * floor).any():
+    if (_left(there, floor)[1] > CLEAR).any():
         # Formulas that do not fit to the noise would move to what is left: they stay where the search found them.
         there = hypothesis
     return there, estimates(there, channel_weight(there, floor), block)
@@ -130,9 +130,21 @@ def free_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimat
 
 
 def channel_weight(hypothesis: System, floor: Array) -> Array:
-    """Take the larger of floor and residual of each channel, shape (6,)."""
+    """Take the larger of noise and residual of each channel, shape (window, 6).
+
+    Noise is the floor with what the chosen effects do at random.
+    """
+    noise, left = _left(hypothesis, floor)
+    return np.asarray(noise * np.maximum(1.0, left))
+
+
+def _left(hypothesis: System, floor: Array) -> tuple[Array, Array]:
+    """Estimate the noise of each window, shape (window, 6), and the root mean square that a fit leaves in it, (6,)."""
     residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-    return np.asarray(np.maximum(floor, np.sqrt(np.mean(residual**2, axis=0))))
+    noise = window_noise(hypothesis, residual, floor)
+    if (noise > floor).any():
+        residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, noise)
+    return noise, np.sqrt(np.mean((residual / noise) ** 2, axis=0))
 
 
 def differs_from_zero(effect: Effect, numbers: Sequence[Estimate]) -> bool:
