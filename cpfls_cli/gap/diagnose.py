@@ -117,7 +117,7 @@ def diagnose(
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, effects)
     notes = () if differ else (*_unsure(judged, settings), *(refused.sentence for refused in refusals))
-    notes = (*_unlearned(judgement.held_out), *notes)
+    notes = (*not_judged(judgement.held_out), *notes)
     diagnosis = _concluded(judged, faults, judgement, differ, notes, steps, settings, torque_alone, audited)
     return DiagnosisRun(diagnosis, audited, hypothesis, estimates, judgement.remainder, judgement.held_out)
 
@@ -129,7 +129,7 @@ def _unsure(judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[s
             yield f"{effect.name} is not sure: chance explains as much beside the others, p = {effect.p_value:.2g}"
 
 
-def _unlearned(unseen: HeldOut) -> Iterator[str]:
+def not_judged(unseen: HeldOut) -> Iterator[str]:
     """Say where the held-out flights go beyond what was learned, and what that costs."""
     for name, share in unseen.unlearned.items():
         yield (

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.gap.balance.balance_system import scatter_size, scatter_variance, system
+from cpfls_cli.gap.naming.estimate import channel_weight
 from tests.builders.gap_flights import candidate, fly, weak
 
 RING = candidate("vertical_descent", sideways=1.0)
@@ -46,3 +47,13 @@ def test_a_residual_that_is_large_everywhere_is_no_scatter():
     residual = 0.3 * np.random.default_rng(1).standard_normal(variance.shape)
     assert scatter_size(variance, residual, floor) == 0.0
     assert scatter_size(np.zeros_like(variance), residual, floor) == 0.0
+
+
+def test_where_an_effect_shakes_a_fit_weighs_less():
+    hypothesis = system([weak(sinking())], [RING])
+    variance = scatter_variance(hypothesis)
+    floor, size = np.full(6, 0.05), 0.1
+    expected = np.sqrt(floor**2 + size**2 * variance)
+    # In place of the residual that the flight would leave.
+    vars(hypothesis)["residual"] = np.random.default_rng(2).standard_normal(variance.shape) * expected
+    np.testing.assert_allclose(channel_weight(hypothesis, floor)[:, :2], expected[:, :2], rtol=0.2)

@@ -8,6 +8,7 @@ import pytest
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.diagnose import not_judged
 from cpfls_cli.gap.naming.held_out import held_out, share_removed
 from tests.builders.gap_flights import candidate, fly, weak
 
@@ -60,6 +61,34 @@ def test_an_effect_that_is_there_closes_the_gap_of_a_flight_not_seen():
 
 def test_an_effect_that_is_not_there_does_not():
     assert max(unseen([candidate("linear_damping")]).shares().values()) < 0.1
+
+
+def sinking(seed, speed):
+    """Sinks at a speed for a third of the time."""
+    signals = fly(seed, tilt=0.02)
+    down = np.zeros_like(signals.velocity)
+    down[:, 2] = -speed * (np.sin(2 * np.pi * signals.time / 10.0) > 0.5)
+    return replace(signals, velocity=down)
+
+
+def test_nothing_is_judged_where_no_flight_learned_from_went():
+    """Up to 4 m/s a part of the curve is learned; of 12 m/s it says nothing."""
+    ring = [candidate("vertical_descent", sideways=1.0)]
+    fitted, slow, fast = system([weak(sinking(1, 4.0))], ring), weak(sinking(2, 4.0)), weak(sinking(2, 12.0))
+    linear, parameters = fit(fitted, np.ones(6)), fit(system(fitted.flights), np.ones(6))
+    within, beyond = (held_out([one], [one], fitted, linear, parameters, 0.0) for one in (slow, fast))
+    assert (within.unlearned, within.known[:, :3].all()) == ({}, True)
+    signals = fast.signals
+    sinks = np.interp(fast.windows.centres(signals.time), signals.time, signals.velocity[:, 2]) < -6
+    assert not beyond.known[sinks, 0].any()
+    assert beyond.unlearned == {"vertical_descent": pytest.approx(1 - beyond.known[:, 0].mean())}
+    assert 0.3 < beyond.unlearned["vertical_descent"] < 0.5
+    left = beyond.after[beyond.known[:, 0], 0]
+    assert beyond.size(beyond.after).value[0] == pytest.approx(np.sqrt(np.mean(left**2)))
+    (told,) = not_judged(beyond)
+    assert told.startswith(
+        f"{100 * beyond.unlearned['vertical_descent']:.2g} % of what is held out goes where no flight"
+    )
 
 
 def test_faults_alone_take_their_share_off_the_model_as_given():
