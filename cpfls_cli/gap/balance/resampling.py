@@ -7,11 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 
 _LARGEST_NUMBER = 24
 _RIDGE = 1e-9
 _LEAST_SHARE = 10
+_ALONE = 0.95
+"""Share of the information on a coefficient from which on one block alone shows it."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +59,15 @@ class Folds:
         """Number of blocks."""
         return len(self.grams)
 
-    def solve(self, columns: IntArray) -> tuple[Array, Array]:
+    def solve(self, columns: IntArray, believed: int = 0) -> tuple[Array, Array]:
         """Fit a subset of columns without each block and evaluate it on that block.
+
+        Parameters
+        ----------
+        columns : array of int
+        believed : int
+            So many of the first columns are not in question: a block that alone shows one of these stays in the fit,
+            because without it nothing is known of that coefficient.
 
         Returns
         -------
@@ -67,8 +76,14 @@ class Folds:
             Sum of squares left on the block that the fit did not see.
         """
         gram, moment = self.gram[:, columns[:, None], columns], self.moment[:, columns]
-        coefficients = _solve(gram.sum(axis=0) - gram + self._known(columns), moment.sum(axis=0) - moment)
+        out = np.where(self.alone(columns[:believed]), 0.0, 1.0)[:, None, None]
+        coefficients = _solve(gram.sum(axis=0) - out * gram + self._known(columns), moment.sum(axis=0) - out * moment)
         return coefficients, self._left(gram, moment, coefficients)
+
+    def alone(self, columns: IntArray) -> BoolArray:
+        """Mark blocks that alone show the coefficient of one of some columns, shape (block,)."""
+        own = self.gram[:, columns, columns]
+        return np.asarray((own > _ALONE * own.sum(axis=0)).any(axis=1))
 
     def fit(self, columns: IntArray) -> tuple[Array, Array]:
         """Fit a subset of columns on all blocks.

@@ -112,7 +112,7 @@ def rank_effects(
     normal = normal_equations(arranged, hypothesis.residual, floor, block)
     ranking = _each_once(score(arranged, normal, hypothesis))
     residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-    before = normal.solve(arranged.base)[1][:, 0]
+    before = normal.solve(arranged.base, len(arranged.base))[1][:, 0]
     return SearchStep(
         hypothesis,
         floor,

@@ -145,7 +145,7 @@ def score(arranged: Layout, normal: Folds, hypothesis: System) -> list[Scored]:
     list of Scored
         Best first.
     """
-    _, before = normal.solve(arranged.base)
+    _, before = normal.solve(arranged.base, len(arranged.base))
     vehicle = hypothesis.flights[0].signals.vehicle
     scored = [_scored(placed, arranged.base, normal, before[:, 0], vehicle) for placed in arranged.candidates]
     return sorted(scored, key=lambda candidate: -candidate.gain)
@@ -166,10 +166,10 @@ def chance(arranged: Layout, normal: Folds) -> Array:
     -------
     array, shape (draw,)
     """
-    _, before = normal.solve(arranged.base)
+    _, before = normal.solve(arranged.base, len(arranged.base))
     best = np.full(before.shape[1], -np.inf)
     for placed in arranged.candidates:
-        best = np.maximum(best, (before - _error(placed, placed.columns, arranged.base, normal)).sum(axis=0))
+        best = np.maximum(best, (before - _error(placed, placed.columns, arranged.base, normal, before)).sum(axis=0))
     return best
 
 
@@ -194,10 +194,19 @@ def _weight(hypothesis: System, candidate: Candidate) -> Array:
     return compensation(rotor_wrench, rotor_wrench + hypothesis.columns(candidate)[..., 0])
 
 
-def _error(placed: PlacedCandidate, columns: IntArray, base: IntArray, normal: Folds) -> Array:
+def _error(placed: PlacedCandidate, columns: IntArray, base: IntArray, normal: Folds, before: Array) -> Array:
+    """Compute what a candidate leaves of each block; a block that alone shows it cannot judge it, and stays as it was.
+
+    Parameters
+    ----------
+    before : array, shape (block, draw)
+        What is left without it.
+    """
     if placed.candidate.effect.unit_coefficient:
-        return normal.subtracted(int(columns[0]), base, placed.weight).solve(np.arange(len(base)))[1]
-    return normal.solve(np.concatenate([base, columns]))[1]
+        without = normal.subtracted(int(columns[0]), base, placed.weight)
+        return without.solve(np.arange(len(base)), len(base))[1]
+    error = normal.solve(np.concatenate([base, columns]), len(base))[1]
+    return np.where(normal.alone(columns)[:, None], before, error)
 
 
 def _scored(placed: PlacedCandidate, base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings) -> Scored:
@@ -205,7 +214,7 @@ def _scored(placed: PlacedCandidate, base: IntArray, normal: Folds, before: Arra
     if len(columns) == 0:
         return Scored(candidate, columns, REFUSED, before, np.zeros(0))
     if candidate.effect.unit_coefficient:
-        error = _error(placed, columns, base, normal)[:, 0]
+        error = _error(placed, columns, base, normal, before[:, None])[:, 0]
         return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
     for _ in range(len(columns)):
@@ -219,7 +228,7 @@ def _scored(placed: PlacedCandidate, base: IntArray, normal: Folds, before: Arra
             break
         kept &= keep
     used = columns[kept]
-    error = _error(placed, used, base, normal)[:, 0]
+    error = _error(placed, used, base, normal, before[:, None])[:, 0]
     return Scored(candidate, used, float((before - error).sum()), error, fitted)
 
 

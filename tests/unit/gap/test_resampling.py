@@ -86,6 +86,22 @@ def test_a_column_that_a_fit_never_sees_gets_nothing():
     assert error[2] == pytest.approx(without[2])
 
 
+def test_a_believed_column_stays_known_in_the_block_that_alone_shows_it():
+    columns, right, block = problem(5)
+    columns[block != 2, :, 3] *= 1e-4
+    normal = folds(columns, right, block)
+    assert normal.alone(np.array([3])).tolist() == [number == 2 for number in range(normal.blocks)]
+    assert not normal.alone(np.array([0])).any()
+    asked, believed = (normal.solve(np.array([3, 0]), count) for count in (0, 1))
+    whole, error = normal.fit(np.array([3, 0]))
+    np.testing.assert_allclose(believed[0][2], whole)
+    np.testing.assert_allclose(believed[1][2], error[2])
+    others = np.arange(normal.blocks) != 2
+    np.testing.assert_allclose(believed[0][others], asked[0][others])
+    # Without its block next to nothing is known of it, and what that says of the block is far off.
+    assert asked[1][2, 0] > 10 * believed[1][2, 0]
+
+
 def test_a_column_of_zeros_does_no_harm():
     columns, right, block = problem(6)
     columns[..., 3] = 0.0
