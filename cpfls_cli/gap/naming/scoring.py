@@ -195,7 +195,7 @@ def _weight(hypothesis: System, candidate: Candidate) -> Array:
 
 
 def _error(placed: PlacedCandidate, columns: IntArray, base: IntArray, normal: Folds, before: Array) -> Array:
-    """Compute what a candidate leaves of each block; a block that alone shows it cannot judge it, and stays as it was.
+    """Compute what a candidate leaves of each block; one that alone shows it is no evidence against it.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def _error(placed: PlacedCandidate, columns: IntArray, base: IntArray, normal: F
         without = normal.subtracted(int(columns[0]), base, placed.weight)
         return without.solve(np.arange(len(base)), len(base))[1]
     error = normal.solve(np.concatenate([base, columns]), len(base))[1]
-    return np.where(normal.alone(columns)[:, None], before, error)
+    return np.where(normal.alone(columns)[:, None], np.minimum(before, error), error)
 
 
 def _scored(placed: PlacedCandidate, base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings) -> Scored:
