@@ -25,6 +25,11 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     return wrench_change(signals, _apply(signals, shape))
 
 
+def _accounts(number: str, values: Mapping[str, float]) -> float:
+    """Account for as much of Izz: yaw knows well only the ratio of the two."""
+    return abs(values["error"]) if number == "inertia_z" else 0.0
+
+
 EFFECT = Effect(
     name="drag_factor_error",
     order=290,
@@ -46,4 +51,5 @@ EFFECT = Effect(
     unit_coefficient=True,
     apply=_apply,
     vehicle=_vehicle,
+    accounts=_accounts,
 )

@@ -84,6 +84,16 @@ def test_effects_that_change_the_number_account_for_it(effects, expected):
     assert told(SURE, effects=effects) == expected
 
 
+def test_a_wrong_drag_factor_accounts_for_as_much_of_izz():
+    wrong = named("drag_factor_error", number("error", 0.2, 0.04))
+    small, large, other = (
+        number(name, value, 0.02) for name, value in (("inertia_z", -0.15), ("inertia_z", -0.25), ("inertia_x", -0.15))
+    )
+    assert told(small, effects=(wrong,)) == ()
+    assert told(large, effects=(wrong,)) == ("inertia_z",)
+    assert told(other, effects=(wrong,)) == ("inertia_x",)
+
+
 def test_a_load_accounts_for_any_thrust():
     assert told(number("thrust_scale", 0.5, 0.01), effects=[named("payload")]) == ()
 
