@@ -203,7 +203,9 @@ def _concluded(
     gap = held_out.size(held_out.before).floors
     least = settings.named_share
     known = [each for each in remainder.unexplained if matters(each, gap, least)] if effects else remainder.unexplained
-    stays = gap_stays(held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors, least)
+    stays = gap_stays(
+        held_out.size(held_out.parameters).floors, held_out.size(held_out.after).floors, least, len(named)
+    )
     verdict = verdict_of(
         effects,
         rivals,

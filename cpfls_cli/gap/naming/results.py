@@ -260,8 +260,10 @@ def verdict_of(
     return GapVerdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else GapVerdict.NAMED
 
 
-def gap_stays(before: Array, after: Array, named_share: float) -> bool:
+def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> bool:
     """Tell whether a relevant gap about or along an axis is not reduced.
+
+    Where several effects leave a clear gap, one may fill in for what the formula of another is off by.
 
     Parameters
     ----------
@@ -269,8 +271,11 @@ def gap_stays(before: Array, after: Array, named_share: float) -> bool:
         Of the held-out flights, with the vehicle's own numbers refitted.
     named_share : float
         Of the gap above the floor that has to go.
+    effects : int
+        How many were named.
     """
-    return any(_stays(before[kind], after[kind], named_share) for kind in (slice(0, 3), slice(3, 6)))
+    filled = effects > 1 and bool((after > CLEAR).any())
+    return filled or any(_stays(before[kind], after[kind], named_share) for kind in (slice(0, 3), slice(3, 6)))
 
 
 def _stays(before: Array, after: Array, named_share: float) -> bool:

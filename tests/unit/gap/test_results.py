@@ -102,5 +102,11 @@ def test_an_axis_that_keeps_its_gap_is_not_all_explained():
     ids=["one axis stays", "all shrink", "a small part of the whole", "no clear gap", "a large rest", "a clear rest"],
 )
 def test_a_gap_stays_where_an_axis_is_clear_and_counts(before, after, stays):
-    assert gap_stays(np.array(before + [1.0] * 3), np.array(after + [1.0] * 3), 0.9) == stays
-    assert gap_stays(np.array([9.0] * 3 + before), np.array([1.0] * 3 + after), 0.9) == stays
+    assert gap_stays(np.array(before + [1.0] * 3), np.array(after + [1.0] * 3), 0.9, 1) == stays
+    assert gap_stays(np.array([9.0] * 3 + before), np.array([1.0] * 3 + after), 0.9, 1) == stays
+
+
+def test_what_several_effects_leave_may_be_what_one_fills_in_for_another():
+    before, after = np.array([40.0, 30.0, 1.0, 1.0, 1.0, np.nan]), np.array([1.0, 1.6, 1.0, 1.0, 1.0, np.nan])
+    assert [gap_stays(before, after, 0.9, effects) for effects in (0, 1, 2)] == [False, False, True]
+    assert not gap_stays(before, np.where(after > 1.5, 1.4, after), 0.9, 2)
