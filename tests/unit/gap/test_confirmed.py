@@ -69,3 +69,10 @@ def test_what_the_others_held_within_bounds_goes_without_them(monkeypatch):
     impossible = ([], Refusal("large", "its c_z would surely be beyond what is possible", True))
     found = refused({"large": 2500.0, "small": 90.0}, 1.1, monkeypatch, beyond=impossible)
     assert found.name == "large"
+
+
+def test_what_no_flight_learned_from_shows_is_no_difference_between_flights():
+    held_out = SimpleNamespace(unlearned={"vertical_descent": 0.2}, shares=lambda: {"force": 0.5})
+    judgement = SimpleNamespace(found=SimpleNamespace(hypothesis=SimpleNamespace(chosen=[None])), held_out=held_out)
+    # Nothing else is asked for: no step, no judge.
+    assert confirmed._other_numbers(judgement, None, GapSettings()) == ()
