@@ -133,10 +133,10 @@ def exchanged(
                 continue
         ranking = moved(flights, others, step)
         best = simplest(ranking, step.above_floor)
-        scored = next(each for each in ranking if each.candidate.effect.name == candidate.effect.name)
-        worse = best is not scored and (
-            scored not in unbeaten(best, ranking, step.above_floor) or _numbers(best) < _numbers(scored)
-        )
+        # What has moved is all that lies between command and rotors; this one may not.
+        scored = next((each for each in ranking if each.candidate.effect.name == candidate.effect.name), scored)
+        rivals = unbeaten(best, [*ranking, scored], step.above_floor)
+        worse = best is not scored and (scored not in rivals or _numbers(best) < _numbers(scored))
         # Beside other effects its own shape may be another one: a delay that is dropped leaves its time to a lag.
         better = best.candidate if worse else scored.candidate
         if better is not candidate:
