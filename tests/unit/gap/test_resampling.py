@@ -5,7 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.resampling import blocks_of, folds
+from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming import scoring
+from cpfls_cli.gap.naming.scoring import PlacedCandidate
 
 WINDOWS, CHANNELS, COLUMNS, BLOCKS = 60, 6, 5, 4
 
@@ -100,6 +104,18 @@ def test_a_believed_column_stays_known_in_the_block_that_alone_shows_it():
     np.testing.assert_allclose(believed[0][others], asked[0][others])
     # Without its block next to nothing is known of it, and what that says of the block is far off.
     assert asked[1][2, 0] > 10 * believed[1][2, 0]
+
+
+def test_a_block_that_alone_shows_a_candidate_is_no_evidence_against_it():
+    columns, right, block = problem(5)
+    columns[block != 2, :, 3] *= 1e-4
+    normal, base, own = folds(columns, right, block), np.array([0]), np.array([3])
+    placed = PlacedCandidate(Candidate(CATALOGUE["torque_bias"], {}), own, np.ones(6))
+    before, plain = normal.solve(base)[1], normal.solve(np.array([0, 3]))[1]
+    error = scoring._error(placed, own, base, normal, before)
+    assert plain[2, 0] > before[2, 0] == error[2, 0]
+    others = np.arange(normal.blocks) != 2
+    np.testing.assert_allclose(error[others], plain[others])
 
 
 def test_a_column_of_zeros_does_no_harm():
