@@ -1,6 +1,6 @@
 """Hostile configs, artifacts and logs against the commands that read them, and commands killed at any moment.
 
-    python -m benchmarks.fuzz --each 10000 --kills 100
+    python -m benchmarks.fuzz --each 10000 --kills 100 --processes 2
 
 A case is met well where a command does its work, or ends with one message, exit code 1 or 2, and all files as they
 were. What is accepted has to pass `cpfls check`. A process of its own runs the cases: one that turns for ever is ended
@@ -22,6 +22,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, Queue
@@ -46,16 +47,16 @@ def main() -> None:
     parser.add_argument("--each", type=int, default=10_000, help="cases of each kind")
     parser.add_argument("--kills", type=int, default=100, help="over all commands")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--processes", type=int, default=1, help="kinds of files that are tried side by side")
     parser.add_argument("--cases", nargs=3, help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if asked.cases:
         run_cases(asked.cases[0], int(asked.cases[1]), int(asked.cases[2]), asked.seed)
         return
-    rows = []
-    for kind in KINDS:
-        counts = counted(kind, asked.each, asked.seed)
-        faults = [counts[fault] for fault in FAULTS]
-        rows.append([kind, asked.each, asked.each - sum(faults), *faults])
+    with ThreadPoolExecutor(asked.processes) as side_by_side:
+        counts = side_by_side.map(lambda kind: counted(kind, asked.each, asked.seed), KINDS)
+        faults = [[of_kind[fault] for fault in FAULTS] for of_kind in counts]
+    rows = [[kind, asked.each, asked.each - sum(found), *found] for kind, found in zip(KINDS, faults, strict=True)]
     table("fuzz", ["kind", "tried", "met well", *FAULTS], rows)
     print()
     columns = ["command", "kills", "resumed", "equal bytes", "other bytes", "left behind"]

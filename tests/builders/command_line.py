@@ -4,19 +4,27 @@ import itertools
 import os
 import signal
 from contextlib import contextmanager
+from functools import cache
 
 import pytest
-from typer.testing import CliRunner
+from typer import testing
 
 from cpfls_cli.cli.app import app
 from cpfls_cli.workers import employ
 
-_RUNNER = CliRunner()
+# Every call would build all commands anew, which takes longer than most of them run.
+testing._get_command = cache(testing._get_command)
+_RUNNER = testing.CliRunner()
+
+
+def invoked(*words):
+    """Run a command; give what it printed, its exit code, and any exception."""
+    return _RUNNER.invoke(app, [str(word) for word in words])
 
 
 def run(*words):
     """Run a command; anything but an exit is a bug and is raised."""
-    result = _RUNNER.invoke(app, [str(word) for word in words])
+    result = invoked(*words)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result

@@ -14,12 +14,10 @@ import h5py
 import numpy as np
 import pyarrow
 from pyarrow import parquet
-from typer.testing import CliRunner
 
-from cpfls_cli.cli.app import app
 from tests.builders import ulogs
 from tests.builders.artifacts import seal
-from tests.builders.command_line import run
+from tests.builders.command_line import invoked, run
 from tests.builders.studies import TINY, VEHICLE, stages
 
 FAULTS = ("traceback", "hang", "wrong exit code", "file left", "accepted nonsense")
@@ -108,7 +106,7 @@ def tried(case):
     folder = case.path.parent
     before = set(folder.iterdir())
     for words in case.commands:
-        result = CliRunner().invoke(app, [str(word) for word in words])
+        result = invoked(*words)
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             last = "".join(traceback.format_exception(result.exception)[-3:])
             return "traceback", f"{words[0]}: {last}"
@@ -123,7 +121,7 @@ def tried(case):
         if any(fails or not path.name.startswith("out.") for path in written):
             return "file left", f"{words[0]}: {[path.name for path in written]}"
         for path in written:
-            checked = CliRunner().invoke(app, ["check", str(path)]) if path.suffix == ".h5" else None
+            checked = invoked("check", path) if path.suffix == ".h5" else None
             if checked is not None and checked.exit_code:
                 return "accepted nonsense", f"{words[0]}: {checked.output[-300:]}"
             path.unlink()
@@ -344,8 +342,8 @@ def _imported(path, good, section, rng):
 
 
 KINDS = {
-    "YAML": yaml_case,
     "HDF5 structure": structure_case,
+    "YAML": yaml_case,
     "HDF5 bytes": bytes_case,
     "CSV": csv_case,
     "Parquet": parquet_case,
