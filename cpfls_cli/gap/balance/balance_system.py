@@ -67,6 +67,22 @@ class System:
         return np.concatenate([self.columns(candidate) for candidate in self.free], axis=2)
 
     @cached_property
+    def noise(self) -> Array:
+        """Noise like that of `base`, and of `residual` in the last column; shape (window, 6, column + 1)."""
+        pairs = zip(self.flights, self.signals, strict=True)
+        return np.concatenate([self._noise(flight, signals) for flight, signals in pairs])
+
+    def _noise(self, flight: WeakFlight, signals: Signals) -> Array:
+        parts = []
+        for candidate in self.free:
+            if candidate.effect.missing(signals):
+                parts.append(np.zeros((len(flight), 6, self.columns(candidate).shape[2])))
+                continue
+            noise = flight.noise(columns_of(candidate, signals))
+            parts.append(noise * flight.turns if candidate.effect.kind == "parameter" else noise)
+        return np.concatenate([*parts, flight.noise(flight.inertial)[..., None]], axis=2)
+
+    @cached_property
     def rotor_wrench(self) -> Array:
         """Torque and force of the rotors, averaged over the windows; shape (window, 6)."""
         pairs = zip(self.flights, self.signals, strict=True)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear, minimize_scalar
@@ -18,6 +20,10 @@ _JOINT_EVALUATIONS = 8
 _STEP = 1e-3
 _STEPS = 6
 _SHARES = (1.0, 0.5, 0.2)
+_LEAST_SIZE = 1e-9
+_MOST_NOISE = 0.5
+"""Share of the squares of any combination of columns that is believed to be noise at most: beyond it, what is left of
+it is uncertain."""
 _SETTLED = 1e-2
 """Change of the sum of squares, in variances, below which a fit stands still: a tenth of a standard error."""
 _ON_BOUND = 1e-6
@@ -49,8 +55,95 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     return system(flights, _together(flights, best, shapes, floor, rotor_wrench) if len(shapes) > 1 else best)
 
 
+@dataclass(frozen=True)
+class Equations:
+    """Weighted rows of columns and of their right side, and noise like that in them.
+
+    Noise in a column shrinks its coefficient, and what goes with it takes the rest: noisy rates and rotor speeds made
+    Izz and the inertia of the rotors 4 % too small, both. So what noise adds is taken off the normal equations.
+
+    Attributes
+    ----------
+    columns : array, shape (row, column)
+    right : array, shape (row,)
+    noise : array, shape (row, column + 1)
+        That of the right side in the last column.
+
+    References
+    ----------
+    Fuller 1987, Measurement Error Models, section 2.2 (method of moments).
+    """
+
+    columns: Array
+    right: Array
+    noise: Array
+
+    @cached_property
+    def _apart(self) -> tuple[Array, Array, Array, Array]:
+        """Tell signal from noise: root of the squares of all rows, its inverse, shares of noise, and their axes."""
+        length = np.linalg.norm(self.columns, axis=0)
+        scale = np.where(length > 0, length, 1.0)
+        triangle = np.asarray(np.linalg.qr(self.columns / scale, mode="r"))
+        inverse = np.linalg.pinv(triangle, rcond=_LEAST_SIZE) / scale[:, None]
+        noise = self.noise[:, :-1] @ inverse
+        share, axes = np.linalg.eigh(noise.T @ noise)
+        return triangle * scale, inverse, np.maximum(share, 0.0), axes
+
+    @property
+    def trusted(self) -> float:
+        """Share of the noise that is taken off."""
+        largest = self._apart[2].max(initial=0.0)
+        return 1.0 if largest <= _MOST_NOISE else float(_MOST_NOISE / largest)
+
+    @cached_property
+    def root(self) -> tuple[Array, Array]:
+        """Columns and a right side whose least squares are those of rows without noise in their columns.
+
+        Of shape (column, column) and (column,).
+        """
+        triangle, inverse, share, axes = self._apart
+        kept = np.sqrt(1.0 - self.trusted * share)
+        right = inverse.T @ (self.columns.T @ self.right - self.trusted * (self.noise[:, :-1].T @ self.noise[:, -1]))
+        return kept[:, None] * (axes.T @ triangle), axes.T @ right / kept
+
+    def around(self, linear: Array, kept: BoolArray, moving: Array) -> Equations:
+        """Subtract what coefficients explain, keep the columns of some, and add weighted columns without noise.
+
+        Parameters
+        ----------
+        linear : array, shape (column,)
+        kept : array of bool, shape (column,)
+        moving : array, shape (..., shape)
+        """
+        added = moving.reshape(len(self.right), -1)
+        left = self.noise[:, -1] - self.noise[:, :-1] @ linear
+        noise = np.column_stack([self.noise[:, :-1][:, kept], np.zeros_like(added), left])
+        return Equations(np.column_stack([self.columns[:, kept], added]), self.right - self.columns @ linear, noise)
+
+    def solve(self) -> Array:
+        """Fit all columns, shape (column,)."""
+        columns, right = self.root
+        length = np.linalg.norm(columns, axis=0)
+        scale = 1.0 / np.where(length > 0, length, 1.0)
+        return np.asarray(np.linalg.lstsq(columns * scale, right, rcond=_LEAST_SIZE)[0] * scale)
+
+
+def equations(hypothesis: System, weight: Array) -> Equations:
+    """Weigh the rows of a hypothesis.
+
+    Parameters
+    ----------
+    hypothesis : System
+    weight : array, shape (6,) or (window, 6), N m and N
+        Standard deviation of each channel.
+    """
+    columns, noise = (rows / weight[..., None] for rows in (hypothesis.base, hypothesis.noise))
+    right = (hypothesis.residual / weight).reshape(-1)
+    return Equations(columns.reshape(len(right), -1), right, noise.reshape(len(right), -1))
+
+
 def fit(hypothesis: System, floor: Array) -> Array:
-    """Fit all free columns by weighted least squares.
+    """Fit all free columns by weighted least squares, without what noise of columns does to them.
 
     Parameters
     ----------
@@ -61,11 +154,7 @@ def fit(hypothesis: System, floor: Array) -> Array:
     -------
     array, shape (column,)
     """
-    matrix = (hypothesis.base / floor[..., None]).reshape(-1, hypothesis.base.shape[2])
-    length = np.linalg.norm(matrix, axis=0)
-    scale = 1.0 / np.where(length > 0, length, 1.0)
-    right = (hypothesis.residual / floor).reshape(-1)
-    return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale)
+    return equations(hypothesis, floor).solve()
 
 
 def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = False) -> tuple[Array, BoolArray]:
@@ -85,9 +174,9 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
     held : array of bool, shape (column,)
         Coefficients on a bound, and those that nothing shows, which are 0.
     """
-    linear = fit(hypothesis, weight)
-    matrix = (hypothesis.base / weight[..., None]).reshape(-1, len(linear))
-    length = np.linalg.norm(matrix, axis=0)
+    rows = equations(hypothesis, weight)
+    linear = rows.solve()
+    length = np.linalg.norm(rows.columns, axis=0)
     least = np.zeros(3, dtype=bool)
     change = _change(hypothesis, length > 0, least if of_vehicle else None)
     at = np.linalg.lstsq(change.matrix, linear - change.offset, rcond=None)[0]
@@ -95,12 +184,9 @@ def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = F
     within = ((at >= change.low) & (at <= change.high)).all()
     if within and not out.any() and _without_lever(hypothesis, linear) is None:
         return linear, np.zeros(len(linear), dtype=bool)
-    scale = np.where(length > 0, length, 1.0)
-    orthogonal, triangle = np.linalg.qr(matrix / scale)
-    right = orthogonal.T @ (hypothesis.residual / weight).reshape(-1)
-    triangle = triangle * scale
+    columns, right = rows.root
     while True:
-        at, linear = _bounded(triangle, right, change, out)
+        at, linear = _bounded(columns, right, change, out)
         leverless = _without_lever(hypothesis, linear)
         light = too_light(linear) & ~least if of_vehicle else least
         if leverless is None and not light.any():
@@ -119,14 +205,14 @@ def _unseen(hypothesis: System, change: Change, length: Array) -> BoolArray:
     return np.asarray(unseen & np.isfinite(most) & (length > 0))
 
 
-def _bounded(triangle: Array, right: Array, change: Change, out: BoolArray) -> tuple[Array, Array]:
+def _bounded(root: Array, right: Array, change: Change, out: BoolArray) -> tuple[Array, Array]:
     """Fit the numbers behind the coefficients within their bounds; give both."""
-    columns = triangle @ change.matrix
+    columns = root @ change.matrix
     length = np.linalg.norm(columns, axis=0)
     free = (length > 0) & ~out
     bounds = (change.low[free] * length[free], change.high[free] * length[free])
     at = np.zeros(len(out))
-    behind = right - triangle @ change.offset
+    behind = right - root @ change.offset
     at[free] = lsq_linear(columns[:, free] / length[free], behind, bounds=bounds, method="bvls").x / length[free]
     return at, np.asarray(change.offset + change.matrix @ at)
 
@@ -258,13 +344,8 @@ def _newton_step(hypothesis: System, weight: Array, rotor_wrench: Array) -> Arra
     weight = weight / compensation(rotor_wrench, hypothesis.rotor_wrench)
     linear, held = fit_within_bounds(hypothesis, weight)
     shapes = shape_columns(hypothesis, linear, rotor_wrench)
-    columns = np.concatenate([hypothesis.base[..., ~held], shapes], axis=2) / weight[..., None]
-    matrix = columns.reshape(-1, columns.shape[2])
-    length = np.linalg.norm(matrix, axis=0)
-    scale = 1.0 / np.where(length > 0, length, 1.0)
-    right = ((hypothesis.residual - hypothesis.base @ linear) / weight).reshape(-1)
-    change = np.linalg.lstsq(matrix * scale, right, rcond=1e-9)[0] * scale
-    return np.asarray(change[-shapes.shape[2] :])
+    rows = equations(hypothesis, weight).around(linear, ~held, shapes / weight[..., None])
+    return np.asarray(rows.solve()[-shapes.shape[2] :])
 
 
 def _moved(hypothesis: System, step: Array) -> System:

@@ -120,6 +120,21 @@ class WeakFlight:
         rows = self.averaged(columns_of(candidate, signals))
         return rows * self.turns if candidate.effect.kind == "parameter" else rows
 
+    def noise(self, columns: Columns) -> Array:
+        """Give noise as large as that in the rows of columns, or of a residual, and without their motion.
+
+        Only what is differentiated has noise that counts: averages smooth it.
+
+        Returns
+        -------
+        array, shape (window, 6, ...)
+            Zero unless the noise of the signals is white: what a filter took off it shows nowhere.
+        """
+        if columns.momentum is None:
+            return np.zeros((len(self), *columns.direct.shape[1:]))
+        rows = self.windows.alternating().derivative(columns.momentum)
+        return np.asarray(rows * self.known.reshape(-1, *[1] * (rows.ndim - 2)))
+
     def without_force(self) -> WeakFlight:
         """Drop the force balance."""
         known = self.known & (np.arange(6) < 3)

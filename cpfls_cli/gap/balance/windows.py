@@ -84,6 +84,11 @@ class Windows:
         """
         return -self._apply(values, self.slope)
 
+    def alternating(self) -> Windows:
+        """Turn the sign of every other sample: white noise stays as large as it was, and what is smooth vanishes."""
+        sign = 1.0 - 2.0 * (np.arange(len(self.weight)) % 2)
+        return Windows(sign * self.weight, sign * self.slope, self.hop, self.period)
+
     def _apply(self, values: Array, kernel: Array) -> Array:
         views = sliding_window_view(values, len(kernel), axis=0)[:: self.hop]
         return np.asarray(views @ kernel)

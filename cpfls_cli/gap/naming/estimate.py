@@ -12,7 +12,15 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free, system, window_noise
-from cpfls_cli.gap.balance.refine import fit, fit_within_bounds, free_shapes, refitted, shape_columns
+from cpfls_cli.gap.balance.refine import (
+    Equations,
+    equations,
+    fit,
+    fit_within_bounds,
+    free_shapes,
+    refitted,
+    shape_columns,
+)
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import CLEAR
@@ -74,11 +82,11 @@ def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array
     shapes = [candidate.shape[name] for candidate, name in free_shapes(hypothesis)]
     values = np.concatenate([linear, shapes])
     moving_shapes = shape_columns(hypothesis, linear, system(hypothesis.flights).rotor_wrench if shapes else None)
-    jacobian = np.concatenate([hypothesis.base, moving_shapes], axis=2)
-    rows = (jacobian / weight[..., None], (hypothesis.residual - hypothesis.base @ linear) / weight)
     moving = np.concatenate([~held, np.ones(len(shapes), dtype=bool)])
     left_out = np.tile(values, (len(np.unique(block)), 1))
-    left_out[:, moving] += _one_step(rows[0][..., moving], rows[1], block)
+    left_out[:, moving] += _one_step(
+        equations(hypothesis, weight).around(linear, ~held, moving_shapes / weight[..., None]), block
+    )
     by_effect, linear_by_effect, first = [], [], hypothesis.columns(hypothesis.free[0]).shape[2]
     parameters = _of(hypothesis.free[0], hypothesis, values[:first], left_out[:, :first], np.zeros(0), left_out[:, :0])
     column, shape_column = first, len(linear)
@@ -207,15 +215,17 @@ def _interval(value: Array, left_out: Array) -> Array:
     return np.asarray(stdtrit(blocks - 1, 0.975) * error)
 
 
-def _one_step(jacobian: Array, residual: Array, block: IntArray) -> Array:
+def _one_step(rows: Equations, block: IntArray) -> Array:
     """Compute the change of all numbers without each block by one Gauss-Newton step, shape (block, number)."""
-    scale = np.sqrt((jacobian**2).sum(axis=(0, 1)))
-    scaled = jacobian / np.where(scale > 0, scale, 1.0)
+    scale = np.linalg.norm(rows.columns, axis=0)
+    scaled, noise = (part / np.where(scale > 0, scale, 1.0) for part in (rows.columns, rows.noise[:, :-1]))
+    of_row = np.repeat(block, len(rows.right) // len(block))
     parts = [
-        (scaled[block == b].reshape(-1, scaled.shape[2]), residual[block == b].reshape(-1)) for b in np.unique(block)
+        (scaled[own].T, noise[own].T, rows.right[own], rows.noise[own, -1])
+        for own in (of_row == b for b in np.unique(block))
     ]
-    gram = np.array([x.T @ x for x, _ in parts])
-    moment = np.array([x.T @ r for x, r in parts])
+    gram = np.array([x @ x.T - rows.trusted * (n @ n.T) for x, n, _, _ in parts])
+    moment = np.array([x @ right - rows.trusted * (n @ own) for x, n, right, own in parts])
     ridge = 1e-9 * np.eye(gram.shape[1])
     change = -np.linalg.solve(gram.sum(axis=0) - gram + ridge, moment[..., None])[..., 0]
     return np.asarray(change / np.where(scale > 0, scale, 1.0))
