@@ -27,6 +27,9 @@ _ERRORS = 2.0
 _FILLS = 0.01
 """Share of what the largest effect takes off, in squares, below which another may fill what its formula is off by."""
 
+_BESIDE = 0.7
+"""Root mean square in floors of one channel that an effect so much smaller has to take off."""
+
 
 class Judgement(NamedTuple):
     """Effects with what they leave of the flights that they were found in and of those held out."""
@@ -98,14 +101,19 @@ class Judge:
             return None
         if raised[least] < SEEN**2:
             return Refusal(least, "on the flights held out the gap is as small without it")
+        if raised[least] >= _FILLS * max(raised.values()):
+            return None
         left = float(np.nanmax(judgement.held_out.size(judgement.held_out.after).floors))
-        if left > CLEAR and raised[least] < _FILLS * max(raised.values()):
-            return Refusal(
-                least,
-                f"{left:.2g} floors are left with it, and it takes off less than a hundredth of what the largest effect"
-                " does: what the formula of that one is off by looks no different",
-            )
-        return None
+        if left <= CLEAR and raised[least] >= _BESIDE**2:
+            return None
+        told = (
+            f"{left:.2g} floors are left with it" if left > CLEAR else f"it is {raised[least] ** 0.5:.2g} floors large"
+        )
+        return Refusal(
+            least,
+            f"{told}, and it takes off less than a hundredth of what the largest effect does: what the formula of that"
+            " one is off by looks no different",
+        )
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""

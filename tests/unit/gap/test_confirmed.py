@@ -37,6 +37,9 @@ def refused(raised, after, monkeypatch, beyond=None):
     [
         ({"large": 2500.0, "small": 9.0}, 1.1, None),
         ({"large": 2500.0, "small": 9.0}, 2.4, "small"),
+        ({"large": 2500.0, "small": 0.4}, 1.1, "small"),
+        ({"large": 2500.0, "small": 0.6}, 1.1, None),
+        ({"large": 30.0, "small": 0.4}, 1.1, None),
         ({"large": 2500.0, "small": 90.0}, 2.4, None),
         ({"large": 2500.0, "small": 0.05}, 1.1, "small"),
         ({"alone": 0.05}, 1.1, "alone"),
@@ -49,6 +52,9 @@ def refused(raised, after, monkeypatch, beyond=None):
     ids=[
         "small beside a formula that fits",
         "small beside one that is off",
+        "hardly to be seen beside a large one",
+        "to be seen beside a large one",
+        "hardly to be seen beside one that is not much larger",
         "not so small",
         "needless",
         "needless alone",
