@@ -122,10 +122,7 @@ class Equations:
 
     def solve(self) -> Array:
         """Fit all columns, shape (column,)."""
-        columns, right = self.root
-        length = np.linalg.norm(columns, axis=0)
-        scale = 1.0 / np.where(length > 0, length, 1.0)
-        return np.asarray(np.linalg.lstsq(columns * scale, right, rcond=_LEAST_SIZE)[0] * scale)
+        return _least_squares(*self.root)
 
 
 def equations(hypothesis: System, weight: Array) -> Equations:
@@ -143,7 +140,7 @@ def equations(hypothesis: System, weight: Array) -> Equations:
 
 
 def fit(hypothesis: System, floor: Array) -> Array:
-    """Fit all free columns by weighted least squares, without what noise of columns does to them.
+    """Fit all free columns by weighted least squares, which leave the least but shrink numbers whose columns are noisy.
 
     Parameters
     ----------
@@ -154,7 +151,15 @@ def fit(hypothesis: System, floor: Array) -> Array:
     -------
     array, shape (column,)
     """
-    return equations(hypothesis, floor).solve()
+    matrix = (hypothesis.base / floor[..., None]).reshape(-1, hypothesis.base.shape[2])
+    return _least_squares(matrix, (hypothesis.residual / floor).reshape(-1))
+
+
+def _least_squares(matrix: Array, right: Array) -> Array:
+    """Solve with columns brought to one length; a column of zeros gets the coefficient 0."""
+    length = np.linalg.norm(matrix, axis=0)
+    scale = 1.0 / np.where(length > 0, length, 1.0)
+    return np.asarray(np.linalg.lstsq(matrix * scale, right, rcond=_LEAST_SIZE)[0] * scale)
 
 
 def fit_within_bounds(hypothesis: System, weight: Array, *, of_vehicle: bool = False) -> tuple[Array, BoolArray]:

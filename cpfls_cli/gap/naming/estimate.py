@@ -133,7 +133,7 @@ def free_estimates(hypothesis: System, floor: Array, block: IntArray) -> Estimat
     block : array of int, shape (window,)
     """
     weight = channel_weight(hypothesis, floor)
-    linear = fit(hypothesis, weight)
+    linear = equations(hypothesis, weight).solve()
     return _estimated(hypothesis, weight, block, linear, np.zeros(len(linear), dtype=bool))
 
 
