@@ -79,16 +79,12 @@ def without_companion(refitted: System, step: SearchStep, settings: GapSettings)
             continue
         others = [other for other in before if other is not candidate]
         one = _rescored(system(refitted.flights, before), step)
-        enough, pairs = _enough(step, one), []
         for pair in _wider_pairs(refitted.flights, others, candidate, step):
             together = refined(refitted.flights, [*pair.chosen, newest], step.floor)
             # It has more numbers than the pair, so blocks that no fit saw decide.
             gained = (_unseen(pair, step.floor, settings) - _unseen(together, step.floor, settings)).sum()
-            scored = _rescored(pair, step)
-            if surely_less(scored, one) and gained < enough:
-                pairs.append((scored.gain, pair))
-        if pairs:
-            return max(pairs, key=lambda each: each[0])[1]
+            if surely_less(_rescored(pair, step), one) and gained < _enough(step, one):
+                return pair
     return refitted
 
 

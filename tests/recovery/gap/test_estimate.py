@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.balance.refine import equations, fit
 from cpfls_cli.gap.naming.earned import fitted
 from cpfls_cli.gap.naming.estimate import estimates
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
@@ -124,7 +124,7 @@ def of_vehicle(values):
 def test_what_a_vehicle_can_have_is_found_as_it_is():
     hypothesis = system([weak(fly(seed, [of_vehicle({"inertia_x": 0.3, "coupling_y": -0.2})])) for seed in (1, 2)])
     linear = estimates(hypothesis, WEIGHT, block_index(hypothesis, SETTINGS)).linear
-    np.testing.assert_array_equal(linear, fit(hypothesis, WEIGHT))
+    np.testing.assert_array_equal(linear, equations(hypothesis, WEIGHT).solve())
     np.testing.assert_allclose(linear[[0, 4]], [0.3, -0.2], atol=1e-3)
 
 
