@@ -38,6 +38,7 @@ from tests.builders.studies import TINY, VEHICLE, stages
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
 PATIENCE_S = 60.0
+PREPARING_S = 600.0
 LONGER = ("--set", "identification.population=40", "--set", "identification.generations=6")
 VEHICLE_STUDY = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "leave_out": left_out(TRIED)}
 
@@ -87,13 +88,14 @@ def told(kind: str, first: int, cases: int, seed: int) -> Iterator[tuple[int, st
             lines.put(None)
 
         Thread(target=read, daemon=True).start()
-        number, fault = first - 1, ""
+        number, fault, patience = first - 1, "", PREPARING_S
         while number + 1 < cases:
             try:
-                line = lines.get(timeout=PATIENCE_S)
+                line = lines.get(timeout=patience)
             except Empty:
                 fault = "hang"
                 break
+            patience = PATIENCE_S
             if line is None:
                 fault = "traceback"
                 break
@@ -107,6 +109,7 @@ def told(kind: str, first: int, cases: int, seed: int) -> Iterator[tuple[int, st
 def run_cases(kind: str, first: int, cases: int, seed: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         good = Good.made(Path(folder))
+        print(json.dumps([first - 1, "", ""]), flush=True)
         for number in range(first, cases):
             fault, what = tried(good.case(kind, [seed, number])) or ("", "")
             print(json.dumps([number, fault, what]), flush=True)
