@@ -46,6 +46,7 @@ VEHICLE_STUDY = {"search_windows": 20, "folds": 2, "generations": 0, "population
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--each", type=int, default=10_000, help="cases of each kind")
+    parser.add_argument("--kinds", default=",".join(KINDS), help="of files")
     parser.add_argument("--kills", type=int, default=100, help="over all commands")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=1, help="kinds of files that are tried side by side")
@@ -54,14 +55,15 @@ def main() -> None:
     if asked.cases:
         run_cases(asked.cases[0], int(asked.cases[1]), int(asked.cases[2]), asked.seed)
         return
+    kinds = asked.kinds.split(",")
     with ThreadPoolExecutor(asked.processes) as side_by_side:
-        counts = side_by_side.map(lambda kind: counted(kind, asked.each, asked.seed), KINDS)
+        counts = side_by_side.map(lambda kind: counted(kind, asked.each, asked.seed), kinds)
         faults = [[of_kind[fault] for fault in FAULTS] for of_kind in counts]
-    rows = [[kind, asked.each, asked.each - sum(found), *found] for kind, found in zip(KINDS, faults, strict=True)]
+    rows = [[kind, asked.each, asked.each - sum(found), *found] for kind, found in zip(kinds, faults, strict=True)]
     table("fuzz", ["kind", "tried", "met well", *FAULTS], rows)
     print()
     columns = ["command", "kills", "resumed", "equal bytes", "other bytes", "left behind"]
-    table("kills", columns, killed(asked.kills, random.Random(asked.seed)))
+    table("kills", columns, killed(asked.kills, random.Random(asked.seed)) if asked.kills else [])
 
 
 def counted(kind: str, cases: int, seed: int) -> Counter[str]:

@@ -116,7 +116,7 @@ def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.rand
         rows.append(direct if remainder.momentum is None else direct + dense.derivative(remainder.momentum))
         rates.append(dense.average(flight.signals.body_rate))
     hop = max(1, len(hypothesis.flights[0].windows.weight) // _PER_WINDOW) * hypothesis.flights[0].windows.period
-    return narrow_band(rows, rates, hop, settings.shifts, rng)
+    return narrow_band(rows, rates, hop, settings.shifts, rng, settings.significance)
 
 
 def _unexplained(

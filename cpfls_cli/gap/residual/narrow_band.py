@@ -56,7 +56,12 @@ class NarrowBand:
 
 
 def narrow_band(
-    residual: Sequence[Array], body_rate: Sequence[Array], hop_s: float, draws: int, rng: np.random.Generator
+    residual: Sequence[Array],
+    body_rate: Sequence[Array],
+    hop_s: float,
+    draws: int,
+    rng: np.random.Generator,
+    significance: float = 1.0,
 ) -> NarrowBand | None:
     """Search for one narrow band that stands out of the smooth spectrum of the residual.
 
@@ -74,13 +79,19 @@ def narrow_band(
     hop_s : float
         From one window to the next, s.
     draws : int
-        Of noise.
+        Of noise, at most.
     rng : numpy.random.Generator
+    significance : float
+        Largest p that anybody asks for: no noise is drawn once p has to be larger.
 
     Returns
     -------
     NarrowBand or None
         None where no flight has 64 rows, or all rows are 0.
+
+    References
+    ----------
+    Besag and Clifford 1991, sequential Monte Carlo p-values.
     """
     kept = [number for number, rows in enumerate(residual) if len(rows) >= _FEWEST_ROWS and rows.any()]
     if not kept:
@@ -94,14 +105,18 @@ def narrow_band(
     smooth = background(power, on)
     prominence = _prominence(power, on)
     strongest, peak = (int(i) for i in np.unravel_index(prominence.argmax(), prominence.shape))
-    noise = [_prominence(noise_like(smooth, lengths, present[:, channels], on, rng), on).max() for _ in range(draws)]
+    drawn = reached = 0
+    while drawn < draws and 1 + reached <= significance * (1 + draws):
+        noise = noise_like(smooth, lengths, present[:, channels], on, rng)
+        reached += int(_prominence(noise, on).max() >= prominence.max())
+        drawn += 1
     channel, frequency = int(channels[strongest]), _between_bins(power[strongest], peak, on)
     mean, error = _mean_power(channel, frequency, hop_s, flights, rates)
     return NarrowBand(
         channel=CHANNELS[channel],
         frequency_hz=frequency,
         share=_share(power[strongest], smooth[strongest], peak, on),
-        p_value=float((1 + (np.array(noise) >= prominence.max()).sum()) / (1 + draws)),
+        p_value=(1 + reached) / (1 + drawn),
         energy=_energy(mean, error),
         power=mean,
         power_error=error,

@@ -52,3 +52,20 @@ def test_a_force_has_no_energy_of_rotation():
     residual[:, 5] = np.sin(2 * np.pi * 0.7 * 0.2 * np.arange(300)) + 0.3 * rng.standard_normal(300)
     band = narrow_band([residual, np.zeros((300, 6))], [rng.standard_normal((300, 3))] * 2, 0.2, 19, rng)
     assert (band.channel, band.energy, band.p_value) == ("force z", "neither", 0.05)
+
+
+@pytest.mark.parametrize(("amplitude", "all_drawn"), [(0.0, False), (3.0, True)])
+def test_no_noise_is_drawn_for_what_is_not_significant_any_more(amplitude, all_drawn, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(
+        "cpfls_cli.gap.residual.narrow_band.noise_like", lambda *given: drawn.append(None) or noise_like(*given)
+    )
+    residual = [
+        np.column_stack([own[0], *np.zeros((5, own.shape[1]))]) for own in red(np.random.default_rng(4), amplitude)
+    ]
+    rates = [np.zeros((len(own), 3)) for own in residual]
+    whole = narrow_band(residual, rates, 0.2, 99, np.random.default_rng(5))
+    assert len(drawn) == 99
+    early = narrow_band(residual, rates, 0.2, 99, np.random.default_rng(5), significance=0.05)
+    assert (len(drawn) == 198) is all_drawn
+    assert (early.p_value <= 0.05) is (whole.p_value <= 0.05) is all_drawn
