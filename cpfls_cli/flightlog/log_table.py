@@ -24,6 +24,8 @@ _STEPS_S = (2e-4, 0.5)
 _SEVERAL = 3.0
 _SLOWEST_HZ = 0.5
 _FEWEST_SAMPLES = 20
+_LARGEST_SPAN = 100
+"""Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses."""
 _GRID_HZ = 100.0
 
 
@@ -185,6 +187,12 @@ def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -
     begin, end = min(float(clock[0]) for clock in clocks), max(float(clock[-1]) for clock in clocks)
     if end - begin < 2.0:
         raise InputError(f"holds only {end - begin:.2g} s; a flight to learn from has ten or more")
+    rows = max(map(len, clocks))
+    if (end - begin) * rate > _LARGEST_SPAN * rows:
+        raise InputError(
+            f"its stamps span {end - begin:.3g} s, and {rows} rows at {rate:.3g} Hz are {rows / rate:.3g} s: damaged,"
+            " or no clock; cut out the part that flies"
+        )
     log.grid = np.arange(begin, end, 1 / rate)
 
 

@@ -36,7 +36,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
             kept = schema.names if wanted is None else [name for name in schema.names if name in wanted]
             _require_single(path, kept)
             table = file.read(columns=kept)
-    except (OSError, pyarrow.ArrowException) as error:
+    # A column's name may be no text.
+    except (OSError, pyarrow.ArrowException, UnicodeDecodeError) as error:
         raise InputError(
             f"{path}: cannot be read as Parquet: {shorten(str(error).splitlines()[0], _LONGEST, placeholder=' ...')}"
         ) from None

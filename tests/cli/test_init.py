@@ -286,3 +286,14 @@ def test_bad_logs_are_refused_with_one_message(refuse, tmp_path, own):
     assert line.startswith(f"{text}: not a log")
     (line,) = refuse("init", cut, "-o", output)
     assert line.startswith(f"{cut}: a broken ULog file")
+
+
+def test_a_stamp_a_year_off_takes_no_memory_and_is_told(refuse, tmp_path, own):
+    """One bit of a log is enough."""
+    log = flat_log(own)
+    columns = log.topics[""]
+    clock = next(iter(columns))
+    columns[clock] = np.append(columns[clock][:-1], columns[clock][-1] + 3e7)
+    path = write_csv(tmp_path / "log.csv", log)
+    (line,) = refuse("init", path, "-o", tmp_path / "study.yaml")
+    assert line.startswith(f"{path}: its stamps span 3e+07 s, and 2000 rows at 100 Hz are 20 s: damaged, or no clock")

@@ -140,6 +140,13 @@ def test_what_is_no_parquet(wrong, tmp_path, content):
     assert line.startswith("LOG: cannot be read as Parquet: ")
 
 
+def test_a_column_whose_name_is_no_text(wrong, write):
+    log = write({"t": TIME} | COLUMNS)
+    log.write_bytes(log.read_bytes().replace(b"roll", b"\xf9oll"))
+    (line,) = wrong(log)
+    assert line.startswith("LOG: cannot be read as Parquet: 'utf-8' codec can't decode byte 0xf9")
+
+
 def test_columns_of_nulls_are_named(wrong, write):
     nulls = pyarrow.array([None] * len(TIME), pyarrow.float64())
     one = pyarrow.array([1.0, *[None] * (len(TIME) - 1)], pyarrow.float64())
