@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -101,6 +101,20 @@ class Signals:
             "force": self.has_force,
         }
         return frozenset(name for name, known in signals.items() if known)
+
+    def to_log(self, missing: Iterable[str]) -> tuple[str, ...]:
+        """Name what a log has to hold for signals that are not available; world axes take the attitude, too.
+
+        Parameters
+        ----------
+        missing : iterable of str
+            Names that `available` lacks.
+        """
+        in_world = {"velocity": self.velocity, "height": self.position}
+        wanted = {name for name in missing if name not in in_world or in_world[name] is None}
+        if self.attitude is None and in_world.keys() & set(missing):
+            wanted.add("attitude")
+        return tuple(sorted(wanted))
 
     @property
     def has_force(self) -> bool:

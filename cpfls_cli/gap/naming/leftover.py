@@ -195,7 +195,8 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
         for name in (name for name in CATALOGUE[effect.name].rivals if name not in settings.ignore):
             missing = [CATALOGUE[name].missing(signals) for signals in hypothesis.signals]
             if all(missing) and not {"command", "measured_rotor_speed"} & set(missing[0]):
-                lacking = " and ".join(signal.replace("_", " ") for signal in missing[0])
+                wanted = hypothesis.signals[0].to_log(missing[0])
+                lacking = " and ".join(signal.replace("_", " ") for signal in wanted)
                 rivals.append(Alternative(name, effect.name, np.nan, f"log {lacking}, without which it was not tried"))
     return tuple(rivals)
 
@@ -205,7 +206,8 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
     if all(missing):
         if "command" in missing[0]:
             return "rotor speeds are measured, so what lies between command and speed does not show"
-        return f"the flights lack {', '.join(name.replace('_', ' ') for name in missing[0])}"
+        wanted = hypothesis.signals[0].to_log(missing[0])
+        return f"the flights lack {', '.join(name.replace('_', ' ') for name in wanted)}"
     if effect.columns is None:
         return ""
     shape = {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}

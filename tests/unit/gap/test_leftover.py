@@ -40,6 +40,16 @@ def test_a_signal_of_one_flight_is_enough():
     assert "rotor_drag" not in reasons([blind, fly(1, speed=5.0)])
 
 
+def test_what_to_log_is_what_the_log_lacks():
+    """Velocity and height along world axes say nothing without the attitude."""
+    whole = fly(2)
+    turned = replace(whole, attitude=None)
+    assert reasons([turned])["rotor_drag"] == "the flights lack attitude"
+    assert reasons([turned])["ground_effect"] == "the flights lack attitude"
+    assert reasons([replace(turned, velocity=None)])["rotor_drag"] == "the flights lack attitude, velocity"
+    assert reasons([replace(whole, position=None)])["ground_effect"] == "the flights lack height"
+
+
 def test_hover_shows_a_bias_but_not_the_motion_that_is_missing():
     still = fly(1, tilt=1e-4, yaw=1e-4, speed=1e-3)
     found = reasons([still])
