@@ -146,7 +146,8 @@ def test_a_rival_that_could_not_be_tried_is_told_with_the_signal_that_is_missing
     words = ("gap", gap_config, *shifted, "-o", tmp_path / "x", "--set", "gap.ignore=[]", "--json")
     summary = json.loads(cpfls(*words).stdout)
     assert summary["headline"] == "These flights cannot tell offset of the centre of mass from steady wind."
-    assert summary["next"][0].startswith("To tell steady wind from offset of the centre of mass: log attitude and velocity")
+    asked = "To tell steady wind from offset of the centre of mass: log attitude and velocity"
+    assert summary["next"][0].startswith(asked)
 
 
 def test_nothing_hidden_nothing_named(none):
