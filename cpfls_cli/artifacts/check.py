@@ -65,7 +65,7 @@ def check_structure(artifact: Checkable) -> list[str]:
 
 def check_values(artifact: Checkable) -> list[str]:
     """Find values that the format does not allow, some rows at a time: datasets may still lie in their file."""
-    return [finding for rule in (_finite, _time_ascends) for finding in rule(artifact)]
+    return [finding for rule in (_finite, _time_ascends, _within) for finding in rule(artifact)]
 
 
 def _dimensions(artifact: Checkable) -> Iterator[str]:
@@ -121,6 +121,24 @@ def _time_ascends(artifact: Checkable) -> Iterator[str]:
             yield f"time: does not ascend at index {start + int(np.argmax(falling))}"
             return
         last = float(block[-1])
+
+
+def _within(artifact: Checkable) -> Iterator[str]:
+    """Find indices that lead to nothing, and numbers below what is possible."""
+    present = list(_present(artifact))
+    lengths = {label: n for spec, held in present for label, n in zip(spec.dimensions, held.shape, strict=False)}
+    for spec, values in present:
+        low, most = (0, lengths[spec.into] - 1) if spec.into in lengths else (spec.least, np.inf)
+        if low == -np.inf or values.dtype.kind not in "iuf":
+            continue
+        what = f"is not an index into the {most + 1} of '{spec.into}'" if spec.into else f"is below {low:g}"
+        for start, block in _blocks(values):
+            wrong = (block < low) | (block > most)
+            if wrong.any():
+                row = int(np.nonzero(wrong)[0][0])
+                where = f" at index {start + row}" if values.ndim else ""
+                yield f"{spec.path}: {block[wrong][0]}{where} {what}"
+                break
 
 
 def _blocks(values: Any) -> Iterator[tuple[int, np.ndarray]]:

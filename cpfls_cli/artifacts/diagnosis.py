@@ -114,7 +114,7 @@ class ResidualChangeGroup:
     """Gap of each held-out window, before and after."""
 
     time: Array = dataset("time", "middle of each held-out window, on the clock of its flight", "window", units="s")
-    flight: IntArray = dataset("flight", "index of its flight", "window")
+    flight: IntArray = dataset("flight", "index of its flight", "window", into="flight")
     before: Array = dataset(
         "before", "gap of the model as given, N m and N", "window", "channel", units="SI", frame=BODY, gaps=True
     )

@@ -76,7 +76,7 @@ class ResidualGroup:
     """Gap of each window."""
 
     time: Array = dataset("time", "middle of each window, on the clock of its flight", "window", units="s")
-    flight: IntArray = dataset("flight", "index of its flight", "window")
+    flight: IntArray = dataset("flight", "index of its flight", "window", into="flight")
     value: Array = dataset(
         "value", "what inertia and rotors leave, N m and N", "window", "channel", units="SI", frame=BODY, gaps=True
     )

@@ -73,7 +73,7 @@ class SolveGroup:
         "singular_values", "of the regressor of the parameters in use, without penalty", "value", units="SI"
     )
     rank: int = dataset("rank", "numerical rank")
-    condition_number: float = dataset("condition_number", "over the kept singular values")
+    condition_number: float = dataset("condition_number", "over the kept singular values", least=1.0)
     parameters: int = dataset("parameters", "number of linear parameters in use")
 
 
@@ -99,7 +99,7 @@ class FrontGroup:
         "3",
         units="SI",
     )
-    chosen: int = dataset("chosen", "index of the chosen member")
+    chosen: int = dataset("chosen", "index of the chosen member", into="member")
     held_out: Array | None = dataset(
         "held_out",
         "mean squared error on the flights kept for the choice; objective 1 of them",

@@ -267,7 +267,7 @@ class PlayedFlightsGroup:
 class WindowGroup:
     """Free runs, one for each sample from which the model was played back."""
 
-    flight: IntArray = dataset("flight", "index of the flight", "window")
+    flight: IntArray = dataset("flight", "index of the flight", "window", into="flight")
     start: Array = dataset("start", "begin, on the clock of the flight", "window", units="s")
     error: Array = dataset(
         "error",
@@ -307,7 +307,7 @@ class WindowGroup:
 class WorstGroup:
     """Runs of the model beside the flight in the windows in which it is farthest off."""
 
-    window: IntArray = dataset("window", "index of the window, the worst first", "worst")
+    window: IntArray = dataset("window", "index of the window, the worst first", "worst", into="window")
     measured: Array = dataset(
         "measured", "body rate of the flight", "worst", "sample", "axis", units="rad/s", frame=BODY
     )
@@ -337,7 +337,7 @@ class WorstGroup:
 class DrawnGroup:
     """Runs of the model one after another beside a stretch of a flight."""
 
-    window: IntArray = dataset("window", "index of the window", "run")
+    window: IntArray = dataset("window", "index of the window", "run", into="window")
     measured: Array = dataset("measured", "body rate of the flight", "run", "sample", "axis", units="rad/s", frame=BODY)
     model: Array = dataset("model", "body rate of the model", "run", "sample", "axis", units="rad/s", frame=BODY)
     measured_position: Array | None = dataset(

@@ -56,6 +56,10 @@ class DatasetSpec:
         Whether every artifact of the format holds it.
     gaps : bool
         Whether values may be not finite, and mean "not known" there.
+    into : str
+        Label of the axis that its values are indices into; empty where they are none.
+    least : float
+        What no value is below.
     """
 
     path: str
@@ -65,6 +69,8 @@ class DatasetSpec:
     description: str
     required: bool = True
     gaps: bool = False
+    into: str = ""
+    least: float = -np.inf
 
     @property
     def by_sample(self) -> bool:
@@ -129,6 +135,8 @@ def dataset(
     units: str = "1",
     frame: str = NO_FRAME,
     gaps: bool = False,
+    into: str = "",
+    least: float = -np.inf,
     default: Any = MISSING,
 ) -> Any:
     """Make a field of a record a dataset; with ``default=None`` an artifact may lack it.
@@ -147,8 +155,12 @@ def dataset(
         Frame of reference of its components.
     gaps : bool
         Whether values may be not finite, and mean "not known" there.
+    into : str
+        Label of the axis that its values are indices into.
+    least : float
+        What no value is below.
     """
-    spec = DatasetSpec(path, dimensions, units, frame, description, default is MISSING, gaps)
+    spec = DatasetSpec(path, dimensions, units, frame, description, default is MISSING, gaps, into, least)
     return field(default=default, metadata={_PATH: spec})
 
 

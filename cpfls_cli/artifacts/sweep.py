@@ -58,7 +58,10 @@ class RunGroup:
     """One row for each run."""
 
     setting: IntArray = dataset(
-        "setting", "index of the setting; every setting with the first seed, then the next seed", "run"
+        "setting",
+        "index of the setting; every setting with the first seed, then the next seed",
+        "run",
+        into="setting",
     )
     seed: IntArray = dataset("seed", "`cpfls identify --seed` with it finds the same model", "run")
     generations: IntArray = dataset("generations", "generations bred", "run")

@@ -31,6 +31,8 @@ def artifacts(draw):
     lengths |= {
         label: 2 + lengths[label] for dataset in spec.datasets if dataset.path == "time" for label in dataset.dimensions
     }
+    # An index needs something to lead to.
+    lengths |= {dataset.into: 1 + lengths[dataset.into] for dataset in spec.datasets if dataset.into in lengths}
     whole = {}
     for dataset in spec.datasets:
         shape = tuple(int(label) if label.isdigit() else lengths[label] for label in dataset.dimensions)
@@ -43,6 +45,9 @@ def artifacts(draw):
             whole[dataset.path] = np.cumsum(rng.uniform(0.1, 1.0, shape))
         else:
             whole[dataset.path] = rng.normal(size=shape)
+            if dataset.into in lengths:
+                whole[dataset.path] = rng.integers(0, lengths[dataset.into], shape)
+            whole[dataset.path] = np.maximum(whole[dataset.path], dataset.least)
             if dataset.gaps and whole[dataset.path].size:
                 whole[dataset.path] = np.where(rng.random(shape) < 0.5, np.nan, whole[dataset.path])
     optional = [dataset.path for dataset in spec.datasets if not dataset.required]

@@ -60,6 +60,20 @@ def test_lengths_in_digits_are_fixed():
     ]
 
 
+@pytest.mark.parametrize("chosen", [3, -1, 10**6])
+def test_an_index_has_to_lead_somewhere(chosen):
+    given = {"front__objectives": np.ones((3, 3)), "front__chosen": np.array(chosen)}
+    expected = f"front/chosen: {chosen} is not an index into the 3 of 'member'"
+    assert findings(ModelRecord.spec(), **given) == [expected]
+    assert findings(ModelRecord.spec(), **(given | {"front__chosen": np.array(2)})) == []
+
+
+def test_a_condition_number_is_one_at_least():
+    assert findings(ModelRecord.spec(), solve__condition_number=np.array(0.0)) == [
+        "solve/condition_number: 0.0 is below 1"
+    ]
+
+
 def test_empty_datasets_are_not_an_error_of_the_rules_but_time_has_two_samples():
     assert findings(attitude=np.zeros((0, 3))) == []
     assert findings(time=np.zeros(1)) == ["time: holds 1 samples, and two are the least"]
