@@ -66,6 +66,8 @@ class Shape:
     meaning : str
     first : float or None
         Where a search stays until the effect is chosen; None: it tries the whole grid.
+    valley : float or None
+        Where the residual has many valleys over it: their width, as a share of the value.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Shape:
     grid: tuple[float, ...]
     meaning: str
     first: float | None = None
+    valley: float | None = None
 
     def bounds(self, _vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the shape, on any vehicle.

@@ -19,6 +19,7 @@ _SMOOTHING_S = 0.1
 _LARGEST_START = 0.5
 _LARGEST_ACROSS = 0.97
 _SWINGS_KEPT = 16
+_PERIODS = 2.0
 
 _Vector = Sequence[float]
 _State = tuple[float, float, float, float, float, float]
@@ -86,7 +87,8 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
     """Add the free swing at the start, estimated from the force balance, to the driven swing.
 
     The horizontal pull on the vehicle is ``m_p g`` times the whole swing. Where forces are known, least squares find
-    ``m_p`` and the two free swings of each direction; else the cable starts at rest.
+    ``m_p`` and the two free swings of each direction, over two periods: later ones hold what has drifted apart since,
+    and their start would be no start. Else the cable starts at rest.
 
     Parameters
     ----------
@@ -107,14 +109,17 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
     mass = signals.vehicle.mass_kg
     pull = mass * signals.acceleration[:, :2] - signals.thrust[:, None] * signals.rotation[:, :2, 2]
     free = _free_swing(signals, length, damping)
-    nothing = np.zeros_like(free)
+    period = 2 * np.pi * np.sqrt(length / signals.vehicle.gravity_m_s2)
+    early = slice(round(_PERIODS * period / signals.period))
+    own = free[early]
+    nothing = np.zeros_like(own)
     columns = np.concatenate(
         [
-            np.column_stack([driven[:, 0], free, nothing, np.ones(len(free)), nothing[:, 0]]),
-            np.column_stack([driven[:, 1], nothing, free, nothing[:, 0], np.ones(len(free))]),
+            np.column_stack([driven[early, 0], own, nothing, np.ones(len(own)), nothing[:, 0]]),
+            np.column_stack([driven[early, 1], nothing, own, nothing[:, 0], np.ones(len(own))]),
         ]
     )
-    solution = np.linalg.lstsq(columns, pull.T.reshape(-1), rcond=None)[0]
+    solution = np.linalg.lstsq(columns, pull[early].T.reshape(-1), rcond=None)[0]
     start = solution[1:5] / solution[0] if solution[0] > 0 else np.zeros(4)
     if np.abs(start).max() > _LARGEST_START:
         return driven
@@ -303,7 +308,14 @@ EFFECT = Effect(
     source="equation of the driven pendulum",
     columns=_columns,
     shapes=(
-        Shape("length_m", "m", (0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.55, 1.9, 2.4, 3.1, 4.0), "length of the cable"),
+        Shape(
+            "length_m",
+            "m",
+            (0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.55, 1.9, 2.4, 3.1, 4.0),
+            "length of the cable",
+            # A light damping lets it swing all flight long, and a few per cent make it one swing late.
+            valley=0.02,
+        ),
         Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing", first=0.2),
         Shape("depth_m", "m", (0.0, 0.1, 0.3), "depth of the hook below the centre of mass", first=0.0),
     ),

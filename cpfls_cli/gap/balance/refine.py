@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear, minimize_scalar
@@ -46,6 +47,9 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     """
     best = list(_exact(system(flights, chosen), floor).chosen)
     rotor_wrench = system(flights).rotor_wrench
+    for shape in best[-1].effect.shapes:
+        if shape.valley is not None:
+            best[-1] = _in_deepest_valley(flights, best, shape, floor)
     shapes = [(index, shape) for index, candidate in enumerate(best) for shape in candidate.effect.shapes]
     # What took the place of a linear effect stands between no points of a grid.
     newest = [(index, shape) for index, shape in shapes if best[index].effect is chosen[-1].effect]
@@ -382,11 +386,38 @@ def _improved(
         hypothesis = system(flights, [*chosen[:index], moved(value), *chosen[index + 1 :]])
         return float((weighted_residual(hypothesis, floor, rotor_wrench) ** 2).sum())
 
-    bracket = _bracket(shape.grid, candidate.shape[shape.name])
+    bracket = _bracket(_steps(shape, candidate.shape[shape.name]), candidate.shape[shape.name])
     optimum = minimize_scalar(
         error, bounds=bracket, method="bounded", options={"maxiter": _EVALUATIONS, "xatol": 1e-3 * np.ptp(bracket)}
     )
     return moved(optimum.x)
+
+
+def _in_deepest_valley(
+    flights: Sequence[WeakFlight], chosen: Sequence[Candidate], shape: Shape, floor: Array
+) -> Candidate:
+    """Try one shape of the newest effect in steps of its valleys, with all that the grids of its others hold."""
+    newest = chosen[-1]
+    low, high = _bracket(shape.grid, newest.shape[shape.name])
+    values = [value for value in _steps(shape, newest.shape[shape.name]) if low <= value <= high]
+    grids = [values if each is shape else each.grid for each in newest.effect.shapes]
+    names = [each.name for each in newest.effect.shapes]
+
+    def error(tried: Candidate) -> float:
+        hypothesis = system(flights, [*chosen[:-1], tried])
+        left = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+        return float(((left / floor) ** 2).sum())
+
+    tried = (Candidate(newest.effect, dict(zip(names, values, strict=True))) for values in product(*grids))
+    return min(tried, key=error)
+
+
+def _steps(shape: Shape, value: float) -> list[float]:
+    """Divide the range of a shape by its grid, or by its valleys from a value on."""
+    if shape.valley is None:
+        return list(shape.grid)
+    down, up = (int(np.log(ratio) / shape.valley) for ratio in (value / shape.grid[0], shape.grid[-1] / value))
+    return [float(value * np.exp(step * shape.valley)) for step in range(-down, up + 1)]
 
 
 def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
