@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted, on_bound
@@ -101,19 +101,7 @@ class Judge:
             return None
         if raised[least] < SEEN**2:
             return Refusal(least, "on the flights held out the gap is as small without it")
-        if raised[least] >= _FILLS * max(raised.values()):
-            return None
-        left = float(np.nanmax(judgement.held_out.size(judgement.held_out.after).floors))
-        if left <= CLEAR and raised[least] >= _BESIDE**2:
-            return None
-        told = (
-            f"{left:.2g} floors are left with it" if left > CLEAR else f"it is {raised[least] ** 0.5:.2g} floors large"
-        )
-        return Refusal(
-            least,
-            f"{told}, and it takes off less than a hundredth of what the largest effect does: what the formula of that"
-            " one is off by looks no different",
-        )
+        return _elsewhere(judgement, compared) or _filling(judgement, compared)
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
@@ -147,9 +135,19 @@ class Without(NamedTuple):
     left: Array
 
     @property
+    def seen(self) -> Array:
+        """By how much the gap of each channel is larger without it; what is below the floor without it is noise."""
+        return np.where(self.left > 1.0, self.raised, 0.0)
+
+    @property
     def visibly(self) -> float:
-        """By how much the gap is larger without it, squared floors; what is below the floor without it is noise."""
-        return float(np.where(self.left > 1.0, self.raised, 0.0).max())
+        """By how much the gap is larger without it, squared floors."""
+        return float(self.seen.max())
+
+    @property
+    def channel(self) -> int:
+        """Channel in which it shows most."""
+        return int(np.argmax(self.seen))
 
     def worse(self, unseen: HeldOut) -> Array:
         """Mark the channels that the effect makes visibly and surely worse."""
@@ -170,6 +168,49 @@ class Without(NamedTuple):
             f"on the flights held out it makes the {CHANNELS[channel]} worse, {self.left[channel]:.2g} floors without "
             f"it and {after[channel]:.2g} with it"
         )
+
+
+def _elsewhere(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:
+    """Find an effect that is not known to end where it should, beside one that takes off more where it shows.
+
+    Its free coefficients follow any curve, that of a larger effect whose formula is off too, and only its shape says
+    that it acts where no other does.
+    """
+    for candidate, numbers in zip(judgement.found.hypothesis.chosen, judgement.found.estimates.effects, strict=True):
+        ends = {shape.name: shape.grid[-1] for shape in candidate.effect.shapes}
+        reaching = [number.name for number in numbers if number.name in ends and number.high >= ends[number.name]]
+        if len(ends) != 1 or not reaching or not is_free(candidate):
+            continue
+        channel = compared[candidate.effect.name].channel
+        largest = max(compared, key=lambda each: compared[each].seen[channel])
+        if largest != candidate.effect.name:
+            return Refusal(
+                candidate.effect.name,
+                f"its {reaching[0]} may be at the bound of what is possible, and what the formula of {largest} is"
+                f" off by in the {CHANNELS[channel]} would then look no different",
+            )
+    return None
+
+
+def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:
+    """Find an effect that may fill what the formula of one a hundred times as large, in squares, is off by.
+
+    Where the large one acts; elsewhere what it is off by is of second order, and a hundred times as small again.
+    """
+    floors = judgement.held_out.size(judgement.held_out.after).floors
+    beyond = _FILLS * max((one.visibly for one in compared.values()), default=0.0)
+    for name in sorted(compared, key=lambda each: compared[each].visibly):
+        channel, off = compared[name].channel, compared[name].visibly
+        left = float(floors[channel])
+        beside = max(beyond, *(one.seen[channel] for one in compared.values()))
+        if off < _FILLS * beside and (left > CLEAR or off < _BESIDE**2):
+            told = f"{left:.2g} floors are left with it" if left > CLEAR else f"it is {off**0.5:.2g} floors large"
+            return Refusal(
+                name,
+                f"in the {CHANNELS[channel]} {told}, and it takes off less than a hundredth of what the largest effect"
+                " does: what the formula of that one is off by looks no different",
+            )
+    return None
 
 
 def differences(
