@@ -65,7 +65,7 @@ def check_structure(artifact: Checkable) -> list[str]:
 
 def check_values(artifact: Checkable) -> list[str]:
     """Find values that the format does not allow, some rows at a time: datasets may still lie in their file."""
-    return [finding for rule in (_finite, _time_ascends, _within) for finding in rule(artifact)]
+    return [finding for rule in (_finite, _time_ascends, _within, _holds) for finding in rule(artifact)]
 
 
 def _dimensions(artifact: Checkable) -> Iterator[str]:
@@ -139,6 +139,12 @@ def _within(artifact: Checkable) -> Iterator[str]:
                 where = f" at index {start + row}" if values.ndim else ""
                 yield f"{spec.path}: {block[wrong][0]}{where} {what}"
                 break
+
+
+def _holds(artifact: Checkable) -> Iterator[str]:
+    for spec, values in _present(artifact):
+        if spec.holds and spec.holds not in np.asarray(values[()]).astype(str):
+            yield f"{spec.path}: lacks {spec.holds}"
 
 
 def _blocks(values: Any) -> Iterator[tuple[int, np.ndarray]]:

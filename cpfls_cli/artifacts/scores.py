@@ -34,7 +34,7 @@ class JudgedGroup:
     """Scores of the model and its baselines, by part of the data and axis."""
 
     models: tuple[str, ...] = dataset("models", "the model and its baselines", "judged_model")
-    parts: tuple[str, ...] = dataset("parts", "training, held-out rest, other flights", "part")
+    parts: tuple[str, ...] = dataset("parts", "training, held-out rest, other flights", "part", holds=TRAINING)
     samples: IntArray = dataset("samples", "samples judged", "part")
     outside: IntArray = dataset("outside", "of them outside the attitudes that training visited", "part")
     mse: Array = dataset("mse", "mean squared torque error", *_JUDGED, units="(N m)^2", frame=EULER)

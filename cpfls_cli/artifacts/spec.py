@@ -60,6 +60,8 @@ class DatasetSpec:
         Label of the axis that its values are indices into; empty where they are none.
     least : float
         What no value is below.
+    holds : str
+        A text that is among its texts.
     """
 
     path: str
@@ -71,6 +73,7 @@ class DatasetSpec:
     gaps: bool = False
     into: str = ""
     least: float = -np.inf
+    holds: str = ""
 
     @property
     def by_sample(self) -> bool:
@@ -137,6 +140,7 @@ def dataset(
     gaps: bool = False,
     into: str = "",
     least: float = -np.inf,
+    holds: str = "",
     default: Any = MISSING,
 ) -> Any:
     """Make a field of a record a dataset; with ``default=None`` an artifact may lack it.
@@ -159,8 +163,10 @@ def dataset(
         Label of the axis that its values are indices into.
     least : float
         What no value is below.
+    holds : str
+        A text that is among its texts.
     """
-    spec = DatasetSpec(path, dimensions, units, frame, description, default is MISSING, gaps, into, least)
+    spec = DatasetSpec(path, dimensions, units, frame, description, default is MISSING, gaps, into, least, holds)
     return field(default=default, metadata={_PATH: spec})
 
 

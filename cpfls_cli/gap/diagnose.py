@@ -118,8 +118,9 @@ def diagnose(
     torque_alone = _torque_alone(weak, settings, effects)
     notes = () if differ else (*_unsure(judged, settings), *(refused.sentence for refused in refusals))
     notes = (*not_judged(judgement.held_out), *notes)
-    diagnosis = _concluded(judged, faults, judgement, differ, notes, steps, settings, torque_alone, audited)
-    return DiagnosisRun(diagnosis, audited, hypothesis, estimates, judgement.remainder, judgement.held_out)
+    remainder = judge.remainder(judgement.found)
+    diagnosis = _concluded(judged, faults, judgement, remainder, differ, notes, steps, settings, torque_alone, audited)
+    return DiagnosisRun(diagnosis, audited, hypothesis, estimates, remainder, judgement.held_out)
 
 
 def _unsure(judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
@@ -182,6 +183,7 @@ def _concluded(
     judged: Sequence[JudgedEffect],
     faults: Sequence[NamedEffect],
     judgement: Judgement,
+    remainder: Leftover,
     differ: tuple[str, ...],
     refusals: tuple[str, ...],
     steps: Sequence[SearchStep],
@@ -189,7 +191,7 @@ def _concluded(
     torque_alone: tuple[tuple[str, float], ...],
     audited: Audit,
 ) -> Diagnosis:
-    (hypothesis, _, estimates), remainder, held_out = judgement
+    (hypothesis, _, estimates), held_out = judgement
     named = sorted((each.effect for each in judged), key=lambda effect: -effect.share)
     effects = [*faults, *named]
     numbers = wrong_numbers(estimates, effects, held_out.removed_by_numbers(), _pull(hypothesis, steps[-1].floor))

@@ -217,6 +217,24 @@ def scatter_variance(hypothesis: System) -> Array:
     return np.concatenate(parts)
 
 
+def relative_scatter(hypothesis: System, linear: Array, floor: Array) -> float:
+    """Estimate the relative scatter of the chosen effects from what a fit leaves.
+
+    Parameters
+    ----------
+    hypothesis : System
+    linear : array, shape (column,)
+        Coefficients of its base.
+    floor : array, shape (6,)
+
+    Returns
+    -------
+    float
+        Its mean square over a window.
+    """
+    return scatter_size(scatter_variance(hypothesis), hypothesis.residual - hypothesis.base @ linear, floor)
+
+
 def scatter_size(variance: Array, residual: Array, floor: Array) -> float:
     """Estimate the relative scatter, one number for all channels, from the residual.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.gap.balance.balance_system import is_free, system
+from cpfls_cli.gap.balance.balance_system import is_free, relative_scatter, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted, on_bound
@@ -32,10 +32,9 @@ _BESIDE = 0.7
 
 
 class Judgement(NamedTuple):
-    """Effects with what they leave of the flights that they were found in and of those held out."""
+    """Effects with what they leave of the flights held out."""
 
     found: Fitted
-    remainder: Leftover
     held_out: HeldOut
 
 
@@ -63,14 +62,17 @@ class Judge:
 
     def judge(self, found: Fitted) -> Judgement:
         """Evaluate effects on the held-out flights, beside the model with its own numbers refitted."""
-        hypothesis, block, estimates = found
-        remainder = leftover(hypothesis, estimates.linear, self.floor, block, self.settings, self.rng)
+        hypothesis, _, estimates = found
         plain = system(hypothesis.flights)
         weight = np.where(plain.residual.any(axis=0), np.sqrt(np.mean(plain.residual**2, axis=0)), 1.0)
-        unseen = held_out(
-            self.logged, self.repaired, hypothesis, estimates.linear, fit(plain, weight), remainder.scatter
-        )
-        return Judgement(found, remainder, unseen)
+        scatter = relative_scatter(hypothesis, estimates.linear, self.floor)
+        unseen = held_out(self.logged, self.repaired, hypothesis, estimates.linear, fit(plain, weight), scatter)
+        return Judgement(found, unseen)
+
+    def remainder(self, found: Fitted) -> Leftover:
+        """Analyse what effects leave of the flights that they were found in."""
+        hypothesis, block, estimates = found
+        return leftover(hypothesis, estimates.linear, self.floor, block, self.settings, self.rng)
 
     def confirmed(self, first: Judgement) -> tuple[Judgement, list[Refusal]]:
         """Drop effects one by one that the held-out flights do not confirm: first what harms, then what is not needed.
@@ -245,7 +247,7 @@ def differences(
             f" held out have none ({unseen[here]:.2g} floors at most): something changed between them, or the flights"
             " held out do not move so that it shows",
         )
-    if unseen[here] > CLEAR and not seen[there] > CLEAR and not last.remainder.unexplained:
+    if unseen[here] > CLEAR and not seen[there] > CLEAR and not judge.remainder(last.found).unexplained:
         return (
             f"the flights held out have a gap of {unseen[here]:.2g} floors in the {CHANNELS[here]}, and those learned"
             f" from have none ({seen[there]:.2g} floors at most): something changed between them, or only the flights"

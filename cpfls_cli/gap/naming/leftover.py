@@ -52,15 +52,12 @@ class Leftover:
     floors : array, shape (6,)
         Root mean square of each channel, in floors; 0 where unknown.
     dependence : tuple of Dependence
-    scatter : float
-        Mean square of the relative scatter of the effects over a window.
     unexplained : tuple of Unexplained
         Channels with a gap.
     """
 
     floors: Array
     dependence: tuple[Dependence, ...]
-    scatter: float
     unexplained: tuple[Unexplained, ...]
 
 
@@ -102,7 +99,7 @@ def leftover(
         for channel, size, direction in zip(CHANNELS, sizes, directions, strict=True)
         if size > _SMALL
     ]
-    return Leftover(sizes, dependence, scatter, tuple(entry for entry in unexplained if entry is not None))
+    return Leftover(sizes, dependence, tuple(entry for entry in unexplained if entry is not None))
 
 
 def _band(hypothesis: System, linear: Array, settings: GapSettings, rng: np.random.Generator) -> NarrowBand | None:

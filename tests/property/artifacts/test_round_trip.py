@@ -32,6 +32,7 @@ def artifacts(draw):
         label: 2 + lengths[label] for dataset in spec.datasets if dataset.path == "time" for label in dataset.dimensions
     }
     # An index needs something to lead to.
+    lengths |= {dataset.dimensions[0]: 1 + lengths[dataset.dimensions[0]] for dataset in spec.datasets if dataset.holds}
     lengths |= {dataset.into: 1 + lengths[dataset.into] for dataset in spec.datasets if dataset.into in lengths}
     whole = {}
     for dataset in spec.datasets:
@@ -41,6 +42,8 @@ def artifacts(draw):
             whole[dataset.path] = np.array(draw(st.lists(words, min_size=size, max_size=size)), dtype="U").reshape(
                 shape
             )
+            if dataset.holds:
+                whole[dataset.path] = np.append(whole[dataset.path][1:], dataset.holds)
         elif dataset.path == "time":
             whole[dataset.path] = np.cumsum(rng.uniform(0.1, 1.0, shape))
         else:

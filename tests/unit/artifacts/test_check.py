@@ -74,6 +74,14 @@ def test_a_condition_number_is_one_at_least():
     ]
 
 
+@pytest.mark.parametrize("kind", ["U8", "S8"])
+def test_scores_hold_those_of_training(kind):
+    parts = {"judged__samples": np.ones(2), "judged__parts": np.array(["training", "held-out"], dtype=kind)}
+    assert findings(ModelRecord.spec(), **parts) == []
+    parts["judged__parts"] = np.array(["x", "held-out"], dtype=kind)
+    assert findings(ModelRecord.spec(), **parts) == ["judged/parts: lacks training"]
+
+
 def test_empty_datasets_are_not_an_error_of_the_rules_but_time_has_two_samples():
     assert findings(attitude=np.zeros((0, 3))) == []
     assert findings(time=np.zeros(1)) == ["time: holds 1 samples, and two are the least"]
