@@ -72,15 +72,20 @@ def _felt_acceleration(signals: Signals, depth: float) -> Array:
     if signals.acceleration is None:
         felt = _smooth_derivative(signals, signals.velocity + hook)
     else:
-        felt = signals.acceleration + _smooth_derivative(signals, hook)
+        felt = _smooth(signals, signals.acceleration) + _smooth_derivative(signals, hook)
     return np.asarray(felt + np.array([0.0, 0.0, signals.vehicle.gravity_m_s2]))
 
 
 def _smooth_derivative(signals: Signals, values: Array) -> Array:
+    return _smooth(signals, values, 1)
+
+
+def _smooth(signals: Signals, values: Array, derivative: int = 0) -> Array:
+    """Fit parabolas to stretches around each sample: a step of the swing is several samples, and noise averages out."""
     from scipy.signal import savgol_filter
 
     samples = max(5, 2 * round(_SMOOTHING_S / signals.period) + 1)
-    return np.asarray(savgol_filter(values, samples, 2, 1, signals.period, axis=0))
+    return np.asarray(savgol_filter(values, samples, 2, derivative, signals.period, axis=0))
 
 
 def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:

@@ -100,6 +100,24 @@ def test_swing_under_a_hook_that_tumbles_with_the_vehicle(flight, depth, acceler
     assert np.abs(expected[:, :2]).max() > 0.3
 
 
+def test_noise_of_the_accelerometer_moves_the_swing_no_more_than_without_its_steps(flight):
+    """Beside an integration that takes each sample, at a hundredth of a second, in its turn."""
+    signals, step = tumbling(flight.vehicle), 0.01
+    coarse, fine = [], []
+    for seed in range(8):
+        noise = 2.0 * np.random.default_rng(seed).standard_normal(signals.acceleration.shape)
+        noisy = replace(signals, acceleration=signals.acceleration + noise)
+        coarse.append(swing(noisy, 1.5, 0.2)[:, :2] - swing(signals, 1.5, 0.2)[:, :2])
+        whole = [
+            integrate(felt.tolist(), (0.5 * (felt[:-1] + felt[1:])).tolist(), step, 1.5, 0.2)[:, :2]
+            for felt in (noisy.acceleration + GRAVITY, signals.acceleration + GRAVITY)
+        ]
+        fine.append(whole[0] - whole[1])
+    size = [np.sqrt(np.mean(np.square(apart))) for apart in (coarse, fine)]
+    assert size[0] < 1.1 * size[1]
+    assert size[1] > 0.03
+
+
 def test_force_is_what_the_load_needs_besides_its_weight(columns, flight):
     """Newton's law of the load itself, which the cable alone accelerates."""
     length, depth = 1.5, 0.1
