@@ -25,7 +25,10 @@ def made_up(spec):
     for index, dataset in enumerate(spec.datasets):
         shape = tuple(int(label) if label.isdigit() else lengths[label] for label in dataset.dimensions)
         values = index + np.arange(np.prod(shape, dtype=int)).reshape(shape)
-        data[dataset.path] = values.astype("U" if dataset.units == "text" else float)
+        values = values % lengths[dataset.into] if dataset.into in lengths else values
+        data[dataset.path] = np.maximum(values, dataset.least).astype("U" if dataset.units == "text" else float)
+        if dataset.holds:
+            data[dataset.path] = np.append(data[dataset.path][1:], dataset.holds)
     return Artifact(spec, Header("0", 1, "seed: 1\n"), data)
 
 
