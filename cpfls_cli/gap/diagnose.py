@@ -20,7 +20,7 @@ from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
 from cpfls_cli.gap.naming.earned import Fitted, Refusal, earned
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.held_out import HeldOut
-from cpfls_cli.gap.naming.leftover import Leftover, not_excited, untried
+from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_excited, untried
 from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
 from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
@@ -109,6 +109,7 @@ def diagnose(
     hypothesis, _, estimates = judgement.found
     progress(0.75, "rivals")
     effect_shares = shares(weak, hypothesis.chosen, estimates, floor)
+    estimates, unnamed = beside_the_unnamed(judgement.found, steps[-1], effects, settings, rng)
     judged = [
         judge_effect(weak, hypothesis.chosen, index, estimates, float(effect_shares[index]), effects, settings, rng)
         for index in range(len(hypothesis.chosen))
@@ -116,7 +117,8 @@ def diagnose(
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     torque_alone = _torque_alone(weak, settings, effects)
-    notes = () if differ else (*_unsure(judged, settings), *(refused.sentence for refused in refusals))
+    notes = (*_too_small(unnamed), *_unsure(judged, settings), *(refused.sentence for refused in refusals))
+    notes = () if differ else notes
     notes = (*not_judged(judgement.held_out), *notes)
     remainder = judge.remainder(judgement.found)
     diagnosis = _concluded(judged, faults, judgement, remainder, differ, notes, steps, settings, torque_alone, audited)
@@ -128,6 +130,15 @@ def _unsure(judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[s
     for effect in (each.effect for each in judged):
         if effect.p_value > settings.significance:
             yield f"{effect.name} is not sure: chance explains as much beside the others, p = {effect.p_value:.2g}"
+
+
+def _too_small(unnamed: Sequence[str]) -> Iterator[str]:
+    """Say what intervals of the named effects leave room for."""
+    if unnamed:
+        yield (
+            f"{' and '.join(unnamed)} explain more than chance and too little for a name; the intervals hold the"
+            " numbers with and without them"
+        )
 
 
 def not_judged(unseen: HeldOut) -> Iterator[str]:

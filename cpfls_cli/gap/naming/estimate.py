@@ -26,6 +26,10 @@ from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+_KNOWN_TO = 0.005
+"""Share of a number that no flight tells: mass and arms that it is measured against are hardly known better, and
+formulas leave out terms as small."""
+
 
 @dataclass(frozen=True)
 class Estimates:
@@ -53,8 +57,9 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     """Fit a hypothesis and compute confidence intervals of its numbers by the jackknife.
 
     The jackknife leaves out one block after another, so it holds for residuals that are correlated within blocks and
-    for noise of unequal size. Shapes take part by their derivatives. The numbers of the vehicle are within what a
-    vehicle can have; only where free ones are surely beyond it, they are told, because the log is wrong then.
+    for noise of unequal size; what no flight tells is added (`_KNOWN_TO`). Shapes take part by their derivatives. The
+    numbers of the vehicle are within what a vehicle can have; only where free ones are surely beyond it, they are told,
+    because the log is wrong then.
 
     Parameters
     ----------
@@ -66,7 +71,8 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
 
     References
     ----------
-    Efron and Tibshirani 1993, chapter 11 (delete-a-group jackknife).
+    Efron and Tibshirani 1993, chapter 11 (delete-a-group jackknife). JCGM 100:2008, 4.3 (uncertainty of what is
+    assumed).
     """
     free = _estimated(hypothesis, weight, block, *fit_within_bounds(hypothesis, weight))
     linear, held = fit_within_bounds(hypothesis, weight, of_vehicle=True)
@@ -207,12 +213,12 @@ def _of(
 
 
 def _interval(value: Array, left_out: Array) -> Array:
-    """Compute half the width of the 95 % confidence interval by the jackknife."""
+    """Compute half the width of the 95 % confidence interval: by the jackknife, and what no flight tells."""
     blocks = len(left_out)
     if blocks < 2:
         return np.full(len(value), np.inf)
     error = np.sqrt((blocks - 1) / blocks * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0))
-    return np.asarray(stdtrit(blocks - 1, 0.975) * error)
+    return np.asarray(np.hypot(stdtrit(blocks - 1, 0.975) * error, _KNOWN_TO * value))
 
 
 def _one_step(rows: Equations, block: IntArray) -> Array:

@@ -1,9 +1,10 @@
-"""Open questions of a diagnosis: unexplained residuals, and effects that the flights could not show."""
+"""Open questions of a diagnosis: unexplained residuals, and effects too small for a name or not shown at all."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,10 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, left_over, scatter_size, scatter_variance
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
-from cpfls_cli.gap.naming.results import Alternative, NamedEffect, NotExcited, Unexplained
+from cpfls_cli.gap.naming.earned import Fitted, fitted
+from cpfls_cli.gap.naming.estimate import Estimates
+from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
+from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.residual.dependence import (
     Dependence,
     joined_states,
@@ -41,6 +45,9 @@ _USUAL_OF_BOUND = 0.2
 
 _VISIBLE = 0.2
 """Root mean square in floors from which an effect is seen."""
+
+_CHANCE = 0.05
+"""Probability of chance up to which an effect widens the intervals of others, which leave out as much."""
 
 
 @dataclass(frozen=True)
@@ -163,6 +170,64 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
     mean, error = means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(len(numbers))
     sure = np.abs(mean) > _SURE * error
     return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
+
+
+class Beside(NamedTuple):
+    """Numbers of the named effects, and what is there beside them without a name.
+
+    Attributes
+    ----------
+    estimates : Estimates
+        Intervals hold what the numbers are with the unnamed effects and without them.
+    unnamed : tuple of str
+    """
+
+    estimates: Estimates
+    unnamed: tuple[str, ...]
+
+
+def beside_the_unnamed(
+    found: Fitted, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
+) -> Beside:
+    """Widen the intervals of named effects by what others do to them that are surely there and too small for a name.
+
+    A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors.
+
+    Parameters
+    ----------
+    found : Fitted
+        The named effects.
+    last : SearchStep
+        Of the search, with nothing to add.
+    effects : sequence of Effect
+        To be tried.
+    settings : GapSettings
+    rng : numpy.random.Generator
+    """
+    named = found.hypothesis.chosen
+    chosen, flights = list(named), found.hypothesis.flights
+    names = {each.effect.name for each in named}
+    step = last
+    if names != {each.effect.name for each in last.hypothesis.chosen}:
+        step = rank_effects(flights, chosen, effects, settings, rng)
+    while step.ranking and len(chosen) < len(named) + settings.effects_max:
+        best = step.ranking[0]
+        if step.p_value(best.gain) > _CHANCE:
+            break
+        chosen.append(best.candidate)
+        step = rank_effects(flights, chosen, effects, settings, rng)
+    if not named or len(chosen) == len(named):
+        return Beside(found.estimates, ())
+    wider = fitted(flights, chosen, last.floor, settings).estimates
+    pairs = zip(found.estimates.effects, wider.effects, strict=False)
+    held = tuple(tuple(_both(number, there) for number in numbers) for numbers, there in pairs)
+    return Beside(replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :]))
+
+
+def _both(number: Estimate, others: Sequence[Estimate]) -> Estimate:
+    """Widen an interval until it holds that of the same number beside other effects."""
+    other = next((each for each in others if each.name == number.name), number)
+    return replace(number, low=min(number.low, other.low), high=max(number.high, other.high))
 
 
 def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> tuple[NotExcited, ...]:

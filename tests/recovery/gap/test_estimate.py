@@ -10,7 +10,8 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import equations, fit
 from cpfls_cli.gap.naming.earned import fitted
 from cpfls_cli.gap.naming.estimate import estimates
-from cpfls_cli.gap.naming.ranking import best_floor, block_index
+from cpfls_cli.gap.naming.leftover import beside_the_unnamed
+from cpfls_cli.gap.naming.ranking import best_floor, block_index, rank_effects
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.closed_loop_flights import flown, signals_of
@@ -233,3 +234,29 @@ def test_noise_of_rates_and_rotors_shrinks_no_inertia():
     ]
     errors = np.array([[number.value for number in numbers] for numbers in found])
     assert np.all(np.abs(errors.mean(axis=0)) < 3 * errors.std(axis=0) / np.sqrt(len(errors)))
+
+
+def widened(hidden, named):
+    """Fit a named effect to flights with what is hidden, and widen its intervals by what else is there."""
+    flights = [weak(fly(seed, hidden, gyro=0.002, rotor=1.0), force=True) for seed in (1, 2)]
+    effects = [CATALOGUE[name] for name in ("rotor_drag", "parasitic_drag", "inflow", "com_offset", "torque_bias")]
+    last = rank_effects(flights, [named], effects, SETTINGS, np.random.default_rng(0))
+    found = fitted(flights, [named], last.floor, SETTINGS)
+    return found, beside_the_unnamed(found, last, effects, SETTINGS, np.random.default_rng(0))
+
+
+def test_intervals_leave_room_for_what_is_too_small_for_a_name():
+    drag, body = candidate("rotor_drag"), candidate("parasitic_drag")
+    found, beside = widened([(drag, [1.3e-3]), (body, [0.01, 0.01, 0.01, 0.0, 0.0, 0.0])], drag)
+    (alone,), (there,) = found.estimates.effects[0], beside.estimates.effects[0]
+    assert beside.unnamed == ("parasitic_drag",)
+    assert alone.low > 1.3e-3
+    assert there.low <= 1.3e-3 <= there.high
+    assert (there.value, there.high) == (alone.value, alone.high)
+
+
+def test_where_nothing_else_is_there_intervals_stay_what_they_are():
+    drag = candidate("rotor_drag")
+    found, beside = widened([(drag, [1.3e-3])], drag)
+    assert beside.unnamed == ()
+    assert beside.estimates is found.estimates
