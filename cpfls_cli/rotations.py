@@ -26,7 +26,30 @@ def rotation_matrix(attitude: Array) -> Array:
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
         [-sp, cp * sr, cp * cr],
     ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return np.array(rows).transpose(2, 0, 1)
+
+
+def cross(first: Array, second: Array) -> Array:
+    """Compute the cross product along the last axis.
+
+    Bit for bit that of NumPy, which spends several times as long on its axes where there is one instant.
+
+    Parameters
+    ----------
+    first, second : array, shape (..., 3)
+        Of shapes that broadcast.
+
+    Returns
+    -------
+    array, shape (..., 3)
+    """
+    (a, b, c), (u, v, w) = ((each[..., 0], each[..., 1], each[..., 2]) for each in (first, second))
+    along = b * w - c * v
+    product = np.empty((*along.shape, 3))
+    product[..., 0] = along
+    product[..., 1] = c * u - a * w
+    product[..., 2] = a * v - b * u
+    return product
 
 
 def euler_angles(rotation: Array) -> Array:

@@ -130,7 +130,7 @@ def rigid_turning(inertia: Array) -> TurningLaw:
     ----------
     inertia : array, shape (3, 3), kg m^2, body frame
     """
-    return lambda _attitude, body_rate: Turning(inertia, np.cross(body_rate, inertia @ body_rate))
+    return lambda _attitude, body_rate: Turning(inertia, rotations.cross(body_rate, inertia @ body_rate))
 
 
 def identified_turning(model: InertiaModel) -> TurningLaw:

@@ -11,6 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.hooks import Actuation, CarriedBody, SensorLog, SensorTest
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 Kind = Literal["wrench", "actuator", "sensor", "parameter"]
@@ -284,7 +285,7 @@ def hub_wrench(hubs: Array, force: Array) -> Array:
     -------
     array, shape (time, 6)
     """
-    return wrench(np.cross(hubs[None], force).sum(axis=1), force.sum(axis=1))
+    return wrench(cross(hubs[None], force).sum(axis=1), force.sum(axis=1))
 
 
 def thrust_wrench(hubs: Array, thrust: Array) -> Array:

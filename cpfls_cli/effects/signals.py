@@ -214,7 +214,7 @@ class Signals:
     @cached_property
     def hub_velocity(self) -> Array:
         """Velocity of each hub through the air, ``v + omega x r_i``, shape (time, rotor, 3), m/s, body frame."""
-        return np.asarray(self.air_velocity[:, None] + np.cross(self.body_rate[:, None], self.hubs[None]))
+        return np.asarray(self.air_velocity[:, None] + rotations.cross(self.body_rate[:, None], self.hubs[None]))
 
     @cached_property
     def hub_height(self) -> Array:

@@ -136,8 +136,8 @@ def _too_small(unnamed: Sequence[str]) -> Iterator[str]:
     """Say what intervals of the named effects leave room for."""
     if unnamed:
         yield (
-            f"{' and '.join(unnamed)} explain more than chance and too little for a name; the intervals hold the"
-            " numbers with and without them"
+            f"beside these, {' and '.join(unnamed)} would explain more than chance and too little for a name; the"
+            " intervals hold the numbers with and without"
         )
 
 

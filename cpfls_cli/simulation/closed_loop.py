@@ -134,7 +134,7 @@ class Autopilot:
         rate_error = body_rate - turned.T @ self._planned.body_rate[step]
         wanted = turned.T @ self._planned.body_acceleration[step]
         wanted = wanted - self._attitude_gain * error - self._rate_gain * rate_error
-        return np.asarray(self._inertia @ wanted + np.cross(body_rate, self._inertia @ body_rate))
+        return np.asarray(self._inertia @ wanted + rotations.cross(body_rate, self._inertia @ body_rate))
 
 
 def upright(pull: Array, yaw: float) -> Array:
@@ -152,9 +152,9 @@ def upright(pull: Array, yaw: float) -> Array:
     """
     up = pull / np.sqrt(pull @ pull)
     # By the definition of yaw the x axis lies in the vertical plane of the heading, however the body rolls.
-    forward = np.cross([-np.sin(yaw), np.cos(yaw), 0.0], up)
+    forward = rotations.cross(np.array([-np.sin(yaw), np.cos(yaw), 0.0]), up)
     forward /= np.sqrt(forward @ forward)
-    return np.column_stack([forward, np.cross(up, forward), up])
+    return np.column_stack([forward, rotations.cross(up, forward), up])
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
@@ -74,3 +75,10 @@ def test_vertical_pitch_raises_no_warning():
     attitude = np.array([[0.0, np.pi / 2, 0.0]])
     assert rotations.attitude_rate(attitude, np.ones((1, 3))).shape == (1, 3)
     assert rotations.body_torque(attitude, np.ones((1, 3))).shape == (1, 3)
+
+
+@pytest.mark.parametrize("shapes", [((3,), (3,)), ((5, 1, 3), (1, 4, 3)), ((7, 3), (3,))])
+def test_cross_product_is_numpys_to_the_bit(shapes):
+    rng = np.random.default_rng(0)
+    first, second = (rng.normal(size=shape) for shape in shapes)
+    np.testing.assert_array_equal(rotations.cross(first, second), np.cross(first, second))

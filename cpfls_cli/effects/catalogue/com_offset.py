@@ -9,11 +9,12 @@ import numpy as np
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.rotations import cross
 
 
 def _levers(signals: Signals, axes: int) -> Columns:
     direct = np.zeros((len(signals), 6, axes))
-    direct[:, :3] = -np.cross(np.eye(3)[None, :axes], signals.force[:, None]).swapaxes(1, 2)
+    direct[:, :3] = -cross(np.eye(3)[None, :axes], signals.force[:, None]).swapaxes(1, 2)
     return Columns(direct)
 
 

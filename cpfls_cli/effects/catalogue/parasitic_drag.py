@@ -10,6 +10,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -18,7 +19,7 @@ def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     drag = -np.linalg.norm(velocity, axis=1, keepdims=True) * velocity
     direct = np.zeros((len(signals), 6, 6))
     direct[:, 3:, :3] = drag[:, :, None] * np.eye(3)
-    direct[:, :3, 3:] = np.cross(np.eye(3)[None], drag[:, None]).swapaxes(1, 2)
+    direct[:, :3, 3:] = cross(np.eye(3)[None], drag[:, None]).swapaxes(1, 2)
     return Columns(direct)
 
 

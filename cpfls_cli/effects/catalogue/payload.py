@@ -12,6 +12,7 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Columns, Effect, Shape, stack, wrench
 from cpfls_cli.effects.hooks import Carrier, Pull
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _STEP_S = 0.04
@@ -248,11 +249,11 @@ class _Load:
         cable, rate = state[:3] / np.linalg.norm(state[:3]), state[3:]
         hook = np.array([0.0, 0.0, -self.depth])
         pulled = self.mass / carrier.mass * cable
-        turned = np.linalg.solve(carrier.inertia, np.cross(self.mass_times_hook, carrier.rotation.T @ cable))
-        bent = np.cross(carrier.turning, hook) + np.cross(carrier.body_rate, np.cross(carrier.body_rate, hook))
+        turned = np.asarray(np.linalg.solve(carrier.inertia, cross(self.mass_times_hook, carrier.rotation.T @ cable)))
+        bent = cross(carrier.turning, hook) + cross(carrier.body_rate, cross(carrier.body_rate, hook))
         felt = carrier.acceleration + carrier.rotation @ bent
         felt[2] += self.gravity
-        response = pulled + carrier.rotation @ np.cross(turned, hook)
+        response = pulled + carrier.rotation @ cross(turned, hook)
         tension = (self.length * rate @ rate - felt @ cable) / (1 + response @ cable)
         felt = felt + tension * response
         across = felt - (felt @ cable) * cable
