@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import IntArray
-from cpfls_cli.regressor.kernels import compiled
+from cpfls_cli.compiling import compiled
 
 Bytes = np.ndarray
 KINDS = "IPGHS"

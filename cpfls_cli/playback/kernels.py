@@ -18,8 +18,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.compiling import compiled
 from cpfls_cli.effects.polynomial import STATE_TERMS
-from cpfls_cli.regressor.kernels import compiled
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
+from cpfls_cli import compiling
 from cpfls_cli.cli.options import Common
 from cpfls_cli.cli.terminal import progress_bar
-from cpfls_cli.regressor import kernels
 
 
 def on_terminal(*words, columns=200):
@@ -104,15 +104,15 @@ def test_an_encoding_without_the_signs_of_the_tables_ends_no_command(study, tmp_
 
 
 def test_first_use_says_that_it_compiles(capsys):
-    kernels._say_compiling.cache_clear()
+    compiling._say_compiling.cache_clear()
     # What no file holds cannot be kept.
     function = eval("lambda number: number + 1")
     with progress_bar("identify", Common(verbose=True)):
-        assert kernels.compiled(function)(1) == 2
-        kernels.compiled(eval("lambda number: number + 2"))(1)
+        assert compiling.compiled(function)(1) == 2
+        compiling.compiled(eval("lambda number: number + 2"))(1)
     # Nobody asked.
-    kernels._say_compiling.cache_clear()
-    kernels.compiled(function)(1.0)
+    compiling._say_compiling.cache_clear()
+    compiling.compiled(function)(1.0)
     said = "identify: compiling for this processor, which takes up to half a minute and is kept\n"
     assert capsys.readouterr().err == said
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,217 +15,22 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_STEP_S = 0.04
-_SMOOTHING_S = 0.1
-_LARGEST_START = 0.5
 _LARGEST_ACROSS = 0.97
-_SWINGS_KEPT = 16
-_PERIODS = 2.0
-
-_Vector = Sequence[float]
-_State = tuple[float, float, float, float, float, float]
-
-
-def swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
-    """Integrate the swing of a load on a cable under a moving hook.
-
-    ``n'' = -(a + g z)_across / L - |n'|^2 n - c n'`` for the direction n of the cable, with the part of the
-    acceleration across it; integrated by the classical Runge-Kutta method. Large swings are slower than small ones,
-    so no filter will do. The cable starts at rest.
-
-    Parameters
-    ----------
-    signals : Signals
-        With velocity.
-    length : float, m
-        L.
-    damping : float, 1/s
-        c.
-    depth : float, m
-        Of the hook below the centre of mass, with which it swings to and fro itself.
-
-    Returns
-    -------
-    array, shape (time, 6)
-        Direction of the cable from the hook, world frame, and its rate in 1/s.
-
-    References
-    ----------
-    Equation of the spherical pendulum with a moving pivot.
-    """
-    from scipy.interpolate import CubicSpline
-
-    stride = max(1, round(_STEP_S / signals.period))
-    felt = _felt_acceleration(signals, depth)
-    nodes = felt[::stride].tolist()
-    middles = (0.5 * (felt[:-stride:stride] + felt[stride::stride])).tolist()
-    states = integrate(nodes, middles, stride * signals.period, length, damping)
-    at = signals.time[::stride]
-    # The samples beyond the last step are less than a step away.
-    return np.asarray(CubicSpline(at, states)(signals.time))
-
-
-def _felt_acceleration(signals: Signals, depth: float) -> Array:
-    """Add gravity to the acceleration of the hook, shape (time, 3), world frame."""
-    assert signals.velocity is not None, "declared among the needs"
-    turning = np.cross(signals.body_rate, [0.0, 0.0, -depth])
-    hook = np.einsum("tij,tj->ti", signals.rotation, turning)
-    if signals.acceleration is None:
-        felt = _smooth_derivative(signals, signals.velocity + hook)
-    else:
-        felt = _smooth(signals, signals.acceleration) + _smooth_derivative(signals, hook)
-    return np.asarray(felt + np.array([0.0, 0.0, signals.vehicle.gravity_m_s2]))
-
-
-def _smooth_derivative(signals: Signals, values: Array) -> Array:
-    return _smooth(signals, values, 1)
-
-
-def _smooth(signals: Signals, values: Array, derivative: int = 0) -> Array:
-    """Fit parabolas to stretches around each sample: a step of the swing is several samples, and noise averages out."""
-    from scipy.signal import savgol_filter
-
-    samples = max(5, 2 * round(_SMOOTHING_S / signals.period) + 1)
-    return np.asarray(savgol_filter(values, samples, 2, derivative, signals.period, axis=0))
-
-
-def settled_swing(signals: Signals, length: float, damping: float, depth: float = 0.0) -> Array:
-    """Add the free swing at the start, estimated from the force balance, to the driven swing.
-
-    The horizontal pull on the vehicle is ``m_p g`` times the whole swing. Where forces are known, least squares find
-    ``m_p`` and the two free swings of each direction, over two periods: later ones hold what has drifted apart since,
-    and their start would be no start. Else the cable starts at rest.
-
-    Parameters
-    ----------
-    signals : Signals
-        With velocity.
-    length : float, m
-    damping : float, 1/s
-    depth : float, m
-        Of the hook.
-
-    Returns
-    -------
-    array, shape (time, 2)
-    """
-    driven = _driven_swing(signals, length, damping, depth)
-    if signals.acceleration is None or signals.thrust is None or signals.attitude is None:
-        return driven
-    mass = signals.vehicle.mass_kg
-    pull = mass * signals.acceleration[:, :2] - signals.thrust[:, None] * signals.rotation[:, :2, 2]
-    free = _free_swing(signals, length, damping)
-    period = 2 * np.pi * np.sqrt(length / signals.vehicle.gravity_m_s2)
-    early = slice(round(_PERIODS * period / signals.period))
-    own = free[early]
-    nothing = np.zeros_like(own)
-    columns = np.concatenate(
-        [
-            np.column_stack([driven[early, 0], own, nothing, np.ones(len(own)), nothing[:, 0]]),
-            np.column_stack([driven[early, 1], nothing, own, nothing[:, 0], np.ones(len(own))]),
-        ]
-    )
-    solution = np.linalg.lstsq(columns, pull[early].T.reshape(-1), rcond=None)[0]
-    start = solution[1:5] / solution[0] if solution[0] > 0 else np.zeros(4)
-    if np.abs(start).max() > _LARGEST_START:
-        return driven
-    return np.asarray(driven + np.column_stack([free @ start[:2], free @ start[2:]]))
-
-
-def _driven_swing(signals: Signals, length: float, damping: float, depth: float) -> Array:
-    """Integrate the swing of a motion once, whatever the rotors do, shape (time, 2)."""
-    key, kept = ("swing", length, damping, depth), signals.of_motion
-    if key not in kept:
-        # All that a search tries, and no more: each is as long as the flight.
-        if len(kept) >= _SWINGS_KEPT:
-            del kept[next(iter(kept))]
-        kept[key] = swing(signals, length, damping, depth)[:, :2]
-    return kept[key]
-
-
-def _free_swing(signals: Signals, length: float, damping: float) -> Array:
-    time = signals.time - signals.time[0]
-    natural = np.sqrt(signals.vehicle.gravity_m_s2 / length)
-    turn = np.sqrt(max(natural**2 - damping**2 / 4, 1e-6)) * time
-    return np.asarray(np.exp(-0.5 * damping * time)[:, None] * np.column_stack([np.cos(turn), np.sin(turn)]))
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+    # Compiled loops are slow to load, and most commands know the load by name alone.
+    from cpfls_cli.effects.swing import felt_acceleration, settled_swing
+
     length = shape["length_m"]
     swung = settled_swing(signals, length, shape["damping_1_s"], shape["depth_m"])
     across = np.minimum((swung**2).sum(axis=1), _LARGEST_ACROSS)
     cable = np.column_stack([swung, -np.sqrt(1 - across)])
     rate = np.gradient(cable, signals.time, axis=0)
-    tension = length * (rate**2).sum(axis=1) - (_felt_acceleration(signals, shape["depth_m"]) * cable).sum(axis=1)
+    tension = length * (rate**2).sum(axis=1) - (felt_acceleration(signals, shape["depth_m"]) * cable).sum(axis=1)
     pull = np.einsum("tji,tj->ti", signals.rotation, cable * tension[:, None])
-    levers = (wrench(np.cross(hook, pull)) for hook in -np.eye(3)[::-1])
+    levers = (wrench(cross(hook, pull)) for hook in -np.eye(3)[::-1])
     return Columns(stack(*levers, wrench(force=pull)))
-
-
-def integrate(
-    nodes: Sequence[_Vector], middles: Sequence[_Vector], step: float, length: float, damping: float
-) -> Array:
-    """Integrate direction and rate of a cable from rest by the classical Runge-Kutta method.
-
-    In plain numbers: arrays of three would cost ten times as much.
-
-    Parameters
-    ----------
-    nodes : sequence of three numbers, m/s^2
-        Acceleration of the hook plus gravity at each step, world frame.
-    middles : sequence of three numbers, m/s^2
-        Half a step later; one fewer.
-    step : float, s
-    length : float, m
-    damping : float, 1/s
-
-    Returns
-    -------
-    array, shape (step, 6)
-        Direction, then rate in 1/s.
-    """
-    state: _State = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
-    states = [state]
-    for number, middle in enumerate(middles):
-        half = 0.5 * step
-        first = _rate(state, nodes[number], length, damping)
-        second = _rate(_moved(state, first, half), middle, length, damping)
-        third = _rate(_moved(state, second, half), middle, length, damping)
-        fourth = _rate(_moved(state, third, step), nodes[number + 1], length, damping)
-        mean = tuple((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(first, second, third, fourth, strict=True))
-        state = _unit(_moved(state, mean, step))
-        states.append(state)
-    return np.array(states)
-
-
-def _rate(state: Sequence[float], felt: _Vector, length: float, damping: float) -> _State:
-    x, y, z, u, v, w = state
-    a, b, c = felt
-    along = a * x + b * y + c * z
-    centripetal = u * u + v * v + w * w
-    return (
-        u,
-        v,
-        w,
-        -(a - x * along) / length - centripetal * x - damping * u,
-        -(b - y * along) / length - centripetal * y - damping * v,
-        -(c - z * along) / length - centripetal * z - damping * w,
-    )
-
-
-def _moved(state: Sequence[float], rate: Sequence[float], step: float) -> _State:
-    x, y, z, u, v, w = state
-    a, b, c, d, e, f = rate
-    return x + step * a, y + step * b, z + step * c, u + step * d, v + step * e, w + step * f
-
-
-def _unit(state: Sequence[float]) -> _State:
-    """Normalise the direction and project its rate onto the plane across it, against rounding."""
-    x, y, z, u, v, w = state
-    scale = 1.0 / (x * x + y * y + z * z) ** 0.5
-    x, y, z = x * scale, y * scale, z * scale
-    along = u * x + v * y + w * z
-    return x, y, z, u - along * x, v - along * y, w - along * z
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
-from cpfls_cli.effects.catalogue.payload import integrate, settled_swing, swing
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.swing import integrate, settled_swing, swing
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
 
@@ -50,7 +50,7 @@ def push(t):
 def test_integration_agrees_with_lagrange_in_large_swings():
     step, length, damping = 0.02, 1.5, 0.1
     at = np.arange(0.0, 8.0, step)
-    found = integrate(push(at).tolist(), push(at[:-1] + step / 2).tolist(), step, length, damping)
+    found = integrate(push(at), push(at[:-1] + step / 2), step, length, damping)
     expected = hanging(push, at, length, damping)
     np.testing.assert_allclose(found[:, :3], expected, atol=1e-5)
     np.testing.assert_allclose(found[:, 3:], CubicSpline(at, expected)(at, 1), atol=5e-3)
@@ -59,7 +59,7 @@ def test_integration_agrees_with_lagrange_in_large_swings():
 
 def test_an_undamped_load_under_a_still_hook_keeps_its_energy():
     step, length, steps = 0.02, 1.0, 600
-    pulse = [[6.0, -4.0, 9.81]] * 20 + [GRAVITY.tolist()] * (steps - 20)
+    pulse = np.array([[6.0, -4.0, 9.81]] * 20 + [GRAVITY.tolist()] * (steps - 20))
     found = integrate(pulse, pulse[:-1], step, length, 0.0)[25:]
     energy = 0.5 * length * (found[:, 3:] ** 2).sum(axis=1) + 9.81 * found[:, 2]
     np.testing.assert_allclose(energy, energy[0], rtol=2e-5)
@@ -109,7 +109,7 @@ def test_noise_of_the_accelerometer_moves_the_swing_no_more_than_without_its_ste
         noisy = replace(signals, acceleration=signals.acceleration + noise)
         coarse.append(swing(noisy, 1.5, 0.2)[:, :2] - swing(signals, 1.5, 0.2)[:, :2])
         whole = [
-            integrate(felt.tolist(), (0.5 * (felt[:-1] + felt[1:])).tolist(), step, 1.5, 0.2)[:, :2]
+            integrate(felt, 0.5 * (felt[:-1] + felt[1:]), step, 1.5, 0.2)[:, :2]
             for felt in (noisy.acceleration + GRAVITY, signals.acceleration + GRAVITY)
         ]
         fine.append(whole[0] - whole[1])

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cpfls_cli.compiling import compiled
 from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.regressor import (
     Motion,
@@ -178,4 +179,4 @@ def test_where_nothing_can_be_kept_a_loop_is_compiled_each_time():
     """A function without a file has no folder for its compiled code: the same error as folders that are read-only."""
     space = {}
     exec("def twice(x):\n    return 2 * x", space)
-    assert kernels.compiled(space["twice"])(21) == 42
+    assert compiled(space["twice"])(21) == 42
