@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import numpy as np
 
 from cpfls_cli.arrays import Array
@@ -134,14 +136,23 @@ def felt_acceleration(signals: Signals, depth: float) -> Array:
     depth : float, m
         Of the hook below the centre of mass.
     """
+    key, kept = "felt", signals.of_motion
+    if key not in kept:
+        _make_room(kept)
+        kept[key] = np.stack(_felt(signals))
+    level, by_depth = kept[key]
+    return np.asarray(level + depth * by_depth)
+
+
+def _felt(signals: Signals) -> tuple[Array, Array]:
+    """Differentiate the motion of a hook at the centre of mass, and what each metre of depth adds."""
     assert signals.velocity is not None, "declared among the needs"
-    turning = cross(signals.body_rate, np.array([0.0, 0.0, -depth]))
-    hook = np.einsum("tij,tj->ti", signals.rotation, turning)
+    below = np.einsum("tij,tj->ti", signals.rotation, cross(signals.body_rate, np.array([0.0, 0.0, -1.0])))
     if signals.acceleration is None:
-        felt = _smooth_derivative(signals, signals.velocity + hook)
+        level = _smooth_derivative(signals, signals.velocity)
     else:
-        felt = _smooth(signals, signals.acceleration) + _smooth_derivative(signals, hook)
-    return np.asarray(felt + np.array([0.0, 0.0, signals.vehicle.gravity_m_s2]))
+        level = _smooth(signals, signals.acceleration)
+    return level + np.array([0.0, 0.0, signals.vehicle.gravity_m_s2]), _smooth_derivative(signals, below)
 
 
 def _smooth_derivative(signals: Signals, values: Array) -> Array:
@@ -203,11 +214,15 @@ def _driven_swing(signals: Signals, length: float, damping: float, depth: float)
     """Integrate the swing of a motion once, whatever the rotors do, shape (time, 2)."""
     key, kept = ("swing", length, damping, depth), signals.of_motion
     if key not in kept:
-        # All that a search tries, and no more: each is as long as the flight.
-        if len(kept) >= _SWINGS_KEPT:
-            del kept[next(iter(kept))]
+        _make_room(kept)
         kept[key] = swing(signals, length, damping, depth)[:, :2]
     return kept[key]
+
+
+def _make_room(kept: dict[Hashable, Array]) -> None:
+    """Keep all that a search tries, and no more: each is as long as the flight."""
+    if len(kept) >= _SWINGS_KEPT:
+        del kept[next(iter(kept))]
 
 
 def _free_swing(signals: Signals, length: float, damping: float) -> Array:
