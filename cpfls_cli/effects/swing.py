@@ -82,8 +82,8 @@ def integrate(nodes: Array, middles: Array, step: float, length: float, damping:
         fourth = _rate(_moved(state, third, step), nodes[number + 1], length, damping)
         mean = _moved(_moved(_moved(first, second, 2.0), third, 2.0), fourth, 1.0)
         state = _unit(_moved(state, mean, step / 6.0))
-        for part_of in range(6):
-            states[number + 1, part_of] = state[part_of]
+        for index in range(6):
+            states[number + 1, index] = state[index]
     return states
 
 

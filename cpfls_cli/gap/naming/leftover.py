@@ -205,6 +205,8 @@ def beside_the_unnamed(
     rng : numpy.random.Generator
     """
     named = found.hypothesis.chosen
+    if not named:
+        return Beside(found.estimates, ())
     chosen, flights = list(named), found.hypothesis.flights
     names = {each.effect.name for each in named}
     step = last
@@ -216,7 +218,7 @@ def beside_the_unnamed(
             break
         chosen.append(best.candidate)
         step = rank_effects(flights, chosen, effects, settings, rng)
-    if not named or len(chosen) == len(named):
+    if len(chosen) == len(named):
         return Beside(found.estimates, ())
     wider = fitted(flights, chosen, last.floor, settings).estimates
     pairs = zip(found.estimates.effects, wider.effects, strict=False)
