@@ -3,11 +3,16 @@
 import signal
 
 import pytest
+from hypothesis import settings
 
 from tests.builders import command_line
 
 # A shell without job control has what it starts in the background ignore interrupts, and all that this starts in turn.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# How long an example takes is the machine's, and no test asks for it.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 @pytest.fixture
