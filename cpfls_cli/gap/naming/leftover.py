@@ -189,7 +189,7 @@ class Beside(NamedTuple):
 def beside_the_unnamed(
     found: Fitted, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
 ) -> Beside:
-    """Widen the intervals of named effects by what others do to them that are surely there and too small for a name.
+    """Widen the intervals of named effects by what others do to them that are no chance and too small for a name.
 
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors.
 
