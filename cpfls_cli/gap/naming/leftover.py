@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, left_over, scatter_size, scatter_variance
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
 from cpfls_cli.gap.naming.earned import Fitted, fitted
@@ -189,9 +190,10 @@ class Beside(NamedTuple):
 def beside_the_unnamed(
     found: Fitted, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
 ) -> Beside:
-    """Widen the intervals of named effects by what others do to them that are no chance and too small for a name.
+    """Widen the intervals of named effects by what is no chance and too small for a name.
 
-    A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors.
+    A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
+    formula that is right in slow flight bends in fast flight: where a bend shows, its number is another one beside it.
 
     Parameters
     ----------
@@ -207,23 +209,59 @@ def beside_the_unnamed(
     named = found.hypothesis.chosen
     if not named:
         return Beside(found.estimates, ())
-    chosen, flights = list(named), found.hypothesis.flights
-    names = {each.effect.name for each in named}
+    flights = found.hypothesis.flights
     step = last
-    if names != {each.effect.name for each in last.hypothesis.chosen}:
-        step = rank_effects(flights, chosen, effects, settings, rng)
-    while step.ranking and len(chosen) < len(named) + settings.effects_max:
-        best = step.ranking[0]
-        if step.p_value(best.gain) > _CHANCE:
-            break
-        chosen.append(best.candidate)
-        step = rank_effects(flights, chosen, effects, settings, rng)
+    if {each.effect.name for each in named} != {each.effect.name for each in last.hypothesis.chosen}:
+        step = rank_effects(flights, named, effects, settings, rng)
+    chosen = _beyond_chance(step, effects, settings, rng)
+    usual = _usual_speed([flight.signals for flight in flights])
+    bends = [_bend(each.effect, usual) for each in named if _of_speed(each.effect)]
+    if bends:
+        chosen = _beyond_chance(rank_effects(flights, chosen, bends, settings, rng), bends, settings, rng)
     if len(chosen) == len(named):
         return Beside(found.estimates, ())
     wider = fitted(flights, chosen, last.floor, settings).estimates
     pairs = zip(found.estimates.effects, wider.effects, strict=False)
     held = tuple(tuple(_both(number, there) for number in numbers) for numbers, there in pairs)
     return Beside(replace(found.estimates, effects=held), tuple(each.effect.name for each in chosen[len(named) :]))
+
+
+def _beyond_chance(
+    step: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
+) -> list[Candidate]:
+    """Add effects to the chosen ones as long as one explains more than chance."""
+    flights, chosen = step.hypothesis.flights, list(step.hypothesis.chosen)
+    most = len(chosen) + settings.effects_max
+    while step.ranking and len(chosen) < most and step.p_value(step.ranking[0].gain) <= _CHANCE:
+        chosen.append(step.ranking[0].candidate)
+        step = rank_effects(flights, chosen, effects, settings, rng)
+    return chosen
+
+
+def _of_speed(effect: Effect) -> bool:
+    """Tell whether an effect is a formula in the speed through the air."""
+    return effect.kind == "wrench" and "velocity" in effect.needs and not (effect.shapes or effect.physical)
+
+
+def _bend(effect: Effect, usual: float) -> Effect:
+    """Take a formula for another one beyond a usual speed, in m/s, than below it.
+
+    Bounded, because powers of the speed hang on the fastest seconds of a flight.
+    """
+
+    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
+        assert effect.columns is not None
+        squared = (signals.air_velocity**2).sum(axis=1)
+        return Columns(effect.columns(signals, shape).direct * (squared / (squared + usual**2))[:, None, None])
+
+    either = tuple(replace(each, low=-each.high) for each in effect.coefficients)
+    return replace(effect, name=f"a bend of {effect.name} over speed", columns=columns, coefficients=either)
+
+
+def _usual_speed(flights: Sequence[Signals]) -> float:
+    """Compute the root mean square of the speed through the air, m/s, over flights that have one."""
+    squared = [(flight.air_velocity**2).sum(axis=1) for flight in flights if "velocity" in flight.available]
+    return float(np.sqrt(np.mean(np.concatenate(squared)))) if squared else np.inf
 
 
 def _both(number: Estimate, others: Sequence[Estimate]) -> Estimate:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.effects.effect import Columns, stack, thrust_wrench
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import equations, fit
@@ -260,3 +261,21 @@ def test_where_nothing_else_is_there_intervals_stay_what_they_are():
     found, beside = widened([(drag, [1.3e-3])], drag)
     assert beside.unnamed == ()
     assert beside.estimates is found.estimates
+
+
+def glauert(signals, _shape):
+    """Thrust that grows as a rotor's own air speed falls, per k_h: v^2 at first, and less and less of it."""
+    hover = 3.0
+    squared = (signals.hub_velocity[..., :2] ** 2).sum(axis=-1)
+    induced = np.sqrt((np.sqrt(squared**2 + 4 * hover**4) - squared) / 2)
+    return Columns(stack(thrust_wrench(signals.hubs, 4 * hover * (hover - induced))))
+
+
+def test_an_interval_holds_the_number_of_slow_flight_where_a_formula_bends():
+    lift = candidate("translational_lift")
+    bending = lift._replace(effect=replace(lift.effect, columns=glauert))
+    found, beside = widened([(bending, [0.05])], lift)
+    (alone,), (there,) = found.estimates.effects[0], beside.estimates.effects[0]
+    assert "a bend of translational_lift over speed" in beside.unnamed
+    assert alone.high < 0.05
+    assert there.low <= 0.05 <= there.high
