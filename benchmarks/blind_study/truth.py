@@ -74,8 +74,10 @@ def _mismatch(hidden, vehicle):
     # What a pair has in common looks like another inertia, so a difference is relative to the mean of its pair.
     pairs = [(gain[i] - gain[i + 2]) / (1 + (gain[i] + gain[i + 2]) / 2) for i in (0, 1)]
     left, right = gain[spin > 0].mean(), gain[spin < 0].mean()
-    lift = (left - right) / (2 + left + right)
-    return {"difference_1": pairs[0], "difference_2": pairs[1], "drag_imbalance": -lift, "lift_imbalance": lift}
+    drag = (right - left) / (2 + left + right)
+    # The mass is known, so a force is relative to nothing.
+    lift = (left - right) / 2
+    return {"difference_1": pairs[0], "difference_2": pairs[1], "drag_imbalance": drag, "lift_imbalance": lift}
 
 
 def _spring(hidden, _vehicle):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
@@ -143,6 +143,19 @@ def _stated_weights(block: str, vehicle: VehicleSettings) -> Array:
     return effect_weights(block, {}, _probe(vehicle))
 
 
+@lru_cache(maxsize=256)
+def _drag_rows(block: str, vehicle: VehicleSettings) -> BoolArray:
+    """Find the rows of each coefficient that grow with the drag factor while others do not, (coefficient, 6)."""
+    known, signals = CATALOGUE[block], _probe(vehicle).signals
+    if known.columns is None or known.kind != "wrench":
+        return np.zeros((len(known.coefficients), 6), dtype=bool)
+    twice = [replace(rotor, drag_factor_n_m_s2=2 * rotor.drag_factor_n_m_s2) for rotor in vehicle.rotors]
+    other = replace(signals, vehicle=replace(vehicle, rotors=tuple(twice)))
+    stated, changed = (known.columns(each, {}).direct for each in (signals, other))
+    grows, acts = np.any(changed != stated, axis=0).T, np.any(stated, axis=0).T
+    return np.asarray(grows & np.any(acts & ~grows, axis=1, keepdims=True))
+
+
 @lru_cache(maxsize=8)
 def _probe(vehicle: VehicleSettings) -> Probe:
     return Probe.of(vehicle)
@@ -179,17 +192,29 @@ class Column:
     share : array, shape (3,)
         A coefficient of torque is counted in units of the inertia about the axes on which it acts, so that a fit can
         change the inertia alone; 0 for one that has a force, which knows no inertia.
+    drags : array of bool, shape (6,)
+        Rows that go with the drag factor, where the others go with the thrust factor.
     """
 
     weights: Array
     share: Array
+    drags: BoolArray
 
     @classmethod
-    def of(cls, weights: Array) -> Column:
+    def of(cls, weights: Array, drags: BoolArray) -> Column:
         """Find the axes on which a coefficient acts."""
         acts = np.any(weights[:3], axis=(1, 2))
         free = not np.any(weights[3:])
-        return cls(weights, acts / max(acts.sum(), 1) * float(free))
+        return cls(weights, acts / max(acts.sum(), 1) * float(free), drags)
+
+    def scaled(self, drag: float) -> Array:
+        """Weights for a unit counted in thrust, with a drag factor that changed by as much more than the thrust's."""
+        return np.where(self.drags[:, None, None], drag * self.weights, self.weights)
+
+    def counted(self, found: Array) -> float:
+        """Count a unit on another vehicle, shape of its weights (6, 34, 1 + 4 rotors)."""
+        stated, other = self.weights[~self.drags, : len(STATE_TERMS)], found[~self.drags]
+        return float(np.sum(stated * other) / np.sum(other**2))
 
 
 class Numbered(ABC):
@@ -312,15 +337,16 @@ class Layout(Numbered):
         for block in self.blocks:
             if block in LEARNED:
                 units = np.eye(len(self._numbers(block)))
+                drags = np.zeros((len(units), 6), dtype=bool)
                 weights = np.array([remainder_weights(self._remainder((block,), unit), rotors) for unit in units])
             elif not _is_effect(block):
                 continue
             else:
-                weights = _stated_weights(block, self.vehicle)
+                weights, drags = _stated_weights(block, self.vehicle), _drag_rows(block, self.vehicle)
                 more = np.zeros((*weights.shape[:2], terms - weights.shape[2], weights.shape[3]))
                 weights = np.concatenate([weights, more], axis=2)
-            named = zip(self._numbers(block), weights, strict=True)
-            columns |= {number.name: Column.of(column) for number, column in named}
+            named = zip(self._numbers(block), weights, drags, strict=True)
+            columns |= {number.name: Column.of(*column) for number, *column in named}
         return columns
 
     def _remainder(self, blocks: Sequence[str], coefficients: Array) -> Remainder:
@@ -414,13 +440,17 @@ class Layout(Numbered):
         rotors = len(self.vehicle.rotors)
         table = np.zeros((6, len(STATE_TERMS) + airflow_terms(self.used_airflow), 1 + 4 * rotors))
         table[:, 0] += self._rotor_table(values)
+        drag = self._drag_over_thrust(values)
         for name, coefficient in self.coefficients(values).items():
             if coefficient:
-                table += coefficient * self._columns[name].weights
+                table += coefficient * self._columns[name].scaled(drag)
         return table * self._forces_by_mass(values)
 
     def _mass(self, values: Array) -> float:
         return self.vehicle.mass_kg * float(np.exp(self._get(values, _MASS, 0.0)))
+
+    def _drag_over_thrust(self, values: Array) -> float:
+        return self._get(values, _DRAG, 1.0) / self._get(values, _THRUST, 1.0)
 
     def _forces_by_mass(self, values: Array) -> Array:
         """Give what rows of the weights are multiplied with: runs divide forces by the stated mass."""
@@ -441,7 +471,7 @@ class Layout(Numbered):
             return None
         if name in self._columns:
             column = self._columns[name]
-            return np.asarray(np.exp(column.share @ log_counted) * column.weights)
+            return np.asarray(np.exp(column.share @ log_counted) * column.scaled(self._drag_over_thrust(values)))
         derivative = np.zeros_like(self._template)
         if name in self._counting:
             axis = self._counting.index(name)
@@ -454,6 +484,10 @@ class Layout(Numbered):
             moved = values.copy()
             moved[self.index[name]] += 1.0
             derivative[:, 0] = self._rotor_table(moved) - self._rotor_table(values)
+            thrust = self._get(values, _THRUST, 1.0)
+            step = {_DRAG: 1.0, _THRUST: -self._drag_over_thrust(values)}.get(name, 0.0) / thrust
+            for each, column in self._columns.items():
+                derivative[column.drags] += step * coefficients[each] * column.weights[column.drags]
         return derivative
 
     @cached_property
@@ -547,7 +581,7 @@ class Layout(Numbered):
         """Count the coefficients of an effect on the vehicle that was found, not on the stated one."""
         found = effect_weights(name, {}, probe)
         scaled = [
-            coefficients[number.name] * _ratio(self._columns[number.name].weights[:, : len(STATE_TERMS)], weights)
+            coefficients[number.name] * self._columns[number.name].counted(weights)
             for number, weights in zip(self._numbers(name), found, strict=True)
         ]
         return ModelEffect(name, {}, np.array(scaled))
@@ -556,10 +590,6 @@ class Layout(Numbered):
 def _is_effect(block: str) -> bool:
     """Tell whether a block is an effect of the catalogue that adds a wrench."""
     return block in CATALOGUE and block not in _OF_ROTORS and block != _PRODUCTS_BLOCK
-
-
-def _ratio(stated: Array, found: Array) -> float:
-    return float(np.sum(stated * found) / np.sum(found**2))
 
 
 @dataclass(frozen=True)

@@ -100,14 +100,22 @@ def _seeds(vehicle: VehicleSettings) -> Array:
 
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
-    drag = np.zeros((len(signals), 3))
-    drag[:, 2] = signals.speed**2 @ [rotor.drag_factor_n_m_s2 for rotor in signals.vehicle.rotors]
-    thrusts = (signals.rotor_thrust * mode for mode in gain_modes(signals.vehicle).T)
+    drags = signals.speed**2 * [rotor.drag_factor_n_m_s2 for rotor in signals.vehicle.rotors]
+    drag = _about_z(drags.sum(axis=1))
+    modes = gain_modes(signals.vehicle).T
     # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force tells.
     lift = np.zeros((len(signals), 3))
     lift[:, 2] = signals.rotor_thrust @ signals.spins
-    levers = (thrust_wrench(signals.hubs, thrust) for thrust in thrusts)
+    # A propeller that pulls less drags less.
+    levers = (
+        thrust_wrench(signals.hubs, signals.rotor_thrust * mode) + wrench(_about_z(-drags @ (signals.spins * mode)))
+        for mode in modes
+    )
     return Columns(stack(*levers, wrench(drag), wrench(force=lift)))
+
+
+def _about_z(torque: Array) -> Array:
+    return np.column_stack([np.zeros((len(torque), 2)), torque])
 
 
 def _accounts(_number: str, values: Mapping[str, float]) -> float:
@@ -119,7 +127,7 @@ EFFECT = Effect(
     order=200,
     title="rotors that differ",
     kind="wrench",
-    formula="dT_i = kappa_i T_i,  M = sum r_i x dT_i z;  M_z += delta sum b_i w_i^2",
+    formula="dT_i = kappa_i T_i,  M = sum r_i x dT_i z,  M_z += sum (delta - s_i kappa_i) b_i w_i^2",
     sentence="One rotor pulls less than its opposite: a worn propeller, a weak motor.",
     coefficients=(
         Coefficient("difference_1", "1", -0.5, 0.5, "kappa of the first opposite pair, first rotor less second"),

@@ -34,7 +34,7 @@ def circle(number):
 
 
 def test_columns_are_what_other_factors_do(columns, flight):
-    true = with_gains(flight.vehicle, [0.05, -0.03, -0.05, 0.03], [-0.1, 0.1, -0.1, 0.1])
+    true = with_gains(flight.vehicle, [0.05, -0.03, -0.05, 0.03], [-0.05, 0.07, -0.15, 0.13])
     change = body_wrench(true, flight.rotor_speed).body_torque - flight.torque
     found = columns("rotor_mismatch", flight).direct @ [0.1, -0.06, 0.1, 0.0]
     np.testing.assert_allclose(found[:, :3], change, atol=1e-12)
