@@ -10,8 +10,9 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
+from cpfls_cli.gap.naming.bends import bends_of
 from cpfls_cli.gap.naming.estimate import Estimates, differs_from_zero, free_estimates, sized, weighted_estimates
-from cpfls_cli.gap.naming.ranking import block_index
+from cpfls_cli.gap.naming.ranking import block_index, rank_effects, surely_less
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
 
@@ -70,15 +71,15 @@ def earned(
 ) -> tuple[Fitted, list[Refusal]]:
     """Fit chosen effects, and refit without those that have not earned a name on the flights that they were found in.
 
-    These are effects whose size does not differ from zero, which nobody has to hear of; effects that sit on a bound;
-    and of effects that cancel each other the one that explains less.
+    These are effects whose size does not differ from zero, which nobody has to hear of; effects that sit on a bound; of
+    effects that cancel each other the one that explains less; and those that a bend of another one would surely beat.
     """
     found, refusals = fitted(flights, chosen, floor, settings), []
     while found.hypothesis.chosen:
         pairs = list(zip(found.hypothesis.chosen, found.estimates.effects, strict=True))
         out = [candidate for candidate, numbers in pairs if not differs_from_zero(candidate.effect, numbers)]
         if not out:
-            refused = on_bound(found, floor) or _cancelling(found, floor)
+            refused = on_bound(found, floor) or _cancelling(found, floor) or _filling_a_bend(found, settings)
             if refused is None:
                 break
             out, refusal = refused
@@ -187,3 +188,18 @@ def _lesser(found: Fitted, floor: Array, *pair: int) -> tuple[list[Candidate], R
     other = next(index for index in pair if index != out)
     names = chosen[out].effect.name, chosen[other].effect.name
     return [chosen[out]], Refusal(names[0], f"{names[0]} and {names[1]} nearly cancel, and one of them does as well")
+
+
+def _filling_a_bend(found: Fitted, settings: GapSettings) -> tuple[list[Candidate], Refusal] | None:
+    """Find an effect, the latest first, that a bend of another one's formula surely explains more than."""
+    chosen, flights = found.hypothesis.chosen, found.hypothesis.flights
+    for own in reversed(chosen):
+        others = [each for each in chosen if each is not own]
+        bends = bends_of(others, flights)
+        if not bends or own.effect.kind != "wrench":
+            continue
+        ranking = rank_effects(flights, others, bends, settings, None, [own]).ranking
+        best, kept = ranking[0], next(each for each in ranking if each.candidate.effect is own.effect)
+        if best is not kept and surely_less(best, kept):
+            return [own], Refusal(own.effect.name, f"{best.candidate.effect.name} explains more")
+    return None

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects.effect import Columns, Effect
+from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, left_over, scatter_size, scatter_variance
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate
+from cpfls_cli.gap.naming.bends import bends_of
 from cpfls_cli.gap.naming.earned import Fitted, fitted
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
@@ -214,8 +214,7 @@ def beside_the_unnamed(
     if {each.effect.name for each in named} != {each.effect.name for each in last.hypothesis.chosen}:
         step = rank_effects(flights, named, effects, settings, rng)
     chosen = _beyond_chance(step, effects, settings, rng)
-    usual = _usual_speed([flight.signals for flight in flights])
-    bends = [_bend(each.effect, usual) for each in named if _of_speed(each.effect)]
+    bends = bends_of(named, flights)
     if bends:
         chosen = _beyond_chance(rank_effects(flights, chosen, bends, settings, rng), bends, settings, rng)
     if len(chosen) == len(named):
@@ -236,32 +235,6 @@ def _beyond_chance(
         chosen.append(step.ranking[0].candidate)
         step = rank_effects(flights, chosen, effects, settings, rng)
     return chosen
-
-
-def _of_speed(effect: Effect) -> bool:
-    """Tell whether an effect is a formula in the speed through the air."""
-    return effect.kind == "wrench" and "velocity" in effect.needs and not (effect.shapes or effect.physical)
-
-
-def _bend(effect: Effect, usual: float) -> Effect:
-    """Take a formula for another one beyond a usual speed, in m/s, than below it.
-
-    Bounded, because powers of the speed hang on the fastest seconds of a flight.
-    """
-
-    def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-        assert effect.columns is not None
-        squared = (signals.air_velocity**2).sum(axis=1)
-        return Columns(effect.columns(signals, shape).direct * (squared / (squared + usual**2))[:, None, None])
-
-    either = tuple(replace(each, low=-each.high) for each in effect.coefficients)
-    return replace(effect, name=f"a bend of {effect.name} over speed", columns=columns, coefficients=either)
-
-
-def _usual_speed(flights: Sequence[Signals]) -> float:
-    """Compute the root mean square of the speed through the air, m/s, over flights that have one."""
-    squared = [(flight.air_velocity**2).sum(axis=1) for flight in flights if "velocity" in flight.available]
-    return float(np.sqrt(np.mean(np.concatenate(squared)))) if squared else np.inf
 
 
 def _both(number: Estimate, others: Sequence[Estimate]) -> Estimate:

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap import diagnose
 from cpfls_cli.gap.balance.balance_system import system
@@ -121,6 +122,34 @@ def test_of_two_that_cancel_one_goes():
     found, (refusal,) = earned(known, [plain, twin], best_floor(system(known, [plain])), SETTINGS)
     assert kept(found) in (["com_offset"], ["twin"])
     assert "nearly cancel" in refusal.sentence
+
+
+@pytest.fixture(scope="module")
+def of_another_power():
+    """A drag of the body that grows with the power 1.5 of the speed."""
+    drag = candidate("parasitic_drag")
+
+    def columns(signals, shape):
+        squared = (signals.air_velocity**2).sum(axis=1)[:, None, None]
+        return Columns(drag.effect.columns(signals, shape).direct / (squared + 1e-6) ** 0.25)
+
+    other = drag._replace(effect=replace(drag.effect, columns=columns))
+    return flights((other, [0.08, 0.08, 0.08, 0.0, 0.0, 0.0]), force=True)
+
+
+@pytest.mark.parametrize("companion", ["rotor_drag", "inflow"])
+def test_what_a_bend_of_another_formula_explains_is_no_name(of_another_power, companion):
+    found, (refusal,) = of(of_another_power, "parasitic_drag", companion)
+    assert kept(found) == ["parasitic_drag"]
+    assert refusal.name == companion
+    assert "a bend of parasitic_drag over speed explains more" in refusal.sentence
+
+
+def test_what_is_there_beside_another_is_no_bend_of_it():
+    known = flights(DRAG, (candidate("parasitic_drag"), [0.05, 0.05, 0.05, 0.0, 0.0, 0.0]), force=True)
+    found, refusals = of(known, "rotor_drag", "parasitic_drag")
+    assert kept(found) == ["rotor_drag", "parasitic_drag"]
+    assert not refusals
 
 
 def judge(training, held):
