@@ -13,18 +13,9 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 
 
 def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[Effect]:
-    """Make an effect of the bend of each formula in the speed through the air.
+    """Make an effect of the bend of each formula in the air velocity u: the formula times ``|u|^2 / (|u|^2 + U^2)``.
 
-    Parameters
-    ----------
-    named : sequence of Candidate
-    flights : sequence of WeakFlight
-
-    Returns
-    -------
-    list of Effect
-        The formula times ``|u|^2 / (|u|^2 + U^2)``, U being the root mean square of u over the flights. Bounded,
-        because powers of the speed hang on the fastest seconds of a flight.
+    U is the root mean square of u over the flights. Bounded, because powers hang on the fastest seconds of a flight.
     """
     usual = _usual_speed([flight.signals for flight in flights])
     return [_bend(each.effect, usual) for each in named if _of_speed(each.effect)]
