@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 
@@ -85,17 +87,13 @@ class OpenSet:
 def main(count: int) -> None:
     rows, totals = [], {way: Counter() for way in WAYS}
     expected = {way: [] for way in WAYS}
-    begin = perf_counter()
-    streams = [open_sets(seed, count // len(SEEDS)) for seed in SEEDS]
-    for number, together in enumerate(zip(*streams, strict=True)):
-        for seed, opened in zip(SEEDS, together, strict=True):
-            outcomes = settle(opened, np.random.default_rng([seed, number, 1]))
-            for way, (outcome, sure) in outcomes.items():
-                totals[way][outcome.partition(":")[0]] += 1
-                expected[way].append(sure)
-            told = [f"{outcome} ({sure:.2f})" for outcome, sure in outcomes.values()]
-            rows.append((opened.hidden.candidate.effect.name, opened.rival, *told))
-            print(seed, number, f"{perf_counter() - begin:.0f} s", *rows[-1], sep="; ", flush=True)
+    with ProcessPoolExecutor(len(SEEDS)) as pool:
+        of_seeds = list(pool.map(settled, SEEDS, [count // len(SEEDS)] * len(SEEDS)))
+    for hidden, rival, outcomes in chain(*of_seeds):
+        for way, (outcome, sure) in outcomes.items():
+            totals[way][outcome.partition(":")[0]] += 1
+            expected[way].append(sure)
+        rows.append((hidden, rival, *(f"{outcome} ({sure:.2f})" for outcome, sure in outcomes.values())))
     table("next-flight-sets", ("hidden", "rival", *(f"{way} (predicted)" for way in WAYS)), rows)
     kinds = ("right", "wrong", "open")
     summary = [
@@ -103,6 +101,16 @@ def main(count: int) -> None:
         for way in WAYS
     ]
     table("next-flight", ("one more flight of 30 s", *kinds, "predicted share right"), summary)
+
+
+def settled(seed: int, count: int) -> list[tuple[str, str, dict[str, tuple[str, float]]]]:
+    """Settle the sets of a seed: hidden effect, its rival, and the outcome of each way."""
+    found, begin = [], perf_counter()
+    for number, opened in enumerate(open_sets(seed, count)):
+        outcomes = settle(opened, np.random.default_rng([seed, number, 1]))
+        found.append((opened.hidden.candidate.effect.name, opened.rival, outcomes))
+        print(seed, number, f"{perf_counter() - begin:.0f} s", *found[-1], sep="; ", flush=True)
+    return found
 
 
 def open_sets(seed: int, count: int):
