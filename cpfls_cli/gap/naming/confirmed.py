@@ -235,7 +235,9 @@ def differences(
         Sentences; none where the flights agree, in a gap or in none.
     """
     seen = _size(start.hypothesis.residual - start.hypothesis.base @ fit(start.hypothesis, start.floor), start.floor)
-    unseen = last.held_out.size(last.held_out.parameters).floors
+    held = last.held_out
+    # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
+    unseen = min((held.size(each).floors for each in (held.before, held.parameters)), key=np.nanmax)
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge, settings)
     there, here = _largest(seen), _largest(unseen)

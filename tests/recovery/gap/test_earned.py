@@ -172,6 +172,21 @@ def test_what_is_there_stands_and_what_is_not_needed_goes():
     assert not differ
 
 
+def test_numbers_that_took_up_what_the_others_lack_hide_no_difference():
+    """Refitted to flights with a drag, the vehicle's own numbers may leave the others worse than as given."""
+    training = flights(DRAG, force=True)
+    there = judge(training, flights(seeds=(3,), force=True))
+    first = there.judge(fitted(training, [DRAG[0]], there.floor, SETTINGS))
+    last, _ = there.confirmed(first)
+    start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
+    worse = last._replace(held_out=replace(last.held_out, parameters=2 * last.held_out.parameters))
+    assert kept(last.found) == []
+    assert (
+        "of what would be rotor_drag, and those held out have none"
+        in differences(first, worse, start, there, SETTINGS)[0]
+    )
+
+
 def test_what_makes_a_channel_worse_goes():
     """Drag is in the flights learned from, and the offset in all."""
     last, refusals, _ = judged(flights(OFFSET, DRAG), flights(OFFSET, seeds=(3,)), "com_offset", "rotor_drag")
