@@ -136,8 +136,8 @@ def _too_small(unnamed: Sequence[str]) -> Iterator[str]:
     """Say what intervals of the named effects leave room for."""
     if unnamed:
         yield (
-            f"beside these, {' and '.join(unnamed)} would explain more than chance and too little for a name; the"
-            " intervals hold the numbers with and without"
+            f"beside these, what is not named explains more than chance ({', '.join(unnamed)}); the intervals hold the"
+            " numbers with and without"
         )
 
 
