@@ -9,20 +9,22 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.report.content import Panel, Plot
-from cpfls_cli.report.numbers import plain
+from cpfls_cli.report.numbers import plain, power_of_ten
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
+    from matplotlib.axis import Axis, Ticker
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
+    from matplotlib.ticker import Formatter, Locator
 
 # Matplotlib is loaded where something is drawn: the sentences of a page are also those of the terminal.
 WIDTH = 7.6
@@ -54,6 +56,8 @@ _STYLE: dict[str, Any] = {
     "font.size": 9.5,
     "axes.titlesize": 10,
     "axes.titlelocation": "left",
+    # Else every round of a layout measures all ticks, for titles to give way to those above a plot: none are there.
+    "axes.titley": 1.0,
     "axes.labelsize": 9.5,
     "axes.edgecolor": "#555555",
     "axes.linewidth": 0.7,
@@ -75,11 +79,17 @@ _STYLE: dict[str, Any] = {
 _NAMESPACE = "http://www.w3.org/2000/svg"
 _COORDINATES = {"d", "x", "y"}
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}(?!\d*e)")
+_POWER = re.compile(r"\$\\mathdefault\{(-?)(?:([\d.]+)\\times)?10\^\{(-?\d+)\}\}\$")
+"""How Matplotlib asks for a power of ten to be typeset."""
 _REFERENCE = re.compile(r"url\(#([^)]+)\)")
 
 _LARGEST = 1500
 # Of an inch of an SVG.
 _POINTS = 72
+# Of a layout: ticks follow the size of a plot, and its margins follow its ticks.
+_ROUNDS = 2
+# Of the range of an axis: a tick at its end is one.
+_ROUNDING = 1e-9
 _ROWS = 25
 """Of a table of the data of a figure, at most."""
 
@@ -289,16 +299,28 @@ def runs(marked: Array | BoolArray) -> list[tuple[int, int]]:
 
 def _show_as_written(figure: Figure) -> None:
     """Show every text as it is: a dollar sign in the name of a setting is no mathematics, and SVG has no bells."""
-    from matplotlib.text import Text
-
-    for text in figure.findobj(Text):
-        # Ticks that are written out only when the figure is drawn are the library's own.
-        if isinstance(text, Text) and (written := text.get_text()):
+    for text in _texts(figure):
+        if written := text.get_text():
             # Invisible, but no font has to know of it.
             own = written.replace(NOT_FIRST, "")
             shown = (each if each.isprintable() or each == "\n" else "\N{REPLACEMENT CHARACTER}" for each in own)
             text.set_text("".join(shown))
             text.set_parse_math(False)
+
+
+def _texts(artist: Artist) -> Iterator[Text]:
+    """Find the texts of a figure, without ticks that the library makes of numbers when it draws."""
+    from matplotlib.axis import Axis
+    from matplotlib.text import Text
+    from matplotlib.ticker import FixedLocator
+
+    if isinstance(artist, Text):
+        yield artist
+    if isinstance(artist, Axis) and not isinstance(artist.get_major_locator(), FixedLocator):
+        yield artist.label
+    else:
+        for part in artist.get_children():
+            yield from _texts(part)
 
 
 def _inline_svg(figure: Figure, name: str, description: str) -> str:
@@ -328,13 +350,87 @@ def _svg(figure: Figure) -> str:
     """Lay out a figure, and draw it once: `savefig` draws it twice, of which the first is for a layout."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    stream, canvas, engine = io.StringIO(), FigureCanvasSVG(figure), figure.get_layout_engine()
+    stream, canvas = io.StringIO(), FigureCanvasSVG(figure)
     figure.set_dpi(_POINTS)
-    if engine is not None:
-        engine.execute(figure)
-        figure.set_layout_engine("none")
+    _lay_out(figure)
     canvas.print_svg(stream, metadata={"Date": None})  # type: ignore[no-untyped-call]  # matplotlib types it not
     return stream.getvalue()
+
+
+def _lay_out(figure: Figure) -> None:
+    """Lay out a figure with the outermost and the widest tick of each axis, and fix the ticks that suit its size.
+
+    Matplotlib would choose, make and measure all ticks several times in each of its rounds, which is half of what a
+    page takes.
+    """
+    engine = figure.get_layout_engine()
+    free = list(_free_ticks(figure))
+    ticks = [_ticks(axis, locator, formatter) for axis, _, locator, formatter in free]
+    for _ in range(_ROUNDS):
+        before = ticks
+        for (_, ticker, _, _), each in zip(free, before, strict=True):
+            _fix(ticker, each.few())
+        if engine is not None:
+            engine.execute(figure)
+        ticks = [_ticks(axis, locator, formatter) for axis, _, locator, formatter in free]
+        if all(now.length <= then.length for now, then in zip(ticks, before, strict=True)):
+            break
+    figure.set_layout_engine("none")
+    for (_, ticker, _, _), each in zip(free, ticks, strict=True):
+        _fix(ticker, each)
+
+
+def _free_ticks(figure: Figure) -> Iterator[tuple[Axis, Ticker, Locator, Formatter]]:
+    """Find whose ticks are for the library to choose; panels that share an axis share its ticks."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    both = [axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)]
+    shared = {ticker: axis for axis in both for ticker in (axis.major, axis.minor)}
+    for ticker, axis in shared.items():
+        locator, formatter = ticker.locator, ticker.formatter
+        if locator and formatter and not isinstance(locator, FixedLocator | NullLocator):
+            yield axis, ticker, locator, formatter
+
+
+class _Ticks(NamedTuple):
+    """Where the ticks of an axis are and what is written at them, with the factor that stands in its corner."""
+
+    places: list[float]
+    words: list[str]
+    corner: str
+
+    @property
+    def length(self) -> int:
+        return max(map(len, self.words), default=0)
+
+    def few(self) -> _Ticks:
+        """Take the first, the last and the one with the longest word."""
+        widest = [index for index, word in enumerate(self.words) if len(word) == self.length][:1]
+        kept = sorted({*range(len(self.words))[:1], *widest, *range(len(self.words))[-1:]})
+        return _Ticks([self.places[index] for index in kept], [self.words[index] for index in kept], self.corner)
+
+
+def _ticks(axis: Axis, locator: Locator, formatter: Formatter) -> _Ticks:
+    """Find the ticks of an axis as large as it is."""
+    low, high = sorted(axis.get_view_interval())
+    rounding = _ROUNDING * (high - low)
+    places = [float(place) for place in locator() if low - rounding <= place <= high + rounding]
+    words = [_POWER.sub(_without_mathematics, word) for word in formatter.format_ticks(places)]
+    return _Ticks(places, words, formatter.get_offset())
+
+
+def _fix(ticker: Ticker, ticks: _Ticks) -> None:
+    from matplotlib.ticker import FixedFormatter, FixedLocator
+
+    formatter = FixedFormatter(ticks.words)
+    formatter.set_offset_string(ticks.corner)
+    ticker.locator, ticker.formatter = FixedLocator(ticks.places), formatter
+
+
+def _without_mathematics(found: re.Match[str]) -> str:
+    """Write a power of ten as in tables: its typesetting takes longer than the rest of an axis."""
+    sign, factor, power = found.groups()
+    return f"{'−' if sign else ''}{f'{factor} × ' if factor else ''}{power_of_ten(int(power))}"
 
 
 def _strip(element: ElementTree.Element) -> None:

@@ -36,7 +36,7 @@ def number(value: float, digits: int = 4) -> str:
         decimals = max(digits - 1 - power, 0) if value else 0
         text = f"{value:.{decimals}f}"
     else:
-        text = f"{mantissa} × 10{str(power).translate(_SUPERSCRIPT)}"
+        text = f"{mantissa} × {power_of_ten(power)}"
     return text.replace("-", "−")
 
 
@@ -51,7 +51,12 @@ def plain(value: float, smallest: float = 1e-3) -> str:
     if value == 0 or not math.isfinite(value) or smallest <= abs(value) < _LARGE:
         return (f"{value:.6g}" if math.isfinite(value) else number(value)).replace("-", "−")
     power = 3 * math.floor(math.log10(abs(value)) / 3)
-    return f"{value / 10.0**power:.6g} × 10{str(power).translate(_SUPERSCRIPT)}".replace("-", "−")
+    return f"{value / 10.0**power:.6g} × {power_of_ten(power)}".replace("-", "−")
+
+
+def power_of_ten(power: int) -> str:
+    """Write ten to a power."""
+    return f"10{str(power).translate(_SUPERSCRIPT)}"
 
 
 def count(value: float) -> str:
@@ -125,7 +130,7 @@ def printed(text: str) -> str:
         With a minus sign, and ``× 10`` with a raised power.
     """
     mantissa, _, power = text.partition("e")
-    raised = f" × 10{str(int(power)).translate(_SUPERSCRIPT)}" if power else ""
+    raised = f" × {power_of_ten(int(power))}" if power else ""
     return mantissa.replace("-", "−") + raised
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.report.canvas import kept_samples, legend_above, legend_over, line, plot, runs
+from cpfls_cli.report.canvas import kept_samples, legend_above, legend_over, line, plot, runs, stacked
 
 
 def draw(figure):
@@ -84,3 +84,39 @@ def test_a_lone_spike_survives():
 def test_runs_cover_exactly_what_is_marked(marked):
     covered = [index for first, last in runs(np.array(marked)) for index in range(first, last + 1)]
     assert covered == [index for index, value in enumerate(marked) if value]
+
+
+def labels_of_several_widths(figure):
+    for panel, (low, high) in zip(stacked(figure, 3), [(0.0, 1.0), (-3e4, 2.5e5), (0.00012, 0.00019)], strict=True):
+        line(panel, np.linspace(0.0, 30.0, 50), np.linspace(low, high, 50))
+        panel.set_ylabel("what")
+    legend_above(panel)
+
+
+def powers_of_ten(figure):
+    left, right = figure.subplots(1, 2)
+    left.loglog([1e-3, 1e4], [2.0, 7.0])
+    right.plot([0.0, 1.0], [0.0, 3e-9])
+
+
+@pytest.mark.parametrize("draw", [labels_of_several_widths, powers_of_ten])
+def test_a_layout_by_few_ticks_is_that_of_the_library(draw):
+    picture = plot("one", "", "what", 4.0, draw).picture
+    figure = picture.figure()
+    figure.set_dpi(72)
+    figure.draw_without_rendering()
+    frames = re.findall(r'<path d="M ([\d.]+) ([\d.]+) L ([\d.]+) \2 L \3 ([\d.]+) L \1 \4', picture.svg)
+    # The first frame is the whole figure.
+    found = np.array(frames[1 : 1 + len(figure.axes)], dtype=float)
+    boxes = np.array([axes.bbox.extents for axes in figure.axes])
+    height = figure.bbox.height
+    expected = np.column_stack([boxes[:, 0], height - boxes[:, 1], boxes[:, 2], height - boxes[:, 3]])
+    # Points, of which a letter is ten high; a power that is typeset is higher than one that is written.
+    assert found == pytest.approx(expected, abs=2.0)
+
+
+def test_ticks_are_written_in_words_that_need_no_typesetting_and_keep_their_factor():
+    figure = plot("one", "", "what", 4.0, powers_of_ten).picture
+    words = {text.strip() for text in ElementTree.fromstring(figure.svg).itertext()}
+    assert {"10⁻³", "10⁰", "10⁴", "2 × 10⁰", "1e−9", "0.5"} <= words
+    assert not any("$" in word or "\\" in word for word in words)
