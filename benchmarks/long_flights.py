@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
 import subprocess
 import sys
 import tempfile
@@ -112,7 +111,7 @@ def write_tiled(path: Path, samples: int) -> None:
 
 
 def measure(path: Path) -> dict[str, float]:
-    """Time evaluations of a flight; report microseconds per sample and peak memory in MB."""
+    """Time evaluations of a flight; report microseconds per sample."""
     source = flight_source(path)
     evaluator = model_evaluator(source, source, paper_study().identification)
     chromosome = np.full(evaluator.structure.genes, 30000)
@@ -130,8 +129,7 @@ def measure(path: Path) -> dict[str, float]:
         # What a first search loads counts where samples are few.
         one_search()
     search = per_sample(one_search, source)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return {"evaluation": float(evaluation), "search": search, "memory": peak}
+    return {"evaluation": float(evaluation), "search": search}
 
 
 def fitted(evaluator, chromosome: np.ndarray):
@@ -147,21 +145,31 @@ def per_sample(work, source: TorqueSource) -> float:
 
 
 def in_own_process(path: Path) -> dict[str, float]:
-    command = [sys.executable, __file__, "--one", str(path)]
-    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    _, memory, said = beside([sys.executable, __file__, "--one", path])
+    return json.loads(said) | {"memory": memory}
 
 
 def by_command(command: str, output: Path, *words: Path | str) -> tuple[float, float]:
     """Run a command of the program: seconds of processor time, and peak memory in MB."""
-    code = (
-        "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
-        "own = resource.getrusage(resource.RUSAGE_CHILDREN);"
-        "print(own.ru_utime + own.ru_stime, own.ru_maxrss / 1024)"
-    )
     full = [sys.executable, "-m", "cpfls_cli", command, CONFIG, *words, "-o", output, "--force"]
-    call = [sys.executable, "-c", code, *map(str, full)]
-    seconds, memory = subprocess.run(call, check=True, stdout=subprocess.PIPE, text=True).stdout.split()
-    return float(seconds), float(memory)
+    seconds, memory, _ = beside(full)
+    return seconds, memory
+
+
+def beside(call) -> tuple[float, float, str]:
+    """Run a program from a small one, as the peak of memory of what a large one starts is not below its own.
+
+    Give its seconds of processor time, its peak memory in MB, and what it said.
+    """
+    code = (
+        "import json, resource, subprocess, sys;"
+        "said = subprocess.run(sys.argv[1:], check=True, stdout=subprocess.PIPE, text=True).stdout;"
+        "own = resource.getrusage(resource.RUSAGE_CHILDREN);"
+        "print(json.dumps([own.ru_utime + own.ru_stime, own.ru_maxrss / 1024, said]))"
+    )
+    small = [sys.executable, "-c", code, *map(str, call)]
+    seconds, memory, said = json.loads(subprocess.run(small, check=True, stdout=subprocess.PIPE, text=True).stdout)
+    return seconds, memory, said
 
 
 def plot(rows, path: Path) -> None:
