@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from cpfls_cli.arrays import Array
@@ -104,20 +106,21 @@ def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
     longer = make_windows(windows.period, wanted, 0.5) if _fits(residual, wanted / windows.period) else windows
     lowest = _LOWEST_PER_WINDOW / (len(longer.weight) * longer.period)
     frequencies = np.linspace(lowest, max(highest, _BAND * lowest), _FREQUENCIES)
-    power = np.array([_power(residual, longer, frequency) for frequency in frequencies]) / _energy(longer)
-    terms = np.array([_terms(longer, frequency) for frequency in frequencies])
-    window_terms = _terms(windows, 0.0) * _energy(windows)
-    return np.array([_extrapolated(terms, channel, window_terms) for channel in power.T])
+    power = _power(residual, longer, frequencies) / _energy(longer)
+    terms = np.array([_terms(longer.weight.tobytes(), longer.period, frequency) for frequency in frequencies])
+    window_terms = _terms(windows.weight.tobytes(), windows.period, 0.0) * _energy(windows)
+    return np.array([_extrapolated(terms, channel, window_terms) for channel in power])
 
 
-def _terms(windows: Windows, centre: float) -> Array:
-    """Average the model spectra of noise over the passband of a window at a frequency."""
-    length = len(windows.weight)
-    through = np.abs(np.fft.rfft(windows.weight, _PADDED * length)) ** 2
-    offset = np.fft.rfftfreq(_PADDED * length, windows.period)
+@lru_cache(maxsize=512)
+def _terms(weights: bytes, period: float, centre: float) -> Array:
+    """Average the model spectra of noise over the passband of a window at a frequency; all flights share windows."""
+    weight = np.frombuffer(weights)
+    through = np.abs(np.fft.rfft(weight, _PADDED * len(weight))) ** 2
+    offset = np.fft.rfftfreq(_PADDED * len(weight), period)
     both = np.concatenate([centre - offset[:0:-1], centre + offset])
     share = np.concatenate([through[:0:-1], through])
-    phase = 2 * np.pi * both * windows.period
+    phase = 2 * np.pi * both * period
     rising = both**2
     colours = [1 / (1 + rho**2 - 2 * rho * np.cos(phase)) for rho in _CORRELATIONS]
     spectra = np.array([spectrum for colour in colours for spectrum in (colour, rising * colour)])
@@ -140,35 +143,58 @@ def _extrapolated(terms: Array, power: Array, window_terms: Array) -> float:
         return 0.0
     # Dividing by the power makes relative errors of equal weight.
     relative = terms / power[:, None]
-    pairs = [(flat, rising) for flat in range(0, terms.shape[1], 2) for rising in range(1, terms.shape[1], 2)]
-    fits = [nnls(relative[:, pair], np.ones(len(power))) for pair in pairs]
-    best = int(np.argmin([misfit for _, misfit in fits]))
-    chosen = 0 if fits[0][1] ** 2 <= _CLEARLY_BETTER * fits[best][1] ** 2 else best
-    return float(np.sqrt(fits[chosen][0] @ window_terms[list(pairs[chosen])]))
+    flat, rising = np.unravel_index(_best_pair(relative), (len(_CORRELATIONS),) * 2)
+    found, _ = nnls(relative[:, [2 * flat, 2 * rising + 1]], np.ones(len(power)))
+    return float(np.sqrt(found @ window_terms[[2 * flat, 2 * rising + 1]]))
 
 
-def _power(residual: Columns, windows: Windows, frequency: float) -> Array:
-    through = modulated(windows, frequency)
+def _best_pair(relative: Array) -> int:
+    """Choose a flat and a rising spectrum, of which neither can be negative, that leave least of one: their number.
+
+    Two columns have a formula, and all pairs are tried at once.
+    """
+    # What is left does not depend on the unit, and fourth powers stay within range.
+    scaled = relative / relative.max()
+    flat, rising = scaled[:, ::2, None], scaled[:, None, 1::2]
+    flat_squared, rising_squared, both = (each.sum(axis=0) for each in (flat**2, rising**2, flat * rising))
+    flat_sum, rising_sum = flat.sum(axis=0), rising.sum(axis=0)
+    determinant = flat_squared * rising_squared - both**2
+    # Where both are the same spectrum no pair has a solution, and one alone is taken.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        much_flat = (rising_squared * flat_sum - both * rising_sum) / determinant
+        much_rising = (flat_squared * rising_sum - both * flat_sum) / determinant
+    alone = np.minimum(_left(flat * (flat_sum / flat_squared)), _left(rising * (rising_sum / rising_squared)))
+    together = _left(much_flat * flat + much_rising * rising)
+    misfit = np.where((much_flat >= 0) & (much_rising >= 0), together, alone)
+    return 0 if misfit[0, 0] <= _CLEARLY_BETTER * misfit.min() else int(np.argmin(misfit))
+
+
+def _left(fitted: Array) -> Array:
+    return np.asarray(np.sum((1 - fitted) ** 2, axis=0))
+
+
+def _power(residual: Columns, windows: Windows, frequencies: Array) -> Array:
+    through = modulated(windows, frequencies)
     rows = through.average(residual.direct)
     if residual.momentum is not None:
         rows = rows + through.derivative(residual.momentum)
     return np.asarray(np.median(np.abs(rows) ** 2, axis=0) / _MEDIAN_OF_EXPONENTIAL)
 
 
-def modulated(windows: Windows, frequency: float) -> Windows:
-    """Shift windows to a frequency, ``phi(t) exp(-2 pi i f t)``.
+def modulated(windows: Windows, frequencies: Array) -> Windows:
+    """Shift windows to frequencies, ``phi(t) exp(-2 pi i f t)``.
 
     Parameters
     ----------
     windows : Windows
-    frequency : float
-        Hz.
+    frequencies : array, shape (frequency,), Hz
 
     Returns
     -------
     Windows
-        Complex.
+        Complex, of shape (window, frequency).
     """
-    turn = 2j * np.pi * frequency
-    phase = np.exp(-turn * windows.period * np.arange(len(windows.weight)))
-    return Windows(windows.weight * phase, (windows.slope - turn * windows.weight) * phase, windows.hop, windows.period)
+    turn = 2j * np.pi * frequencies
+    phase = np.exp(-turn * windows.period * np.arange(len(windows.weight))[:, None])
+    weight, slope = windows.weight[:, None], windows.slope[:, None]
+    return Windows(weight * phase, (slope - turn * weight) * phase, windows.hop, windows.period)
