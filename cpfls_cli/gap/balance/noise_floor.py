@@ -106,10 +106,10 @@ def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
     longer = make_windows(windows.period, wanted, 0.5) if _fits(residual, wanted / windows.period) else windows
     lowest = _LOWEST_PER_WINDOW / (len(longer.weight) * longer.period)
     frequencies = np.linspace(lowest, max(highest, _BAND * lowest), _FREQUENCIES)
-    power = _power(residual, longer, frequencies) / _energy(longer)
+    power = np.array([_power(residual, longer, frequency) for frequency in frequencies]) / _energy(longer)
     terms = np.array([_terms(longer.weight.tobytes(), longer.period, frequency) for frequency in frequencies])
     window_terms = _terms(windows.weight.tobytes(), windows.period, 0.0) * _energy(windows)
-    return np.array([_extrapolated(terms, channel, window_terms) for channel in power])
+    return np.array([_extrapolated(terms, channel, window_terms) for channel in power.T])
 
 
 @lru_cache(maxsize=512)
@@ -173,28 +173,28 @@ def _left(fitted: Array) -> Array:
     return np.asarray(np.sum((1 - fitted) ** 2, axis=0))
 
 
-def _power(residual: Columns, windows: Windows, frequencies: Array) -> Array:
-    through = modulated(windows, frequencies)
+def _power(residual: Columns, windows: Windows, frequency: float) -> Array:
+    through = modulated(windows, frequency)
     rows = through.average(residual.direct)
     if residual.momentum is not None:
         rows = rows + through.derivative(residual.momentum)
     return np.asarray(np.median(np.abs(rows) ** 2, axis=0) / _MEDIAN_OF_EXPONENTIAL)
 
 
-def modulated(windows: Windows, frequencies: Array) -> Windows:
-    """Shift windows to frequencies, ``phi(t) exp(-2 pi i f t)``.
+def modulated(windows: Windows, frequency: float) -> Windows:
+    """Shift windows to a frequency, ``phi(t) exp(-2 pi i f t)``.
 
     Parameters
     ----------
     windows : Windows
-    frequencies : array, shape (frequency,), Hz
+    frequency : float
+        Hz.
 
     Returns
     -------
     Windows
-        Complex, of shape (window, frequency).
+        Complex.
     """
-    turn = 2j * np.pi * frequencies
-    phase = np.exp(-turn * windows.period * np.arange(len(windows.weight))[:, None])
-    weight, slope = windows.weight[:, None], windows.slope[:, None]
-    return Windows(weight * phase, (slope - turn * weight) * phase, windows.hop, windows.period)
+    turn = 2j * np.pi * frequency
+    phase = np.exp(-turn * windows.period * np.arange(len(windows.weight)))
+    return Windows(windows.weight * phase, (windows.slope - turn * windows.weight) * phase, windows.hop, windows.period)
