@@ -157,9 +157,9 @@ def by_command(command: str, output: Path, *words: Path | str) -> tuple[float, f
 
 
 def beside(call) -> tuple[float, float, str]:
-    """Run a program from a small one, as the peak of memory of what a large one starts is not below its own.
+    """Run a program from a small process: seconds of processor time, peak memory in MB, and what it printed.
 
-    Give its seconds of processor time, its peak memory in MB, and what it said.
+    The peak memory of a process is never below that of the process that started it.
     """
     code = (
         "import json, resource, subprocess, sys;"

@@ -360,8 +360,7 @@ def _svg(figure: Figure) -> str:
 def _lay_out(figure: Figure) -> None:
     """Lay out a figure with the outermost and the widest tick of each axis, and fix the ticks that suit its size.
 
-    Matplotlib would choose, make and measure all ticks several times in each of its rounds, which is half of what a
-    page takes.
+    Matplotlib would choose, make and measure all ticks several times in each of its rounds.
     """
     engine = figure.get_layout_engine()
     free = list(_free_ticks(figure))
@@ -428,7 +427,7 @@ def _fix(ticker: Ticker, ticks: _Ticks) -> None:
 
 
 def _without_mathematics(found: re.Match[str]) -> str:
-    """Write a power of ten as in tables: its typesetting takes longer than the rest of an axis."""
+    """Write a power of ten as in tables, without slow typesetting."""
     sign, factor, power = found.groups()
     return f"{'−' if sign else ''}{f'{factor} × ' if factor else ''}{power_of_ten(int(power))}"
 

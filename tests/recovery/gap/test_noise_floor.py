@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 from scipy.signal import butter, filtfilt, lfilter
 
 from cpfls_cli.effects.effect import Columns
@@ -121,3 +122,19 @@ def test_cut_offs_are_those_of_the_signals_that_a_channel_is_made_of():
     np.testing.assert_allclose(channel_cut_offs(signals, euler=False), 12.0, rtol=0.1)
     sensed = replace(signals, specific_force=white["acceleration"])
     np.testing.assert_allclose(channel_cut_offs(sensed, euler=False), [12.0] * 3 + [np.inf] * 3, rtol=0.1)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_pair_of_spectra_leaves_as_little_as_scipy_finds(seed):
+    """Of six flat and six rising spectra one each, neither negative; the first two unless others are far better."""
+    from cpfls_cli.gap.balance.noise_floor import _best_pair
+
+    rng = np.random.default_rng(seed)
+    spectra = np.cumsum(rng.random((16, 12)) ** 4, axis=0)[:: rng.choice([-1, 1])]
+    power = spectra[:, rng.integers(12, size=2)] @ rng.random(2) * np.exp(0.1 * rng.standard_normal(16))
+    relative = 10.0 ** rng.uniform(-30, 30) * spectra / power[:, None]
+    left = np.array([nnls(relative[:, [2 * i, 2 * j + 1]], np.ones(16))[1] ** 2 for i in range(6) for j in range(6)])
+    chosen = _best_pair(relative)
+    assert (chosen == 0) == (left[0] <= 1.5 * left.min())
+    # Where one spectrum alone is best, whatever stands beside it leaves the same.
+    assert chosen == 0 or left[chosen] == pytest.approx(left.min(), rel=1e-9)
