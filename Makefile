@@ -8,6 +8,7 @@ CPFLS := $(BIN)/cpfls
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 INSTALLED := .venv/.installed
 INSTALLED_DEV := .venv/.installed-dev
+INSTALLED_BENCH := .venv/.installed-bench
 export OPENBLAS_NUM_THREADS := 1
 # The tests start hundreds of processes: what they import is compiled once, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE :=
@@ -28,7 +29,7 @@ help:
 	@echo "  make gap-example [HIDDEN=NAME=VALUES]   a flight with a hidden effect, and what the gap workflow makes of it"
 	@echo "  make replay-example   a vehicle that is not what its config states: found in flights, and what it predicts then"
 	@echo "  make lint        formatting, lint, types, import contracts"
-	@echo "  make bench       benchmarks, as Markdown tables"
+	@echo "  make bench       benchmarks, as Markdown tables; hours, and goes on where it was stopped"
 	@echo "  make blind-study [SEED=N DRAWS=N NONE=N SIZE=...]   flights with hidden effects, to data/blind/tables.md"
 	@echo "  make blind-quick [SIZE=...]                          a few sets of each group in six minutes"
 	@echo "  make fuzz [EACH=N KILLS=N]   hostile files and killed commands against all that reads and writes them"
@@ -76,6 +77,10 @@ $(INSTALLED): pyproject.toml
 
 $(INSTALLED_DEV): pyproject.toml | $(INSTALLED)
 	$(PIP) -e ".[dev]"
+	@touch $@
+
+$(INSTALLED_BENCH): $(INSTALLED_DEV)
+	$(PIP) -e ".[bench,dask,simulators]"
 	@touch $@
 
 # Each artifact depends on its inputs and on its own part of the config, written out with all defaults and the version
@@ -328,38 +333,26 @@ lint: $(INSTALLED_DEV)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# Every table is also written to benchmarks/results, as JSON.
-STUDY := configs/paper-gentle.yaml data/paper-gentle/flight.h5 data/paper-gentle/selection.h5
-bench: $(INSTALLED_DEV)
-	$(PIP) -e ".[bench,dask,simulators]"
-	$(BIN)/python benchmarks/evaluation.py
-	$(BIN)/python benchmarks/whole_run.py
-	$(BIN)/python benchmarks/workers.py
-	$(BIN)/python benchmarks/long_flights.py
-	$(BIN)/python benchmarks/reduction.py
-	$(BIN)/python benchmarks/reduction_streamed.py --samples 100000
-	$(BIN)/python benchmarks/evolution_hypervolume.py
-	$(BIN)/python benchmarks/gap.py
-	$(BIN)/python benchmarks/replay.py
-	$(MAKE) data/paper-gentle/selection.h5
-	$(BIN)/python benchmarks/judging.py $(STUDY)
-	$(BIN)/python benchmarks/time_to_quality.py $(STUDY)
-	$(BIN)/python benchmarks/quality_elsewhere.py
-	$(BIN)/python benchmarks/trajectory_planning.py
-	$(BIN)/python benchmarks/excitation.py
-	$(BIN)/python benchmarks/full_circle.py
-	$(BIN)/python benchmarks/full_circle_limit.py
-	$(BIN)/python benchmarks/full_circle_noise.py
-	$(BIN)/python benchmarks/attitude_inertia.py
-	$(BIN)/python benchmarks/unseen_path.py
-	$(BIN)/python benchmarks/seam.py
-	$(BIN)/python benchmarks/band_coverage.py
-	$(BIN)/python benchmarks/tracking.py
-	$(BIN)/python benchmarks/export_speed.py
-	$(BIN)/python benchmarks/simulators.py
-	$(BIN)/python benchmarks/fuzzy_fitting.py
-	$(MAKE) data/paper/report.html
-	$(BIN)/python benchmarks/report_cost.py configs/paper.yaml $(ARTIFACTS:%=data/paper/%.h5) data/paper/sweep-*.h5
+# Every table is also written to benchmarks/results, as JSON. Programs that measure times run one after the other, the
+# rest two at once. Stopped and started again it goes on where it was, unless the code has changed since.
+TIMED := evaluation whole_run workers long_flights reduction reduction_streamed gap replay time_to_quality \
+	trajectory_planning excitation full_circle attitude_inertia export_speed simulators fuzzy_fitting
+UNTIMED := evolution_hypervolume judging quality_elsewhere full_circle_limit full_circle_noise unseen_path seam \
+	band_coverage tracking
+STUDY := data/paper-gentle/flight.h5 data/paper-gentle/selection.h5
+ON_reduction_streamed := --samples 100000
+ON_judging := configs/paper-gentle.yaml $(STUDY)
+ON_time_to_quality := $(ON_judging)
+ON_report_cost = configs/paper.yaml $(ARTIFACTS:%=data/paper/%.h5) data/paper/sweep-*.h5
+bench: $(INSTALLED_BENCH)
+	$(MAKE) --jobs=1 $(STUDY) data/paper/times.json $(TIMED:%=benchmarks/results/%.done)
+	$(MAKE) --jobs=2 --output-sync=target data/paper/report.html $(UNTIMED:%=benchmarks/results/%.done)
+	$(MAKE) --jobs=1 benchmarks/results/report_cost.done
+
+benchmarks/results/report_cost.done: data/paper/report.html
+benchmarks/results/%.done: benchmarks/%.py $(shell find cpfls_cli benchmarks/shared tests/builders -name "*.py")
+	$(BIN)/python $< $(ON_$*)
+	@mkdir -p $(@D) && touch $@
 
 # Stopped and started again it goes on where it was. SIZE takes more options: `python -m benchmarks.blind_study --help`.
 SEED := 2027
