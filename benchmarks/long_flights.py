@@ -1,9 +1,9 @@
 """Time per sample and peak memory of reduction, identification and prediction, from 5e3 to 5e6 samples.
 
-python benchmarks/long_flights.py [--most 5000000] [--plot docs/long-flights.svg]
+python benchmarks/long_flights.py [--most 5000000]
 
 Each flight is the paper's, tiled, with noise on its motion and torque. Every line runs in a process of its own, whose
-peak memory is read at its end.
+peak memory is read at its end. Draws docs/long-flights.svg.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ pin_threads()
 
 import h5py
 import numpy as np
+from matplotlib.figure import Figure
 
 from benchmarks.shared.studies import CONFIG, paper_flight, paper_study
 from cpfls_cli import __version__
@@ -38,8 +39,11 @@ from cpfls_cli.identification.chromosome import decode
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import Problem, refine
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.report.canvas import GREY, legend_above, plot, stacked, style_of
 
 SIZES = (5_000, 50_000, 500_000, 5_000_000)
+OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "long-flights.svg"
+AIM_MB = 600
 NOISE = 0.01
 EVALUATIONS = 3
 BUDGET = 4
@@ -49,7 +53,6 @@ SMALL = ("--set", "identification.population=10", "--set", "identification.gener
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--most", type=int, default=SIZES[-1])
-    parser.add_argument("--plot", type=Path)
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if asked.one:
@@ -82,8 +85,11 @@ def main() -> None:
         "its file, MB",
     )
     table("long_flights", columns, rows)
-    if asked.plot:
-        plot(rows, asked.plot)
+    caption = "Time per sample and peak memory over the number of samples"
+    description = f"{caption}: neither grows with the flight"
+    drawn = plot("long-flights", caption, description, 4.6, lambda figure: draw(figure, rows))
+    OUTPUT.write_text(drawn.picture.svg + "\n")
+    print(f"wrote {OUTPUT}")
 
 
 def write_tiled(path: Path, samples: int) -> None:
@@ -172,27 +178,24 @@ def beside(call) -> tuple[float, float, str]:
     return seconds, memory, said
 
 
-def plot(rows, path: Path) -> None:
+def draw(figure: Figure, rows) -> None:
     """Draw time per sample and peak memory over the number of samples."""
-    import matplotlib as mpl
-
-    mpl.use("svg")
-    import matplotlib.pyplot as plt
-
-    mpl.rcParams["svg.hashsalt"] = "cpfls"
     samples = [row[0] for row in rows]
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2), layout="constrained")
-    left.loglog(samples, [row[1] for row in rows], "k-o", label="one evaluation")
-    left.loglog(samples, [row[2] for row in rows], "k--s", label="one local search, 4 evaluations")
-    left.set(xlabel="samples", ylabel="time per sample, us")
-    right.semilogx(samples, [row[3] for row in rows], "k-o", label="identification")
-    right.semilogx(samples, [row[5] for row in rows], "k--s", label="reduction")
-    right.axhline(1024, color="0.6", label="1 GB")
-    right.set(xlabel="samples", ylabel="peak memory, MB", ylim=(0, None))
-    for axes in (left, right):
+    times, memory = stacked(figure, 2)
+    for axes, curves, label in (
+        (times, {"one evaluation": 1, "one local search, 4 evaluations": 2}, "time per sample, μs"),
+        (memory, {"identification": 3, "cpfls reduce": 5, "cpfls predict": 7}, "peak memory, MB"),
+    ):
+        for index, (name, column) in enumerate(curves.items()):
+            style = {**style_of(index), "marker": "os^"[index], "markersize": 4}
+            axes.semilogx(samples, [row[column] for row in rows], label=name, **style)
+        axes.set_ylabel(label)
         axes.grid(color="0.9")
-        axes.legend(frameon=False)
-    figure.savefig(path, metadata={"Date": None})
+    memory.axhline(AIM_MB, color=GREY, label=f"aim, {AIM_MB} MB")
+    memory.set_xlabel("samples")
+    for axes in (times, memory):
+        axes.set_ylim(0, None)
+        legend_above(axes)
 
 
 if __name__ == "__main__":
