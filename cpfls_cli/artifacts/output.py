@@ -27,6 +27,9 @@ except ImportError:
 _BESIDE = ("", ".checkpoint", ".partial")
 """What the names of files add to that of the output beside which a command writes them."""
 
+_LOCKED_BY = b"cpfls"
+"""How a lock begins."""
+
 
 @contextmanager
 def locked(path: Path, title: str) -> Iterator[None]:
@@ -61,15 +64,20 @@ def locked(path: Path, title: str) -> Iterator[None]:
 def _locked(lock: Path, path: Path, title: str) -> int | None:
     while fcntl is not None:
         try:
-            handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+            # What is behind a link is the user's.
+            handle = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
         except OSError:
             return None
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # Whoever held it before may have removed the file between the two calls.
             if lock.exists() and os.fstat(handle).st_ino == lock.stat().st_ino:
-                os.truncate(handle, 0)
-                os.write(handle, f"cpfls {title}, process {os.getpid()}".encode())
+                if not (os.read(handle, len(_LOCKED_BY)) or _LOCKED_BY).startswith(_LOCKED_BY):
+                    # A file of the user that happens to have this name.
+                    os.close(handle)
+                    return None
+                os.ftruncate(handle, 0)
+                os.pwrite(handle, _LOCKED_BY + f" {title}, process {os.getpid()}".encode(), 0)
                 return handle
         except BlockingIOError:
             holder = os.read(handle, 200).decode(errors="replace") or "another command"
@@ -128,6 +136,17 @@ def refuse_inputs(output: Path, inputs: Iterable[Path]) -> None:
     # Unlike a method of a path, this takes a name that the system does not as one of no file.
     if os.path.exists(output) and any(path.exists() and path.samefile(output) for path in inputs):
         raise InputError(f"{output}: is an input of this command; -o must name another file")
+
+
+def refuse_own(path: Path, output: Path) -> None:
+    """Refuse a further output where the command writes its first one, or what it keeps beside that.
+
+    Raises
+    ------
+    InputError
+    """
+    if os.path.realpath(path) in {os.path.realpath(f"{output}{addition}") for addition in _BESIDE}:
+        raise InputError(f"{path}: is what the command writes for -o {output}; name another file")
 
 
 @contextmanager
@@ -294,13 +313,15 @@ def _writing(path: Path) -> Iterator[None]:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-def check_folder(folder: Path, force: bool) -> None:
+def check_folder(folder: Path, force: bool, names: Sequence[str]) -> None:
     """Refuse a folder that cannot or must not be filled.
 
     Parameters
     ----------
     force : bool
         Allow files in it to be replaced.
+    names : sequence of str
+        Files that may be written.
 
     Raises
     ------
@@ -312,6 +333,12 @@ def check_folder(folder: Path, force: bool) -> None:
         raise InputError(f"{folder}: exists already and is not empty; --force replaces what is in it")
     if not folder.absolute().parent.is_dir():
         raise InputError(f"{folder}: cannot be made: there is no folder {folder.parent}")
+    for name in names:
+        if (folder / name).is_dir():
+            raise InputError(f"{folder / name}: is a folder, and a file of this name is to be written; move it away")
+    for place in (folder.resolve().parent, folder.resolve()):
+        if place.is_dir() and not os.access(place, os.W_OK | os.X_OK):
+            raise InputError(f"{folder}: cannot write into the folder {place}; change its permissions")
 
 
 @contextmanager

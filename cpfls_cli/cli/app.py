@@ -247,6 +247,7 @@ def trajectory(
 
         if job.study.trajectory.path == "next-flight":
             return next_flight.run(job, diagnosis, plot)
+        command.require_no_room(box, height)
         return command.run(job, waypoints, plot)
 
     _run("trajectory", config, output, common, call)
@@ -309,10 +310,11 @@ def init(
     logs: LogsArgument,
     output: OutputOption,
     mass: Annotated[
-        float | None, typer.Option("--mass", metavar="KG", min=1e-6, help="Mass as it flew, with battery, kg.")
+        float | None, typer.Option("--mass", metavar="KG", min=1e-6, max=1e4, help="Mass as it flew, with battery, kg.")
     ] = None,
     arm: Annotated[
-        float | None, typer.Option("--arm", metavar="M", min=1e-6, help="From the middle to a rotor's axis, m.")
+        float | None,
+        typer.Option("--arm", metavar="M", min=1e-6, max=100, help="Middle to a rotor's axis, m."),
     ] = None,
     *,
     common: Common,
@@ -428,7 +430,7 @@ def vehicle(
     def call(job: Job) -> Outcome:
         from cpfls_cli.commands import vehicle as command
 
-        copy = None if write_config is None else command.ConfigCopy(config, write_config)
+        copy = None if write_config is None else command.ConfigCopy(config.name, common.data(config), write_config)
         return command.run(job, flights, held_out or [], copy, resume=resume)
 
     _run("vehicle", config, output, common, call)

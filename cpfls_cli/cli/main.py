@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 
 from cpfls_cli.cli.interrupts import interruptible, leave_on_interrupt
 
@@ -17,12 +18,29 @@ _THREAD_LIMITS = (
 
 def run() -> None:
     """Run the command line."""
+    _open_standard_streams()
     leave_on_interrupt()
     use_one_thread()
+    from typer import Exit
+
     from cpfls_cli.cli.app import app
+    from cpfls_cli.cli.terminal import messages_for_errors
 
     with interruptible():
-        app(prog_name="cpfls")
+        try:
+            # The library prints help itself, which fails where the output does.
+            with messages_for_errors():
+                app(prog_name="cpfls")
+        except Exit as end:
+            sys.exit(end.exit_code)
+
+
+def _open_standard_streams() -> None:
+    """Open those that the caller closed: else the next file opened takes their place, and is printed into."""
+    for name, mode in {"stdin": "r", "stdout": "w", "stderr": "w"}.items():
+        if getattr(sys, name) is None:
+            # It gets the lowest number that is free, which is that of the stream.
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
 
 
 def use_one_thread() -> None:

@@ -54,6 +54,12 @@ class Common:
 
         return load_study(config, self.overrides or (), self.seed, sweep=sweep)
 
+    def data(self, config: Path) -> dict[str, Any]:
+        """Read a config as plain data, with the overrides given on the command line."""
+        from cpfls_cli.config.load import read_overridden
+
+        return read_overridden(config, self.overrides or (), self.seed)
+
 
 class Commands(TyperGroup):
     """The commands, with messages on values of options that name the value, and the nearest one where there are few."""
@@ -102,6 +108,8 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
         common = Common(**{f.name: kwargs.pop(f.name) for f in fields(Common)})
+        if "config" not in hints:
+            _refuse_overrides(common)
         _check_order(command.__name__.rstrip("_"), {name: kwargs[name] for name in arguments}, kwargs.get("output"))
         command(*args, common=common, **kwargs)
 
@@ -110,6 +118,18 @@ def with_common(command: Callable[..., None]) -> Callable[..., None]:
     wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return wrapped
+
+
+def _refuse_overrides(common: Common) -> None:
+    """Refuse what overrides a config where none is read."""
+    from cpfls_cli.cli.terminal import messages_for_errors
+    from cpfls_cli.errors import InputError
+
+    given = {"--set": next(iter(common.overrides or ()), None), "--seed": common.seed}
+    with messages_for_errors():
+        for option, value in given.items():
+            if value is not None:
+                raise InputError(f"{option} {value}: this command reads no config; leave {option} out")
 
 
 def _check_order(command: str, arguments: Mapping[str, Any], output: Path | None) -> None:

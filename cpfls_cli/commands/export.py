@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -34,8 +35,8 @@ from cpfls_cli.report.outcome import Outcome
 _SEED = 1
 _LANGUAGES = {"json": "JSON", "c": "C", "python": "Python"}
 ENDINGS = {"json": ".json", "c": ".c", "python": ".py"} | {form: target.ending for form, target in TARGETS.items()}
-# What the module imports: under such a name it would import itself.
-_IMPORTED = ("casadi", "jax", "math", "numpy", "rotorpy", "sys", "warnings")
+# What the module imports beside the standard library: under such a name it would import itself.
+_IMPORTED = ("casadi", "jax", "numpy", "rotorpy")
 
 
 def run(job: Job, model: Path, form: str | None, name: str | None) -> Outcome:
@@ -214,7 +215,7 @@ def _outputs_of(output: Path, form: str) -> list[Path]:
     if ending == ".py" and not _importable(output.stem):
         raise InputError(
             f"{output}: Python cannot import a module of this name; use letters, digits and _, no digit first, none of "
-            f"its own words, not {', '.join(_IMPORTED[:-1])} or {_IMPORTED[-1]}, such as "
+            f"its own words or modules, not {', '.join(_IMPORTED[:-1])} or {_IMPORTED[-1]}, such as "
             f"{identifier(output.stem)}_model.py"
         )
     if form != "c":
@@ -225,4 +226,4 @@ def _outputs_of(output: Path, form: str) -> list[Path]:
 
 
 def _importable(stem: str) -> bool:
-    return stem.isidentifier() and not keyword.iskeyword(stem) and stem not in _IMPORTED
+    return stem.isidentifier() and not keyword.iskeyword(stem) and stem not in {*_IMPORTED, *sys.stdlib_module_names}

@@ -95,7 +95,7 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
 def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path | None) -> _Given:
     roles = flight_roles("flight", flights) | flight_roles("held-out", held_out)
     inputs = take_inputs(job, roles | ({} if model is None else {"model": model}))
-    check_folder(job.output, job.force)
+    check_folder(job.output, job.force, FILES)
     for name in FILES:
         refuse_inputs(job.output / name, job.inputs)
     check_ignored(job.study)

@@ -28,7 +28,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight_source import flight_source
 from cpfls_cli.flights.recordings import read_flights
-from cpfls_cli.flights.same_vehicle import other_vehicles, read_of_vehicle, read_vehicle
+from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_of_vehicle, read_vehicle
 from cpfls_cli.gap.extended import ExtendedModel, inertial_force
 from cpfls_cli.gap.whole_vehicle import of_vehicle, with_effects
 from cpfls_cli.identification.data import TorqueSource
@@ -69,7 +69,8 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
         return nothing_written(job)
     found = Findings()
     finish_parts(job, _along(rebuilt, identified.draws(), flown, torque, found, job.progress), len(flown), inputs)
-    notes = (*trust_notes(identified, model), *(Text(n, "warning") for n in other_vehicles([flight], job.study)))
+    others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
+    notes = (*trust_notes(identified, model), *(Text(note, "warning") for note in others))
     return Outcome(found.summary, (*notes, *answer(found, identified)))
 
 

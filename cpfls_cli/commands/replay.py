@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.replay import ReplayRecord
+from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.commands.compare import flight_roles
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.playback import ModelToPlay, flights_to_play, is_vehicle, model_to_play
+from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.replay import answer
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.playback.flight import LoggedFlight
@@ -41,9 +44,22 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
     if job.dry_run:
         return nothing_written(job)
     errors = replay(played, horizon, options.every, lambda done: job.progress(done, 1))
-    warnings = [*(warning for flight in given for warning in flight.warnings), *_warnings(model.name, to_play, played)]
+    warnings = [
+        *seen_twice((file for role, file in inputs.items() if role not in of_model), ()),
+        *(_learned_from(model, inputs) if of_model else ()),
+        *(warning for flight in given for warning in flight.warnings),
+        *_warnings(model.name, to_play, played),
+    ]
     record = finish(job, ReplayRecord.of(model.name, options, given, played, errors, warnings), inputs)
     return Outcome(record.summary, tuple(answer(source_of(job, record))))
+
+
+def _learned_from(model: Path, inputs: Mapping[str, InputFile]) -> Iterator[str]:
+    """Name the flights that a model has learned from."""
+    learned = {file.sha256 for role, file in read_header(model).inputs.items() if role.startswith("flight")}
+    for role, file in inputs.items():
+        if role.startswith("flight") and file.sha256 in learned:
+            yield f"{file.name}: {model.name} has learned from it, so it shows nothing of flights not seen"
 
 
 def _warnings(name: str, model: ModelToPlay, played: Sequence[Played]) -> Iterator[str]:

@@ -40,7 +40,7 @@ def run(
     choose_on : sequence of Path
         Other flights to choose models on, for settings with `identification.choice: held-out`.
     """
-    options.require_one_place()
+    options.require_workers()
     inputs = take_inputs(job, input_roles(flights, None, validate, choose_on))
     partial = PartialSweep.beside(job.output, header_of(job.study, inputs))
     before = partial.take_up(resume=options.resume, force=job.force)

@@ -133,6 +133,21 @@ def option_overrides(
     ]
 
 
+def require_no_room(box: str | None, height: float | None) -> None:
+    """Refuse room for a path that is not planned for it.
+
+    Raises
+    ------
+    InputError
+    """
+    for option, value in (("--box", box), ("--height", height)):
+        if value is not None:
+            raise InputError(
+                f"{option} {value}: is room for the flight that --to-tell or --for plans, and this path is planned "
+                "without; give one of them, or set trajectory.displacement_m and trajectory.direction"
+            )
+
+
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
     settings = study.trajectory
     if waypoints is not None:

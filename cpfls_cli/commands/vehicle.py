@@ -7,20 +7,20 @@ from dataclasses import replace
 from difflib import get_close_matches
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from cpfls_cli.artifacts.job import Job, check_outputs, finish
-from cpfls_cli.artifacts.output import write_text
+from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.parameters import vehicle_section
 from cpfls_cli.artifacts.replay import HeldOutGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.compare import flight_roles
 from cpfls_cli.commands.stopped import stopped, without_model
-from cpfls_cli.config.load import read_config
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flights.playback import flights_to_play, whole
+from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.pages.vehicle_model import answer
 from cpfls_cli.playback.flight import LoggedFlight
@@ -40,9 +40,10 @@ _KEPT_EVERY = 10
 
 
 class ConfigCopy(NamedTuple):
-    """A config to be written again with the numbers that were found."""
+    """A config, as it is with what the command line changes, to be written again with the numbers that are found."""
 
-    config: Path
+    name: str
+    data: dict[str, Any]
     copy: Path
 
 
@@ -74,9 +75,11 @@ def run(
         asked for, or cannot be resumed.
     """
     study = job.study
-    roles = flight_roles("flight", flights) | flight_roles("held-out", held_out)
-    inputs, checkpoint, kept = begin_vehicle_search(job, roles, resume=resume)
+    learned, unseen = flight_roles("flight", flights), flight_roles("held-out", held_out)
+    inputs, checkpoint, kept = begin_vehicle_search(job, learned | unseen, resume=resume)
+    twice = seen_twice(*([inputs[role] for role in roles] for roles in (learned, unseen)))
     if config is not None:
+        refuse_own(config.copy, job.output)
         check_outputs(job, config.copy)
     read = _grouped(flights_to_play([*flights, *held_out], study), [*flights, *held_out], study.playback.groups)
     for flight in read:
@@ -93,7 +96,7 @@ def run(
     with checkpoint.kept():
         found, signal = _found(job, training, checkpoint, kept or {})
         judged = _judged(found, rest, job) if rest else None
-        warnings = [warning for flight in read for warning in flight.warnings]
+        warnings = [*twice, *(warning for flight in read for warning in flight.warnings)]
         commanded = any(flight.parts[0].commanded for flight in training)
         record = finish(job, VehicleRecord.of(found, judged, warnings, commanded=commanded), inputs)
     written: tuple[Text, ...] = ()
@@ -109,8 +112,8 @@ def _write_config(config: ConfigCopy | None, record: VehicleRecord) -> tuple[Tex
     """Write a config with the numbers that were found in the place of its section `vehicle`, and say so."""
     if config is None:
         return ()
-    data = read_config(config.config) | {"vehicle": vehicle_section(record)}
-    write_text(config.copy, f"# {config.config.name}, with the vehicle that `cpfls vehicle` found\n{to_yaml(data)}")
+    data = config.data | {"vehicle": vehicle_section(record)}
+    write_text(config.copy, f"# {config.name}, with the vehicle that `cpfls vehicle` found\n{to_yaml(data)}")
     return (Text(f"{config.copy}: written, the config with these constants"),)
 
 

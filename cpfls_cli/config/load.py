@@ -36,14 +36,26 @@ def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = Non
     ConfigError
         If the file cannot be read, is not YAML, or any key is wrong; all wrong keys are listed.
     """
+    data = read_overridden(path, overrides, seed)
+    # Nobody's file is of the vehicle that a study begins with: without the section its keys are missing.
+    data.setdefault("vehicle", {})
+    return validate(data, str(path), sweep=sweep)
+
+
+def read_overridden(path: Path, overrides: Sequence[str] = (), seed: int | None = None) -> dict[str, Any]:
+    """Read a config file as plain data, with the keys that the command line overrides.
+
+    Raises
+    ------
+    ConfigError
+        As `read_config`, or if an override is none.
+    """
     data = read_config(path)
     for override in overrides:
         apply_override(data, override)
     if seed is not None:
         data["seed"] = seed
-    # Nobody's file is of the vehicle that a study begins with: without the section its keys are missing.
-    data.setdefault("vehicle", {})
-    return validate(data, str(path), sweep=sweep)
+    return data
 
 
 def read_config(path: Path) -> dict[str, Any]:

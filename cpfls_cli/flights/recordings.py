@@ -277,7 +277,7 @@ def seen_twice(given: Iterable[InputFile], held_out: Iterable[InputFile]) -> tup
             warnings.append(f"{file.name}: is given twice, also as {learned[file.sha256]}")
         learned[file.sha256] = file.name
     warnings += [
-        f"{file.name}: is learned from and held out at once, so the gap after shows nothing of flights not seen"
+        f"{file.name}: is learned from and held out at once, so what is said of it says nothing of flights not seen"
         for file in held_out
         if file.sha256 in learned
     ]

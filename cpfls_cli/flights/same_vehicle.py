@@ -122,6 +122,12 @@ def other_vehicles(paths: Sequence[Path], study: Study) -> tuple[str, ...]:
     )
 
 
+def model_of_another(path: Path, study: Study) -> tuple[str, ...]:
+    """Say of a model that it is one of another vehicle than that of the config, in a sentence or none."""
+    different = _difference_of(path, study)
+    return (f"{path}: is a model of another vehicle than the config's; not the same: {different}",) if different else ()
+
+
 def _difference_of(path: Path, study: Study) -> str:
     try:
         return _different(_vehicle_of(path, read_header(path)), study.vehicle)

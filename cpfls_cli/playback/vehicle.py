@@ -319,7 +319,8 @@ def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fit
     for place, step in enumerate(_STEP * fitted.layout.scales * np.eye(len(values))):
         ahead, behind = physical(values + step), physical(values - step)
         slopes.append([(ahead[name].value - behind[name].value) / (2 * step[place]) for name in ahead])
-    by_number = np.array(slopes).reshape(len(values), -1)
+    # The shape is that of no numbers too, where the vehicle as stated is the best.
+    by_number = np.reshape(slopes, (len(values), len(physical(values))))
     return np.asarray(by_number.T @ spread.covariance @ by_number)
 
 

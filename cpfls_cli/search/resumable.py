@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
@@ -16,11 +17,14 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.archive import Evaluate
 from cpfls_cli.identification.search import SearchRun, SearchStep, Stop, StopReason, is_end
 from cpfls_cli.search.checkpoint import Checkpoint, VehicleCheckpoint
-from cpfls_cli.workers.employ import employ
+from cpfls_cli.workers.employ import employ, require_address
 from cpfls_cli.workers.workforce import WorkerError, Workforce
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.structure import Kept
+
+_OF_A_PROCESSOR = 8
+"""Processes that a processor may get: more of them take longer to start than the search."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,8 @@ class SearchOptions:
         """Employ the workers that evaluate."""
         return employ(evaluate, count=self.workers, scheduler=self.scheduler)
 
-    def require_one_place(self) -> None:
-        """Refuse processes of this machine together with the workers of a scheduler.
+    def require_workers(self) -> None:
+        """Refuse more processes than this machine can run, and a scheduler beside them or without an address.
 
         Raises
         ------
@@ -62,6 +66,11 @@ class SearchOptions:
         """
         if self.scheduler is not None and self.workers > 1:
             raise InputError("--scheduler: knows its own workers; leave --workers out")
+        if self.scheduler is not None:
+            require_address(self.scheduler)
+        processors = os.cpu_count() or 1
+        if self.workers > _OF_A_PROCESSOR * processors:
+            raise InputError(f"--workers {self.workers}: this machine has {processors} processors; give that many")
 
 
 class Watch:
@@ -169,7 +178,7 @@ def begin_search(
     InputError
         As `begin`; also if there is a checkpoint and neither --resume nor --force, or none that can be resumed.
     """
-    options.require_one_place()
+    options.require_workers()
     files = take_inputs(job, inputs)
     header = header_of(job.study, files)
     search = resumable(job.output, header, resume=options.resume, force=job.force)

@@ -49,7 +49,10 @@ class ClosedLoopSettings(Settings):
         float, Gt(0), Doc("time in which the rotors reach 63 % of a step, s; the effect motor_lag replaces it")
     ] = 0.05
     integration_rate_hz: Annotated[
-        float, Gt(0), Doc("steps of the integration in a second, at least one for each sample of the trajectory")
+        float,
+        Gt(0),
+        Le(1e5),
+        Doc("steps of the integration in a second, at least one for each sample of the trajectory"),
     ] = 500.0
     position_frequency_hz: Annotated[float, Gt(0), Doc("natural frequency of the position control, Hz")] = 0.25
     position_damping: Annotated[float, Gt(0), Doc("damping of the position control, 1 is critical")] = 0.9
@@ -85,7 +88,7 @@ class ComputedTorqueSettings(Settings):
         float, Gt(0), Doc("commands in a second, held in between; not fewer than samples of the trajectory")
     ] = 100.0
     integration_rate_hz: Annotated[
-        float, Gt(0), Doc("steps of the integration in a second, at least one for each command")
+        float, Gt(0), Le(1e5), Doc("steps of the integration in a second, at least one for each command")
     ] = 100.0
     initial_error_rad: Annotated[
         _Three, Doc("planned less flown roll, pitch and yaw at the start, rad, so that a transient is seen")

@@ -127,3 +127,11 @@ def test_a_flight_larger_than_memory_may_be(pipeline, tmp_path, command, exit_co
     assert done.returncode == exit_code
     assert any("time: does not ascend at index 1" in line for line in said)
     assert int(peak.removeprefix("peak ")) < 400e3
+
+
+@pytest.mark.parametrize("option", [("--set", "vehicle.mass_kg=99"), ("--seed", "3")])
+@pytest.mark.parametrize("command", ["info", "check", "export"])
+def test_what_overrides_a_config_is_refused_where_none_is_read(refuse, pipeline, tmp_path, command, option):
+    output = ("-o", tmp_path / "model.json") if command == "export" else ()
+    (line,) = refuse(command, pipeline.model, *output, *option)
+    assert line == f"{' '.join(option)}: this command reads no config; leave {option[0]} out"

@@ -147,6 +147,16 @@ def test_what_a_killed_command_left_half_written_goes(cpfls, study, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["trajectory.h5"]
 
 
+@pytest.mark.parametrize("linked", [True, False])
+def test_a_file_of_the_user_with_the_name_of_the_lock_is_left_alone(cpfls, study, tmp_path, linked):
+    lock, precious = tmp_path / ".trajectory.h5.lock", tmp_path / "precious"
+    (precious if linked else lock).write_text("precious")
+    if linked:
+        lock.symlink_to(precious)
+    assert cpfls("trajectory", study, "-o", tmp_path / "trajectory.h5").exit_code == 0
+    assert lock.read_text() == "precious"
+
+
 def test_links_are_no_outputs(refuse, study, tmp_path):
     link = tmp_path / "link.h5"
     for target in (tmp_path / "nowhere.h5", tmp_path / "file.h5"):

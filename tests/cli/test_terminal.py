@@ -124,3 +124,21 @@ def test_a_name_with_control_characters_stays_on_its_line(refuse, tmp_path, monk
     (line,) = refuse("info", path)
     assert line == f"{tmp_path}/{repr(name)[1:-1]}: no such file"
     assert line.isprintable()
+
+
+@pytest.mark.parametrize("closed", ["stdin", "stdout", "stderr", "stdin stdout stderr"])
+def test_streams_that_the_caller_closed(study, tmp_path, closed):
+    output = tmp_path / "trajectory.h5"
+    shell = " ".join({"stdin": "<&-", "stdout": ">&-", "stderr": "2>&-"}[name] for name in closed.split())
+    command = f'"$1" -m cpfls_cli trajectory "$2" -o "$3" {shell}'
+    done = subprocess.run(["sh", "-c", command, "sh", sys.executable, study, output], capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert output.read_bytes().startswith(b"\x89HDF")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no device that is full")
+def test_help_into_a_device_that_is_full():
+    with open("/dev/full", "w") as full:
+        words = [sys.executable, "-m", "cpfls_cli", "gap", "--help"]
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, "cpfls: error: output: No space left on device\n")

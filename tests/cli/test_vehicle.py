@@ -11,6 +11,7 @@ import pytest
 
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.config.load import read_config
 from cpfls_cli.report.outcome import plain
 from tests.builders.artifacts import edited
 from tests.builders.command_line import undrawn
@@ -361,3 +362,28 @@ def test_a_log_of_stated_torque_is_refused(refused, tmp_path):
     options = ("--set", f"import.signals={json.dumps(signals)}", "--set", "import.torque_source=column")
     message = refused(log, options=options)
     assert message.startswith("stated.csv: states torque and thrust instead of rotor speeds")
+
+
+def test_the_copy_of_the_config_has_what_the_command_line_changes(cpfls, config, flights, tmp_path):
+    copy = tmp_path / "found.yaml"
+    words = ("--set", "playback.horizon_s=0.4", "--seed", 7, "--write-config", copy)
+    result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", *words)
+    assert result.exit_code == 0, result.stderr
+    written = read_config(copy)
+    assert (written["seed"], written["playback"]["horizon_s"]) == (7, 0.4)
+
+
+@pytest.mark.parametrize("name", ["x.h5", "x.h5.checkpoint"])
+def test_the_copy_of_the_config_is_no_other_output(refused, flights, tmp_path, name):
+    line = refused(flights[0], options=("--write-config", tmp_path / name, "--force", "--dry-run"))
+    assert line == f"{tmp_path / name}: is what the command writes for -o {tmp_path / 'x.h5'}; name another file"
+
+
+def test_a_flight_that_is_learned_from_and_held_out_is_named(cpfls, config, flights, tmp_path):
+    output = tmp_path / "v.h5"
+    result = cpfls("vehicle", config, flights[0], "--held-out", flights[0], "-o", output)
+    assert result.exit_code == 0, result.stderr
+    assert "flight-1.h5: is learned from and held out at once" in result.stderr
+    result = cpfls("replay", config, output, flights[0], flights[0], "-o", tmp_path / "r.h5", "--every", 500)
+    assert "flight-1.h5: is given twice" in result.stderr
+    assert "flight-1.h5: v.h5 has learned from it" in result.stderr

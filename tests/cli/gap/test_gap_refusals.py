@@ -1,5 +1,6 @@
 """What the gap workflow refuses, and what it says then."""
 
+import os
 import re
 
 import numpy as np
@@ -35,6 +36,25 @@ def test_output_that_is_a_file(refuse, gap_config, shifted, tmp_path):
     (tmp_path / "file").write_text("mine")
     (message,) = refuse("gap", gap_config, *shifted, "-o", tmp_path / "file", "--force")
     assert message.endswith("is a file; -o names a folder")
+
+
+def test_a_folder_in_the_place_of_a_file(refuse, gap_config, shifted, tmp_path):
+    (tmp_path / "out" / "report.html").mkdir(parents=True)
+    (message,) = refuse("gap", gap_config, *shifted, "-o", tmp_path / "out", "--force")
+    assert message.endswith("report.html: is a folder, and a file of this name is to be written; move it away")
+
+
+@pytest.mark.parametrize("made", [True, False])
+def test_a_folder_that_cannot_be_written_is_found_before_the_work(
+    refuse, gap_config, shifted, tmp_path, monkeypatch, made
+):
+    # Root may write anywhere, so the answer of the system is put in its place.
+    monkeypatch.setattr("os.access", lambda _path, mode, **_: not mode & os.W_OK)
+    out = tmp_path / "out"
+    if made:
+        out.mkdir()
+    (message,) = refuse("gap", gap_config, *shifted, "-o", out, "--dry-run")
+    assert message == f"{out}: cannot write into the folder {tmp_path}; change its permissions"
 
 
 def test_unknown_effect_to_ignore(refuse, gap_config, shifted, tmp_path):

@@ -63,3 +63,15 @@ def test_what_is_wrong_with_the_workers_is_not_said_of_the_flight(refuse, words,
     address = "tcp://127.0.0.1:8786"
     (line,) = refuse(*words, "-o", tmp_path / "model.h5", "--scheduler", address, code=1)
     assert line.startswith(f"--scheduler {address}: a scheduler needs Dask")
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (("--workers", 100_000), "--workers 100000: this machine has "),
+        (("--scheduler", "nonsense"), "scheduler = nonsense: not an address"),
+    ],
+)
+def test_workers_that_cannot_be_are_refused_before_the_search(refuse, words, tmp_path, option, message):
+    (line,) = refuse(*words, "-o", tmp_path / "model.h5", *option, "--dry-run")
+    assert line.startswith(message)

@@ -251,3 +251,10 @@ def test_plot_draws_both_figures(cpfls, refuse, tmp_path, config):
     (tmp_path / "t.h5").unlink()
     (message,) = refuse("trajectory", config, "-o", tmp_path / "t.h5", "--plot")
     assert message.endswith("t-derivatives.svg: exists already; --force replaces it")
+
+
+@pytest.mark.parametrize("option", [("--box", "1,1,1"), ("--height", "3")])
+def test_room_for_a_path_that_is_not_planned_for_it_is_refused(refuse, tmp_path, config, option):
+    (line,) = refuse("trajectory", config, "-o", tmp_path / "path.h5", *option)
+    assert line.startswith(f"{option[0]} {option[1]}")
+    assert "is room for the flight that --to-tell or --for plans" in line

@@ -104,3 +104,9 @@ def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
     for number in inertia:
         assert number.low < number.value < number.high
         assert not number.at_bound
+
+
+def test_a_vehicle_as_it_is_stated_has_no_numbers(flight):
+    windows = [Windows.of(flight, 20, 20)]
+    fitted = fit(Layout(STATED, (), Airflow(np.zeros(0), 0)), windows, {}, 20, 1e-4)
+    assert list(vehicle.found_numbers(fitted, uncertainty(fitted, windows))) == []
