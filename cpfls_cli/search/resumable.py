@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cpfls_cli.playback.structure import Kept
 
 _OF_A_PROCESSOR = 8
-"""Processes that a processor may get: more of them take longer to start than the search."""
+"""Processes that a processor may get, of which more than one only share it."""
 
 
 @dataclass(frozen=True)

@@ -266,7 +266,13 @@ def test_a_suffix_that_tells_no_form(refuse, pipeline, tmp_path):
 
 @pytest.mark.parametrize(
     ("stem", "instead"),
-    [("class", "class_model"), ("a b", "a_b_model"), ("2-m", "model_2_m_model"), ("numpy", "numpy_model")],
+    [
+        ("class", "class_model"),
+        ("a b", "a_b_model"),
+        ("2-m", "model_2_m_model"),
+        ("numpy", "numpy_model"),
+        ("json", "json_model"),
+    ],
 )
 def test_a_module_that_nobody_could_import(cpfls, refuse, pipeline, tmp_path, stem, instead):
     output = tmp_path / f"{stem}.py"

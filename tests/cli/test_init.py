@@ -297,3 +297,11 @@ def test_a_stamp_a_year_off_takes_no_memory_and_is_told(refuse, tmp_path, own):
     path = write_csv(tmp_path / "log.csv", log)
     (line,) = refuse("init", path, "-o", tmp_path / "study.yaml")
     assert line.startswith(f"{path}: its stamps span 3e+07 s, and 2000 rows at 100 Hz are 20 s: damaged, or no clock")
+
+
+@pytest.mark.parametrize("option", [("--mass", "inf"), ("--mass", "1e300"), ("--arm", "170")])
+def test_masses_and_arms_that_nothing_flies_with_are_refused(cpfls, log, tmp_path, option):
+    result = cpfls("init", log, "-o", tmp_path / "study.yaml", *option)
+    assert result.exit_code == 2
+    assert f"Invalid value for '{option[0]}'" in result.stderr
+    assert not (tmp_path / "study.yaml").exists()
