@@ -189,6 +189,13 @@ def test_wrong_override(wrong, override, message):
     assert line.startswith(message)
 
 
+@pytest.mark.parametrize("section", ["closed_loop", "computed_torque"])
+def test_an_integration_without_end_is_refused(wrong, section):
+    key = f"simulation.{section}.integration_rate_hz"
+    (line,) = wrong("vehicle: {mass_kg: 6}\n", "--set", f"{key}=1e12", whole=True)
+    assert line.startswith(f"FILE: {key} = 1000000000000.0: must be less than or equal to 100000")
+
+
 def test_what_a_vehicle_lacks_is_named_and_no_other_vehicle_stands_in_for_it(wrong):
     lines = wrong("vehicle: {mass_kg: 0.03, rotors: [{position_m: [0.03, 0.03, 0]}]}")
     assert [line.partition(":")[2].partition(";")[0] for line in lines] == [
