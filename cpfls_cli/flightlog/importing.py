@@ -41,6 +41,8 @@ from cpfls_cli.flightlog.stretches import rotors_at_rest, warn_of_dead, warn_of_
 _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10
 _SHORTEST_PERIOD_S = 1e-6
+_FASTEST_HZ = 40e3
+"""Above the 32 kHz at which the fastest gyroscopes are read."""
 _FEWEST_SAMPLES = 10
 
 
@@ -145,6 +147,7 @@ def read_signals(columns: Mapping[str, Array], settings: ImportSettings) -> LogS
             *warn_of_slow(slow, rate_hz),
             *warn_of_cut_offs(filtered, settings),
             *_warn_of_gap(stretch.beyond_gap),
+            *_warn_of_clock(rate_hz, settings),
             *warn_of_angles(read.signals),
         ),
     )
@@ -170,6 +173,13 @@ def _gaps(time: Array) -> tuple[int, float]:
 
 def _warn_of_gap(rows: int) -> list[str]:
     return [f"{rows} rows beyond a gap are not used"] if rows else []
+
+
+def _warn_of_clock(rate_hz: float, settings: ImportSettings) -> list[str]:
+    if rate_hz < _FASTEST_HZ:
+        return []
+    unit = settings.time_unit
+    return [f"{rate_hz:.3g} rows a second, which no sensor of a vehicle gives: is import.time_unit = {unit} right"]
 
 
 def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:

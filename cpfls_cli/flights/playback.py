@@ -20,6 +20,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
+from cpfls_cli.flights.contradictions import contradictions
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import ReadFlight, read_flight, read_import, signals_of, with_voltage
 from cpfls_cli.flights.same_vehicle import read_of_vehicle, read_vehicle
@@ -122,7 +123,12 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     stretches = _stretches(flight, actuation)
     made = [signals_of(flight, _known(flight, actuation, part), study) for part in stretches]
     parts = tuple(signals for signals, _ in made)
-    warnings = [*flight.warnings, *made[0][1], *_warnings(flight, stretches, parts[0])]
+    warnings = [
+        *flight.warnings,
+        *made[0][1],
+        *_warnings(flight, stretches, parts[0]),
+        *contradictions(parts, study.gap),
+    ]
     usual: Hold = "linear" if actuation == "rotor_speed" else "previous"
     words = {
         "rotor_speed": "measured rotor speeds",

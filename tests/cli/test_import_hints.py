@@ -13,7 +13,7 @@ SIGNALS = {
     "body_rate": "body_rate: {columns: [p, q, r], unit: rad/s}",
     "body_torque": "body_torque: {columns: [mx, my, mz], unit: N m}",
     "rotor_command": "rotor_command: {columns: [u1, u2, u3, u4], unit: '1'}",
-    "rotor_speed": "rotor_speed: {columns: [u1, u2, u3, u4], unit: rad/s}",
+    "rotor_speed": "rotor_speed: {columns: [w1, w2, w3, w4], unit: rad/s}",
 }
 NO_ATTITUDE = "the flight has no attitude, so reduce, identify and predict will refuse it: map one with import.signals."
 NO_ROTATION = "the flight has neither attitude nor body rates: only the balance of its rotors"
@@ -28,8 +28,10 @@ def imported(cpfls, tmp_path):
 
     def call(*signals, source="null"):
         names = ["t", "roll", "pitch", "yaw", "p", "q", "r", "mx", "my", "mz", "u1", "u2", "u3", "u4"]
-        waves = [0.1 * np.sin((2 + number % 3) * TIME) for number in range(len(names) - 5)]
-        rows = np.column_stack([TIME, *waves, *(0.5 + waves[wave] for wave in range(4))])
+        names += ["w1", "w2", "w3", "w4"]
+        waves = [0.1 * np.sin((2 + number % 3) * TIME) for number in range(9)]
+        commands = [0.5 + waves[wave] for wave in range(4)]
+        rows = np.column_stack([TIME, *waves, *commands, *(700.0 * command for command in commands)])
         log, config, flight = (tmp_path / name for name in ("log.csv", "study.yaml", "flight.h5"))
         np.savetxt(log, rows, delimiter=",", header=",".join(names), comments="")
         mapped = ", ".join(SIGNALS[signal] for signal in signals)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 from types import SimpleNamespace
 
@@ -387,3 +388,15 @@ def test_a_flight_that_is_learned_from_and_held_out_is_named(cpfls, config, flig
     result = cpfls("replay", config, output, flights[0], flights[0], "-o", tmp_path / "r.h5", "--every", 500)
     assert "flight-1.h5: is given twice" in result.stderr
     assert "flight-1.h5: v.h5 has learned from it" in result.stderr
+
+
+def test_a_velocity_in_another_unit_is_said(cpfls, config, flights, tmp_path):
+    flight = tmp_path / "kmh.h5"
+    shutil.copy(flights[0], flight)
+    with edited(flight) as file:
+        file["velocity"][:] *= 3.6
+    for words in (("vehicle", config, flight, "--held-out", flights[1]), ("replay", config, "vehicle", flight)):
+        result = cpfls(*words, "-o", tmp_path / "out.h5", "--force")
+        assert result.exit_code == 0, result.stderr
+        assert "kmh.h5: the velocity is in km/h, judged by the position" in result.stderr
+        assert "flight-2.h5:" not in result.stderr

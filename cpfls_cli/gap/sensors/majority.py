@@ -13,13 +13,14 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
 from cpfls_cli.gap.balance.windows import Windows
-from cpfls_cli.gap.sensors.channels import AXES
+from cpfls_cli.gap.sensors.channels import AXES, SAME
 from cpfls_cli.gap.sensors.motion import NAMES, PairCheck, checked
 from cpfls_cli.gap.sensors.repairs import ChannelRepair, is_derived
 
 _ROUNDS = 3
 _PARTS, _SIGMAS = 16, 4.0
 _TINY = 1e-100
+_CLIMBS_M_S2 = 0.1
 _MENDED = ("velocity", "acceleration", "specific_force")
 _SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
@@ -50,15 +51,19 @@ class Settled:
     repairs : tuple of ChannelRepair
     checks : tuple of PairCheck
         Of the repaired flights.
+    upside_down : str
+        Sentence on a world whose z points against the thrust; empty where it does not.
     """
 
     repairs: tuple[ChannelRepair, ...]
     checks: tuple[PairCheck, ...]
+    upside_down: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Contradictions that stay; those with the thrust are what a diagnosis is about."""
-        return tuple(problem for check in self.checks if check.pair.exact for problem in check.problems)
+        """Contradictions that stay; those with the thrust are what a diagnosis is about, but for the way it points."""
+        stays = (problem for check in self.checks if check.pair.exact for problem in check.problems)
+        return (*([self.upside_down] if self.upside_down else []), *stays)
 
 
 def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
@@ -78,6 +83,10 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
     # What was made of the accelerometer is no second witness.
     now = tuple(replace(signals, acceleration=None) if is_derived(signals) else signals for signals in flights)
     checks = checked(now, windows)
+    over = _upside_down(checks)
+    if over:
+        # Judged by the thrust every channel of such a world is wrong.
+        return Settled((), checks, over)
     for _ in range(_ROUNDS):
         found = _mended(now, checks, windows)
         if not found:
@@ -86,6 +95,21 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
         now = tuple(reduce(lambda s, repair: repair.applied(s), found, signals) for signals in now)
         checks = checked(now, windows)
     return Settled(repairs, checks)
+
+
+def _upside_down(checks: Sequence[PairCheck]) -> str:
+    """Tell of a world that is upside down: drag and wind weaken what a thrust shows, nothing reverses it along z."""
+    against = [check for check in checks if check.pair.first == "thrust" and check.pair.second != "specific_force"]
+    if not against or not all(_reversed_along_z(check) for check in against):
+        return ""
+    who = " and ".join(NAMES[check.pair.second] for check in against)
+    return f"Along z the thrust of the rotors is opposite to {who}: check import.world_frame and import.body_frame."
+
+
+def _reversed_along_z(check: PairCheck) -> bool:
+    first, second = check.first[:, 2], check.second[:, 2]
+    moves = len(first) >= _PARTS and min(first.std(), second.std()) > _CLIMBS_M_S2
+    return bool(moves and np.corrcoef(first, second)[0, 1] < -SAME)
 
 
 def _mended(flights: tuple[Signals, ...], checks: Sequence[PairCheck], windows: Windows) -> tuple[ChannelRepair, ...]:
@@ -318,11 +342,14 @@ def _told(
     way = "late" if repair.delay_s > 0 else "early"
     clock = [f"is {way} by {abs(1000 * repair.delay_s):.0f} ms"] if repair.delay_s else []
     who = f"The {NAMES[repair.channel]}" if not others else "The world of velocity and position"
-    sentence = (
-        f"{who} {_joined([*what, *clock])}, judged by the {_joined(witnesses)}. It is set right before the balance; "
-        f"mend the log, or {_KEYS[repair.channel]}."
+    finding = f"{who} {_joined([*what, *clock])}, judged by the {_joined(witnesses)}"
+    remedy = f"mend the log, or {_KEYS[repair.channel]}."
+    told = replace(
+        first,
+        sentence=f"{finding}. It is set right before the balance; {remedy}",
+        unrepaired=f"{finding}; {remedy}",
     )
-    return (replace(first, sentence=sentence), *others)
+    return (told, *others)
 
 
 def _left_out(channel: str, witnesses: Sequence[str]) -> ChannelRepair:
@@ -331,8 +358,13 @@ def _left_out(channel: str, witnesses: Sequence[str]) -> ChannelRepair:
         "acceleration": "the force comes from other channels, if there are any",
         "specific_force": "the force comes from other channels, if there are any",
     }[channel]
-    sentence = (
+    finding = (
         f"The {NAMES[channel]} contradicts the {_joined(witnesses)}, and neither unit, gravity, axes nor delay "
-        f"explains it. It is left out: {without}. Check {_KEYS[channel]}."
+        "explains it"
     )
-    return ChannelRepair(channel, dropped=True, sentence=sentence)
+    return ChannelRepair(
+        channel,
+        dropped=True,
+        sentence=f"{finding}. It is left out: {without}. Check {_KEYS[channel]}.",
+        unrepaired=f"{finding}; check {_KEYS[channel]}.",
+    )

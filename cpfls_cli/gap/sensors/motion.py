@@ -250,7 +250,7 @@ def _problems(
     allowed = _SCALE_OFF if pair.exact else _THRUST_OFF
     for each in matches:
         if each.r2 > SAME**2 and _scale_off(each, allowed):
-            yield f"The scales of {each.channels} along {each.axis} differ by a factor of {each.scale:.2f}."
+            yield f"The scales of {each.channels} along {each.axis} differ by a factor of {each.scale:#.3g}."
         if pair.first != "position" and abs(each.offset) > _GRAVITY_OFF_M_S2:
             yield f"{each.channels.capitalize()} differ by {each.offset:.1f} m/s^2 along {each.axis}: gravity?"
     if pair.exact and delay.beyond(_DELAY_OFF_S):

@@ -36,6 +36,8 @@ class ChannelRepair:
         Added along the vertical, m/s^2.
     sentence : str
         What is wrong, who says so, what is done and what to mend.
+    unrepaired : str
+        The same where nothing is done about it.
     """
 
     channel: str
@@ -45,6 +47,7 @@ class ChannelRepair:
     matrix: Array = field(default_factory=lambda: np.eye(3))
     gravity_m_s2: float = 0.0
     sentence: str = ""
+    unrepaired: str = ""
 
     @property
     def is_mistake(self) -> bool:

@@ -268,6 +268,13 @@ def test_a_step_longer_than_the_gap_asks_for_the_unit_of_time(rule):
     )
 
 
+@pytest.mark.parametrize(("factor", "said"), [(1.0, False), (1 / 320, False), (1e-3, True)])
+def test_a_clock_that_no_sensor_has_asks_for_the_unit_of_time(factor, said):
+    report = read_signals(log() | {"t": factor * log()["t"]}, settings()).report
+    asked = [each for each in report.warnings if "is import.time_unit = s right" in each]
+    assert asked == (["1e+05 rows a second, which no sensor of a vehicle gives: is import.time_unit = s right"] * said)
+
+
 def test_a_slow_column_in_a_fast_log_is_told_from_a_wrong_clock():
     columns = log()
     columns["r"][np.arange(201) % 20 != 0] = np.nan

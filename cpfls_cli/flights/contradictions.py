@@ -1,0 +1,104 @@
+"""What of a flight contradicts itself or its vehicle, where nobody audits its sensors: units, axes, signs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cpfls_cli.config.study import Study
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.errors import InputError
+from cpfls_cli.flights.recordings import ReadFlight, signals_of
+from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.sensors.majority import settled
+from cpfls_cli.gap.settings import GapSettings
+
+# A wrong unit or a slipped digit is farther from the weight.
+_THRUST_TO_WEIGHT = 5.0
+# Measured speeds overshoot what a data sheet states; a wrong unit of speed is a factor of six at least.
+_ABOVE_THE_LIMIT = 1.5
+_FEWEST_WINDOWS = 16
+
+
+def contradictions_of(flight: ReadFlight, study: Study) -> tuple[str, ...]:
+    """Say what of an imported flight contradicts itself; nothing of one that nothing drives."""
+    try:
+        signals, _ = signals_of(flight, flight.signals, study)
+    except InputError:
+        return ()
+    return contradictions([signals], study.gap)
+
+
+def contradictions(parts: Sequence[Signals], settings: GapSettings) -> tuple[str, ...]:
+    """Hold the channels of a flight against each other and against its vehicle; nothing is set right.
+
+    Parameters
+    ----------
+    parts : sequence of Signals
+        Stretches of one flight; those too short for windows are left out.
+    settings : GapSettings
+        `window_s` and `overlap`, as in the sensor audit.
+
+    Returns
+    -------
+    tuple of str
+        What is wrong, who says so, and what to mend, to stand behind the name of the flight.
+    """
+    return tuple(f"{found[0].lower()}{found[1:].removesuffix('.')}" for found in _found(parts, settings))
+
+
+def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
+    yield from _too_fast(parts)
+    about_thrust = _of_thrust(parts)
+    if about_thrust:
+        yield (
+            f"The thrust of the rotors is {about_thrust}: check the unit of import.signals.rotor_speed (or "
+            "rotor_command), vehicle.mass_kg and thrust_factor_n_s2 of vehicle.rotors."
+        )
+    try:
+        shared = windows(parts[0].period, settings.window_s, settings.overlap)
+    except InputError:
+        return
+    told = not about_thrust and "thrust_factor" not in parts[0].vehicle.unknown
+    long = [part if told else _weighed(part) for part in parts if shared.count(len(part))]
+    if sum(shared.count(len(part)) for part in long) < _FEWEST_WINDOWS:
+        return
+    motion = settled(long, shared)
+    yield from (repair.unrepaired for repair in motion.repairs if repair.unrepaired)
+    yield from motion.warnings
+
+
+def _too_fast(parts: Sequence[Signals]) -> Iterator[str]:
+    fastest = max((float(part.rotor_speed.max()) for part in parts if part.rotor_speed is not None), default=0.0)
+    limit = parts[0].vehicle.rotor_speed_max_rad_s
+    if fastest > _ABOVE_THE_LIMIT * limit:
+        yield (
+            f"The rotors turn at up to {fastest:.4g} rad/s, and vehicle.rotor_speed_max_rad_s is {limit:.4g}: check "
+            "the unit of import.signals.rotor_speed (rpm?), or the limit."
+        )
+
+
+def _of_thrust(parts: Sequence[Signals]) -> str:
+    """Say how the thrust lies to the weight where no flight has it so; nothing where a guess states it."""
+    vehicle = parts[0].vehicle
+    if "thrust_factor" in vehicle.unknown:
+        return ""
+    known = [part.thrust for part in parts if part.rotor_speed is not None and part.thrust is not None]
+    thrust = np.concatenate([*known, np.zeros(0)]) / (vehicle.mass_kg * vehicle.gravity_m_s2)
+    # A log may hold a long rest on the ground, so that its mean says nothing of too little.
+    if len(thrust) and thrust.mean() > _THRUST_TO_WEIGHT:
+        return f"{thrust.mean():.3g} times the weight on average, which no flight keeps up"
+    if len(thrust) and thrust.max() < 1 / _THRUST_TO_WEIGHT:
+        return f"{thrust.max():.3g} times the weight at most, which lifts no vehicle"
+    return ""
+
+
+def _weighed(part: Signals) -> Signals:
+    """Scale thrust to the weight where its size says nothing, so that its direction still bears witness."""
+    if part.rotor_speed is None or part.thrust is None or not part.thrust.any():
+        return part
+    scale = part.vehicle.mass_kg * part.vehicle.gravity_m_s2 / float(part.thrust.mean())
+    rotors = tuple(replace(rotor, thrust_factor_n_s2=scale * rotor.thrust_factor_n_s2) for rotor in part.vehicle.rotors)
+    return replace(part, vehicle=replace(part.vehicle, rotors=rotors))

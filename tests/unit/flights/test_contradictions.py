@@ -1,0 +1,121 @@
+"""What of a flight contradicts itself is said, and nothing else: faults made on purpose, and flights without any."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.flights.contradictions import contradictions
+from cpfls_cli.gap.settings import GapSettings
+from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
+
+SETTINGS = GapSettings()
+NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.02, "position": 0.005, "acceleration": 0.1}
+UP_IS_DOWN = np.array([1.0, 1.0, -1.0])
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return signals_of(flown(12.0, noise=NOISE))
+
+
+def said(signals):
+    return " ".join(contradictions([signals], SETTINGS))
+
+
+def cut(signals, part):
+    known = ("time", "body_rate", "attitude", "velocity", "position", "acceleration", "rotor_speed")
+    return replace(signals, **{name: getattr(signals, name)[part] for name in known})
+
+
+def upside_down(signals):
+    return replace(
+        signals,
+        velocity=signals.velocity * UP_IS_DOWN,
+        position=signals.position * UP_IS_DOWN,
+        acceleration=signals.acceleration * UP_IS_DOWN,
+    )
+
+
+def with_vehicle(signals, **changes):
+    return replace(signals, vehicle=replace(VEHICLE, **changes))
+
+
+def guessed(signals, factor):
+    """A flight of a vehicle whose thrust factor is a guess, wrong by a factor."""
+    rotors = tuple(replace(each, thrust_factor_n_s2=factor * each.thrust_factor_n_s2) for each in VEHICLE.rotors)
+    return with_vehicle(signals, rotors=rotors, unknown=("thrust_factor",))
+
+
+def test_nothing_is_said_of_a_flight_that_agrees_with_itself(flight):
+    assert contradictions([flight], SETTINGS) == ()
+
+
+@pytest.mark.parametrize("factor", [1e-3, 0.1, 30.0])
+def test_a_thrust_factor_that_is_a_guess_contradicts_nothing(flight, factor):
+    assert contradictions([guessed(flight, factor)], SETTINGS) == ()
+
+
+FAULTS = {
+    "velocity in km/h": (lambda s: replace(s, velocity=3.6 * s.velocity), "the velocity is in km/h"),
+    "velocity in mm/s": (lambda s: replace(s, velocity=1e3 * s.velocity), "the velocity is in mm/s"),
+    "velocity swapped": (
+        lambda s: replace(s, velocity=s.velocity[:, [1, 0, 2]]),
+        "the velocity has y, x, z where x, y, z should be",
+    ),
+    "velocity down": (lambda s: replace(s, velocity=s.velocity * UP_IS_DOWN), "the velocity has x, y, -z"),
+    "position in mm": (
+        lambda s: replace(s, position=1e3 * s.position),
+        "the scales of position and velocity along y differ by a factor of 0.001",
+    ),
+    "acceleration in g": (lambda s: replace(s, acceleration=s.acceleration / 9.80665), "the acceleration is in g"),
+    "world down": (upside_down, "along z the thrust of the rotors is opposite to"),
+    "world down, thrust unknown": (lambda s: upside_down(guessed(s, 30.0)), "opposite to velocity"),
+    "speeds in rpm": (
+        lambda s: replace(s, rotor_speed=s.rotor_speed * 60 / (2 * np.pi)),
+        "times the weight on average",
+    ),
+    "speeds in rpm, thrust unknown": (
+        lambda s: replace(guessed(s, 1.0), rotor_speed=s.rotor_speed * 60 / (2 * np.pi)),
+        "and vehicle.rotor_speed_max_rad_s is 1000",
+    ),
+    "speeds in turns a second": (
+        lambda s: replace(s, rotor_speed=s.rotor_speed / (2 * np.pi)),
+        "times the weight at most",
+    ),
+    "a digit of the mass": (lambda s: with_vehicle(s, mass_kg=0.6), "times the weight on average"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_said(flight, fault):
+    made, sentence = FAULTS[fault]
+    assert sentence in said(made(flight))
+
+
+def test_a_long_rest_on_the_ground_is_no_lack_of_thrust(flight):
+    time = PERIOD * np.arange(10 * len(flight))
+    still = {name: np.repeat(getattr(flight, name)[-1:], 9 * len(flight), axis=0) for name in ("attitude", "position")}
+    still |= {name: np.zeros((9 * len(flight), 3)) for name in ("body_rate", "velocity", "acceleration")}
+    still["rotor_speed"] = np.zeros((9 * len(flight), 4))
+    both = {name: np.concatenate([getattr(flight, name), values]) for name, values in still.items()}
+    assert "times the weight" not in said(replace(flight, time=time, **both))
+
+
+def test_every_sentence_names_what_to_look_at(flight):
+    for made, _ in (each for name, each in FAULTS.items() if name != "position in mm"):
+        assert all("import." in each or "vehicle." in each for each in contradictions([made(flight)], SETTINGS))
+
+
+@pytest.mark.parametrize("seconds", [0.1, 0.5, 1.0])
+def test_of_a_flight_too_short_for_windows_only_the_rotors_are_judged(flight, seconds):
+    short = cut(flight, slice(0, round(seconds / PERIOD)))
+    assert said(replace(short, velocity=3.6 * short.velocity)) == ""
+    assert "times the weight" in said(replace(short, rotor_speed=9.55 * short.rotor_speed))
+
+
+def test_each_stretch_is_looked_at(flight):
+    halves = [cut(flight, slice(0, 600)), cut(flight, slice(600, None))]
+    faulty = [replace(half, velocity=3.6 * half.velocity) for half in halves]
+    assert contradictions(halves, SETTINGS) == ()
+    assert "km/h" in " ".join(contradictions(faulty, SETTINGS))
