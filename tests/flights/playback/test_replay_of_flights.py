@@ -1,10 +1,14 @@
 """`cpfls replay` on flights of others, with the shipped configs of the vehicles: what each log lets be played back."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from cpfls_cli.config.load import load_study
+from cpfls_cli.flights.contradictions import contradictions
+from cpfls_cli.flights.playback import flights_to_play
 from tests.builders.command_line import run
 from tests.builders.recorded_flights import path_of_log
 
@@ -48,3 +52,48 @@ def test_real_flights_are_played_back_as_far_as_they_are_known(config, folder, n
     assert flight["rotation_alone"] == (signals == ("body_rate",))
     # No real flight follows the rigid body for half a second: each has a lag or a number that is wrong.
     assert answer["models"]["model"]["body_rate"]["sum"] > answer["models"]["nothing-moves"]["body_rate"]["sum"]
+
+
+def logged(config, folder, name):
+    study = load_study(CONFIGS / f"{config}.yaml")
+    (flight,) = flights_to_play([path_of_log(folder, name)], study)
+    return flight.parts, study.gap
+
+
+SCALES = "differ by a factor of"
+
+
+@pytest.mark.parametrize(
+    ("config", "folder", "name", "said"),
+    [
+        *(("rotorpy", "rotorpy", name, []) for name in ("none", "com", "drag")),
+        *(("crazyswarm2", "real/crazyswarm2_lee", name, []) for name in ("log119", "log149", "log45")),
+        *(("arpl", "real/arpl_crazyflie_1khz", name, []) for name in ("log10_35_65s", "log15_55_90s", "log16_32_49s")),
+        ("crazypad", "real/crazypad_com", "add_weight_W1_near_M3__E9_log04", []),
+        ("crazypad", "real/crazypad_com", "add_weight_W3_near_M3__E9_log00", []),
+        # A velocity of a filter that trusts its accelerometer little, in a hover.
+        ("crazypad", "real/crazypad_com", "add_weight_W3_near_M3__E9_log02", [SCALES]),
+        ("crazypad", "real/crazypad_com", "normal_flight__E9_log00", [SCALES]),
+        ("crazypad", "real/crazypad_com", "normal_flight__E9_log01", []),
+        ("crazypad", "real/crazypad_com", "normal_flight__E9_log02", [SCALES]),
+        ("crazypad_usd", "real/crazypad_usd", "normal_flight__E8_log00", []),
+        ("crazypad_usd", "real/crazypad_usd", "cut_propeller_M3_4mm_4mm_39mm__E8_log00", []),
+        ("crazypad_usd", "real/crazypad_usd", "weight_on_string_W3_near_M3__E8_log01", []),
+    ],
+)
+def test_a_flight_in_its_right_units_does_not_contradict_itself(config, folder, name, said):
+    found = contradictions(*logged(config, folder, name))
+    assert len(found) == len(said)
+    assert all(words in sentence for words, sentence in zip(said, found, strict=True))
+
+
+@pytest.mark.parametrize("name", ["none", "com", "drag"])
+def test_a_flight_of_another_simulator_with_a_wrong_unit_is_said(name):
+    (part,), settings = logged("rotorpy", "rotorpy", name)
+    assert "the velocity is in km/h" in contradictions([replace(part, velocity=3.6 * part.velocity)], settings)[0]
+    assert (
+        "the acceleration is in g"
+        in contradictions([replace(part, acceleration=part.acceleration / 9.81)], settings)[0]
+    )
+    in_rpm = contradictions([replace(part, rotor_speed=9.549 * part.rotor_speed)], settings)
+    assert ["rotors turn" in in_rpm[0], "times the weight" in in_rpm[1], len(in_rpm)] == [True, True, 2]
