@@ -19,6 +19,7 @@ from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.evolution.state import EvolutionState
+from cpfls_cli.files import is_hdf5
 from cpfls_cli.identification.search import Unfinished
 
 if TYPE_CHECKING:
@@ -61,16 +62,30 @@ class Leftover:
         return self.path.with_suffix("")
 
     def require_permission(self, *, force: bool) -> None:
-        """Refuse to give up what is left, unless that is allowed.
+        """Refuse to give up what is left, unless that is allowed, and what is not left by this program in any case.
 
         Raises
         ------
         InputError
         """
+        self.require_own()
         if self.path.exists() and not force:
             raise InputError(
                 f"{self.path}: a {self.WORK} for {self.output} was stopped here; --resume continues it, --force "
                 "starts again"
+            )
+
+    def require_own(self) -> None:
+        """Refuse a file of the user that happens to have the name of what is left.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.path.exists() and not (self.path.is_file() and is_hdf5(self.path)):
+            raise InputError(
+                f"{self.path}: has the name of what a stopped {self.WORK} leaves, and is none of it; move it away, or "
+                "name another output"
             )
 
     def output_may_be_replaced(self) -> bool:

@@ -52,6 +52,7 @@ class PartialSweep(Leftover):
         InputError
             If there is something and neither is asked for, or nothing that can be resumed.
         """
+        Checkpoint.beside(self.output, self.header).require_own()
         if not resume:
             self.require_permission(force=force)
             return None

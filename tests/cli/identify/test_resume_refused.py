@@ -115,6 +115,19 @@ def test_damaged_checkpoint(refuse, words, stopped):
     assert line.endswith("--force without --resume starts again")
 
 
+@pytest.mark.parametrize("folder", [False, True])
+@pytest.mark.parametrize("option", [(), ("--force",)])
+def test_a_file_of_the_user_with_the_name_of_the_checkpoint_is_kept(refuse, words, tmp_path, option, folder):
+    notes = tmp_path / "model.h5.checkpoint"
+    notes.mkdir() if folder else notes.write_text("my notes\n")
+    (line,) = refuse(*words, "-o", tmp_path / "model.h5", *option)
+    assert line == (
+        f"{notes}: has the name of what a stopped search leaves, and is none of it; move it away, or name another "
+        "output"
+    )
+    assert notes.is_dir() if folder else notes.read_text() == "my notes\n"
+
+
 def test_other_file_in_the_place_of_the_output_is_not_replaced(refuse, words, stopped, pipeline):
     for content in (b"precious", pipeline.model.read_bytes()):
         stopped.write_bytes(content)
