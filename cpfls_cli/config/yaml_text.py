@@ -13,6 +13,8 @@ _TAG = "tag:yaml.org,2002:"
 _FLOAT = re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$")
 _MOST_VALUES = 100_000
 _INT = re.compile(r"^[-+]?(0|[1-9][0-9]*)$")
+_MOST_DIGITS = 400
+"""More than a float holds, and fewer than Python converts."""
 
 
 class _StudyLoader(yaml.SafeLoader):
@@ -46,6 +48,13 @@ def _mapping_without_duplicates(loader: _StudyLoader, node: yaml.MappingNode) ->
     return mapping
 
 
+def _whole_number(loader: _StudyLoader, node: yaml.ScalarNode) -> int:
+    if len(node.value) > _MOST_DIGITS:
+        raise yaml.constructor.ConstructorError(None, None, f"a number of {len(node.value)} digits", node.start_mark)
+    return int(loader.construct_yaml_int(node))
+
+
+_StudyLoader.add_constructor(_TAG + "int", _whole_number)
 _StudyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping_without_duplicates)
 
 
@@ -81,7 +90,9 @@ def parse_yaml(text: str, source: str) -> Any:
         mark = error.problem_mark
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         raise ConfigError(f"{source}{where}: not valid YAML: {error.problem}") from None
-    except (yaml.YAMLError, RecursionError, ValueError, LookupError, TypeError, ArithmeticError) as error:
+    except RecursionError:
+        raise ConfigError(f"{source}: lists or mappings are nested deeper than those of any config") from None
+    except (yaml.YAMLError, ValueError, LookupError, TypeError, ArithmeticError) as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise ConfigError(f"{source}: not valid YAML: {reason}") from None
     finally:

@@ -29,6 +29,15 @@ def test_nothing_to_resume(refuse, words, tmp_path):
     assert line == f"{tmp_path / 'sweep.h5'}.partial: no such file, so nothing to resume; start without --resume"
 
 
+@pytest.mark.parametrize("suffix", ["partial", "checkpoint"])
+def test_a_file_of_the_user_with_the_name_of_what_a_sweep_leaves_is_kept(refuse, words, tmp_path, suffix):
+    notes = tmp_path / f"sweep.h5.{suffix}"
+    notes.write_text("my notes\n")
+    (line,) = refuse(*words, "-o", tmp_path / "sweep.h5", "--force")
+    assert line.startswith(f"{notes}: has the name of what a stopped ")
+    assert notes.read_text() == "my notes\n"
+
+
 def test_finished_sweep_has_nothing_to_resume(refuse, words, whole):
     assert refuse(*words, "-o", whole, "--resume") == [f"{whole}: is complete; nothing to resume"]
 
