@@ -14,21 +14,42 @@ from cpfls_cli.flights.recordings import ReadFlight, signals_of
 from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.sensors.majority import settled
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 # A wrong unit or a slipped digit is farther from the weight.
 _THRUST_TO_WEIGHT = 5.0
 # Measured speeds overshoot what a data sheet states; a wrong unit of speed is a factor of six at least.
 _ABOVE_THE_LIMIT = 1.5
+_TOO_WIDE = 5.0
 _FEWEST_WINDOWS = 16
 
 
 def contradictions_of(flight: ReadFlight, study: Study) -> tuple[str, ...]:
-    """Say what of an imported flight contradicts itself; nothing of one that nothing drives."""
+    """Say what of an imported flight or its vehicle cannot be; nothing of a flight that nothing drives."""
     try:
         signals, _ = signals_of(flight, flight.signals, study)
     except InputError:
         return ()
-    return contradictions([signals], study.gap)
+    return (*beyond_belief(study.vehicle), *contradictions([signals], study.gap))
+
+
+def beyond_belief(vehicle: VehicleSettings) -> tuple[str, ...]:
+    """Say which stated moments of inertia are those of no body so light between such rotors; nothing of guesses."""
+    if "inertia" in vehicle.unknown:
+        return ()
+    stated = dict(zip((f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]), vehicle.inertia_kg_m2, strict=False))
+    hubs = np.array([rotor.position_m for rotor in vehicle.rotors])
+    # A frame may be wider than its rotors, and a paper may round; a slipped digit or g cm^2 is more than that.
+    limits = beyond_any_body(vehicle.mass_kg * _TOO_WIDE, hubs, stated)
+    return tuple(
+        f"vehicle.inertia_kg_m2: {name.removeprefix('inertia.')} is {stated[name]:.3g} kg m^2, and a body of "
+        f"{vehicle.mass_kg:.3g} kg between these rotors has hardly {limit / _TOO_WIDE:.2g}: check it, vehicle.mass_kg "
+        "and position_m of vehicle.rotors"
+        for name, limit in limits.items()
+        # Rotors that stand for others, all in one place, tell no size.
+        if limit > 0
+    )
 
 
 def contradictions(parts: Sequence[Signals], settings: GapSettings) -> tuple[str, ...]:

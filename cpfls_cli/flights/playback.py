@@ -20,7 +20,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
-from cpfls_cli.flights.contradictions import contradictions
+from cpfls_cli.flights.contradictions import beyond_belief, contradictions
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import ReadFlight, read_flight, read_import, signals_of, with_voltage
 from cpfls_cli.flights.same_vehicle import read_of_vehicle, read_vehicle
@@ -76,7 +76,7 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
                 f"{flight.name}: sampled at {rates[0]}, {first.name} at {rates[1]}; play them back one by one, or "
                 "import them with import.rate_hz"
             )
-    return tuple(flights)
+    return (replace(first, warnings=(*beyond_belief(study.vehicle), *first.warnings)), *flights[1:])
 
 
 def _parts(path: Path, study: Study) -> list[ImportedFlight]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.flights.contradictions import contradictions
+from cpfls_cli.flights.contradictions import beyond_belief, contradictions
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
 
@@ -100,6 +100,17 @@ def test_a_long_rest_on_the_ground_is_no_lack_of_thrust(flight):
     still["rotor_speed"] = np.zeros((9 * len(flight), 4))
     both = {name: np.concatenate([getattr(flight, name), values]) for name, values in still.items()}
     assert "times the weight" not in said(replace(flight, time=time, **both))
+
+
+@pytest.mark.parametrize(
+    ("inertia", "said"),
+    [((0.6, 0.6, 1.2), 0), ((6.0, 0.6, 6.1), 2), ((365.0, 365.0, 700.0), 3), ((0.6, 0.6, 1.2, 0.1, 0.0, 0.0), 0)],
+)
+def test_an_inertia_of_no_such_body_is_said_unless_it_is_a_guess(inertia, said):
+    stated = replace(VEHICLE, inertia_kg_m2=inertia)
+    assert len(beyond_belief(stated)) == said
+    assert beyond_belief(replace(stated, unknown=("inertia",))) == ()
+    assert all("Ixx" in each or "Iyy" in each or "Izz" in each for each in beyond_belief(stated))
 
 
 def test_every_sentence_names_what_to_look_at(flight):
