@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.airframe import RotorPlace, airframe_from_motion, disagreement_on_rotors
 from cpfls_cli.flights.recordings import ReadFlight, signals_of
 from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.sensors.majority import settled
@@ -23,6 +24,8 @@ _THRUST_TO_WEIGHT = 5.0
 _ABOVE_THE_LIMIT = 1.5
 _TOO_WIDE = 5.0
 _FEWEST_WINDOWS = 16
+_ENOUGH = 200_000
+"""Samples that tell which rotor is where."""
 
 
 def contradictions_of(flight: ReadFlight, study: Study) -> tuple[str, ...]:
@@ -78,6 +81,7 @@ def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
             f"The thrust of the rotors is {about_thrust}: check the unit of import.signals.rotor_speed (or "
             "rotor_command), vehicle.mass_kg and thrust_factor_n_s2 of vehicle.rotors."
         )
+    yield from _misplaced(max(parts, key=len))
     try:
         shared = windows(parts[0].period, settings.window_s, settings.overlap)
     except InputError:
@@ -114,6 +118,20 @@ def _of_thrust(parts: Sequence[Signals]) -> str:
     if len(thrust) and thrust.max() < 1 / _THRUST_TO_WEIGHT:
         return f"{thrust.max():.3g} times the weight at most, which lifts no vehicle"
     return ""
+
+
+def _misplaced(part: Signals) -> Iterator[str]:
+    if part.rotor_speed is None:
+        return
+    known = slice(0, _ENOUGH)
+    moved = airframe_from_motion(part.body_rate[known], part.rotor_speed[known], 1 / part.period, part.commanded)
+    stated = [RotorPlace("", each.position_m[:2], each.spin) for each in part.vehicle.rotors]
+    elsewhere = "" if moved is None else disagreement_on_rotors(moved, stated)
+    if elsewhere:
+        yield (
+            f"By the motion the rotors are, in the order of their columns: {elsewhere}. vehicle.rotors says otherwise: "
+            "check position_m and spin there, the order of the columns, the gyroscope's axes, and import.body_frame."
+        )
 
 
 def _weighed(part: Signals) -> Signals:

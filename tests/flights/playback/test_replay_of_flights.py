@@ -97,3 +97,25 @@ def test_a_flight_of_another_simulator_with_a_wrong_unit_is_said(name):
     )
     in_rpm = contradictions([replace(part, rotor_speed=9.549 * part.rotor_speed)], settings)
     assert ["rotors turn" in in_rpm[0], "times the weight" in in_rpm[1], len(in_rpm)] == [True, True, 2]
+
+
+@pytest.mark.parametrize(
+    ("config", "folder", "name"),
+    [
+        ("rotorpy", "rotorpy", "none"),
+        ("rotorpy", "rotorpy", "com"),
+        ("arpl", "real/arpl_crazyflie_1khz", "log10_35_65s"),
+        ("crazypad_usd", "real/crazypad_usd", "normal_flight__E8_log02"),
+    ],
+)
+def test_columns_of_rotors_in_another_order_are_said_with_the_right_one(config, folder, name):
+    parts, settings = logged(config, folder, name)
+    part = max(parts, key=len)
+    (said,) = contradictions([replace(part, rotor_speed=part.rotor_speed[:, [1, 0, 2, 3]])], settings)
+    places = said.partition("columns: ")[2].partition(" (which")[0].split("; ")
+    sides = [place.partition(",")[0].split() for place in places]
+    right = [part.vehicle.rotors[index] for index in (1, 0, 2, 3)]
+    assert [("front" in side, "left" in side) for side in sides] == [
+        (rotor.position_m[0] > 0, rotor.position_m[1] > 0) for rotor in right
+    ]
+    assert [place.endswith("counter-clockwise") for place in places] == [rotor.spin > 0 for rotor in right]

@@ -71,6 +71,14 @@ FAULTS = {
     "acceleration in g": (lambda s: replace(s, acceleration=s.acceleration / 9.80665), "the acceleration is in g"),
     "world down": (upside_down, "along z the thrust of the rotors is opposite to"),
     "world down, thrust unknown": (lambda s: upside_down(guessed(s, 30.0)), "opposite to velocity"),
+    "rotors in another order": (
+        lambda s: replace(s, rotor_speed=s.rotor_speed[:, [1, 0, 2, 3]]),
+        "by the motion the rotors are, in the order of their columns: right, clockwise; front, counter-clockwise; rear",
+    ),
+    "spins reversed": (
+        lambda s: with_vehicle(s, rotors=tuple(replace(each, spin=-each.spin) for each in VEHICLE.rotors)),
+        "front, counter-clockwise; right, clockwise; rear, counter-clockwise; left, clockwise (which explains",
+    ),
     "speeds in rpm": (
         lambda s: replace(s, rotor_speed=s.rotor_speed * 60 / (2 * np.pi)),
         "times the weight on average",
