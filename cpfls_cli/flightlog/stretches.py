@@ -24,7 +24,9 @@ _CLIPPED_SAMPLES = 5
 _CLIPPED_TO_NEXT = 3
 # By signal: no sensor of a multirotor has its limit lower. A common smallest range of a gyroscope is 125 deg/s.
 _LOWEST_LIMIT = {"body_rate": 1.0, "attitude_rate": 1.0, "acceleration": 15.0, "rotor_command": 0.0}
-_MEASURED = frozenset({"attitude", "quaternion", "body_rate", "attitude_rate", "position", "velocity", "acceleration"})
+_MEASURED = frozenset(
+    {"attitude", "quaternion", "body_rate", "attitude_rate", "position", "velocity", "acceleration", "rotor_speed"}
+)
 _SHORTEST_PAUSE_S = 0.5
 _FEWEST_IN_PAUSE = 20
 _USUAL_STEPS = 10
@@ -144,7 +146,9 @@ def warn_of_dead(table: SignalTable, known: Sequence[str], settings: ImportSetti
                 count = int((by_column[column] == limit).sum())
                 yield f"column {column} is clipped at {_shown(limit, signal)}, for {count} samples: the rest is lost"
         if name in _MEASURED and len(constant) < len(by_column):
-            yield from _warn_of_pause(name, table.time, values)
+            known_rest = name in _ROTORS and _at_rest(table.time, values, settings.saturation_samples)
+            moves = np.broadcast_to(np.logical_not(known_rest), len(values))
+            yield from _warn_of_pause(name, table.time[moves], values[moves])
 
 
 def _constant(name: str, columns: Sequence[str], rows: int) -> str:
@@ -203,9 +207,10 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
         marked = np.zeros(len(time), dtype=bool)
         for first, last in pauses:
             marked[first : last + 1] = True
+        each = "rotor" if name in _ROTORS else "axis"
         yield (
-            f"{name} does not change on any axis {_when(time, marked)}: its source was silent there, and the last value"
-            " was repeated; cut it off with import.crop_s"
+            f"{name} does not change on any {each} {_when(time, marked)}: its source was silent there, and the last"
+            " value was repeated; cut it off with import.crop_s"
         )
 
 

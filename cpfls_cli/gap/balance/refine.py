@@ -47,7 +47,8 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     """
     best = list(_exact(system(flights, chosen), floor).chosen)
     rotor_wrench = system(flights).rotor_wrench
-    for shape in best[-1].effect.shapes:
+    # Numbers of the vehicle alone, such as its mass, can be all that is named.
+    for shape in best[-1].effect.shapes if best else ():
         if shape.valley is not None:
             best[-1] = _in_deepest_valley(flights, best, shape, floor)
     shapes = [(index, shape) for index, candidate in enumerate(best) for shape in candidate.effect.shapes]

@@ -13,14 +13,18 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
 from cpfls_cli.gap.balance.windows import Windows
-from cpfls_cli.gap.sensors.channels import AXES, SAME
+from cpfls_cli.gap.sensors.channels import AXES
 from cpfls_cli.gap.sensors.motion import NAMES, PairCheck, checked
 from cpfls_cli.gap.sensors.repairs import ChannelRepair, is_derived
 
 _ROUNDS = 3
 _PARTS, _SIGMAS = 16, 4.0
 _TINY = 1e-100
-_CLIMBS_M_S2 = 0.1
+_MOVES_M_S2 = 0.1
+# Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
+# and more along z.
+_TOGETHER, _APART, _REVERSED = 0.8, 0.5, 0.6
+_ANOTHER_NORTH = np.radians(20.0)
 _MENDED = ("velocity", "acceleration", "specific_force")
 _SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
@@ -51,19 +55,19 @@ class Settled:
     repairs : tuple of ChannelRepair
     checks : tuple of PairCheck
         Of the repaired flights.
-    upside_down : str
-        Sentence on a world whose z points against the thrust; empty where it does not.
+    against_thrust : str
+        Sentence on a world that is upside down, turned or mirrored against thrust and attitude; empty where it is not.
     """
 
     repairs: tuple[ChannelRepair, ...]
     checks: tuple[PairCheck, ...]
-    upside_down: str = ""
+    against_thrust: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Contradictions that stay; those with the thrust are what a diagnosis is about, but for the way it points."""
         stays = (problem for check in self.checks if check.pair.exact for problem in check.problems)
-        return (*([self.upside_down] if self.upside_down else []), *stays)
+        return (*([self.against_thrust] if self.against_thrust else []), *stays)
 
 
 def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
@@ -83,10 +87,10 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
     # What was made of the accelerometer is no second witness.
     now = tuple(replace(signals, acceleration=None) if is_derived(signals) else signals for signals in flights)
     checks = checked(now, windows)
-    over = _upside_down(checks)
-    if over:
+    against_thrust = _against_thrust(checks)
+    if against_thrust:
         # Judged by the thrust every channel of such a world is wrong.
-        return Settled((), checks, over)
+        return Settled((), checks, against_thrust)
     for _ in range(_ROUNDS):
         found = _mended(now, checks, windows)
         if not found:
@@ -97,19 +101,41 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
     return Settled(repairs, checks)
 
 
-def _upside_down(checks: Sequence[PairCheck]) -> str:
-    """Tell of a world that is upside down: drag and wind weaken what a thrust shows, nothing reverses it along z."""
+def _against_thrust(checks: Sequence[PairCheck]) -> str:
+    """Tell of a world whose channels agree, and all lie otherwise than thrust and attitude: drag and wind turn none."""
     against = [check for check in checks if check.pair.first == "thrust" and check.pair.second != "specific_force"]
-    if not against or not all(_reversed_along_z(check) for check in against):
+    if not against or any(len(check.first) < _PARTS for check in against):
         return ""
     who = " and ".join(NAMES[check.pair.second] for check in against)
-    return f"Along z the thrust of the rotors is opposite to {who}: check import.world_frame and import.body_frame."
+    if all(_reversed_along_z(check) for check in against):
+        return f"Along z the thrust of the rotors is opposite to {who}: check import.world_frame and import.body_frame."
+    turned, mirrored = zip(*(_about_the_vertical(check) for check in against), strict=True)
+    if all(abs(turn) > _TOGETHER and abs(np.angle(turn)) > _ANOTHER_NORTH for turn in turned):
+        return (
+            f"By thrust and attitude {who} lie turned by {np.degrees(np.angle(turned[0])):.0f} deg about the vertical: "
+            "check the yaw of import.signals.attitude (or quaternion), the order of x and y, and import.world_frame."
+        )
+    if all(abs(turn) < _APART and abs(mirror) > _TOGETHER for turn, mirror in zip(turned, mirrored, strict=True)):
+        return (
+            f"By thrust and attitude {who} lie mirrored: check order and signs of their x and y, import.world_frame "
+            "and import.body_frame."
+        )
+    return ""
 
 
 def _reversed_along_z(check: PairCheck) -> bool:
     first, second = check.first[:, 2], check.second[:, 2]
-    moves = len(first) >= _PARTS and min(first.std(), second.std()) > _CLIMBS_M_S2
-    return bool(moves and np.corrcoef(first, second)[0, 1] < -SAME)
+    moves = min(first.std(), second.std()) > _MOVES_M_S2
+    return bool(moves and np.corrcoef(first, second)[0, 1] < -_REVERSED)
+
+
+def _about_the_vertical(check: PairCheck) -> tuple[complex, complex]:
+    """Correlate what moves in the plane, turned and mirrored, as numbers whose angle is that of the turn."""
+    first, second = ((part - part.mean(axis=0)) @ np.array([1.0, 1.0j, 0.0]) for part in (check.first, check.second))
+    if min(first.std(), second.std()) < _MOVES_M_S2:
+        return 0j, 0j
+    size = np.linalg.norm(first) * np.linalg.norm(second)
+    return complex(np.vdot(first, second) / size), complex((first * second).sum() / size)
 
 
 def _mended(flights: tuple[Signals, ...], checks: Sequence[PairCheck], windows: Windows) -> tuple[ChannelRepair, ...]:

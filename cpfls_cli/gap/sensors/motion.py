@@ -24,6 +24,9 @@ _TURNED_RAD = np.radians(3.0)
 _SIGMAS = 6.0
 _BLOCK_S = 4.0
 _TOGETHER = 0.5
+_ALIKE = 1.05
+_LENGTHS = {"mm": 0.001, "cm": 0.01, "ft": 0.3048}
+"""Metres of units of length that a position is logged in."""
 _TINY = 1e-100
 
 
@@ -248,9 +251,13 @@ def _problems(
         yield from frames
         return
     allowed = _SCALE_OFF if pair.exact else _THRUST_OFF
+    off = [each for each in matches if each.r2 > SAME**2 and _scale_off(each, allowed)]
+    scales = [each.scale for each in off]
+    if off and 0 < max(scales) < _ALIKE * min(scales):
+        yield _of_scale([each.axis for each in off], off[0].channels, float(np.median(scales)))
+    else:
+        yield from (_of_scale([each.axis], each.channels, each.scale) for each in off)
     for each in matches:
-        if each.r2 > SAME**2 and _scale_off(each, allowed):
-            yield f"The scales of {each.channels} along {each.axis} differ by a factor of {each.scale:#.3g}."
         if pair.first != "position" and abs(each.offset) > _GRAVITY_OFF_M_S2:
             yield f"{each.channels.capitalize()} differ by {each.offset:.1f} m/s^2 along {each.axis}: gravity?"
     if pair.exact and delay.beyond(_DELAY_OFF_S):
@@ -259,6 +266,14 @@ def _problems(
     if pair.exact and pair.second != "specific_force" and turn.beyond(_TURNED_RAD):
         degrees = abs(np.degrees(np.arctan(turn.value)))
         yield f"{pair.words.capitalize()} are turned against each other by {degrees:.0f} deg about the vertical."
+
+
+def _of_scale(axes: Sequence[str], channels: str, scale: float) -> str:
+    *most, last = axes
+    along = f"{', '.join(most)} and {last}" if most else last
+    unit = next((unit for unit, metres in _LENGTHS.items() if 1 / _ALIKE < scale / metres < _ALIKE), "")
+    asked = f": is the position in {unit}" if unit and channels.startswith(NAMES["position"]) else ""
+    return f"The scales of {channels} along {along} differ by a factor of {scale:#.3g}{asked}."
 
 
 def _scale_off(match: ChannelMatch, allowed: float) -> bool:

@@ -9,6 +9,13 @@ def test_nothing_hidden_is_no_gap(answer_of):
     assert answer["effects"] == []
 
 
+def test_a_mass_that_is_stated_wrong_is_all_that_is_named(answer_of, coefficients_of):
+    answer = answer_of("rotorpy", "rotorpy", "none", options=("--set", "vehicle.mass_kg=0.65"))
+    assert [effect["name"] for effect in answer["effects"]] == ["parameter_error"]
+    assert answer["verdict"] == "NAMED"
+    assert coefficients_of(answer, "parameter_error")["thrust_scale"]["value"] == pytest.approx(0.3, rel=0.01)
+
+
 def test_an_offset_of_the_centre_of_mass_is_found_to_five_percent(answer_of, coefficients_of):
     answer = answer_of("rotorpy", "rotorpy", "com")
     assert [effect["name"] for effect in answer["effects"]] == ["com_offset"]

@@ -150,3 +150,11 @@ def test_a_load_that_swings_all_flight_long_is_found_in_its_narrow_valley():
     (found,) = refined(known, [start], np.ones(6)).chosen
     assert found.shape["length_m"] == pytest.approx(hidden["length_m"], rel=0.01)
     assert found.shape["damping_1_s"] == pytest.approx(hidden["damping_1_s"], abs=0.01)
+
+
+def test_where_numbers_of_the_vehicle_alone_are_named_there_is_nothing_to_refine():
+    known = flights()
+    unrefined = system(known)
+    found = refined(known, [], np.ones(6))
+    assert list(found.chosen) == []
+    np.testing.assert_array_equal(found.residual, unrefined.residual)

@@ -66,7 +66,7 @@ FAULTS = {
     "velocity down": (lambda s: replace(s, velocity=s.velocity * UP_IS_DOWN), "the velocity has x, y, -z"),
     "position in mm": (
         lambda s: replace(s, position=1e3 * s.position),
-        "the scales of position and velocity along y differ by a factor of 0.001",
+        ": is the position in mm",
     ),
     "acceleration in g": (lambda s: replace(s, acceleration=s.acceleration / 9.80665), "the acceleration is in g"),
     "world down": (upside_down, "along z the thrust of the rotors is opposite to"),
@@ -78,6 +78,24 @@ FAULTS = {
     "spins reversed": (
         lambda s: with_vehicle(s, rotors=tuple(replace(each, spin=-each.spin) for each in VEHICLE.rotors)),
         "front, counter-clockwise; right, clockwise; rear, counter-clockwise; left, clockwise (which explains",
+    ),
+    "heading turned": (
+        lambda s: replace(s, attitude=s.attitude + np.array([0.0, 0.0, 1.0])),
+        "by thrust and attitude velocity and acceleration lie turned by -57 deg about the vertical",
+    ),
+    "world turned over its x": (
+        lambda s: replace(
+            s, **{name: getattr(s, name) * [1.0, -1.0, 1.0] for name in ("velocity", "position", "acceleration")}
+        ),
+        "by thrust and attitude velocity and acceleration lie mirrored",
+    ),
+    "hanging": (
+        lambda s: replace(s, attitude=s.attitude + np.array([np.pi, 0.0, 0.0])),
+        "by its attitude the vehicle hangs upside down on average",
+    ),
+    "twice the mass": (
+        lambda s: with_vehicle(s, mass_kg=2 * VEHICLE.mass_kg),
+        "the thrust of the rotors is 0.50 times what the motion takes along the vertical",
     ),
     "speeds in rpm": (
         lambda s: replace(s, rotor_speed=s.rotor_speed * 60 / (2 * np.pi)),
