@@ -27,6 +27,8 @@ _ABOVE_THE_LIMIT = 1.5
 # Of 23 real flights with attitude and measured speeds the thrust carries 0.94 to 1.02 of what it has to.
 _LIFTS = 1.25
 _IDLE = 0.3
+_HANGS = -0.5
+"""Mean upward part of body z below which an attitude is turned over; full rotations come to 0."""
 _OF_THRUST = (
     "check the unit of import.signals.rotor_speed (or rotor_command), vehicle.mass_kg, vehicle.gravity_m_s2 and "
     "thrust_factor_n_s2 of vehicle.rotors"
@@ -86,7 +88,13 @@ def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
     yield from _too_fast(parts)
     about_thrust = _of_thrust(parts)
     if about_thrust:
-        yield (f"The thrust of the rotors is {about_thrust}: {_OF_THRUST}.")
+        yield f"The thrust of the rotors is {about_thrust}: {_OF_THRUST}."
+    if parts[0].attitude is not None and np.concatenate([part.rotation[:, 2, 2] for part in parts]).mean() < _HANGS:
+        yield (
+            "By its attitude the vehicle hangs upside down on average: check import.world_frame, import.body_frame and "
+            "the order of the quaternion."
+        )
+        return
     yield from _misplaced(max(parts, key=len))
     try:
         shared = windows(parts[0].period, settings.window_s, settings.overlap)
@@ -95,12 +103,6 @@ def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
     told = not about_thrust and "thrust_factor" not in parts[0].vehicle.unknown
     long = [part if told else _weighed(part) for part in parts if shared.count(len(part))]
     if sum(shared.count(len(part)) for part in long) < _FEWEST_WINDOWS:
-        return
-    if long[0].attitude is not None and np.concatenate([part.rotation[:, 2, 2] for part in long]).mean() < 0:
-        yield (
-            "By its attitude the vehicle hangs upside down on average: check import.world_frame, import.body_frame and "
-            "the order of the quaternion."
-        )
         return
     motion = settled(long, shared)
     yield from (repair.unrepaired for repair in motion.repairs if repair.unrepaired)
@@ -118,7 +120,7 @@ def _of_lift(checks: Sequence[PairCheck], vehicle: VehicleSettings) -> Iterator[
     flown = given > _IDLE * np.quantile(given, 0.9)
     share = float(given[flown].mean() / taken[flown].mean())
     if not 1 / _LIFTS < share < _LIFTS:
-        yield (f"The thrust of the rotors is {share:.2f} times what the motion takes along the vertical: {_OF_THRUST}.")
+        yield f"The thrust of the rotors is {share:.2f} times what the motion takes along the vertical: {_OF_THRUST}."
 
 
 def _too_fast(parts: Sequence[Signals]) -> Iterator[str]:
