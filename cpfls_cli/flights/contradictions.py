@@ -12,8 +12,9 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import RotorPlace, airframe_from_motion, disagreement_on_rotors
 from cpfls_cli.flightlog.quality import warn_of_disagreement
-from cpfls_cli.flights.recordings import ReadFlight, signals_of
+from cpfls_cli.flights.recordings import ReadFlight, signals_of, stretch_of
 from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.sensors.audit import gross_faults
 from cpfls_cli.gap.sensors.majority import settled
 from cpfls_cli.gap.sensors.motion import PairCheck
 from cpfls_cli.gap.settings import GapSettings
@@ -35,8 +36,8 @@ _OF_THRUST = (
 )
 _TOO_WIDE = 5.0
 _FEWEST_WINDOWS = 16
-_ENOUGH = 200_000
-"""Samples that tell which rotor is where."""
+_ENOUGH = 50_000
+"""Samples that tell units, axes and which rotor is where."""
 
 
 def contradictions_of(flight: ReadFlight, study: Study) -> tuple[str, ...]:
@@ -81,7 +82,18 @@ def contradictions(parts: Sequence[Signals], settings: GapSettings) -> tuple[str
     tuple of str
         What is wrong, who says so, and what to mend, to stand behind the name of the flight.
     """
-    return tuple(f"{found[0].lower()}{found[1:].removesuffix('.')}" for found in _found(parts, settings))
+    return tuple(f"{found[0].lower()}{found[1:].removesuffix('.')}" for found in _found(_begin(parts), settings))
+
+
+def _begin(parts: Sequence[Signals]) -> list[Signals]:
+    """Take no more of a long flight than tells its units and axes."""
+    taken: list[Signals] = []
+    left = _ENOUGH
+    for part in parts:
+        if left > 1:
+            taken.append(stretch_of(part, slice(0, left)))
+            left -= len(part)
+    return taken
 
 
 def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
@@ -104,6 +116,7 @@ def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
     long = [part if told else _weighed(part) for part in parts if shared.count(len(part))]
     if sum(shared.count(len(part)) for part in long) < _FEWEST_WINDOWS:
         return
+    yield from (f"{fault[:-1]}: check import.signals.body_rate." for fault in gross_faults(long, shared))
     motion = settled(long, shared)
     yield from (repair.unrepaired for repair in motion.repairs if repair.unrepaired)
     yield from motion.warnings
@@ -151,13 +164,10 @@ def _of_thrust(parts: Sequence[Signals]) -> str:
 def _misplaced(part: Signals) -> Iterator[str]:
     if part.rotor_speed is None:
         return
-    known = slice(0, _ENOUGH)
-    if part.attitude is not None and warn_of_disagreement(
-        part.time[known], part.attitude[known], part.body_rate[known]
-    ):
+    if part.attitude is not None and warn_of_disagreement(part.time, part.attitude, part.body_rate):
         # A gyroscope that the attitude contradicts tells of no rotor.
         return
-    moved = airframe_from_motion(part.body_rate[known], part.rotor_speed[known], 1 / part.period, part.commanded)
+    moved = airframe_from_motion(part.body_rate, part.rotor_speed, 1 / part.period, part.commanded)
     stated = [RotorPlace("", each.position_m[:2], each.spin) for each in part.vehicle.rotors]
     elsewhere = "" if moved is None else disagreement_on_rotors(moved, stated)
     if elsewhere:

@@ -288,8 +288,8 @@ def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
     # A flight whose windows are refused as a whole is refused for another reason than its length.
     common_windows([flight], settings)
     cut = 2 * len(flight.signals) // 3
-    training = Recording(f"{flight.name} (first two thirds)", _cut(flight.signals, slice(0, cut)))
-    last = Recording(f"{flight.name} (last third)", _cut(flight.signals, slice(cut, None)))
+    training = Recording(f"{flight.name} (first two thirds)", stretch_of(flight.signals, slice(0, cut)))
+    last = Recording(f"{flight.name} (last third)", stretch_of(flight.signals, slice(cut, None)))
     try:
         common_windows([training, last], settings)
     except InputError as error:
@@ -300,7 +300,8 @@ def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
     return FlightSplit((training,), (last,), f"there is one flight only, so it was held out in time: {last.name}")
 
 
-def _cut(signals: Signals, part: slice) -> Signals:
+def stretch_of(signals: Signals, part: slice) -> Signals:
+    """Take a part of a flight, with its clock."""
     values: dict[str, Any] = {field.name: getattr(signals, field.name) for field in fields(signals)}
     cut: dict[str, Any] = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
     return replace(signals, **cut)

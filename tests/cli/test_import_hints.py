@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog.smoothing import low_pass
+from cpfls_cli.rotations import body_rate
 from tests.builders.studies import VEHICLE
 
 TIME = np.arange(0.0, 4.0, 0.02)
@@ -100,8 +101,9 @@ def notes_of(cpfls, tmp_path):
     signals = ("attitude", "body_rate", "rotor_command")
 
     def call(*words, **changes):
-        motion = {name: 0.3 * np.sin((1 + i) * time) + 0.02 * NOISE[:, i] for i, name in enumerate("pqr")}
         angles = {name: -0.3 * np.cos((1 + i) * time) / (1 + i) for i, name in enumerate(("roll", "pitch", "yaw"))}
+        attitude, slopes = np.column_stack(list(angles.values())), 0.3 * np.sin(np.outer(time, [1, 2, 3]))
+        motion = dict(zip("pqr", (body_rate(attitude, slopes) + 0.02 * NOISE[:, :3]).T, strict=True))
         rotors = {f"u{i}": 0.5 + 0.05 * NOISE[:, 5 + i] for i in range(1, 5)}
         columns = {"t": time} | angles | motion | rotors | changes
         log, config, flight = (tmp_path / name for name in ("log.csv", "study.yaml", "flight.h5"))

@@ -35,6 +35,8 @@ _TURNING = 0.05
 _BIAS_APART = 0.0015
 _CROSS = 0.005
 _SIGMAS_APART = 4.0
+# Twice the most that 23 real flights show, and more: rad/s, a share, rad, s.
+_GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 0.016}
 
 
 @dataclass(frozen=True)
@@ -145,6 +147,25 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
         repairs=(*clock, *motion.repairs),
         filtered=filter_warnings(flights),
     )
+
+
+def gross_faults(flights: Sequence[Signals], windows: Windows) -> tuple[str, ...]:
+    """Name what is wrong with the gyroscope alone and far beyond what sensors of multirotors show.
+
+    Parameters
+    ----------
+    flights : sequence of Signals
+        As for `audit`.
+    """
+    faults, _, _, frames = _gyroscope(flights, windows)
+    if frames:
+        return ()
+    return tuple(finding.sentence for finding in findings(faults, windows.period) if _is_gross(finding))
+
+
+def _is_gross(finding: AuditFinding) -> bool:
+    largest = max((abs(number.value) for number in finding.coefficients if number.named), default=0.0)
+    return bool(largest > _GROSS[str(_estimate(finding.name))])
 
 
 _Outcome = tuple[Sequence[CheckedFault], Mapping[str, str], GyroFit | None, tuple[str, ...]]

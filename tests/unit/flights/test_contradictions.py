@@ -97,6 +97,18 @@ FAULTS = {
         lambda s: with_vehicle(s, mass_kg=2 * VEHICLE.mass_kg),
         "the thrust of the rotors is 0.50 times what the motion takes along the vertical",
     ),
+    "gyroscope of another scale": (
+        lambda s: replace(s, body_rate=1.3 * s.body_rate),
+        "the gyroscope reads 30 % too much about x",
+    ),
+    "gyroscope with a bias": (
+        lambda s: replace(s, body_rate=s.body_rate + np.array([0.0, 0.5, 0.0])),
+        "the gyroscope shows a rate where there is none: +0.4998 rad/s about y",
+    ),
+    "gyroscope late": (
+        lambda s: replace(s, body_rate=np.roll(s.body_rate, 5, axis=0)),
+        "the gyroscope runs 49.9 ms behind the attitude",
+    ),
     "speeds in rpm": (
         lambda s: replace(s, rotor_speed=s.rotor_speed * 60 / (2 * np.pi)),
         "times the weight on average",
