@@ -284,7 +284,7 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     MovedBy or None
         None for another number of rotors, or where nothing is explained.
     """
-    if speed.shape[1] != 4 or len(speed) < 5 * rate_hz:
+    if speed.shape[1] != 4 or len(speed) < 5 * rate_hz or not speed.any():
         return None
     cutoff = min(_ACCELERATION_HZ, rate_hz / 5)
     rate = low_pass(body_rate, rate_hz, cutoff, 2)

@@ -27,7 +27,7 @@ _THRUST_TO_WEIGHT = 5.0
 _ABOVE_THE_LIMIT = 1.5
 # Of 23 real flights with attitude and measured speeds the thrust carries 0.94 to 1.02 of what it has to.
 _LIFTS = 1.25
-_IDLE = 0.3
+_IDLE = 0.5
 _HANGS = -0.5
 """Mean upward part of body z below which an attitude is turned over; full rotations come to 0."""
 _OF_THRUST = (
@@ -82,18 +82,20 @@ def contradictions(parts: Sequence[Signals], settings: GapSettings) -> tuple[str
     tuple of str
         What is wrong, who says so, and what to mend, to stand behind the name of the flight.
     """
-    return tuple(f"{found[0].lower()}{found[1:].removesuffix('.')}" for found in _found(_begin(parts), settings))
+    return tuple(f"{found[0].lower()}{found[1:].removesuffix('.')}" for found in _found(parts, settings))
 
 
-def _begin(parts: Sequence[Signals]) -> list[Signals]:
-    """Take no more of a long flight than tells its units and axes."""
-    taken: list[Signals] = []
-    left = _ENOUGH
-    for part in parts:
-        if left > 1:
-            taken.append(stretch_of(part, slice(0, left)))
-            left -= len(part)
-    return taken
+def _middle(parts: Sequence[Signals]) -> list[Signals]:
+    """Take no more of a long log than tells units and axes, from the middle of where its rotors turn."""
+    if sum(len(part) for part in parts) <= _ENOUGH:
+        return list(parts)
+    longest = max(parts, key=len)
+    centre = len(longest) // 2
+    if longest.rotor_speed is not None:
+        power = (longest.rotor_speed**2).sum(axis=1)
+        centre = int(np.median(np.flatnonzero(power >= _IDLE * np.quantile(power, 0.99))))
+    first = max(0, min(centre - _ENOUGH // 2, len(longest) - _ENOUGH))
+    return [stretch_of(longest, slice(first, first + _ENOUGH))]
 
 
 def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
@@ -101,6 +103,7 @@ def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
     about_thrust = _of_thrust(parts)
     if about_thrust:
         yield f"The thrust of the rotors is {about_thrust}: {_OF_THRUST}."
+    parts = _middle(parts)
     if parts[0].attitude is not None and np.concatenate([part.rotation[:, 2, 2] for part in parts]).mean() < _HANGS:
         yield (
             "By its attitude the vehicle hangs upside down on average: check import.world_frame, import.body_frame and "
@@ -130,7 +133,11 @@ def _of_lift(checks: Sequence[PairCheck], vehicle: VehicleSettings) -> Iterator[
     if not against:
         return
     given, taken = (part[:, 2] + vehicle.gravity_m_s2 for part in (against[0].first, against[0].second))
-    flown = given > _IDLE * np.quantile(given, 0.9)
+    most = given.max()
+    if most < vehicle.gravity_m_s2 / _THRUST_TO_WEIGHT:
+        # On the ground, or told already.
+        return
+    flown = given > _IDLE * most
     share = float(given[flown].mean() / taken[flown].mean())
     if not 1 / _LIFTS < share < _LIFTS:
         yield f"The thrust of the rotors is {share:.2f} times what the motion takes along the vertical: {_OF_THRUST}."

@@ -139,7 +139,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     Returns
     -------
     GyroFit or None
-        None where there are too few blocks.
+        None where there are too few blocks. Nothing is known where some of them alone tell of a rotation.
 
     References
     ----------
@@ -160,14 +160,15 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
         matrix = np.eye(3) + solution[:9].reshape(3, 3)
         delay = float(np.clip(base + solution[12], -LONGEST_DELAY_S, LONGEST_DELAY_S))
     left_out = _padded(normal.solve(columns)[0][..., 0], columns)
-    draws = np.array([_faults(each, base) for each in left_out])
+    turns = _turns_right(np.vstack([solution, left_out]))
+    draws = np.array([_faults(each, base) if turns else each for each in left_out])
     spread = ((draws - draws.mean(axis=0)) ** 2).sum(axis=0) * (len(draws) - 1) / len(draws)
     bias, error = _flight_bias(rest, index, block)
     return GyroFit(
-        value=_faults(solution, base),
+        value=_faults(solution, base) if turns else np.zeros_like(solution),
         error=np.sqrt(spread),
         pull=_pull(scanned.read, variance),
-        known=_known(scanned.excited),
+        known=_known(scanned.excited) & turns,
         blocks=len(draws),
         variance=variance,
         flight_bias=bias,
@@ -199,6 +200,11 @@ def _padded(solutions: Array, columns: IntArray) -> Array:
     whole = np.zeros((len(solutions), 13))
     whole[:, columns] = solutions
     return whole
+
+
+def _turns_right(solutions: Array) -> bool:
+    """Tell whether no solution mirrors the axes, as only noise does where a flight hardly turns."""
+    return bool((np.linalg.det(np.eye(3) + solutions[:, :9].reshape(-1, 3, 3)) > 0).all())
 
 
 def _faults(solution: Array, base: float) -> Array:

@@ -323,7 +323,9 @@ def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Tuned:
     if repair.channel != "specific_force":
         should, reading = should - should.mean(axis=0), reading - reading.mean(axis=0)
     squares = np.array([(should**2).sum(), (reading**2).sum()])
-    size = float(np.sqrt(squares[0] / max(squares[1], _TINY)))
+    if squares.min() < _TINY:
+        return repair, ()
+    size = float(np.sqrt(squares[0] / squares[1]))
     # Noise on one side makes its size too large, by no more than the correlation tells.
     error = (_UNIT_ERROR if check.pair.exact else _THRUST_ERROR) - np.log(_correlation(should, reading))
     if abs(np.log(size)) < max(error, _SAME_UNIT):

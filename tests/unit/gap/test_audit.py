@@ -46,6 +46,20 @@ def test_too_short_a_flight_is_not_tested():
     assert set(found.untested.values()) == {"the flights are too short"}
 
 
+@pytest.mark.parametrize("seed", [3, 5, 6])
+def test_a_flight_that_rests_for_most_of_its_time_is_told_to_hardly_turn(seed):
+    """Without the few seconds in which it turns noise is all there is, which may tell of mirrored axes."""
+    rng = np.random.default_rng(seed)
+    flight = faulty_flight(rng, Faults(), LEVELS["high"], duration=12.0)
+    count = 60 * len(flight)
+    still = {name: 0.01 * rng.standard_normal((count, 3)) for name in ("attitude", "body_rate")}
+    both = {name: np.concatenate([values, getattr(flight, name)]) for name, values in still.items()}
+    time = flight.period * np.arange(count + len(flight))
+    found = audit([replace(flight, time=time, **both)], WINDOWS)
+    assert found.named == ()
+    assert "the flights hardly turn, so it would not show" in found.untested.values()
+
+
 def integrated(signals):
     steps = Rotation.from_rotvec(0.5 * (signals.body_rate[1:] + signals.body_rate[:-1]) * signals.period)
     turned = [Rotation.identity()]
