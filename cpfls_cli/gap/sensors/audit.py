@@ -35,7 +35,7 @@ _TURNING = 0.05
 _BIAS_APART = 0.0015
 _CROSS = 0.005
 _SIGMAS_APART = 4.0
-# Twice the most that 23 real flights show, and more: rad/s, a share, rad, s.
+# About twice the most that 23 real flights show, or more: rad/s, a share, rad, s.
 _GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 0.016}
 
 
