@@ -13,10 +13,10 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import RotorPlace, airframe_from_motion, disagreement_on_rotors
 from cpfls_cli.flightlog.quality import warn_of_disagreement
 from cpfls_cli.flights.recordings import ReadFlight, signals_of, stretch_of
-from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.balance.windows import FEWEST_WINDOWS, windows
 from cpfls_cli.gap.sensors.audit import gross_faults
 from cpfls_cli.gap.sensors.majority import settled
-from cpfls_cli.gap.sensors.motion import PairCheck
+from cpfls_cli.gap.sensors.motion import PairCheck, by_thrust
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -35,7 +35,6 @@ _OF_THRUST = (
     "thrust_factor_n_s2 of vehicle.rotors"
 )
 _TOO_WIDE = 5.0
-_FEWEST_WINDOWS = 16
 _ENOUGH = 50_000
 """Samples that tell units, axes and which rotor is where."""
 
@@ -117,7 +116,7 @@ def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
         return
     told = not about_thrust and "thrust_factor" not in parts[0].vehicle.unknown
     long = [part if told else _weighed(part) for part in parts if shared.count(len(part))]
-    if sum(shared.count(len(part)) for part in long) < _FEWEST_WINDOWS:
+    if sum(shared.count(len(part)) for part in long) < FEWEST_WINDOWS:
         return
     yield from (f"{fault[:-1]}: check import.signals.body_rate." for fault in gross_faults(long, shared))
     motion = settled(long, shared)
@@ -129,7 +128,7 @@ def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
 
 def _of_lift(checks: Sequence[PairCheck], vehicle: VehicleSettings) -> Iterator[str]:
     """Hold the thrust against what the motion takes along the vertical, where the rotors do not idle."""
-    against = [check for check in checks if check.pair.first == "thrust" and check.pair.second != "specific_force"]
+    against = by_thrust(checks)
     if not against:
         return
     given, taken = (part[:, 2] + vehicle.gravity_m_s2 for part in (against[0].first, against[0].second))

@@ -14,7 +14,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.settings import GapSettings
 
 _FEWEST_SAMPLES = 8
-_FEWEST_WINDOWS = 16
+FEWEST_WINDOWS = 16
+"""Windows below which a flight tells too little."""
 _SAME_RATE = 1e-3
 """Relative difference of sampling periods that clocks of one logger have, and that no floor shows."""
 
@@ -157,9 +158,9 @@ def common_windows(recordings: Sequence[Recording], settings: GapSettings) -> Wi
         )
     shared = windows(period, settings.window_s, settings.overlap)
     for recording in recordings:
-        if shared.count(len(recording.signals)) < _FEWEST_WINDOWS:
+        if shared.count(len(recording.signals)) < FEWEST_WINDOWS:
             raise InputError(
                 f"{recording.name}: {len(recording.signals) * period:.3g} s are too short; "
-                f"{_FEWEST_WINDOWS} windows of gap.window_s = {settings.window_s:g} s are needed"
+                f"{FEWEST_WINDOWS} windows of gap.window_s = {settings.window_s:g} s are needed"
             )
     return shared

@@ -12,9 +12,9 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
-from cpfls_cli.gap.balance.windows import Windows
+from cpfls_cli.gap.balance.windows import FEWEST_WINDOWS, Windows
 from cpfls_cli.gap.sensors.channels import AXES
-from cpfls_cli.gap.sensors.motion import NAMES, PairCheck, checked
+from cpfls_cli.gap.sensors.motion import NAMES, PairCheck, by_thrust, checked
 from cpfls_cli.gap.sensors.repairs import ChannelRepair, is_derived
 
 _ROUNDS = 3
@@ -103,8 +103,8 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
 
 def _against_thrust(checks: Sequence[PairCheck]) -> str:
     """Tell of a world whose channels agree, and all lie otherwise than thrust and attitude: drag and wind turn none."""
-    against = [check for check in checks if check.pair.first == "thrust" and check.pair.second != "specific_force"]
-    if not against or any(len(check.first) < _PARTS for check in against):
+    against = by_thrust(checks)
+    if not against or any(len(check.first) < FEWEST_WINDOWS for check in against):
         return ""
     who = " and ".join(NAMES[check.pair.second] for check in against)
     if all(_reversed_along_z(check) for check in against):

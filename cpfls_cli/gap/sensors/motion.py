@@ -164,6 +164,11 @@ def checked(flights: Sequence[Signals], windows: Windows, channel: str | None = 
     return tuple(check for pair in pairs if (check := _checked(pair, flights, windows)) is not None)
 
 
+def by_thrust(checks: Sequence[PairCheck]) -> list[PairCheck]:
+    """Select what is compared with the thrust in world axes."""
+    return [check for check in checks if check.pair.first == "thrust" and check.pair.second != "specific_force"]
+
+
 def _checked(pair: _Pair, flights: Sequence[Signals], windows: Windows) -> PairCheck | None:
     rows = [(signals, row) for signals in flights if (row := _row(pair, signals, windows)) is not None]
     if not rows:
