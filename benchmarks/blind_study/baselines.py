@@ -80,8 +80,9 @@ def _gains(flights, chosen, effects, settings):
     tried = [c for c in candidates_of([e for e in effects if e.name not in names]) if hypothesis.can(c)]
     arranged = layout(hypothesis, tried, floor)
     normal = normal_equations(arranged, hypothesis.residual, floor, block_index(hypothesis, settings))
+    scored, _ = score(arranged, normal.beside(arranged.base), hypothesis)
     # The score is asked only which columns the bounds leave.
-    admitted = [scored for scored in score(arranged, normal, hypothesis) if scored.gain != REFUSED]
+    admitted = [each for each in scored if each.gain != REFUSED]
     matrix = arranged.matrix.reshape(-1, arranged.matrix.shape[2])
     right = (hypothesis.residual / floor).reshape(-1)
     least = _Normal(matrix, right)

@@ -97,18 +97,6 @@ class Folds:
         coefficients = _solve(gram.sum(axis=0) + self._known(columns), moment.sum(axis=0))
         return coefficients, self._left(gram, moment, coefficients[None])
 
-    def errors(self, columns: IntArray) -> Array:
-        """Give standard errors of a fit on all blocks as if rows were independent; one draw.
-
-        Returns
-        -------
-        array, shape (column,)
-        """
-        gram = self.gram[:, columns[:, None], columns].sum(axis=0) + self._known(columns)
-        _, left = self.fit(columns)
-        inverse = _solve(gram, np.eye(len(columns)))
-        return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse), 0.0) * max(left.sum() / self.rows, 1.0)))
-
     def _known(self, columns: IntArray) -> Array:
         return np.diag(self.prior[columns])
 
@@ -118,24 +106,128 @@ class Folds:
         )
         return np.asarray(self.square - explained)
 
-    def subtracted(self, column: int, kept: IntArray, weight: Array) -> Folds:
-        """Subtract a column with coefficient 1 from the right side and weigh the channels.
+    def beside(self, base: IntArray) -> Beside:
+        """Fit a base, so that a fit of it with a few columns more costs no more than those columns.
+
+        Parameters
+        ----------
+        base : array of int
+            Not in question: a block that alone shows one of these stays in the fit.
+        """
+        gram, moment, out = self.gram, self.moment, np.where(self.alone(base), 0.0, 1.0)[:, None, None]
+        # Behind the blocks stands the fit on all of them, judged on all of them.
+        whole = gram.sum(axis=0, keepdims=True), moment.sum(axis=0, keepdims=True)
+        seen, right = (np.concatenate([w - out * own, w]) for w, own in zip(whole, (gram, moment), strict=True))
+        own, own_right = (np.concatenate([own, w]) for w, own in zip(whole, (gram, moment), strict=True))
+        square = np.concatenate([self.square, self.square.sum(axis=0, keepdims=True)])
+        across, inner, inner_right = seen[:, base], own[:, base], own_right[:, base]
+        solved = _solve(across[:, :, base] + self._known(base), np.concatenate([across, right[:, base]], axis=2))
+        shadow, fitted = solved[..., : seen.shape[2]], solved[..., seen.shape[2] :]
+        turned, rest = shadow.swapaxes(1, 2), inner - inner[:, :, base] @ shadow
+        missed = inner_right - inner[:, :, base] @ fitted
+        return Beside(
+            normal=self,
+            base=base,
+            gram=seen - across.swapaxes(1, 2) @ shadow,
+            moment=right - across.swapaxes(1, 2) @ fitted,
+            length=np.sqrt(np.diagonal(seen, axis1=1, axis2=2) + self.prior),
+            own=own - turned @ inner - rest.swapaxes(1, 2) @ shadow,
+            own_moment=own_right - inner.swapaxes(1, 2) @ fitted - turned @ missed,
+            left=square - np.einsum("bcd,bcd->bd", inner_right + missed, fitted),
+        )
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Normal equations of what a base leaves, by the Schur complement of the base; behind the blocks those of all.
+
+    Attributes
+    ----------
+    normal : Folds
+    base : array of int
+    gram : array, shape (block + 1, column, column)
+        Of columns without what the base explains of them, over the blocks that a fit sees.
+    moment : array, shape (block + 1, column, draw)
+    length : array, shape (block + 1, column)
+        Of whole columns.
+    own, own_moment : array
+        As `gram` and `moment`, on the block that a fit does not see, or on all blocks.
+    left : array, shape (block + 1, draw)
+        Sum of squares that the base leaves there.
+    """
+
+    normal: Folds
+    base: IntArray
+    gram: Array
+    moment: Array
+    length: Array
+    own: Array
+    own_moment: Array
+    left: Array
+
+    @property
+    def before(self) -> Array:
+        """What the base leaves of each block that its fit did not see, shape (block, draw)."""
+        return self.left[:-1]
+
+    def unseen(self, columns: IntArray) -> Array:
+        """Compute what base and columns leave of each block that their fit did not see, shape (block, draw)."""
+        return self._fit(columns, slice(0, -1))[1]
+
+    def fit(self, columns: IntArray) -> tuple[Array, Array]:
+        """Fit base and columns on all blocks to the first right side.
+
+        Returns
+        -------
+        coefficients : array, shape (column,)
+        errors : array, shape (column,)
+            Standard errors as if rows were independent.
+        """
+        coefficients, left = self._fit(columns, slice(-1, None))
+        gram, length = self._part(columns, slice(-1, None))
+        variance = np.diagonal(_solve(gram, np.eye(len(columns)), length)[0])
+        scale = max(float(left[0, 0]) / self.normal.rows, 1.0)
+        return coefficients[0, :, 0], np.asarray(np.sqrt(np.maximum(variance, 0.0) * scale))
+
+    def subtracted(self, column: int, weight: Array) -> Array:
+        """Subtract a column with coefficient 1 from the right side, weigh the channels and fit the base anew.
 
         Parameters
         ----------
         column : int
-        kept : array of int
-            Columns that the result has.
         weight : array, shape (channel,)
             On the rows.
+
+        Returns
+        -------
+        array, shape (block, draw)
+            Left of each block that the fit did not see.
         """
-        inner = self.grams[:, :, kept, column, None]
-        square = self.squares - 2 * self.moments[:, :, column] + self.grams[:, :, column, column, None]
-        power = weight[:, None] ** 2
-        grams = power[..., None] * self.grams[:, :, kept[:, None], kept]
-        return Folds(
-            grams, power[..., None] * (self.moments[:, :, kept] - inner), power * square, self.rows, self.prior[kept]
-        )
+        normal, base, power = self.normal, self.base, weight**2
+        grams, moments = self._channels
+        inner = np.einsum("c,bci->bi", power, normal.grams[:, :, base, column])
+        square = normal.squares - 2 * normal.moments[:, :, column] + normal.grams[:, :, column, column, None]
+        gram = (power @ grams).reshape(-1, len(base), len(base))
+        moment = (power @ moments).reshape(-1, len(base), square.shape[2]) - inner[..., None]
+        weighed = Folds(gram[:, None], moment[:, None], (power @ square)[:, None], normal.rows, normal.prior[base])
+        return weighed.solve(np.arange(len(base)), len(base))[1]
+
+    @cached_property
+    def _channels(self) -> tuple[Array, Array]:
+        """Grams and moments of the base, flat behind the channel."""
+        grams, moments = self.normal.grams[:, :, self.base[:, None], self.base], self.normal.moments[:, :, self.base]
+        return grams.reshape(*grams.shape[:2], -1), moments.reshape(*moments.shape[:2], -1)
+
+    def _fit(self, columns: IntArray, where: slice) -> tuple[Array, Array]:
+        gram, length = self._part(columns, where)
+        coefficients = _solve(gram, self.moment[where, columns], length)
+        own, moment = self.own[where, columns[:, None], columns], self.own_moment[where, columns]
+        explained = np.einsum("bcd,bcd->bd", 2 * moment - own @ coefficients, coefficients)
+        return coefficients, np.asarray(self.left[where] - explained)
+
+    def _part(self, columns: IntArray, where: slice) -> tuple[Array, Array]:
+        gram = self.gram[where, columns[:, None], columns] + np.diag(self.normal.prior[columns])
+        return gram, self.length[where, columns]
 
 
 def folds(columns: Array, right: Array, block: IntArray, prior: Array | None = None) -> Folds:
@@ -192,9 +284,10 @@ def blocks_of(flight_index: IntArray, centres: Array, block_s: float) -> IntArra
     return block
 
 
-def _solve(gram: Array, moment: Array) -> Array:
+def _solve(gram: Array, moment: Array, length: Array | None = None) -> Array:
     """Solve normal equations with columns brought to one length; a column of zeros gets the coefficient 0."""
-    length = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
+    if length is None:
+        length = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
     scale = 1.0 / np.where(length > 0, length, 1.0)
     scaled = gram * scale[..., :, None] * scale[..., None, :] + _RIDGE * np.eye(gram.shape[-1])
     empty = (length <= 0)[..., None] * np.eye(gram.shape[-1])

@@ -14,10 +14,8 @@ from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.resampling import blocks_of, mirror_shifted
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.scoring import (
-    Layout,
     Scored,
     candidates_of,
-    chance,
     layout,
     normal_equations,
     score,
@@ -109,18 +107,15 @@ def rank_effects(
     tried = [candidate for candidate in listed if hypothesis.can(candidate)]
     arranged = layout(hypothesis, tried, floor)
     block = block_index(hypothesis, settings)
-    normal = normal_equations(arranged, hypothesis.residual, floor, block)
-    ranking = _each_once(score(arranged, normal, hypothesis))
-    residual = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
-    before = normal.solve(arranged.base, len(arranged.base))[1][:, 0]
-    return SearchStep(
-        hypothesis,
-        floor,
-        ranking,
-        _chance(arranged, residual, hypothesis, floor, block, settings, rng),
-        float(max(before.sum() - rows(hypothesis), 1e-9)),
-        block,
-    )
+    right = hypothesis.residual[..., None]
+    if rng is not None:
+        unexplained = hypothesis.residual - hypothesis.base @ fit(hypothesis, floor)
+        shifted = mirror_shifted(unexplained, hypothesis.flight_index, settings.shifts, rng)
+        right = np.concatenate([right, shifted], axis=2)
+    beside = normal_equations(arranged, right, floor, block).beside(arranged.base)
+    scored, chance = score(arranged, beside, hypothesis)
+    above_floor = float(max(beside.before[:, 0].sum() - rows(hypothesis), 1e-9))
+    return SearchStep(hypothesis, floor, _each_once(scored), chance, above_floor, block)
 
 
 def best_floor(hypothesis: System) -> Array:
@@ -148,21 +143,6 @@ def block_index(hypothesis: System, settings: GapSettings) -> IntArray:
     """
     centres = np.concatenate([f.windows.centres(f.signals.time) for f in hypothesis.flights])
     return blocks_of(hypothesis.flight_index, centres, settings.block_s)
-
-
-def _chance(
-    arranged: Layout,
-    residual: Array,
-    hypothesis: System,
-    floor: Array,
-    block: IntArray,
-    settings: GapSettings,
-    rng: np.random.Generator | None,
-) -> Array:
-    if rng is None:
-        return np.zeros(0)
-    draws = mirror_shifted(residual, hypothesis.flight_index, settings.shifts, rng)
-    return chance(arranged, normal_equations(arranged, draws, floor, block))
 
 
 def _each_once(ranking: Sequence[Scored]) -> tuple[Scored, ...]:

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.refine import compensation, fit, free_shapes, shape_columns
-from cpfls_cli.gap.balance.resampling import Folds, folds
+from cpfls_cli.gap.balance.resampling import Beside, Folds, folds
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -130,47 +130,31 @@ def _grid(candidate: Candidate, name: str) -> tuple[float, ...]:
     return next(shape.grid for shape in candidate.effect.shapes if shape.name == name)
 
 
-def score(arranged: Layout, normal: Folds, hypothesis: System) -> list[Scored]:
-    """Score every candidate.
+def score(arranged: Layout, beside: Beside, hypothesis: System) -> tuple[list[Scored], Array]:
+    """Score every candidate, and the best of them on what is chance.
+
+    Signs and bounds are not used on chance, so that it is given more than its due.
 
     Parameters
     ----------
     arranged : Layout
-    normal : Folds
-        Of one right side.
-    hypothesis : System
+    beside : Beside
+        Of the residual, and of shifted residuals behind it.
 
     Returns
     -------
     list of Scored
         Best first.
+    chance : array, shape (shift,)
+        Gain of the best candidate on each of the shifted residuals.
     """
-    _, before = normal.solve(arranged.base, len(arranged.base))
-    vehicle = hypothesis.flights[0].signals.vehicle
-    scored = [_scored(placed, arranged.base, normal, before[:, 0], vehicle) for placed in arranged.candidates]
-    return sorted(scored, key=lambda candidate: -candidate.gain)
-
-
-def chance(arranged: Layout, normal: Folds) -> Array:
-    """Compute the gain of the best candidate on each draw of shifted residuals.
-
-    Signs and bounds are not used, so chance is given more than its due.
-
-    Parameters
-    ----------
-    arranged : Layout
-    normal : Folds
-        Of many right sides.
-
-    Returns
-    -------
-    array, shape (draw,)
-    """
-    _, before = normal.solve(arranged.base, len(arranged.base))
-    best = np.full(before.shape[1], -np.inf)
+    vehicle, scored = hypothesis.flights[0].signals.vehicle, []
+    chance = np.full(beside.before.shape[1] - 1, -np.inf)
     for placed in arranged.candidates:
-        best = np.maximum(best, (before - _error(placed, placed.columns, arranged.base, normal, before)).sum(axis=0))
-    return best
+        error = _error(placed, placed.columns, beside)
+        chance = np.maximum(chance, (beside.before - error)[:, 1:].sum(axis=0))
+        scored.append(_scored(placed, error[:, 0], beside, vehicle))
+    return sorted(scored, key=lambda candidate: -candidate.gain), chance
 
 
 def normal_equations(arranged: Layout, right: Array, floor: Array, block: IntArray) -> Folds:
@@ -194,33 +178,25 @@ def _weight(hypothesis: System, candidate: Candidate) -> Array:
     return compensation(rotor_wrench, rotor_wrench + hypothesis.columns(candidate)[..., 0])
 
 
-def _error(placed: PlacedCandidate, columns: IntArray, base: IntArray, normal: Folds, before: Array) -> Array:
-    """Compute what a candidate leaves of each block; one that alone shows it is no evidence against it.
-
-    Parameters
-    ----------
-    before : array, shape (block, draw)
-        What is left without it.
-    """
+def _error(placed: PlacedCandidate, columns: IntArray, beside: Beside) -> Array:
+    """Compute what a candidate leaves of each block; one that alone shows it is no evidence against it."""
     if placed.candidate.effect.unit_coefficient:
-        without = normal.subtracted(int(columns[0]), base, placed.weight)
-        return without.solve(np.arange(len(base)), len(base))[1]
-    error = normal.solve(np.concatenate([base, columns]), len(base))[1]
-    return np.where(normal.alone(columns)[:, None], np.minimum(before, error), error)
+        return beside.subtracted(int(columns[0]), placed.weight)
+    error = beside.unseen(columns)
+    return np.where(beside.normal.alone(columns)[:, None], np.minimum(beside.before, error), error)
 
 
-def _scored(placed: PlacedCandidate, base: IntArray, normal: Folds, before: Array, vehicle: VehicleSettings) -> Scored:
-    candidate, columns, _ = placed
+def _scored(placed: PlacedCandidate, error: Array, beside: Beside, vehicle: VehicleSettings) -> Scored:
+    """Score a candidate that leaves `error` of the blocks with all its columns."""
+    (candidate, columns, _), before = placed, beside.before[:, 0]
     if len(columns) == 0:
         return Scored(candidate, columns, REFUSED, before, np.zeros(0))
     if candidate.effect.unit_coefficient:
-        error = _error(placed, columns, base, normal, before[:, None])[:, 0]
         return Scored(candidate, columns, float((before - error).sum()), error, np.ones(1))
     kept = np.ones(len(columns), dtype=bool)
     for _ in range(len(columns)):
         fitted, unsure = np.zeros(len(columns)), np.zeros(len(columns))
-        together = np.concatenate([base, columns[kept]])
-        fitted[kept], unsure[kept] = normal.fit(together)[0][len(base) :, 0], normal.errors(together)[len(base) :]
+        fitted[kept], unsure[kept] = beside.fit(columns[kept])
         keep, admissible = within_bounds(candidate.effect, fitted, unsure, vehicle)
         if not admissible or not (kept & keep).any():
             return Scored(candidate, columns, REFUSED, before, fitted)
@@ -228,7 +204,8 @@ def _scored(placed: PlacedCandidate, base: IntArray, normal: Folds, before: Arra
             break
         kept &= keep
     used = columns[kept]
-    error = _error(placed, used, base, normal, before[:, None])[:, 0]
+    if len(used) < len(columns):
+        error = _error(placed, used, beside)[:, 0]
     return Scored(candidate, used, float((before - error).sum()), error, fitted)
 
 

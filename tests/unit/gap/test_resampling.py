@@ -49,14 +49,34 @@ def test_fit_uses_all_blocks_and_its_errors_are_those_of_textbooks():
     np.testing.assert_allclose(coefficients[:, 0], expected, rtol=1e-6)
     assert error.sum() == pytest.approx(left @ left)
     covariance = np.linalg.inv(flat.T @ flat) * (left @ left) / len(left)
-    np.testing.assert_allclose(normal.errors(chosen), np.sqrt(np.diag(covariance)), rtol=1e-6)
+    beside, unsure = normal.beside(chosen[:1]).fit(chosen[1:])
+    np.testing.assert_allclose(beside, expected[1:], rtol=1e-6)
+    np.testing.assert_allclose(unsure, np.sqrt(np.diag(covariance))[1:], rtol=1e-6)
 
 
 def test_errors_never_fall_below_those_of_unit_noise():
     columns, right, block = problem(2)
     flat = columns.reshape(-1, COLUMNS)
     expected = np.sqrt(np.diag(np.linalg.inv(flat.T @ flat)))
-    np.testing.assert_allclose(folds(columns, 0.1 * right, block).errors(np.arange(5)), expected, rtol=1e-6)
+    _, unsure = folds(columns, 0.1 * right, block).beside(np.array([0])).fit(np.arange(1, 5))
+    np.testing.assert_allclose(unsure, expected[1:], rtol=1e-6)
+
+
+@pytest.mark.parametrize("known", [0.0, 0.3])
+def test_columns_beside_a_base_are_judged_as_one_fit_of_both(known):
+    columns, right, block = problem(7, draws=3)
+    # Nearly what the base is, nothing at all, seen in one block only.
+    columns[..., 3] = columns[..., 0] + 1e-4 * columns[..., 3]
+    columns[..., 2] = 0.0
+    columns[block != 2, :, 4] = 0.0
+    normal, base = folds(columns, right, block, np.full(COLUMNS, known)), np.array([0, 4])
+    beside = normal.beside(base)
+    np.testing.assert_allclose(beside.before, normal.solve(base, 2)[1], rtol=1e-9)
+    for own in ([1], [3], [2], [1, 2, 3], []):
+        together = np.array([*base, *own])
+        np.testing.assert_allclose(beside.unseen(np.array(own, dtype=int)), normal.solve(together, 2)[1], rtol=1e-6)
+        found, _ = beside.fit(np.array(own, dtype=int))
+        np.testing.assert_allclose(found, normal.fit(together)[0][2:, 0], rtol=1e-6)
 
 
 def test_draws_are_right_sides_of_their_own():
@@ -73,11 +93,9 @@ def test_a_subtracted_column_is_gone_from_the_right_side_and_channels_weigh_what
     columns, right, block = problem(4)
     columns[..., 1] *= 1e-3
     kept, weight = np.array([0, 4]), np.array([1.0, 2.0, 0.5, 1.0, 1.0, 3.0])
-    found = folds(columns, right, block).subtracted(1, kept, weight).solve(np.arange(2))
+    found = folds(columns, right, block).beside(kept).subtracted(1, weight)
     by_hand = weight[:, None] * columns[..., kept], weight * (right - columns[..., 1])
-    expected = folds(*by_hand, block).solve(np.arange(2))
-    for one, other in zip(found, expected, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-9)
+    np.testing.assert_allclose(found, folds(*by_hand, block).solve(np.arange(2))[1], rtol=1e-9)
 
 
 def test_a_column_that_a_fit_never_sees_gets_nothing():
@@ -112,7 +130,7 @@ def test_a_block_that_alone_shows_a_candidate_is_no_evidence_against_it():
     normal, base, own = folds(columns, right, block), np.array([0]), np.array([3])
     placed = PlacedCandidate(Candidate(CATALOGUE["torque_bias"], {}), own, np.ones(6))
     before, plain = normal.solve(base)[1], normal.solve(np.array([0, 3]))[1]
-    error = scoring._error(placed, own, base, normal, before)
+    error = scoring._error(placed, own, normal.beside(base))
     assert plain[2, 0] > before[2, 0] == error[2, 0]
     others = np.arange(normal.blocks) != 2
     np.testing.assert_allclose(error[others], plain[others])
