@@ -1,9 +1,10 @@
 """Time per sample and peak memory of reduction, identification and prediction, from 5e3 to 5e6 samples.
 
-python benchmarks/long_flights.py [--most 5000000]
+python benchmarks/long_flights.py [--most 5000000] [--effects]
 
 Each flight is the paper's, tiled, with noise on its motion and torque. Every line runs in a process of its own, whose
-peak memory is read at its end. Draws docs/long-flights.svg.
+peak memory is read at its end. Draws docs/long-flights.svg. A model with effects predicts a flight of 40 s with rotor
+speeds, tiled; with --effects that is all.
 """
 
 from __future__ import annotations
@@ -28,10 +29,14 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.blind.cases import make
+from benchmarks.blind.generator import generate, write
+from benchmarks.blind_study.fly import config as config_of
 from benchmarks.shared.studies import CONFIG, paper_flight, paper_study
 from cpfls_cli import __version__
-from cpfls_cli.artifacts.flight import MOTION
+from cpfls_cli.artifacts.flight import MOTION, FlightRecord
 from cpfls_cli.artifacts.spec import SCHEMA_VERSION
+from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.files import seal_of, text_sha256
 from cpfls_cli.flights.flight_source import flight_source
@@ -53,18 +58,27 @@ SMALL = ("--set", "identification.population=10", "--set", "identification.gener
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--most", type=int, default=SIZES[-1])
+    parser.add_argument("--effects", action="store_true")
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if asked.one:
         print(json.dumps(measure(asked.one)))
         return
+    sizes = [size for size in SIZES if size <= asked.most]
+    if not asked.effects:
+        of_identified_models(sizes)
+    of_effects(sizes)
+
+
+def of_identified_models(sizes: list[int]) -> None:
+    """Reduce, evaluate and predict flights of these sizes; print and draw it."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         flight, model = Path(folder) / "flight.h5", Path(folder) / "model.h5"
         write_tiled(flight, SIZES[0])
         # A model with bands; the loops of all commands are compiled then.
         by_command("identify", model, flight, *SMALL)
-        for samples in (size for size in SIZES if size <= asked.most):
+        for samples in sizes:
             write_tiled(flight, samples)
             one = in_own_process(flight)
             reduced = by_command("reduce", Path(folder) / "selection.h5", flight)
@@ -92,24 +106,52 @@ def main() -> None:
     print(f"wrote {OUTPUT}")
 
 
+def of_effects(sizes: list[int]) -> None:
+    """Predict flights of these sizes by a model with effects."""
+    rows, rng = [], np.random.default_rng(1)
+    case = make("timing", "pair", "sixkg", ("com_offset", "rotor_drag"), rng)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        study, model, flight, output = (folder / own for own in ("study.yaml", "gap", "flight.h5", "prediction.h5"))
+        write(generate(case, rng, 40.0), folder, "mid", "white", rng)
+        study.write_text(config_of(folder / "vehicle.json"), encoding="utf-8")
+        logs = sorted(folder.glob("train_*.csv"))
+        by_command("gap", model, *logs, config=study)
+        by_command("import", flight, logs[0], config=study)
+        flown = read_record(flight, FlightRecord)
+        signals = {name: values for name, values in flown.signals.items() if name != "time"}
+        for samples in sizes:
+            write_over_and_over(flight, samples, signals, float(flown.time[1]), flown.origin.config, 0.0)
+            predicted = by_command("predict", output, model / "extended.h5", flight, config=study)
+            rows.append((samples, *predicted, output.stat().st_size / 2**20))
+    columns = ("samples", "`cpfls predict` of a model with effects, s", "its peak memory, MB", "its file, MB")
+    table("long_flights_effects", columns, rows)
+
+
 def write_tiled(path: Path, samples: int) -> None:
-    """Write a flight artifact block by block: the paper's flight over and over, with noise."""
-    flight, rng = paper_flight(), np.random.default_rng(6)
+    """Write the paper's flight over and over."""
+    flight = paper_flight()
     names = ("attitude", "rate", "acceleration")
-    signals = dict(zip(MOTION, (getattr(flight.motion, name) for name in names), strict=True)) | {
-        "torque": flight.torque
-    }
-    config = resolved_yaml(paper_study())
+    motion = dict(zip(MOTION, (getattr(flight.motion, name) for name in names), strict=True))
+    write_over_and_over(path, samples, motion | {"torque": flight.torque}, 0.01, resolved_yaml(paper_study()), NOISE)
+
+
+def write_over_and_over(
+    path: Path, samples: int, signals: dict[str, np.ndarray], period: float, config: str, noise: float
+) -> None:
+    """Write a flight artifact block by block: a flight over and over, with noise as a share of its scatter."""
+    rng = np.random.default_rng(6)
     with h5py.File(path, "w") as file:
         header = {"format": "cpfls/flight", "schema_version": SCHEMA_VERSION, "cpfls_version": __version__, "seed": 6}
         file.attrs.update(header | {"config_sha256": text_sha256(config)})
         file["config"] = np.bytes_(config.encode())
-        file["time"] = 0.01 * np.arange(samples)
+        file["time"] = period * np.arange(samples)
         for name, values in signals.items():
-            dataset, scale = file.create_dataset(name, (samples, 3), dtype=float), NOISE * values.std(axis=0)
-            for start in range(0, samples, len(flight)):
-                count = min(len(flight), samples - start)
-                dataset[start : start + count] = values[:count] + scale * rng.standard_normal((count, 3))
+            dataset = file.create_dataset(name, (samples, *values.shape[1:]), dtype=float)
+            scale = noise * values.std(axis=0)
+            for start in range(0, samples, len(values)):
+                own = values[: samples - start]
+                dataset[start : start + len(own)] = own + scale * rng.standard_normal(own.shape)
     with path.open("r+b") as file, mmap(file.fileno(), 0) as content:
         line = seal_of(content)
     with path.open("ab") as file:
@@ -155,9 +197,9 @@ def in_own_process(path: Path) -> dict[str, float]:
     return json.loads(said) | {"memory": memory}
 
 
-def by_command(command: str, output: Path, *words: Path | str) -> tuple[float, float]:
+def by_command(command: str, output: Path, *words: Path | str, config: Path = CONFIG) -> tuple[float, float]:
     """Run a command of the program: seconds of processor time, and peak memory in MB."""
-    full = [sys.executable, "-m", "cpfls_cli", command, CONFIG, *words, "-o", output, "--force"]
+    full = [sys.executable, "-m", "cpfls_cli", command, config, *words, "-o", output, "--force"]
     seconds, memory, _ = beside(full)
     return seconds, memory
 

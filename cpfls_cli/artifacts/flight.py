@@ -347,7 +347,7 @@ class FlightRecord(Record):
         """
         report = flight.report
         estimate = report.delay
-        signals = {name: values for name in cls._signal_names() if (values := getattr(flight, name)) is not None}
+        signals = {name: values for name in cls.signal_names() if (values := getattr(flight, name)) is not None}
         return cls(
             **signals,
             quality=QualityGroup.of(findings, report.warnings, report.cut_off_hz),
@@ -366,13 +366,14 @@ class FlightRecord(Record):
         return replace(self, quality=replace(quality, warning=(*(quality.warning or ()), *warnings)))
 
     @classmethod
-    def _signal_names(cls) -> list[str]:
+    def signal_names(cls) -> list[str]:
+        """List time and the signals that a flight can hold."""
         return [spec.path for spec in cls.spec().datasets if "/" not in spec.path]
 
     @property
     def signals(self) -> dict[str, Array]:
         """Time and the signals that it holds, by the names of the fields."""
-        return {name: values for name in self._signal_names() if (values := getattr(self, name)) is not None}
+        return {name: values for name in self.signal_names() if (values := getattr(self, name)) is not None}
 
     @property
     def motion(self) -> Motion:

@@ -135,10 +135,11 @@ class PredictionRecord(Record):
         """How well the flight is predicted, and where the model is not to be trusted."""
         findings = Findings()
         for start in range(0, len(self.time), PART):
-            findings.add(self._part(slice(start, start + PART)))
+            findings.add(self.part(slice(start, start + PART)))
         return findings
 
-    def _part(self, samples: slice) -> Self:
+    def part(self, samples: slice) -> Self:
+        """Take some of the samples."""
         own = {name: value[samples] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         changes: dict[str, Any] = own
         return replace(self, **changes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,11 +13,11 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.job import Job, Progress, begin, finish, finish_parts
+from cpfls_cli.artifacts.job import Job, Progress, begin, finish_parts
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.prediction import Findings, PredictionRecord
 from cpfls_cli.artifacts.spec import PART
-from cpfls_cli.artifacts.store import count_rows, holds, read_record
+from cpfls_cli.artifacts.store import count_rows, holds, read_header, read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
@@ -26,13 +26,14 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.flight_source import flight_source
-from cpfls_cli.flights.recordings import read_flights
+from cpfls_cli.flights.flight_source import Stretch, Stretches, flight_source, flight_stretches
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_of_vehicle, read_vehicle
+from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel, inertial_force
 from cpfls_cli.gap.whole_vehicle import of_vehicle, with_effects
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.model import Model
+from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
 from cpfls_cli.regressor.regressor import InertiaValues
@@ -41,6 +42,9 @@ from cpfls_cli.report.outcome import Outcome, nothing_written
 
 if TYPE_CHECKING:
     from cpfls_cli.validation.bootstrap import Draws
+
+
+_Predicted = Callable[[Stretch], PredictionRecord]
 
 
 def run(job: Job, model: Path, flight: Path) -> Outcome:
@@ -54,20 +58,22 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     inputs = begin(job, {"model": model, "flight": flight})
     require_known(job.study, "predict", whole=holds(model, VehicleRecord))
     with_more = {ExtendedRecord: _with_effects, VehicleRecord: _of_vehicle}
-    predicted = next((predict for kind, predict in with_more.items() if holds(model, kind)), None)
-    if predicted is not None:
-        prediction = predicted(model, flight, job.study)
+    predicting = next((kind for record, kind in with_more.items() if holds(model, record)), None)
+    found = Findings()
+    if predicting is not None:
+        predicted, stretches = predicting(model, flight, job.study), flight_stretches(flight, job.study)
         if job.dry_run:
+            predicted(next(iter(stretches)))
             return nothing_written(job)
-        found = finish(job, prediction, inputs).findings
-        return Outcome(found.summary, tuple(answer(found)))
+        finish_parts(job, _by_stretches(predicted, stretches, found, job.progress), len(stretches), inputs)
+        about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
+        return Outcome(found.summary, (*about, *answer(found)))
     identified = read_record(model, ModelRecord)
     rebuilt = identified.rebuilt(model)
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
     flown = flight_source(flight, torque=torque)
     if job.dry_run:
         return nothing_written(job)
-    found = Findings()
     finish_parts(job, _along(rebuilt, identified.draws(), flown, torque, found, job.progress), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
     notes = (*trust_notes(identified, model), *(Text(note, "warning") for note in others))
@@ -86,59 +92,72 @@ def _along(
             yield part
 
 
-def _with_effects(path: Path, flight: Path, study: Study) -> PredictionRecord:
+def _by_stretches(
+    predicted: _Predicted, stretches: Stretches, found: Findings, progress: Progress
+) -> Iterator[PredictionRecord]:
+    """Predict stretch by stretch, and take note of what is found."""
+    for stretch in stretches:
+        own = predicted(stretch).part(stretch.own)
+        for start in range(0, len(own.time), PART):
+            part = own.part(slice(start, start + PART))
+            found.add(part)
+            progress(found.samples, len(stretches))
+            yield part
+
+
+def _with_effects(path: Path, flight: Path, study: Study) -> _Predicted:
     """Predict the rotors' torque of a model with effects: what is measured less that is the gap that remains.
 
-    Raises
-    ------
-    InputError
-        If the flight lacks the attitude or a signal that an effect needs.
+    A stretch raises an InputError if the flight lacks the attitude or a signal that an effect needs.
     """
     model = read_of_vehicle(path, ExtendedRecord, study).rebuilt(path)
-    logged = read_flights([flight], study).recordings[0].signals
-    if logged.attitude is None or logged.torque is None:
-        raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
-    signals = model.repaired(logged)
-    prediction = _prediction(signals, model, model.rotor_torque(signals), logged.torque)
-    if not isinstance(model.base, Model):
-        return prediction
-    return replace(prediction, outside=model.base.outside(logged.attitude))
+
+    def predicted(stretch: Stretch) -> PredictionRecord:
+        logged = stretch.signals
+        if logged.attitude is None or logged.torque is None:
+            raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
+        signals = model.repaired(logged)
+        prediction = _prediction(signals, model, model.rotor_torque(signals), logged.torque)
+        if not isinstance(model.base, Model):
+            return prediction
+        return replace(prediction, outside=model.base.outside(logged.attitude))
+
+    return predicted
 
 
-def _of_vehicle(path: Path, flight: Path, study: Study) -> PredictionRecord:
+def _of_vehicle(path: Path, flight: Path, study: Study) -> _Predicted:
     """Predict torque and force on a whole vehicle; they are held against what the motion takes.
 
-    A torque that was logged beside the rotor speeds is taken in its place.
-
-    Raises
-    ------
-    InputError
-        If the flight lacks the attitude or a signal that the model needs.
+    A torque that was logged beside the rotor speeds is taken in its place. A stretch raises an InputError if the flight
+    lacks the attitude or a signal that the model needs.
     """
     model = read_vehicle(path, study).vehicle.vehicle_model()
-    signals = of_vehicle(read_flights([flight], study).recordings[0], model).signals
-    if signals.attitude is None:
-        raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
-    extended = with_effects(model)
-    wrench = signals.wrench + extended.effect_wrench(signals)
-    recorded = _recorded_torque(flight, signals)
-    against = extended.inertial_torque(signals) if recorded is None else recorded
-    return replace(
-        _prediction(signals, extended, wrench[:, :3], against),
-        held_against="motion" if recorded is None else "recorded",
-        force=wrench[:, 3:],
-        measured_force=inertial_force(signals) if signals.has_force else None,
-    )
+    extended, told = with_effects(model), _tells_torque(flight, study)
+
+    def predicted(stretch: Stretch) -> PredictionRecord:
+        signals = of_vehicle(Recording(flight.name, stretch.signals), model).signals
+        if signals.attitude is None:
+            raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
+        wrench = signals.wrench + extended.effect_wrench(signals)
+        recorded = stretch.known.get("body_torque") if told else None
+        against = extended.inertial_torque(signals) if recorded is None else recorded
+        return replace(
+            _prediction(signals, extended, wrench[:, :3], against),
+            held_against="motion" if recorded is None else "recorded",
+            force=wrench[:, 3:],
+            measured_force=inertial_force(signals) if signals.has_force else None,
+        )
+
+    return predicted
 
 
-def _recorded_torque(path: Path, signals: Signals) -> Array | None:
-    """Give the body torque of a flight, where a sensor told it and no rotor of the config."""
-    record = read_record(path, FlightRecord)
-    config = parse_config(record.origin.config, f"{path}: /config")
-    told = record.made_from("log") is not None and config["import"]["torque_source"] == "column"
-    if not told or record.body_torque is None:
-        return None
-    return np.asarray(record.body_torque[np.isin(record.time, signals.time)])
+def _tells_torque(path: Path, study: Study) -> bool:
+    """Tell whether a sensor told the body torque of a flight, and no rotor of the config."""
+    if is_log(path):
+        return study.import_.torque_source == "column"
+    made = read_header(path)
+    config = parse_config(made.config, f"{path}: /config")
+    return "log" in made.inputs and config["import"]["torque_source"] == "column"
 
 
 def _prediction(signals: Signals, model: ExtendedModel, body_torque: Array, measured: Array) -> PredictionRecord:

@@ -1,18 +1,34 @@
-"""Flights as sources of samples: read whole where they fit, else chunk by chunk from their files."""
+"""Flights as sources of samples or stretches: read whole where they fit, else some rows at a time from their files."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord
-from cpfls_cli.artifacts.store import check_rows, count_rows, read_record, read_rows
+from cpfls_cli.artifacts.spec import PART
+from cpfls_cli.artifacts.store import check_rows, count_rows, read_header, read_record, read_rows
+from cpfls_cli.config.study import Study
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.recordings import (
+    ReadFlight,
+    all_known,
+    full_battery,
+    in_volts,
+    longest_known,
+    read_flight,
+    signals_of,
+    units_of,
+)
 from cpfls_cli.identification.data import CHUNK, TorqueData, TorqueSource
+from cpfls_cli.logs.formats import is_log
 from cpfls_cli.regressor.motion import Motion
 
 _NEEDED = ("time", *MOTION)
@@ -20,6 +36,12 @@ _TORQUE = "torque"
 
 IN_MEMORY = 500_000
 """Samples of a flight that are held in memory, 52 MB of motion and torque."""
+
+STRETCH = 12 * PART
+"""Samples that effects are evaluated on at once, some 2 kB each; whole parts of an artifact."""
+
+_OVERLAP_S = 10.0
+"""What splines, filters and lags remember is far shorter, and a load on a cable finds its swing in two periods."""
 
 
 @dataclass(frozen=True)
@@ -119,3 +141,116 @@ def part_of(source: TorqueSource, samples: slice) -> TorqueSource:
         return replace(source, start=source.start + samples.start, stop=source.start + samples.stop)
     assert isinstance(source, TorqueData)
     return source[samples]
+
+
+class Stretch(NamedTuple):
+    """Consecutive samples of a flight, with those before and after that they are evaluated with.
+
+    Attributes
+    ----------
+    signals : Signals
+    known : mapping of str to array
+        What was read, by the names of a flight's datasets.
+    own : slice
+        Samples without those of the stretches before and after.
+    """
+
+    signals: Signals
+    known: Mapping[str, Array]
+    own: slice
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """The longest part of a flight in which all is known, cut into stretches for the evaluation of effects.
+
+    Attributes
+    ----------
+    name : str
+    rows : callable
+        Reads all signals, by name, from a first row to the one before another.
+    units : mapping of str to str
+        Of the import.
+    known : slice
+        Rows of the flight.
+    overlap : int
+        Samples of a stretch that belong to the one before it, and to the one after it.
+    full : float
+        Voltage of the full battery, V; 0 where the flight states a share.
+    warnings : tuple of str
+    study : Study
+    """
+
+    name: str
+    rows: Callable[[int, int], Mapping[str, Array]]
+    units: Mapping[str, str]
+    known: slice
+    overlap: int
+    full: float
+    warnings: tuple[str, ...]
+    study: Study
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        return int(self.known.stop - self.known.start)
+
+    def __iter__(self) -> Iterator[Stretch]:
+        """Read one stretch after the other.
+
+        Raises
+        ------
+        InputError
+            As `signals_of`.
+        """
+        first, stop = self.known.start, self.known.stop
+        for start in range(first, stop, STRETCH):
+            end = min(start + STRETCH, stop)
+            low, high = max(first, start - self.overlap), min(stop, end + self.overlap)
+            known = self.rows(low, high)
+            signals, _ = signals_of(ReadFlight(self.name, known, self.units, ()), known, self.study)
+            if self.full and signals.voltage is not None:
+                signals = replace(signals, voltage=signals.voltage / self.full)
+            yield Stretch(signals, known, slice(start - low, end - low))
+
+
+def flight_stretches(path: Path, study: Study) -> Stretches:
+    """Open a flight or import a log, and cut it into stretches; one of more than `IN_MEMORY` samples stays in its file.
+
+    Raises
+    ------
+    InputError
+        As `read_flights`.
+    """
+    samples = None if is_log(path) else count_rows(path, FlightRecord.spec(), FlightRecord.path("time"))
+    if samples is None or samples <= IN_MEMORY:
+        flight = read_flight(path, study)
+        rows, samples = partial(_rows_of, flight.signals), len(flight.signals["time"])
+    else:
+        flight = ReadFlight(path.name, {}, units_of(path, read_header(path), study), ())
+        spec = FlightRecord.spec()
+        names = [name for name in FlightRecord.signal_names() if count_rows(path, spec, name) is not None]
+        check_rows(path, spec, names)
+        rows = partial(_rows_in, path, names)
+    volts = in_volts(flight.units)
+    known, time, voltage = [], [], []
+    for start in range(0, max(samples, 1), CHUNK):
+        read = rows(start, min(start + CHUNK, samples))
+        known.append(all_known(read))
+        time.append(read["time"])
+        voltage.append(read["voltage"] if volts and "voltage" in read else np.zeros(0))
+    clock = np.concatenate(time)
+    best, notes = longest_known(path.name, np.concatenate(known), clock)
+    full = float(np.max(np.concatenate(voltage)[best], initial=0.0))
+    if full:
+        notes = (*notes, full_battery(full))
+    overlap = round(_OVERLAP_S / max(float(np.median(np.diff(clock[best], append=np.inf))), 1e-6))
+    return Stretches(path.name, rows, flight.units, best, overlap, full, (*flight.warnings, *notes), study)
+
+
+def _rows_of(signals: Mapping[str, Array], start: int, stop: int) -> Mapping[str, Array]:
+    return {name: values[start:stop] for name, values in signals.items()}
+
+
+def _rows_in(path: Path, names: Sequence[str], start: int, stop: int) -> Mapping[str, Array]:
+    (read,) = read_rows(path, names, start, stop, max(stop - start, 1))
+    return dict(zip(names, read, strict=True))

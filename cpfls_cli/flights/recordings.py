@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import find_objects, label
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.flight import FlightRecord
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
@@ -113,10 +113,21 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
 
 def _artifact(path: Path, study: Study) -> ReadFlight:
     record = read_record(path, FlightRecord)
+    return ReadFlight(path.name, record.signals, units_of(path, record.origin, study), ())
+
+
+def units_of(path: Path, made: Header, study: Study) -> Mapping[str, str]:
+    """Give the units that the import of a flight read, empty for one that was simulated.
+
+    Raises
+    ------
+    InputError
+        If the flight is of another vehicle than that of the config.
+    """
     source = f"{path}: /config"
-    made_by = validate(parse_config(record.origin.config, source), source)
+    made_by = validate(parse_config(made.config, source), source)
     require_same_vehicle(path, made_by.vehicle, study.vehicle)
-    return ReadFlight(path.name, record.signals, _units(made_by) if record.made_from("log") else {}, ())
+    return _units(made_by) if "log" in made.inputs else {}
 
 
 def _units(study: Study) -> dict[str, str]:
@@ -190,19 +201,46 @@ def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], 
 
 def _known_part(flight: ReadFlight) -> tuple[dict[str, Array], tuple[str, ...]]:
     """Keep the longest stretch in which everything is known."""
-    count = len(flight.signals["time"])
-    known = np.ones(count, dtype=bool)
-    for values in flight.signals.values():
-        known &= np.isfinite(values.reshape(count, -1)).all(axis=1)
-    if known.all() and count:
+    known = all_known(flight.signals)
+    if known.all() and len(known):
         return dict(flight.signals), flight.warnings
+    best, note = longest_known(flight.name, known, flight.signals["time"])
+    return {name: values[best] for name, values in flight.signals.items()}, (*flight.warnings, *note)
+
+
+def all_known(signals: Mapping[str, Array]) -> BoolArray:
+    """Mark the samples at which every signal is known."""
+    count = len(signals["time"])
+    known = np.ones(count, dtype=bool)
+    for values in signals.values():
+        known &= np.isfinite(values.reshape(count, -1)).all(axis=1)
+    return known
+
+
+def longest_known(name: str, known: BoolArray, time: Array) -> tuple[slice, tuple[str, ...]]:
+    """Find the longest stretch in which everything is known, and say so where it is not all.
+
+    Parameters
+    ----------
+    name : str
+        Of the flight.
+    known : array of bool, shape (time,)
+    time : array, shape (time,), s
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
     runs = [parts[0] for parts in find_objects(label(known)[0])]
     if not runs:
-        raise InputError(f"{flight.name}: no sample at which all of its signals are known")
+        raise InputError(f"{name}: no sample at which all of its signals are known")
     best = max(runs, key=lambda run: run.stop - run.start)
-    time = flight.signals["time"][best]
-    note = f"only {time[0]:.2f} s to {time[-1]:.2f} s are used, the longest stretch in which all signals are known"
-    return {name: values[best] for name, values in flight.signals.items()}, (*flight.warnings, note)
+    if best.stop - best.start == len(known):
+        return best, ()
+    first, last = time[best.start], time[best.stop - 1]
+    note = f"only {first:.2f} s to {last:.2f} s are used, the longest stretch in which all signals are known"
+    return best, (note,)
 
 
 def with_voltage(
@@ -219,12 +257,21 @@ def with_voltage(
     if not any(full):
         return list(recordings), ()
     scaled = [_share(r, max(full)) if volts else r for r, volts in zip(recordings, full, strict=True)]
-    return scaled, (f"voltage: the largest of these flights, {max(full):.3g} V, is taken for that of a full battery",)
+    return scaled, (full_battery(max(full)),)
+
+
+def full_battery(volts: float) -> str:
+    """Say which voltage is taken for that of a full battery."""
+    return f"voltage: the largest of these flights, {volts:.3g} V, is taken for that of a full battery"
+
+
+def in_volts(units: Mapping[str, str]) -> bool:
+    """Tell whether a flight states its voltage in V, and no share of the full battery."""
+    return units.get("voltage", "1") != "1"
 
 
 def _largest_volts(signals: Signals, flight: ReadFlight) -> float:
-    in_volts = flight.units.get("voltage", "1") != "1"
-    return float(signals.voltage.max()) if in_volts and signals.voltage is not None else 0.0
+    return float(signals.voltage.max()) if in_volts(flight.units) and signals.voltage is not None else 0.0
 
 
 def _share(recording: Recording, full: float) -> Recording:

@@ -1,8 +1,17 @@
 """Prediction of a model with effects: what is left is the gap that remains."""
 
+import json
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
+
+from cpfls_cli.artifacts.flight import FlightRecord
+from cpfls_cli.artifacts.prediction import PredictionRecord
+from cpfls_cli.artifacts.spec import PART
+from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.flights import flight_source
 
 COLUMNS = "t,wx,wy,wz,om1,om2,om3,om4,phi,theta,psi"
 
@@ -40,3 +49,27 @@ def test_a_flight_without_attitude_is_refused(cpfls, refuse, gap_config, extende
     assert cpfls("import", gap_config, shifted[0], "-o", flight).exit_code == 0
     (message,) = refuse("predict", gap_config, extended, flight, "-o", tmp_path / "x.h5")
     assert "lacks the attitude" in message
+
+
+def test_a_long_flight_is_predicted_in_stretches(cpfls, gap_config, extended, flown, tmp_path, monkeypatch):
+    record = read_record(flown, FlightRecord)
+    times = 2 * PART // len(record.time) + 1
+    tiled = {name: np.concatenate([values] * times) for name, values in record.signals.items()}
+    tiled["time"] = record.time[1] * np.arange(len(tiled["body_rate"]))
+    write_record(tmp_path / "long.h5", replace(record, **tiled))
+
+    def predicted(name):
+        output = tmp_path / name
+        result = cpfls("predict", gap_config, extended, tmp_path / "long.h5", "-o", output, "--json")
+        assert result.exit_code == 0
+        return read_record(output, PredictionRecord).data, json.loads(result.stdout)["samples"], output.read_bytes()
+
+    whole, samples, _ = predicted("whole.h5")
+    monkeypatch.setattr(flight_source, "STRETCH", PART)
+    monkeypatch.setattr(flight_source, "IN_MEMORY", PART)
+    (parts, in_parts, written), (*_, again) = predicted("parts.h5"), predicted("again.h5")
+    assert samples == in_parts == len(tiled["time"]) > 2 * PART
+    assert written == again
+    assert parts.keys() == whole.keys()
+    for name, values in whole.items():
+        np.testing.assert_allclose(parts[name], values, rtol=1e-9, atol=1e-12)

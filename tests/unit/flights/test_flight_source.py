@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord
-from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import write_record
+from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.flights import flight_source as sources
+from cpfls_cli.flights import recordings
 
 SAMPLES = 30
 
@@ -62,3 +64,56 @@ def test_another_file_is_refused_with_path_and_remedy(source, change, said):
     change(source.path)
     with pytest.raises(InputError, match=f"{source.path}: {said}.*put the same file there on each"):
         next(source.chunks())
+
+
+PERIOD_S = 0.5
+
+
+def driven(path, *, unit="V"):
+    """A flight with a battery that sags, of a log with body torque."""
+    rng = np.random.default_rng(4)
+    mapped = {"voltage": {"columns": ["u"], "unit": unit}, "body_torque": {"columns": ["a", "b", "c"], "unit": "N m"}}
+    config = parse_config(resolved_yaml(Study()), "own") | {"import": {"signals": mapped}}
+    study = validate(config, "own")
+    header = Header("1", 1, resolved_yaml(study), {"log": InputFile("log.csv", "0" * 64, "CSV")})
+    signals = {name: rng.normal(size=(90, 3)) for name in ("attitude", "body_rate", "body_torque")}
+    record = FlightRecord(header=header, time=PERIOD_S * np.arange(90), voltage=np.linspace(12.5, 10.0, 90), **signals)
+    write_record(path, record)
+    return path
+
+
+@pytest.mark.parametrize("in_memory", [10, 1000])
+def test_stretches_overlap_and_hold_all_of_a_flight_once(tmp_path, monkeypatch, in_memory):
+    monkeypatch.setattr(sources, "IN_MEMORY", in_memory)
+    monkeypatch.setattr(sources, "STRETCH", 40)
+    path = driven(tmp_path / "flight.h5")
+    stretches = sources.flight_stretches(path, Study())
+    whole = recordings.read_flights([path], Study())
+    (expected,) = whole.recordings
+    assert len(stretches) == 90
+    assert [len(each.signals) for each in stretches] == [60, 70, 30]
+    for name in ("time", "attitude", "body_rate", "stated_torque", "voltage"):
+        joined = np.concatenate([getattr(each.signals, name)[each.own] for each in stretches])
+        np.testing.assert_array_equal(joined, getattr(expected.signals, name))
+    assert stretches.warnings == whole.warnings
+    assert "12.5 V" in stretches.warnings[0]
+
+
+def test_a_voltage_that_is_a_share_stays_one(tmp_path):
+    (only,) = sources.flight_stretches(driven(tmp_path / "flight.h5", unit="1"), Study())
+    assert only.signals.voltage[0] == 12.5
+
+
+def test_stretches_are_of_the_longest_part_in_which_all_is_known(tmp_path, monkeypatch):
+    path = driven(tmp_path / "flight.h5")
+    read = recordings.read_flight(path, Study())
+    read.signals["attitude"][30] = np.nan
+    monkeypatch.setattr(sources, "read_flight", lambda *_: read)
+    stretches = sources.flight_stretches(path, Study())
+    (only,) = stretches
+    assert only.signals.time[only.own][0] == 31 * PERIOD_S
+    assert len(stretches) == 59
+    assert "only 15.50 s to 44.50 s are used" in stretches.warnings[0]
+    read.signals["attitude"][:] = np.nan
+    with pytest.raises(InputError, match=r"flight\.h5: no sample at which all"):
+        sources.flight_stretches(path, Study())
