@@ -27,6 +27,9 @@ except ImportError:
 _BESIDE = ("", ".checkpoint", ".partial")
 """What the names of files add to that of the output beside which a command writes them."""
 
+_NEW: set[str] = set()
+"""Outputs of which there was no file when the command began: one that is there in the end is somebody else's."""
+
 _LOCKED_BY = b"cpfls"
 """How a lock begins."""
 
@@ -124,6 +127,29 @@ def check_output(path: Path, force: bool, inputs: Iterable[Path] = ()) -> None:
             raise InputError(f"{path}: is a device or a pipe; -o names a file")
         if path.exists() and not force:
             raise InputError(f"{path}: exists already; --force replaces it")
+    _expect([path], new=not force)
+
+
+def _expect(paths: Iterable[Path], *, new: bool) -> None:
+    """Take note of outputs that may be made, and not replaced; or of those that may be."""
+    names = {os.path.abspath(path) for path in paths}
+    _NEW.difference_update(names)
+    _NEW.update(names if new else ())
+
+
+def _refuse_appeared(paths: Iterable[Path]) -> None:
+    for path in paths:
+        if os.path.abspath(path) in _NEW and os.path.lexists(path):
+            raise OutputError(
+                f"{path}: was not there when the command began, and is kept; move it away and run the command again"
+            )
+
+
+def _move(temporary: Path, path: Path) -> None:
+    """Put a complete file in its place; the command may then write it again."""
+    _refuse_appeared([path])
+    os.replace(temporary, path)
+    _expect([path], new=False)
 
 
 def refuse_inputs(output: Path, inputs: Iterable[Path]) -> None:
@@ -274,7 +300,7 @@ def sealed_output(path: Path) -> Iterator[EnduringFile]:
         file.write(seal)
         file.require_written()
         os.fsync(raw.fileno())
-        os.replace(temporary, path)
+        _move(temporary, path)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -300,9 +326,10 @@ def write_texts(texts: Mapping[Path, str]) -> None:
                 file.write(text.encode("utf-8", "replace"))
                 file.flush()
                 os.fsync(file.fileno())
+        _refuse_appeared(written)
         for path, temporary in written.items():
             with _writing(path):
-                os.replace(temporary, path)
+                _move(temporary, path)
 
 
 @contextmanager
@@ -339,6 +366,7 @@ def check_folder(folder: Path, force: bool, names: Sequence[str]) -> None:
     for place in (folder.resolve().parent, folder.resolve()):
         if place.is_dir() and not os.access(place, os.W_OK | os.X_OK):
             raise InputError(f"{folder}: cannot write into the folder {place}; change its permissions")
+    _expect((folder.resolve() / name for name in names), new=not force)
 
 
 @contextmanager
@@ -365,10 +393,11 @@ def filled_folder(folder: Path, names: Sequence[str]) -> Iterator[Path]:
     try:
         yield temporary
         folder.mkdir(exist_ok=True)
+        _refuse_appeared(folder / name for name in names if (temporary / name).exists())
         for name in names:
             if (temporary / name).exists():
-                os.replace(temporary / name, folder / name)
-            else:
+                _move(temporary / name, folder / name)
+            elif os.path.abspath(folder / name) not in _NEW:
                 (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error}") from None

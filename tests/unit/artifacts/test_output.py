@@ -8,7 +8,15 @@ import h5py
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.output import EnduringFile, atomic_path, check_output, filled_folder, locked, write_texts
+from cpfls_cli.artifacts.output import (
+    EnduringFile,
+    atomic_path,
+    check_folder,
+    check_output,
+    filled_folder,
+    locked,
+    write_texts,
+)
 from cpfls_cli.errors import InputError, OutputError
 
 
@@ -86,6 +94,38 @@ def test_files_in_a_folder_of_an_earlier_run_go(tmp_path):
     fill(folder)
     assert {path.name: path.read_text() for path in folder.iterdir()} == {"a.txt": "new", "mine.txt": "mine"}
     assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_what_appears_while_a_command_is_at_work_is_kept(tmp_path):
+    output, second = tmp_path / "a.txt", tmp_path / "b.txt"
+    for path in (output, second):
+        check_output(path, force=False)
+    second.write_text("mine")
+    with pytest.raises(OutputError, match=r"b\.txt: was not there when the command began"):
+        write_texts({output: "new", second: "new"})
+    assert [path.name for path in tmp_path.iterdir()] == ["b.txt"]
+    assert second.read_text() == "mine"
+    check_output(second, force=True)
+    write_texts({output: "new", second: "new"})
+    # A command may write its own output again.
+    write_texts({output: "newer"})
+    assert (output.read_text(), second.read_text()) == ("newer", "new")
+
+
+def test_what_appears_in_a_folder_is_kept(tmp_path):
+    folder = tmp_path / "out"
+    check_folder(folder, False, ["a.txt", "b.txt"])
+    folder.mkdir()
+    (folder / "b.txt").write_text("mine")
+    fill(folder)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {"a.txt": "new", "b.txt": "mine"}
+    (folder / "a.txt").unlink()
+    (folder / "b.txt").unlink()
+    check_folder(folder, False, ["a.txt", "b.txt"])
+    (folder / "a.txt").write_text("mine")
+    with pytest.raises(OutputError, match=r"a\.txt: was not there when the command began"):
+        fill(folder)
+    assert (folder / "a.txt").read_text() == "mine"
 
 
 @pytest.mark.parametrize("room", range(0, 66_000, 2_797))
