@@ -219,7 +219,7 @@ def _unexplained(channel: Unexplained) -> str:
 def next_steps(record: DiagnosisRecord) -> list[str]:
     """Say what to do next, in sentences."""
     if record.impossible:
-        return ["Correct the section `import` of the config, and run this again."]
+        return ["Correct what looks wrong, in the section `import` of the config or in `vehicle`, and run this again."]
     usual = _NEXT.get(record.verdict)
     first = [f"to tell {flight}" for flight in _telling_flights(record)]
     # A rival that was not tried wants a signal, and two that do what one does another log; else a flight is planned.

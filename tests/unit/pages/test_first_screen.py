@@ -127,7 +127,7 @@ def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tel
         ({"verdict": "NOT_EXCITED", "named": ()}, "Fly more: roll, pitch and yaw sweeps at two amplitudes, "),
         (
             {"verdict": "UNEXPLAINED", "named": (), "impossible": made.texts(WRONG)},
-            "Correct the section `import` of the config, and run this again.",
+            "Correct what looks wrong, in the section `import` of the config or in `vehicle`, and run this again.",
         ),
     ],
 )
