@@ -148,6 +148,10 @@ def _sorted(model: ExtendedModel, vehicle: VehicleSettings, *, speeds: bool) -> 
         if ModelEffect(effect.name, shape, fitted.linear).is_lever:
             centre = fitted.linear
             continue
+        if effect.carried is not None:
+            # It has a state of its own: the random motions of the probe, a second apart, may make it diverge.
+            along.append(fitted)
+            continue
         added = _as_inertia(fitted, probe)
         weights = polynomial(effect, probe, shape)
         # Without rotor speeds the terms of the rotors are 0, and the thrust is what the log states.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.registry import VEHICLE_NUMBERS
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.balance.windows import Recording
@@ -54,6 +54,17 @@ def test_the_true_effect_predicts_the_flight(name):
     errors, _ = played_back(model_of({name: values}), signals)
     assert errors["body_rate"][0] < share * stated["body_rate"][0]
     assert errors["attitude"][0] < share * stated["attitude"][0]
+
+
+def test_a_load_on_a_short_cable_is_evaluated_along_the_motion():
+    """Motions at random, a second apart, which tell polynomials, would make its swing diverge."""
+    signals = signals_of(flown())
+    shape = {"length_m": 0.3, "damping_1_s": 0.6, "depth_m": 0.05}
+    load = FittedEffect(Candidate(CATALOGUE["payload"], shape), np.array([0.03, 0.0, 0.0, 0.3]))
+    with_load = ExtendedModel(None, np.zeros(len(PARAMETERS)), (load,))
+    _, player = extended_player(with_load, "flight", [signals], "linear")
+    assert np.isfinite(player.along).all()
+    assert np.abs(player.along[:, 5]).max() > 1.0
 
 
 def test_without_effects_it_is_the_vehicle_of_the_config():
