@@ -118,7 +118,7 @@ def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
     long = [part if told else _weighed(part) for part in parts if shared.count(len(part))]
     if sum(shared.count(len(part)) for part in long) < FEWEST_WINDOWS:
         return
-    yield from (f"{fault[:-1]}: check import.signals.body_rate." for fault in gross_faults(long, shared))
+    yield from gross_faults(long, shared)
     motion = settled(long, shared)
     yield from (repair.unrepaired for repair in motion.repairs if repair.unrepaired)
     yield from motion.warnings

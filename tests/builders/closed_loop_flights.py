@@ -13,20 +13,23 @@ VEHICLE = VehicleSettings(rotors=tuple(RotorSettings(position_m=hub, spin=spin, 
 PERIOD = 0.01
 
 
-def planned(duration=3.0):
-    """Swings along all axes that a multirotor can fly exactly, 1.5 m above the ground."""
+def planned(duration=3.0, also=0.0):
+    """Swings along all axes that a multirotor can fly exactly, 1.5 m above the ground, and faster ones of `also` m."""
     time = PERIOD * np.arange(round(duration / PERIOD) + 1)
-    size, pulsation, phase = np.array([0.35, 0.25, 0.2]), np.array([2.4, 2.9, 1.7]), np.array([0.3, 1.0, 2.0])
-    angle = np.outer(time, pulsation) + phase
-    motion = [size * pulsation**n * np.sin(angle + n * np.pi / 2) for n in range(5)]
+    swings = ((np.array([0.35, 0.25, 0.2]), np.array([2.4, 2.9, 1.7])), (also, np.array([5.1, 6.1, 4.3])))
+    phase = np.array([0.3, 1.0, 2.0])
+    motion = [
+        sum(size * speed**n * np.sin(np.outer(time, speed) + phase + n * np.pi / 2) for size, speed in swings)
+        for n in range(5)
+    ]
     heading = np.stack([0.15 * 1.5**n * np.sin(1.5 * time + n * np.pi / 2) for n in range(3)])
     flat = flat_attitude(time, np.stack(motion[2:]), heading, 9.81)
     path = {"position": motion[0] + [0, 0, 1.5], "velocity": motion[1], "acceleration": motion[2]}
     return time, {**path, **vars(flat)}
 
 
-def flown(duration=3.0, seed=1, vehicle=VEHICLE, noise=None, relative_noise=None, **closed_loop):
-    time, plan = planned(duration)
+def flown(duration=3.0, seed=1, vehicle=VEHICLE, noise=None, relative_noise=None, also=0.0, **closed_loop):
+    time, plan = planned(duration, also)
     settings = SimulationSettings(
         mode="closed-loop",
         noise=noise or {},

@@ -18,7 +18,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
 from cpfls_cli.gap.balance.windows import Recording, Windows
 from cpfls_cli.gap.sensors.channels import channel_warnings, filter_warnings, frame_warnings
-from cpfls_cli.gap.sensors.clocks import ActuationDelay, actuation_delay, attitude_on_clock
+from cpfls_cli.gap.sensors.clocks import ActuationDelay, actuation_delay, attitude_on_clock, rotors_on_clock
 from cpfls_cli.gap.sensors.findings import AuditFinding, CheckedFault, findings
 from cpfls_cli.gap.sensors.gyro import GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.gap.sensors.majority import settled
@@ -127,13 +127,16 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
     ----------
     Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
     """
-    actuation = actuation_delay(flights)
     gyroscope = _gyroscope(flights, windows)
     clock, doubts = _late_attitude(gyroscope[0], flights, windows)
     if clock:
         flights = [repair.applied(signals) for signals in flights for repair in clock]
         gyroscope = _gyroscope(flights, windows)
     faults, untested, fit, frames = gyroscope
+    rotors = _late_rotors(faults, flights, windows)
+    flights = [repair.applied(signals) for signals in flights for repair in rotors] if rotors else flights
+    clock = (*clock, *rotors)
+    actuation = actuation_delay(flights)
     motion = settled(flights, windows)
     delay_note = () if actuation is None else (actuation.sentence,)
     return Audit(
@@ -150,17 +153,24 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
 
 
 def gross_faults(flights: Sequence[Signals], windows: Windows) -> tuple[str, ...]:
-    """Name what is wrong with the gyroscope alone and far beyond what sensors of multirotors show.
+    """Name what is wrong with the gyroscope alone, far beyond what sensors of multirotors show, or else a late rotor.
 
     Parameters
     ----------
     flights : sequence of Signals
         As for `audit`.
+
+    Returns
+    -------
+    tuple of str
+        With what to mend.
     """
     faults, _, _, frames = _gyroscope(flights, windows)
     if frames:
         return ()
-    return tuple(finding.sentence for finding in findings(faults, windows.period) if _is_gross(finding))
+    gross = [finding.sentence for finding in findings(faults, windows.period) if _is_gross(finding)]
+    late = (repair.unrepaired for repair in _late_rotors(faults, flights, windows))
+    return (*(f"{sentence[:-1]}: check import.signals.body_rate." for sentence in gross), *late)
 
 
 def _is_gross(finding: AuditFinding) -> bool:
@@ -171,11 +181,23 @@ def _is_gross(finding: AuditFinding) -> bool:
 _Outcome = tuple[Sequence[CheckedFault], Mapping[str, str], GyroFit | None, tuple[str, ...]]
 
 
+def _late_gyroscope(faults: Sequence[CheckedFault], windows: Windows) -> list[AuditFinding]:
+    """Find the fault that shifts the gyroscope against the attitude."""
+    return [each for each in findings(faults, windows.period) if each.named and _estimate(each.name) == "delay"]
+
+
+def _late_rotors(
+    faults: Sequence[CheckedFault], flights: Sequence[Signals], windows: Windows
+) -> tuple[ChannelRepair, ...]:
+    """Hold the rotors against the gyroscope where nothing is known against its clock."""
+    repair = None if _late_gyroscope(faults, windows) else rotors_on_clock(flights, windows)
+    return () if repair is None else (repair,)
+
+
 def _late_attitude(
     faults: Sequence[CheckedFault], flights: Sequence[Signals], windows: Windows
 ) -> tuple[tuple[ChannelRepair, ...], tuple[str, ...]]:
-    # The fault that shifts the gyroscope against the attitude.
-    late = [each for each in findings(faults, windows.period) if each.named and _estimate(each.name) == "delay"]
+    late = _late_gyroscope(faults, windows)
     return attitude_on_clock(late[0].coefficients[0].value, flights, windows) if late else ((), ())
 
 

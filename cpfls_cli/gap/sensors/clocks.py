@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
@@ -26,6 +27,13 @@ _SMALLEST_R2 = 0.3
 # Missing effects shift the motion against the torque by about this much; a damping is allowed for.
 _SURE_S = 0.002
 _FEWEST_WINDOWS, _FEWEST_HALVES = 24, 2
+# Filters before a gyroscope, and a flow that lags behind a rotor, are a few milliseconds.
+_ROTORS_OFF_S = 0.008
+_TELEMETRY_S, _TELEMETRY_STEPS, _FINER = 0.24, 25, 9
+_SCATTER_S, _SCATTER = 0.004, 0.2
+_FEWEST_SHIFTS = 4
+_NEXT_TO_NOTHING = 0.01
+_HALF = 0.5
 _UNDECIDED = "Whether gyroscope or attitude is late these flights do not tell; the gyroscope is shifted."
 
 
@@ -117,6 +125,64 @@ def attitude_on_clock(
     return (ChannelRepair("attitude", delay_s=-gyro_delay, sentence=sentence),), ()
 
 
+def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepair | None:
+    """Put measured rotor speeds that are late or early against the gyroscope onto its clock.
+
+    Telemetry of speed controllers comes late. Every half of a flight has to say the same about roll and about pitch,
+    and a shift has to halve what is left at least: on real flights whose clocks agree, drag and damping explain the
+    torque as well with any shift. Yaw says nothing, because rotors that speed up turn the vehicle ahead of their drag.
+
+    Returns
+    -------
+    ChannelRepair or None
+        None where nothing is wrong, or nobody knows.
+    """
+    told = [shift for signals, part in _halves(flights) for shift in _shifts(signals, part, windows)]
+    if len(told) < _FEWEST_SHIFTS:
+        return None
+    delay = float(np.median(told))
+    if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(told) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
+        return None
+    off = (
+        f"The rotor speeds are {'late' if delay > 0 else 'early'} by {abs(1000 * delay):.0f} ms, judged by the "
+        "gyroscope"
+    )
+    return ChannelRepair(
+        "rotor_speed",
+        delay_s=delay,
+        sentence=f"{off}. They are set right before the balance; mend their clock in the log.",
+        unrepaired=f"{off}; mend their clock in the log",
+    )
+
+
+def _shifts(signals: Signals, part: slice, windows: Windows) -> Iterator[float]:
+    """Estimate by how much the rotors are late about roll and pitch, s; 0 for no sure shift, nothing for no hint."""
+    time, motion, torque = signals.time[part], _motion(signals, part, windows), signals.torque
+    assert torque is not None, "rotors turn"
+    if motion is None or not np.ptp(torque[part, :2], axis=0).all():
+        return
+    curve = CubicSpline(time, torque[part, :2])
+
+    def left(delay: float) -> Array:
+        turned = windows.average(curve(np.clip(time + delay, time[0], time[-1])))
+        return np.array([1 - _share(turned[:, axis], motion[axis]) for axis in (0, 1)])
+
+    as_logged = left(0.0)
+    if as_logged.max() < _NEXT_TO_NOTHING:
+        yield from (0.0, 0.0)
+        return
+    coarse = np.linspace(-_TELEMETRY_S, _TELEMETRY_S, _TELEMETRY_STEPS)
+    rest = np.array([left(delay) for delay in coarse])
+    for axis, best in enumerate(rest.argmin(axis=0)):
+        if rest[best, axis] > 1 - _SMALLEST_R2:
+            continue
+        near = np.linspace(-1.0, 1.0, _FINER) * (coarse[1] - coarse[0]) + coarse[best]
+        fine = np.array([left(delay)[axis] for delay in near])
+        closest = int(fine.argmin())
+        sure = 0 < best < _TELEMETRY_STEPS - 1 and 0 < closest < _FINER - 1 and fine[closest] < _HALF * as_logged[axis]
+        yield _vertex(near, fine, closest) if sure else 0.0
+
+
 def rotor_clock(flights: Sequence[Signals], windows: Windows) -> Array:
     """Estimate the delay of the gyroscope behind measured rotors, half flight by half flight.
 
@@ -128,40 +194,56 @@ def rotor_clock(flights: Sequence[Signals], windows: Windows) -> Array:
     array, shape (half,), s
         Halves that tell nothing are left out; empty for commands, which a lag lies behind.
     """
-    halves = [
-        delay
-        for signals in flights
-        if signals.rotor_speed is not None and not signals.commanded
-        for part in (slice(0, len(signals) // 2), slice(len(signals) // 2, None))
-        if (delay := _delay(signals, part, windows)) is not None
-    ]
-    return np.array(halves)
+    found = (_delay(signals, part, windows) for signals, part in _halves(flights))
+    return np.array([delay for delay in found if delay is not None])
+
+
+def _halves(flights: Sequence[Signals]) -> Iterator[tuple[Signals, slice]]:
+    """Name both halves of the flights with measured rotor speeds."""
+    for signals in flights:
+        if signals.rotor_speed is not None and not signals.commanded:
+            middle = len(signals) // 2
+            yield from ((signals, slice(0, middle)), (signals, slice(middle, None)))
 
 
 def _delay(signals: Signals, part: slice, windows: Windows) -> float | None:
-    time, rate, torque = signals.time[part], signals.body_rate[part], signals.torque
+    time, torque, motion = signals.time[part], signals.torque, _motion(signals, part, windows)
     assert torque is not None, "rotors turn"
-    if windows.count(len(time)) < _FEWEST_WINDOWS:
+    if motion is None:
         return None
     delays = np.linspace(-_LONGEST_S, _LONGEST_S, _STEPS)
-    air = signals.ground_velocity[part] if "velocity" in signals.available else np.zeros((len(time), 0))
-    columns = (windows.derivative(rate), windows.average(rate), windows.average(air))
-    explained = np.array([_explained(windows.average(shifted(torque[part], time, -each)), *columns) for each in delays])
+    explained = np.array([_explained(windows.average(shifted(torque[part], time, -each)), motion) for each in delays])
     best = int(np.argmax(explained))
     if explained[best] < _SMALLEST_R2 or best in (0, _STEPS - 1):
         return None
-    below, top, above = explained[best - 1 : best + 2]
+    return _vertex(delays, explained, best)
+
+
+def _vertex(delays: Array, values: Array, best: int) -> float:
+    """Give the extremum of a parabola through the best of some values and its neighbours."""
+    below, top, above = values[best - 1 : best + 2]
     return float(delays[best] + 0.5 * (delays[1] - delays[0]) * (below - above) / (below - 2 * top + above))
 
 
-def _explained(torque: Array, turning: Array, rate: Array, air: Array) -> float:
+def _motion(signals: Signals, part: slice, windows: Windows) -> list[Array] | None:
+    """Give what explains a torque about each axis: angular acceleration, rate and air velocity, about their means."""
+    rate = signals.body_rate[part]
+    if windows.count(len(rate)) < _FEWEST_WINDOWS:
+        return None
+    air = signals.ground_velocity[part] if "velocity" in signals.available else np.zeros((len(rate), 0))
+    turning, turned, moved = windows.derivative(rate), windows.average(rate), windows.average(air)
+    columns = (np.column_stack([turning[:, axis], turned[:, axis], moved]) for axis in range(3))
+    return [each - each.mean(axis=0) for each in columns]
+
+
+def _explained(torque: Array, motion: Sequence[Array]) -> float:
     """Give the share of the torque that the motion explains, all axes with equal weight."""
-    shares = []
-    for axis in range(3):
-        right = torque[:, axis] - torque[:, axis].mean()
-        left = np.column_stack([turning[:, axis], rate[:, axis], air])
-        left = left - left.mean(axis=0)
-        if right.any():
-            rest = right - left @ np.linalg.lstsq(left, right, rcond=None)[0]
-            shares.append(1 - (rest**2).sum() / (right**2).sum())
+    shares = [_share(torque[:, axis], motion[axis]) for axis in range(3) if np.ptp(torque[:, axis])]
     return float(np.mean(shares)) if shares else 0.0
+
+
+def _share(torque: Array, motion: Array) -> float:
+    """Give the share of the torque about one axis that the motion explains."""
+    about = torque - torque.mean()
+    rest = about - motion @ np.linalg.lstsq(motion, about, rcond=None)[0]
+    return float(1 - (rest**2).sum() / (about**2).sum())

@@ -23,7 +23,7 @@ class ChannelRepair:
     Attributes
     ----------
     channel : str
-        Field of `Signals`, shape (time, 3).
+        Field of `Signals`, shape (time, 3); of ``rotor_speed`` the delay alone counts.
     dropped : bool
         Whether it is left out; then nothing else counts.
     delay_s : float
@@ -72,6 +72,8 @@ class ChannelRepair:
 
     def _truth(self, reading: Array, signals: Signals) -> Array:
         truth = shifted(reading, signals.time, self.delay_s)
+        if self.channel == "rotor_speed":
+            return truth
         if self.in_body:
             truth = np.einsum("tij,tj->ti", signals.rotation, truth)
         truth = truth @ self.matrix.T
@@ -102,7 +104,7 @@ def shifted(reading: Array, time: Array, delay: float) -> Array:
 
     Parameters
     ----------
-    reading : array, shape (time, 3)
+    reading : array, shape (time, column)
     time : array, shape (time,), s
     delay : float
         s.

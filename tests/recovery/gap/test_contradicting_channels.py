@@ -30,8 +30,18 @@ NOISE = {
 @pytest.fixture(scope="module")
 def flights():
     """Two noisy flights that head 60 degrees left of x, of which a drag at the rotors is hidden."""
-    logged = [signals_of(flown(20.0, seed=seed, noise=NOISE, effects={"rotor_drag": [DRAG]})) for seed in (1, 2)]
-    return [headed(signals, 60.0) for signals in logged]
+    return dragged(0.0)
+
+
+@pytest.fixture(scope="module")
+def lively():
+    """The same with fast swings beside the slow ones: of one swing drag and damping explain any delay."""
+    return dragged(0.05)
+
+
+def dragged(also):
+    flown_twice = (flown(20.0, seed=seed, noise=NOISE, also=also, effects={"rotor_drag": [DRAG]}) for seed in (1, 2))
+    return [headed(signals_of(flight), 60.0) for flight in flown_twice]
 
 
 def headed(signals, degrees):
@@ -153,6 +163,50 @@ def test_commands_do_not_tell_whose_clock_is_wrong(flights):
     found = audit(commanded, WINDOWS)
     assert not any(repair.channel == "attitude" for repair in found.repairs)
     assert any("gyroscope or attitude is late" in note for note in found.notes)
+
+
+def with_rotors_late(flights, *delays):
+    return [replace(s, rotor_speed=late(s.rotor_speed, by)) for s, by in zip(flights, delays, strict=True)]
+
+
+@pytest.mark.parametrize(("delay", "words"), [(0.05, "late by"), (0.14, "late by"), (-0.08, "early by")])
+def test_rotors_on_another_clock_are_set_right(lively, delay, words):
+    given = with_rotors_late(lively, delay, delay)
+    found = audit(given, WINDOWS)
+    [sentence] = found.settled
+    assert f"The rotor speeds are {words}" in sentence
+    assert found.repairs[0].delay_s == pytest.approx(delay, abs=0.004)
+    assert (found.warnings, found.named) == ((), ())
+    true, now, before = (WINDOWS.average(s.rotor_speed) for s in (lively[0], found.repaired(given[0]), given[0]))
+    assert np.abs(now - true).mean() < 0.1 * np.abs(before - true).mean()
+    again = AuditGroup.of(found).audit()
+    np.testing.assert_array_equal(again.repaired(given[0]).rotor_speed, found.repaired(given[0]).rotor_speed)
+
+
+def test_rotors_on_the_clock_of_the_gyroscope_stay(lively):
+    assert audit(lively, WINDOWS).repairs == ()
+
+
+def test_a_late_gyroscope_is_not_taken_for_early_rotors(lively):
+    found = audit([replace(s, body_rate=late(s.body_rate, 0.05)) for s in lively], WINDOWS)
+    assert [fault.name for fault in found.named] == ["channel_delay"]
+    assert found.repairs == ()
+
+
+def test_commands_that_are_ahead_of_the_motion_are_left_alone(lively):
+    ahead = [replace(signals, commanded=True) for signals in with_rotors_late(lively, -0.05, -0.05)]
+    assert audit(ahead, WINDOWS).repairs == ()
+
+
+def test_rotors_that_disagree_about_their_delay_are_left_alone(lively):
+    assert audit(with_rotors_late(lively, 0.05, 0.09), WINDOWS).repairs == ()
+
+
+def test_the_effect_is_named_in_spite_of_late_rotors(lively):
+    found = answer(*with_rotors_late(lively, 0.05, 0.05))
+    assert (found.verdict, [effect.name for effect in found.effects]) == ("NAMED", ["rotor_drag"])
+    assert found.effects[0].coefficients[0].value == pytest.approx(DRAG, rel=0.05)
+    assert "The rotor speeds are late" in found.notes[0]
 
 
 def test_what_was_made_of_the_accelerometer_follows_its_repair(flights):

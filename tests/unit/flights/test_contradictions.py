@@ -131,6 +131,12 @@ def test_a_fault_is_said(flight, fault):
     assert sentence in said(made(flight))
 
 
+def test_rotors_on_another_clock_are_said():
+    lively = signals_of(flown(20.0, noise=NOISE, also=0.05))
+    assert said(lively) == ""
+    assert "the rotor speeds are late by" in said(replace(lively, rotor_speed=np.roll(lively.rotor_speed, 5, axis=0)))
+
+
 @pytest.mark.parametrize("idle", [0.0, 60.0, 200.0])
 @pytest.mark.parametrize("times", [0.3, 9, 60])
 def test_a_long_rest_on_the_ground_contradicts_nothing(flight, times, idle):
