@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar, cast
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -13,6 +14,8 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.vehicle.rotors import body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
+
+_T = TypeVar("_T")
 
 _SHORTEST = 8
 """Samples up to which a signal is taken as it is."""
@@ -24,7 +27,7 @@ _OF_MOTION = (
 """Cached properties that no rotor speed changes."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Signals:
     """A flight on a uniform clock, in SI, body frame FLU, world z up.
 
@@ -229,6 +232,20 @@ class Signals:
     def radii(self) -> Array:
         """Radius of each propeller, shape (rotor,), m."""
         return np.array([rotor.radius_m for rotor in self.vehicle.rotors], dtype=float)
+
+    def once(self, key: Hashable, make: Callable[[], _T]) -> _T:
+        """Make what follows from the flight, or give what was made before: no stage of a workflow makes it again.
+
+        Parameters
+        ----------
+        key : hashable
+            Who makes it, and all that it depends on beside the flight.
+        make : callable
+        """
+        made = self.__dict__.setdefault("made", {})
+        if key not in made:
+            made[key] = make()
+        return cast(_T, made[key])
 
     def with_rotor_speed(self, rotor_speed: Array) -> Signals:
         """Exchange the rotor speeds.

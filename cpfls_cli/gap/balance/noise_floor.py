@@ -66,6 +66,10 @@ def known_up_to(signals: Signals) -> dict[str, float]:
     dict from field of `Signals` to float, Hz
         Signals without a cliff in their spectrum, and those that are updated slower than the clock, are left out.
     """
+    return signals.once(known_up_to, lambda: _known_up_to(signals))
+
+
+def _known_up_to(signals: Signals) -> dict[str, float]:
     logged = {name: values for name in _FILTERED if (values := getattr(signals, name)) is not None}
     if "body_rate" not in signals.available:
         del logged["body_rate"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +44,7 @@ class Candidate(NamedTuple):
         return self.effect.name, len(self.effect.coefficients), tuple(self.shape.values())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WeakFlight:
     """A flight with its inertial torque and force.
 
@@ -178,6 +179,21 @@ def weak_flight(
     floor : array, shape (6,), N m and N, or None
         Noise of a flight that is planned; None: as its residual shows it.
     """
+    make = partial(_weak_flight, name, signals, windows, model, force, axes, floor)
+    # Each stage rebuilds its model, and a flight is planned once.
+    shared = model is None and floor is None
+    return signals.once((weak_flight, name, windows, force, tuple(axes)), make) if shared else make()
+
+
+def _weak_flight(
+    name: str,
+    signals: Signals,
+    windows: Windows,
+    model: InertiaModel | None,
+    force: bool,
+    axes: Sequence[str],
+    floor: Array | None,
+) -> WeakFlight:
     with_force = force and signals.has_force
     rotation = rotation_balance(signals, model)
     nothing = np.zeros((len(signals), 3))

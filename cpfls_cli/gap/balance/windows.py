@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -20,7 +21,7 @@ _SAME_RATE = 1e-3
 """Relative difference of sampling periods that clocks of one logger have, and that no floor shows."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Windows:
     """Windows ``phi(s) = sin(pi s)^4``, scaled to integral 1 and repeated at a hop.
 
@@ -95,6 +96,7 @@ class Windows:
         return np.asarray(views @ kernel)
 
 
+@lru_cache(maxsize=64)
 def windows(period: float, window_s: float, overlap: float) -> Windows:
     """Make windows of a length for a sampling period.
 

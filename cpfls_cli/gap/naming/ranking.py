@@ -127,6 +127,11 @@ def best_floor(hypothesis: System) -> Array:
     -------
     array, shape (6,)
     """
+    key = (best_floor, hypothesis.flights, tuple(candidate.key for candidate in hypothesis.chosen))
+    return hypothesis.flights[0].signals.once(key, lambda: _best_floor(hypothesis))
+
+
+def _best_floor(hypothesis: System) -> Array:
     rows = hypothesis.residual
     floor = np.where(rows.any(axis=0), np.sqrt(np.mean(rows**2, axis=0)), 1.0)
     for _ in range(2):

@@ -127,6 +127,11 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
     ----------
     Weak form: Shinbrot 1957. Reverse regression and its bounds: Frisch 1934.
     """
+    key = (audit, tuple(flights), windows)
+    return flights[0].once(key, lambda: _audit(flights, windows))
+
+
+def _audit(flights: Sequence[Signals], windows: Windows) -> Audit:
     gyroscope = _gyroscope(flights, windows)
     clock, doubts = _late_attitude(gyroscope[0], flights, windows)
     if clock:
