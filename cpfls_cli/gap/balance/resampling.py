@@ -17,47 +17,72 @@ _ALONE = 0.95
 
 
 @dataclass(frozen=True)
+class BlockRows:
+    """What normal equations are made of.
+
+    Attributes
+    ----------
+    columns : array, shape (window, channel, column)
+    right : array, shape (window, channel, draw)
+    parts : list of slice or array of bool
+        Windows of each block.
+    """
+
+    columns: Array
+    right: Array
+    parts: list[slice | BoolArray]
+
+    def products(self, first: Array, second: Array) -> Array:
+        """Multiply columns with columns over the windows of each block and over all channels.
+
+        Parameters
+        ----------
+        first, second : array, shape (window, channel, column)
+
+        Returns
+        -------
+        array, shape (block, column of the first, column of the second)
+        """
+        pairs = ((first[rows], second[rows]) for rows in self.parts)
+        return np.array([x.reshape(-1, x.shape[2]).T @ y.reshape(-1, y.shape[2]) for x, y in pairs])
+
+    def by_channel(self, first: Array, second: Array) -> Array:
+        """Multiply as `products`, over each channel alone, shape (block, channel, column, column)."""
+        pairs = ((first[rows].swapaxes(0, 1), second[rows].swapaxes(0, 1)) for rows in self.parts)
+        return np.array([x.swapaxes(1, 2) @ y for x, y in pairs])
+
+    @cached_property
+    def squares(self) -> Array:
+        """Sums of squares of the right side, shape (block, channel, draw)."""
+        return np.array([(self.right[rows] ** 2).sum(axis=0) for rows in self.parts])
+
+
+@dataclass(frozen=True)
 class Folds:
     """Normal equations of each block.
 
     Attributes
     ----------
-    grams : array, shape (block, channel, column, column)
-    moments : array, shape (block, channel, column, draw)
+    gram : array, shape (block, column, column)
+    moment : array, shape (block, column, draw)
         Columns times right side; several right sides are draws.
-    squares : array, shape (block, channel, draw)
+    square : array, shape (block, draw)
         Sums of squares of the right side.
-    rows : int
-        Rows of all blocks.
     prior : array, shape (column,)
         Information that bounds give before any data: one over the square of the largest possible coefficient.
+    made_of : BlockRows
     """
 
-    grams: Array
-    moments: Array
-    squares: Array
-    rows: int
+    gram: Array
+    moment: Array
+    square: Array
     prior: Array
-
-    @cached_property
-    def gram(self) -> Array:
-        """Over all channels, shape (block, column, column)."""
-        return np.asarray(self.grams.sum(axis=1))
-
-    @cached_property
-    def moment(self) -> Array:
-        """Over all channels, shape (block, column, draw)."""
-        return np.asarray(self.moments.sum(axis=1))
-
-    @cached_property
-    def square(self) -> Array:
-        """Over all channels, shape (block, draw)."""
-        return np.asarray(self.squares.sum(axis=1))
+    made_of: BlockRows
 
     @property
     def blocks(self) -> int:
         """Number of blocks."""
-        return len(self.grams)
+        return len(self.gram)
 
     def solve(self, columns: IntArray, believed: int = 0) -> tuple[Array, Array]:
         """Fit a subset of columns without each block and evaluate it on that block.
@@ -186,7 +211,7 @@ class Beside:
         coefficients, left = self._fit(columns, slice(-1, None))
         gram, length = self._part(columns, slice(-1, None))
         variance = np.diagonal(_solve(gram, np.eye(len(columns)), length)[0])
-        scale = max(float(left[0, 0]) / self.normal.rows, 1.0)
+        scale = max(float(left[0, 0]) / self.normal.made_of.columns[..., 0].size, 1.0)
         return coefficients[0, :, 0], np.asarray(np.sqrt(np.maximum(variance, 0.0) * scale))
 
     def subtracted(self, column: int, weight: Array) -> Array:
@@ -203,20 +228,26 @@ class Beside:
         array, shape (block, draw)
             Left of each block that the fit did not see.
         """
-        normal, base, power = self.normal, self.base, weight**2
-        grams, moments = self._channels
-        inner = np.einsum("c,bci->bi", power, normal.grams[:, :, base, column])
-        square = normal.squares - 2 * normal.moments[:, :, column] + normal.grams[:, :, column, column, None]
+        if (weight == 1.0).all():
+            own = self.own[:-1, column, column, None]
+            return np.asarray(self.before - 2 * self.own_moment[:-1, column] + own)
+        rows, base, power = self.normal.made_of, self.base, weight**2
+        taken = rows.columns[..., [column]]
+        weighed = power[:, None] * taken
+        known, grams, moments = self._by_channel
         gram = (power @ grams).reshape(-1, len(base), len(base))
-        moment = (power @ moments).reshape(-1, len(base), square.shape[2]) - inner[..., None]
-        weighed = Folds(gram[:, None], moment[:, None], (power @ square)[:, None], normal.rows, normal.prior[base])
-        return weighed.solve(np.arange(len(base)), len(base))[1]
+        moment = (power @ moments).reshape(len(gram), len(base), -1) - rows.products(known, weighed)
+        own = rows.products(weighed, taken) - 2 * rows.products(weighed, rows.right)
+        found = Folds(gram, moment, power @ rows.squares + own[:, 0], self.normal.prior[base], rows)
+        return found.solve(np.arange(len(base)), len(base))[1]
 
     @cached_property
-    def _channels(self) -> tuple[Array, Array]:
-        """Grams and moments of the base, flat behind the channel."""
-        grams, moments = self.normal.grams[:, :, self.base[:, None], self.base], self.normal.moments[:, :, self.base]
-        return grams.reshape(*grams.shape[:2], -1), moments.reshape(*moments.shape[:2], -1)
+    def _by_channel(self) -> tuple[Array, Array, Array]:
+        """Columns of the base; their grams and moments, flat behind the channel."""
+        rows = self.normal.made_of
+        known = rows.columns[..., self.base]
+        grams, moments = rows.by_channel(known, known), rows.by_channel(known, rows.right)
+        return known, grams.reshape(*grams.shape[:2], -1), moments.reshape(*moments.shape[:2], -1)
 
     def _fit(self, columns: IntArray, where: slice) -> tuple[Array, Array]:
         gram, length = self._part(columns, where)
@@ -243,16 +274,22 @@ def folds(columns: Array, right: Array, block: IntArray, prior: Array | None = N
     prior : array, shape (column,), or None
         None for nothing known.
     """
-    draws = right.reshape(*right.shape[:2], -1)
-    in_block = [block == b for b in range(int(block.max()) + 1)]
-    parts = [(columns[rows].swapaxes(0, 1), draws[rows].swapaxes(0, 1)) for rows in in_block]
+    parts = [_rows(block == number) for number in range(int(block.max()) + 1)]
+    rows = BlockRows(columns, right.reshape(*right.shape[:2], -1), parts)
     return Folds(
-        np.array([x.swapaxes(1, 2) @ x for x, _ in parts]),
-        np.array([x.swapaxes(1, 2) @ y for x, y in parts]),
-        np.array([(y**2).sum(axis=1) for _, y in parts]),
-        columns.shape[0] * columns.shape[1],
+        rows.products(columns, columns),
+        rows.products(columns, rows.right),
+        rows.squares.sum(axis=1),
         np.zeros(columns.shape[2]) if prior is None else prior,
+        rows,
     )
+
+
+def _rows(marked: BoolArray) -> slice | BoolArray:
+    """Say which rows are marked, as a slice where they are neighbours: nothing is copied then."""
+    rows = np.flatnonzero(marked)
+    neighbours = len(rows) > 0 and rows[-1] - rows[0] + 1 == len(rows)
+    return slice(rows[0], rows[-1] + 1) if neighbours else marked
 
 
 def blocks_of(flight_index: IntArray, centres: Array, block_s: float) -> IntArray:

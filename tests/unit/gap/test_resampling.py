@@ -89,13 +89,21 @@ def test_draws_are_right_sides_of_their_own():
         np.testing.assert_allclose(together[1][:, draw], alone[1][:, 0], rtol=1e-9)
 
 
-def test_a_subtracted_column_is_gone_from_the_right_side_and_channels_weigh_what_they_are_told():
-    columns, right, block = problem(4)
+@pytest.mark.parametrize("weight", [np.ones(6), np.array([1.0, 2.0, 0.5, 1.0, 1.0, 3.0])])
+@pytest.mark.parametrize("order", [np.arange(WINDOWS), np.arange(WINDOWS)[::-1] * 7 % WINDOWS])
+def test_a_subtracted_column_is_gone_from_the_right_side_and_channels_weigh_what_they_are_told(weight, order):
+    columns, right, block = problem(4, draws=3)
     columns[..., 1] *= 1e-3
-    kept, weight = np.array([0, 4]), np.array([1.0, 2.0, 0.5, 1.0, 1.0, 3.0])
+    # Of blocks whose windows stand one after another, and of others.
+    kept, block = np.array([0, 4]), block[order]
     found = folds(columns, right, block).beside(kept).subtracted(1, weight)
-    by_hand = weight[:, None] * columns[..., kept], weight * (right - columns[..., 1])
-    np.testing.assert_allclose(found, folds(*by_hand, block).solve(np.arange(2))[1], rtol=1e-9)
+    by_hand = weight[:, None] * columns[..., kept], weight[:, None] * (right - columns[..., [1]])
+    for b in range(BLOCKS):
+        seen, unseen = (tuple(each[rows] for each in by_hand) for rows in (block != b, block == b))
+        for draw in range(3):
+            expected = least_squares(seen[0], seen[1][..., draw])
+            left = unseen[1][..., draw] - unseen[0] @ expected
+            assert found[b, draw] == pytest.approx((left**2).sum())
 
 
 def test_a_column_that_a_fit_never_sees_gets_nothing():
