@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -279,7 +280,13 @@ class Kinematics:
         -------
         array, shape (window, 3), rad/s
         """
-        return np.asarray(np.einsum("wsai,wsi->wa", self.turning, self.gyro(self.time + delay)))
+        read = self.gyro(self.time + delay).reshape(len(self.time), -1)
+        return np.asarray(np.einsum("wak,wk->wa", self._turning_rows, read))
+
+    @cached_property
+    def _turning_rows(self) -> Array:
+        """Rows that a whole rate along the window is multiplied with, shape (window, 3, 3 sample)."""
+        return np.moveaxis(self.turning, 1, 2).reshape(len(self.turning), 3, -1)
 
     def products(self, delay: float, order: int = 0) -> Array:
         """Average each reading, put on each axis; the columns of a matrix on the gyroscope.
