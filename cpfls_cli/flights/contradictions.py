@@ -12,7 +12,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import RotorPlace, airframe_from_motion, disagreement_on_rotors
 from cpfls_cli.flightlog.quality import warn_of_disagreement
-from cpfls_cli.flights.recordings import ReadFlight, signals_of, stretch_of
+from cpfls_cli.flights.recordings import ReadFlight, doubts_on_voltage, signals_of, stretch_of
 from cpfls_cli.gap.balance.windows import FEWEST_WINDOWS, windows
 from cpfls_cli.gap.sensors.audit import gross_faults
 from cpfls_cli.gap.sensors.majority import settled
@@ -45,7 +45,8 @@ def contradictions_of(flight: ReadFlight, study: Study) -> tuple[str, ...]:
         signals, _ = signals_of(flight, flight.signals, study)
     except InputError:
         return ()
-    return (*beyond_belief(study.vehicle), *contradictions([signals], study.gap))
+    doubts = doubts_on_voltage(flight.signals, flight.units)
+    return (*beyond_belief(study.vehicle), *doubts, *contradictions([signals], study.gap))
 
 
 def beyond_belief(vehicle: VehicleSettings) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import (
     ReadFlight,
     all_known,
+    doubts_on_voltage,
     full_battery,
     in_volts,
     longest_known,
@@ -237,12 +238,13 @@ def flight_stretches(path: Path, study: Study) -> Stretches:
         read = rows(start, min(start + CHUNK, samples))
         known.append(all_known(read))
         time.append(read["time"])
-        voltage.append(read["voltage"] if volts and "voltage" in read else np.zeros(0))
+        voltage.append(read.get("voltage", np.zeros(0)))
     clock = np.concatenate(time)
     best, notes = longest_known(path.name, np.concatenate(known), clock)
-    full = float(np.max(np.concatenate(voltage)[best], initial=0.0))
-    if full:
-        notes = (*notes, full_battery(full))
+    battery = np.concatenate(voltage)[best]
+    full = float(np.max(battery, initial=0.0)) if volts else 0.0
+    doubts = doubts_on_voltage({"voltage": battery}, flight.units)
+    notes = (*notes, *doubts, *([full_battery(full)] if full and not doubts else []))
     overlap = round(_OVERLAP_S / max(float(np.median(np.diff(clock[best], append=np.inf))), 1e-6))
     return Stretches(path.name, rows, flight.units, best, overlap, full, (*flight.warnings, *notes), study)
 

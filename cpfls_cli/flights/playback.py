@@ -22,7 +22,14 @@ from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputErr
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flights.contradictions import beyond_belief, contradictions
 from cpfls_cli.flights.imported import imported
-from cpfls_cli.flights.recordings import ReadFlight, read_flight, read_import, signals_of, with_voltage
+from cpfls_cli.flights.recordings import (
+    ReadFlight,
+    doubts_on_voltage,
+    read_flight,
+    read_import,
+    signals_of,
+    with_voltage,
+)
 from cpfls_cli.flights.same_vehicle import read_of_vehicle, read_vehicle
 from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel
@@ -127,6 +134,7 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
         *flight.warnings,
         *made[0][1],
         *_warnings(flight, stretches, parts[0]),
+        *doubts_on_voltage(flight.signals, flight.units),
         *contradictions(parts, study.gap),
     ]
     usual: Hold = "linear" if actuation == "rotor_speed" else "previous"

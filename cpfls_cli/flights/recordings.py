@@ -28,6 +28,8 @@ from cpfls_cli.logs.formats import is_log
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
 _UNIFORM = 0.01
+# A charger fills a cell to a few percent more than is usual; a cell of 3 V that is taken for a share is more.
+_FULL = 1.5
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ def _units(study: Study) -> dict[str, str]:
 def _recording(flight: ReadFlight, study: Study) -> tuple[Recording, tuple[str, ...]]:
     known, warnings = _known_part(flight)
     signals, notes = signals_of(flight, known, study)
-    return Recording(flight.name, signals), (*warnings, *notes)
+    return Recording(flight.name, signals), (*warnings, *notes, *doubts_on_voltage(known, flight.units))
 
 
 def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> tuple[Signals, tuple[str, ...]]:
@@ -173,7 +175,7 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
         time=time,
         body_rate=rate,
         vehicle=study.vehicle,
-        voltage=known.get("voltage"),
+        voltage=None if doubts_on_voltage(known, flight.units) else known.get("voltage"),
         ground_height_m=study.gap.ground_height_m,
         **optional,
     )
@@ -258,6 +260,32 @@ def with_voltage(
         return list(recordings), ()
     scaled = [_share(r, max(full)) if volts else r for r, volts in zip(recordings, full, strict=True)]
     return scaled, (full_battery(max(full)),)
+
+
+def doubts_on_voltage(signals: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, ...]:
+    """Say why a voltage is that of no battery in flight, and is not used; nothing where it may be or is not known.
+
+    Parameters
+    ----------
+    signals : mapping of str to array
+        Of a flight.
+    units : mapping of str to str
+        Of its import.
+    """
+    known = signals.get("voltage", np.zeros(0))
+    known = known[np.isfinite(known)]
+    empty, most = int((known <= 0).sum()), float(known.max(initial=0.0))
+    if empty:
+        return (
+            f"voltage is 0 or less at {empty} of {len(known)} samples, so it is not used: drop these rows, or check "
+            "import.signals.voltage",
+        )
+    if not in_volts(units) and most > _FULL:
+        return (
+            f"voltage is up to {most:.3g} times that of a full battery, so it is not used: set "
+            "import.signals.voltage.unit to V if it is in V",
+        )
+    return ()
 
 
 def full_battery(volts: float) -> str:

@@ -1,6 +1,7 @@
 """A flight that stays in its file: whoever reads it must find the very file that was opened."""
 
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.flights import flight_source as sources
-from cpfls_cli.flights import recordings
+from cpfls_cli.flights import playback, recordings
+from cpfls_cli.flights.contradictions import contradictions_of
 
 SAMPLES = 30
 
@@ -69,7 +71,7 @@ def test_another_file_is_refused_with_path_and_remedy(source, change, said):
 PERIOD_S = 0.5
 
 
-def driven(path, *, unit="V"):
+def driven(path, *, unit="V", voltage=(12.5, 10.0)):
     """A flight with a battery that sags, of a log with body torque."""
     rng = np.random.default_rng(4)
     mapped = {"voltage": {"columns": ["u"], "unit": unit}, "body_torque": {"columns": ["a", "b", "c"], "unit": "N m"}}
@@ -77,8 +79,8 @@ def driven(path, *, unit="V"):
     study = validate(config, "own")
     header = Header("1", 1, resolved_yaml(study), {"log": InputFile("log.csv", "0" * 64, "CSV")})
     signals = {name: rng.normal(size=(90, 3)) for name in ("attitude", "body_rate", "body_torque")}
-    record = FlightRecord(header=header, time=PERIOD_S * np.arange(90), voltage=np.linspace(12.5, 10.0, 90), **signals)
-    write_record(path, record)
+    signals["voltage"] = np.linspace(*voltage, 90)
+    write_record(path, FlightRecord(header=header, time=PERIOD_S * np.arange(90), **signals))
     return path
 
 
@@ -100,8 +102,42 @@ def test_stretches_overlap_and_hold_all_of_a_flight_once(tmp_path, monkeypatch, 
 
 
 def test_a_voltage_that_is_a_share_stays_one(tmp_path):
-    (only,) = sources.flight_stretches(driven(tmp_path / "flight.h5", unit="1"), Study())
-    assert only.signals.voltage[0] == 12.5
+    (only,) = sources.flight_stretches(driven(tmp_path / "flight.h5", unit="1", voltage=(1.04, 0.8)), Study())
+    assert only.signals.voltage[0] == 1.04
+
+
+@pytest.mark.parametrize(
+    ("unit", "voltage", "said"),
+    [
+        ("V", (12.5, -0.3), "voltage is 0 or less at 3 of 90 samples, so it is not used: drop these rows, or check"),
+        ("1", (0.9, 0.0), "voltage is 0 or less at 1 of 90 samples"),
+        (
+            "1",
+            (12.5, 10.0),
+            r"12\.5 times that of a full battery, so it is not used: set import\.signals",
+        ),
+    ],
+)
+@pytest.mark.parametrize("read", [recordings.read_flights, playback.flights_to_play, sources.flight_stretches])
+def test_a_voltage_that_no_battery_has_is_not_used_and_said(tmp_path, unit, voltage, said, read):
+    path = driven(tmp_path / "flight.h5", unit=unit, voltage=voltage)
+    if read is recordings.read_flights:
+        found = read([path], Study())
+        parts, warnings = [each.signals for each in found.recordings], found.warnings
+    elif read is playback.flights_to_play:
+        (found,) = read([path], Study())
+        parts, warnings = found.parts, found.warnings
+    else:
+        found = read(path, Study())
+        parts, warnings = [each.signals for each in found], found.warnings
+    assert [part.voltage for part in parts] == [None] * len(parts)
+    assert len(re.findall(said, " ".join(warnings))) == 1
+    assert "taken for that of a full battery" not in " ".join(warnings)
+
+
+def test_an_import_says_what_is_wrong_with_a_voltage(tmp_path):
+    flight = recordings.read_flight(driven(tmp_path / "flight.h5", voltage=(12.5, 0.0)), Study())
+    assert "voltage is 0 or less at 1 of 90" in " ".join(contradictions_of(flight, Study()))
 
 
 def test_stretches_are_of_the_longest_part_in_which_all_is_known(tmp_path, monkeypatch):
