@@ -254,7 +254,7 @@ def still_runs(flight: PlaybackFlight, starts: IntArray, horizon: int, *, rate_s
     errors = np.empty((len(starts), horizon, 4, 3))
     for step in range(horizon):
         at = starts + step + 1
-        held = held @ turn
+        held = held @ turn if rate_stays else held
         gone = moves * (step + 1) * motion.period * velocity
         errors[:, step, 0] = motion.position[starts] + gone - motion.position[at]
         errors[:, step, 1] = velocity - motion.velocity[at]
@@ -286,7 +286,7 @@ def rotation_vectors(measured: Array, predicted: Array) -> Array:
         axis=-1,
     )
     sine: Array = np.sqrt((skew**2).sum(axis=-1))
-    cosine: Array = 0.5 * (np.trace(away, axis1=-2, axis2=-1) - 1.0)
+    cosine: Array = 0.5 * (away[..., 0, 0] + away[..., 1, 1] + away[..., 2, 2] - 1.0)
     angle = np.arctan2(sine, cosine)
     vector = skew * np.expand_dims(np.where(sine > _TINY, angle / np.maximum(sine, _TINY), 1.0), -1)
     # Half a turn: the axis does not show in the skew part, its length is all that is used.
