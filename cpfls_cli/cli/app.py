@@ -628,7 +628,7 @@ def verify_export(
         options = command.Options(
             form.value, 0.5 if horizon is None else horizon, windows, None if hold is None else hold.value
         )
-        tell(command.run(model, flight, options, force=common.force), common)
+        tell(command.run(model, flight, options, force=common.force, dry_run=common.dry_run), common)
 
 
 @app.command()

@@ -17,6 +17,7 @@ from cpfls_cli.flights.playback import flights_to_play, model_to_play
 from cpfls_cli.pages.export import verification_answer, verification_summary
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
 from cpfls_cli.playback.rotors import Hold
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome
 
 
@@ -42,13 +43,15 @@ class Options:
     hold: Hold | None = None
 
 
-def run(model: Path, flight: Path, options: Options, *, force: bool) -> Outcome:
+def run(model: Path, flight: Path, options: Options, *, force: bool, dry_run: bool) -> Outcome:
     """Export a model, fly it, and say how far it is from its own playback.
 
     Parameters
     ----------
     force : bool
         Take a model that nobody should use.
+    dry_run : bool
+        Check that both belong together, and fly nothing.
     """
     require_package(options.form)
     for path in (model, flight):
@@ -60,6 +63,9 @@ def run(model: Path, flight: Path, options: Options, *, force: bool) -> Outcome:
     to_play = model_to_play(model, study)
     (logged,) = flights_to_play([flight], study, options.hold)
     played = to_play.played(logged)
+    if dry_run:
+        line = Text(f"{model}: would be flown along {flight}, in {options.form}; model and flight are good")
+        return Outcome({"dry_run": True}, (line,))
     horizon = max(1, round(options.horizon_s / played.flight.motion.period))
     found = verified(
         options.form, made, _as_logged(model, logged), (played.flight, played.model), horizon, options.windows

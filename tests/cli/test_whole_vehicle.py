@@ -10,6 +10,7 @@ import pytest
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.prediction import PredictionRecord
 from cpfls_cli.artifacts.store import read_record, write_record
+from cpfls_cli.commands import verify_export
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import ModelEffect
@@ -338,7 +339,7 @@ def test_what_a_config_leaves_open_is_no_fact_for_another_model(refuse, open_con
     assert f"not known in this config, and `cpfls {command}` needs what is null there" in line
 
 
-def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy):
+def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy, monkeypatch):
     """By Gazebo's equations, which any machine has: what it holds it flies, and what differs is said."""
     result = cpfls("verify-export", vehicle, noisy, "--format", "sdf", "--windows", "3", "--horizon", "0.1", "--json")
     assert result.exit_code == 0, result.stderr
@@ -349,5 +350,9 @@ def test_an_exported_vehicle_is_flown_back(cpfls, refuse, vehicle, flight, noisy
     assert 0.001 < found["playback_error"]["body_rate"] < found["target_error"]["body_rate"]
     words = ("verify-export", vehicle, flight, "--format", "sdf", "--windows", "2", "--horizon", "0.05")
     assert "Gazebo's motor model flies what was exported: 2 runs of 0.05 s along flight.h5" in cpfls(*words).stdout
-    (line,) = refuse("verify-export", vehicle, flight.with_name("none.h5"), "--format", "sdf")
-    assert line == f"{flight.with_name('none.h5')}: no such file"
+    monkeypatch.setattr(verify_export, "verified", None)
+    checked = cpfls(*words, "--dry-run")
+    assert (checked.exit_code, checked.stdout.count("would be flown along")) == (0, 1)
+    for more in ([], ["--dry-run"]):
+        (line,) = refuse("verify-export", vehicle, flight.with_name("none.h5"), "--format", "sdf", *more)
+        assert line == f"{flight.with_name('none.h5')}: no such file"
