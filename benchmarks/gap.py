@@ -6,6 +6,7 @@ python benchmarks/gap.py
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
@@ -55,8 +56,10 @@ def main() -> None:
 
 def time(recordings: list[Recording], settings: GapSettings) -> float:
     """Time one diagnosis by its own processor time, half of the flights held out."""
+    # A flight keeps what was made of it; a copy has to make it all.
+    copies = [Recording(each.name, replace(each.signals)) for each in recordings]
     start = process_time()
-    diagnose(recordings[:3], recordings[3:], settings, np.random.default_rng(1))
+    diagnose(copies[:3], copies[3:], settings, np.random.default_rng(1))
     return process_time() - start
 
 
