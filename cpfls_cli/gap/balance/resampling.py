@@ -211,7 +211,7 @@ class Beside:
         coefficients, left = self._fit(columns, slice(-1, None))
         gram, length = self._part(columns, slice(-1, None))
         variance = np.diagonal(_solve(gram, np.eye(len(columns)), length)[0])
-        scale = max(float(left[0, 0]) / self.normal.made_of.columns[..., 0].size, 1.0)
+        scale = max(float(left[0, 0]) / self.normal.made_of.right[..., 0].size, 1.0)
         return coefficients[0, :, 0], np.asarray(np.sqrt(np.maximum(variance, 0.0) * scale))
 
     def subtracted(self, column: int, weight: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NamedTuple
@@ -29,7 +29,7 @@ CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
 
 
-CandidateKey = tuple[str, int, tuple[float, ...]]
+CandidateKey = tuple[Hashable, ...]
 
 
 class Candidate(NamedTuple):
@@ -40,8 +40,9 @@ class Candidate(NamedTuple):
 
     @property
     def key(self) -> CandidateKey:
-        """What its columns depend on: name and form of the effect, and its shape."""
-        return self.effect.name, len(self.effect.coefficients), tuple(self.shape.values())
+        """What its columns depend on: formula and form of the effect, which one name may have several of, and shape."""
+        effect = self.effect
+        return effect.name, effect.columns, len(effect.coefficients), tuple(self.shape.values())
 
 
 @dataclass(frozen=True, eq=False)

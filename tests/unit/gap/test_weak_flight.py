@@ -11,8 +11,9 @@ from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.weak_flight import actuated, columns_of, rotation_balance, translation_balance
+from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, rotation_balance, translation_balance
 from cpfls_cli.gap.balance.windows import windows
+from cpfls_cli.gap.naming.bends import bends_of
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.gap_flights import THROUGH, VEHICLE, candidate, effect_wrench, fly, sines, weak
@@ -53,6 +54,19 @@ def test_what_is_left_is_the_wrench_of_the_effects_and_their_rows():
     np.testing.assert_allclose(left, rows, atol=2e-4)
     np.testing.assert_allclose(left, THROUGH.average(effect_wrench(signals, EFFECTS)), atol=2e-4)
     assert np.abs(left).max(axis=0).min() > 0.01 or np.abs(left[:, 5]).max() < 1e-3
+
+
+def test_what_is_kept_of_a_flight_is_that_of_the_formula_that_was_asked_for():
+    """A bend over speed takes the usual one of all flights, and a flight may be judged beside some and then others."""
+    signals = fly(1, EFFECTS)
+    flight, faster = weak(signals, force=True), weak(replace(signals, velocity=3 * signals.velocity), force=True)
+    assert weak(signals, force=True) is flight
+    (alone,), (beside,) = (bends_of([candidate("rotor_drag")], each) for each in ([flight], [flight, faster]))
+    for bend in (alone, beside):
+        fresh = weak(replace(signals), force=True)
+        rows = [each.rows(Candidate(bend, {}), each.signals) for each in (flight, fresh)]
+        np.testing.assert_array_equal(*rows)
+        assert rows[0].any()
 
 
 def test_unknown_channels_are_zero():
