@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
+from unicodedata import category
 from xml.etree import ElementTree
 
 import numpy as np
@@ -303,9 +304,13 @@ def _show_as_written(figure: Figure) -> None:
         if written := text.get_text():
             # Invisible, but no font has to know of it.
             own = written.replace(NOT_FIRST, "")
-            shown = (each if each.isprintable() or each == "\n" else "\N{REPLACEMENT CHARACTER}" for each in own)
-            text.set_text("".join(shown))
+            text.set_text("".join(each if _is_shown(each) else "\N{REPLACEMENT CHARACTER}" for each in own))
             text.set_parse_math(False)
+
+
+def _is_shown(character: str) -> bool:
+    """Tell whether a character can be drawn; to Python no space is, but the one that all use."""
+    return character.isprintable() or character == "\n" or category(character) == "Zs"
 
 
 def _texts(artist: Artist) -> Iterator[Text]:

@@ -44,6 +44,14 @@ def test_a_figure_is_well_formed_named_and_carries_no_style_sheet():
     assert "a < b & c" in "".join(root.itertext())
 
 
+def test_a_unit_stays_on_one_line_and_what_cannot_be_drawn_is_marked():
+    def label(figure):
+        figure.subplots().set_xlabel("torque, N\N{NO-BREAK SPACE}m of a\x07b")
+
+    words = "".join(ElementTree.fromstring(plot("one", "", "what", 2.0, label).picture.svg).itertext())
+    assert "torque, N\N{NO-BREAK SPACE}m of a\N{REPLACEMENT CHARACTER}b" in words
+
+
 @pytest.mark.parametrize("over", [False, True])
 def test_names_in_a_figure_are_shown_as_they_are_written(over):
     """Neither as mathematics, which this would not even be, nor as one of matplotlib's own names, which are hidden."""
