@@ -22,10 +22,10 @@ from benchmarks.blind.cases import make
 from benchmarks.blind.generator import simulate_many
 from benchmarks.blind.measure import columns, disturb
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.weak_form.windows import Recording
 
 EFFECTS = ("com_offset", "rotor_drag")
 

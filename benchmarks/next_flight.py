@@ -30,7 +30,6 @@ from benchmarks.gap import vehicle_of
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, SettingError
-from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
 from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, planned_signals
@@ -38,12 +37,13 @@ from cpfls_cli.gap.next_flight.rivals import physical_values, questions_left, us
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, apart, beyond_numbers, gathered
-from cpfls_cli.gap.sensors.audit import Preparation
+from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.harmonics import HarmonicPath
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
+from cpfls_cli.weak_form.windows import Recording, common_windows
 
 SEEDS = (31, 47)
 # A load on a cable costs as much as the rest of the catalogue, and its swing is no look-alike of a gentle flight.

@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import f as fisher
 
+from cpfls_cli.consistency.audit import audit
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import weak_flight
-from cpfls_cli.gap.balance.windows import common_windows
 from cpfls_cli.gap.diagnose import considered
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.scoring import REFUSED, candidates_of, layout, normal_equations, score
-from cpfls_cli.gap.sensors.audit import audit
+from cpfls_cli.weak_form.windows import common_windows
 
 
 class Gain(NamedTuple):

@@ -27,12 +27,12 @@ from cpfls_cli.artifacts.gap_flights import (
 from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, group, record, rows_of
 
 if TYPE_CHECKING:
-    from cpfls_cli.gap.balance.windows import Recording
     from cpfls_cli.gap.before_after import BeforeAfter
     from cpfls_cli.gap.diagnose import DiagnosisRun
     from cpfls_cli.gap.extended import ExtendedModel
     from cpfls_cli.gap.naming.held_out import HeldOut
     from cpfls_cli.gap.naming.results import Alternative, Unexplained
+    from cpfls_cli.weak_form.windows import Recording
 
 KINDS = ("torque", "force")
 

@@ -16,9 +16,9 @@ from cpfls_cli.artifacts.spec import BODY, Format, Record, columns_of, dataset, 
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 
 if TYPE_CHECKING:
-    from cpfls_cli.gap.balance.windows import Recording
     from cpfls_cli.gap.compare import Disagreement, WorstChannel
     from cpfls_cli.gap.residual.dependence import Dependence
+    from cpfls_cli.weak_form.windows import Recording
 
 _SIGNIFICANT = 0.05
 """Probability of chance below which a gap follows a signal."""

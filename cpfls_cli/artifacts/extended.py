@@ -16,9 +16,9 @@ from cpfls_cli.artifacts.vehicle_model import VehicleGroup
 from cpfls_cli.inertia import six_parameters, symmetric
 
 if TYPE_CHECKING:
-    from cpfls_cli.gap.balance.windows import Recording
     from cpfls_cli.gap.extended import ExtendedModel, Refit
     from cpfls_cli.vehicle.settings import VehicleSettings
+    from cpfls_cli.weak_form.windows import Recording
 
 FUZZY_INERTIA = "inertia over attitude"
 """Part of an extended model that no table of polynomials holds."""

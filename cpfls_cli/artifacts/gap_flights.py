@@ -16,14 +16,14 @@ from cpfls_cli.inertia import six_parameters
 if TYPE_CHECKING:
     # Reading a record does not need the compiled kernels that evaluate a model.
     from cpfls_cli.config.study import Study
+    from cpfls_cli.consistency.audit import Audit
+    from cpfls_cli.consistency.faults import AuditFinding, FaultNumber
+    from cpfls_cli.consistency.repairs import ChannelRepair
     from cpfls_cli.effects.signals import Signals
-    from cpfls_cli.gap.balance.windows import Recording
     from cpfls_cli.gap.naming.results import NotExcited
-    from cpfls_cli.gap.sensors.audit import Audit
-    from cpfls_cli.gap.sensors.findings import AuditFinding, FaultNumber
-    from cpfls_cli.gap.sensors.repairs import ChannelRepair
     from cpfls_cli.identification.model import Model
     from cpfls_cli.vehicle.settings import VehicleSettings
+    from cpfls_cli.weak_form.windows import Recording
 
 RIGID_BODY = "rigid-body"
 """Kind of a base that is the rigid body of the vehicle."""
@@ -77,7 +77,7 @@ class AuditCoefficientGroup:
 
     def of_finding(self, finding: str) -> tuple[FaultNumber, ...]:
         """Rebuild the numbers of one fault."""
-        from cpfls_cli.gap.sensors.findings import FaultNumber
+        from cpfls_cli.consistency.faults import FaultNumber
 
         rows = [row for row in rows_of(self) if row.pop("finding") == finding]
         return tuple(FaultNumber(**{**row, "named": bool(row["named"])}) for row in rows)
@@ -102,7 +102,7 @@ class AuditRepairGroup:
 
     def repairs(self) -> tuple[ChannelRepair, ...]:
         """Rebuild the repairs."""
-        from cpfls_cli.gap.sensors.repairs import ChannelRepair
+        from cpfls_cli.consistency.repairs import ChannelRepair
 
         rows = rows_of(self)
         for row in rows:
@@ -146,7 +146,7 @@ class AuditGroup:
 
     def audit(self) -> Audit:
         """Rebuild the audit, as far as repairs need it."""
-        from cpfls_cli.gap.sensors.audit import Audit
+        from cpfls_cli.consistency.audit import Audit
 
         repairs = () if self.repair is None else self.repair.repairs()
         return Audit(self.findings, self.untested_because, self.warning, self.note, None, (), None, repairs)
@@ -154,7 +154,7 @@ class AuditGroup:
     @property
     def findings(self) -> tuple[AuditFinding, ...]:
         """Faults that were tested."""
-        from cpfls_cli.gap.sensors.findings import AuditFinding
+        from cpfls_cli.consistency.faults import AuditFinding
 
         columns = zip(self.finding, self.p_value.tolist(), self.named, self.sentence, strict=True)
         return tuple(
@@ -437,7 +437,7 @@ class FlightsGroup:
 
     def recordings(self, study: Study, *roles: str) -> list[Recording]:
         """Rebuild the flights in these roles; all if none is named."""
-        from cpfls_cli.gap.balance.windows import Recording
+        from cpfls_cli.weak_form.windows import Recording
 
         each = self.each
         last = [*each.first[1:], len(self.signals.time)]

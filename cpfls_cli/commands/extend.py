@@ -13,13 +13,13 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle
-from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.playback import errors_by_horizon, played_pairs
 from cpfls_cli.pages.extended import answer, warnings
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.weak_form.windows import Recording
 
 _EXTENDS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 

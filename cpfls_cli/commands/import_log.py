@@ -8,9 +8,8 @@ from typing import Any
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.flightlog.results import ImportReport
-from cpfls_cli.flights.contradictions import contradictions_of
 from cpfls_cli.flights.imported import imported, log_findings
-from cpfls_cli.flights.recordings import read_import
+from cpfls_cli.flights.recordings import contradictions_of, read_import
 from cpfls_cli.pages.flight import answer, import_blocks, missing_signals
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.report.outcome import Outcome, nothing_written

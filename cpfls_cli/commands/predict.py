@@ -28,7 +28,6 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight_source import Stretch, Stretches, flight_source, flight_stretches
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_of_vehicle, read_vehicle
-from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel, inertial_force
 from cpfls_cli.gap.whole_vehicle import of_vehicle, with_effects
 from cpfls_cli.identification.data import TorqueSource
@@ -39,6 +38,7 @@ from cpfls_cli.pages.prediction import answer
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
+from cpfls_cli.weak_form.windows import Recording
 
 if TYPE_CHECKING:
     from cpfls_cli.validation.bootstrap import Draws

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -259,6 +259,13 @@ class Signals:
         changed.__dict__.update({name: getattr(self, name) for name in _OF_MOTION if name in self.__dict__})
         changed.__dict__["of_motion"] = self.of_motion
         return changed
+
+
+def stretch_of(signals: Signals, part: slice) -> Signals:
+    """Take a part of a flight, with its clock."""
+    values: dict[str, Any] = {field.name: getattr(signals, field.name) for field in fields(signals)}
+    cut: dict[str, Any] = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
+    return replace(signals, **cut)
 
 
 def fused(values: Array, rate: Array | None, period: float) -> Array:

@@ -17,10 +17,10 @@ from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
+from cpfls_cli.consistency.check import beyond_belief, contradictions
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
-from cpfls_cli.flights.contradictions import beyond_belief, contradictions
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import (
     ReadFlight,
@@ -31,7 +31,6 @@ from cpfls_cli.flights.recordings import (
     with_voltage,
 )
 from cpfls_cli.flights.same_vehicle import read_of_vehicle, read_vehicle
-from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.playback import extended_player
 from cpfls_cli.logs.formats import is_log
@@ -40,6 +39,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.replay import Played, Player, player_of
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.vehicle.rotors import require_control
+from cpfls_cli.weak_form.windows import Recording
 
 _STATE = ("body_rate", "attitude", "velocity", "position")
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +16,16 @@ from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.consistency.check import beyond_belief, contradictions
+from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flights.imported import commanded_speed, imported, log_findings
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
-from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import is_log
+from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
 _UNIFORM = 0.01
@@ -288,6 +289,16 @@ def doubts_on_voltage(signals: Mapping[str, Array], units: Mapping[str, str]) ->
     return ()
 
 
+def contradictions_of(flight: ReadFlight, study: Study) -> tuple[str, ...]:
+    """Say what of an imported flight or its vehicle cannot be; nothing of a flight that nothing drives."""
+    try:
+        signals, _ = signals_of(flight, flight.signals, study)
+    except InputError:
+        return ()
+    doubts = doubts_on_voltage(flight.signals, flight.units)
+    return (*beyond_belief(study.vehicle), *doubts, *contradictions([signals], study.gap))
+
+
 def full_battery(volts: float) -> str:
     """Say which voltage is taken for that of a full battery."""
     return f"voltage: the largest of these flights, {volts:.3g} V, is taken for that of a full battery"
@@ -373,13 +384,6 @@ def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
             f"FLIGHT: {error}"
         ) from None
     return FlightSplit((training,), (last,), f"there is one flight only, so it was held out in time: {last.name}")
-
-
-def stretch_of(signals: Signals, part: slice) -> Signals:
-    """Take a part of a flight, with its clock."""
-    values: dict[str, Any] = {field.name: getattr(signals, field.name) for field in fields(signals)}
-    cut: dict[str, Any] = {name: value[part] for name, value in values.items() if isinstance(value, np.ndarray)}
-    return replace(signals, **cut)
 
 
 def _names(flights: Sequence[Recording]) -> str:

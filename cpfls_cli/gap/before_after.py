@@ -9,13 +9,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
-from cpfls_cli.gap.balance.windows import Recording, Windows, common_windows
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.playback import PlayedPair, WorstStretch, errors_by_horizon, played_pairs, worst_stretch
 from cpfls_cli.gap.residual.views import Stretch, Whiteness, stretches, whiteness
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.replay import Replay
+from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 
 _SHORTEST_S = 4.0
 _PER_WINDOW = 16

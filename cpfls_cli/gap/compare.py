@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight, weak_flight
-from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.leftover import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
@@ -19,9 +19,9 @@ from cpfls_cli.gap.naming.results import NotExcited
 from cpfls_cli.gap.playback import PlayedPair, errors_by_horizon, played_pairs
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
 from cpfls_cli.gap.residual.views import HeatMap, Stretch, heat_map, stretches
-from cpfls_cli.gap.sensors.audit import Audit, audit
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.replay import Replay
+from cpfls_cli.weak_form.windows import Recording, common_windows
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
-from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
 from cpfls_cli.gap.naming.causes import JudgedEffect, impossible, judge_effect, sensor_fault, shares, wrong_numbers
 from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
@@ -24,8 +24,9 @@ from cpfls_cli.gap.naming.leftover import Leftover, beside_the_unnamed, not_exci
 from cpfls_cli.gap.naming.ranking import SearchStep, rank_effects
 from cpfls_cli.gap.naming.results import Diagnosis, GapVerdict, NamedEffect, gap_stays, matters, verdict_of
 from cpfls_cli.gap.naming.search import forward_selection
-from cpfls_cli.gap.sensors.audit import Audit, Preparation, audit
+from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _EXCITED_FLOORS = 3.0
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, inertia_tensor
 from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
@@ -29,14 +30,14 @@ from cpfls_cli.gap.balance.weak_flight import (
     rotation_balance,
     translation_balance,
 )
-from cpfls_cli.gap.balance.windows import Recording, common_windows
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, weighted_estimates
 from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NamedEffect
-from cpfls_cli.gap.sensors.audit import Audit, Preparation
+from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.regressor.regressor import InertiaValues
+from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _TOUCHED = 0.2
 """Root mean square in floors by which effects and refit move a channel, from which on it has to get better."""

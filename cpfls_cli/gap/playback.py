@@ -19,7 +19,6 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import is_free
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of
-from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.extended import Corrected, ExtendedModel, FittedEffect, instantaneous
 from cpfls_cli.playback.flight import PlaybackFlight, playback_flight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel, body_of, lever_weights, rotor_weights
@@ -39,6 +38,7 @@ from cpfls_cli.playback.replay import (
 )
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import Recording
 
 _EVERY = 5
 _STRETCH_S, _RUN_S, _LEFT_S = 2.0, 1.0, 0.5

@@ -8,9 +8,9 @@ from cpfls_cli import rotations
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import Candidate, weak_flight
-from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import windows
 
 PERIOD = 0.01
 # Rotors of four times the drag: those of the paper can hardly turn the vehicle in yaw.

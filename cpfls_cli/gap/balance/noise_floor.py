@@ -7,12 +7,11 @@ from functools import lru_cache
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.consistency.channels import known_up_to
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals
-from cpfls_cli.flightlog.repair import SignalTable
-from cpfls_cli.gap.balance.windows import Windows
-from cpfls_cli.gap.balance.windows import windows as make_windows
+from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.weak_form.windows import windows as make_windows
 
 _FREQUENCIES = 16
 _LONGER = 2
@@ -21,7 +20,6 @@ _HIGHEST_OF_RATE = 0.4
 # Share of a cut-off up to which even gentle filters pass nearly all, and the band that a fit needs.
 _PASSED = 0.6
 _BAND = 1.5
-_FILTERED = ("attitude", "body_rate", "velocity", "acceleration", "specific_force", "rotor_speed")
 _CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)
 _CLEARLY_BETTER = 1.5
 _PADDED = 8
@@ -56,24 +54,6 @@ def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = Non
         channels = np.flatnonzero(limit == edge)
         floor[channels] = _below(residual, windows, float(edge))[channels]
     return floor
-
-
-def known_up_to(signals: Signals) -> dict[str, float]:
-    """Find the cut-offs of the low-pass filters that the signals of a flight went through before they were logged.
-
-    Returns
-    -------
-    dict from field of `Signals` to float, Hz
-        Signals without a cliff in their spectrum, and those that are updated slower than the clock, are left out.
-    """
-    return signals.once(known_up_to, lambda: _known_up_to(signals))
-
-
-def _known_up_to(signals: Signals) -> dict[str, float]:
-    logged = {name: values for name in _FILTERED if (values := getattr(signals, name)) is not None}
-    if "body_rate" not in signals.available:
-        del logged["body_rate"]
-    return cut_offs(logged, 1 / signals.period, slow_signals(SignalTable(signals.time, logged)))
 
 
 def channel_cut_offs(signals: Signals, euler: bool) -> Array:

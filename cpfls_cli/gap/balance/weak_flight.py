@@ -18,7 +18,7 @@ from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
-from cpfls_cli.gap.balance.windows import Windows
+from cpfls_cli.weak_form.windows import Windows
 
 _AXES = ("x", "y", "z")
 

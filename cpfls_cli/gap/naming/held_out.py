@@ -12,10 +12,10 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, floors, scatter_variance, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
-from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.naming.results import GapSize
-from cpfls_cli.gap.sensors.audit import Preparation
+from cpfls_cli.gap.preparation import Preparation
 from cpfls_cli.gap.settings import CLEAR
+from cpfls_cli.weak_form.windows import Recording
 
 _MARGIN = 1.25
 """Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""

@@ -11,7 +11,6 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import fit
-from cpfls_cli.gap.balance.resampling import blocks_of, mirror_shifted
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.scoring import (
     Scored,
@@ -21,6 +20,7 @@ from cpfls_cli.gap.naming.scoring import (
     score,
 )
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
 NEAR = 0.6
 """Share of what the best one explains from which on another one is compared with it."""

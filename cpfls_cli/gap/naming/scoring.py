@@ -13,9 +13,9 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.refine import compensation, fit, free_shapes, shape_columns
-from cpfls_cli.gap.balance.resampling import Beside, Folds, folds
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.resampling import Beside, Folds, folds
 
 REFUSED = -np.inf
 _ERRORS = 2.0

@@ -14,7 +14,6 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import floors, system
 from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
-from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.next_flight.rivals import physical_values
 from cpfls_cli.gap.next_flight.room import Room, squared_speeds
 from cpfls_cli.gap.next_flight.separation import SizedEffect
@@ -24,6 +23,7 @@ from cpfls_cli.simulation.model import SimulatedModel, simulated_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import windows
 
 _BATTERY_USE = 0.2
 """Share of its voltage that the battery loses over the flight."""

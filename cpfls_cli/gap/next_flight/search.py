@@ -10,11 +10,11 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
-from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.next_flight.logged import Logging, planned_signals
 from cpfls_cli.gap.next_flight.room import Room
 from cpfls_cli.gap.next_flight.separation import Evidence, Judgement, Question, gathered, judged, shared_noise
 from cpfls_cli.trajectory.harmonics import HarmonicPath
+from cpfls_cli.weak_form.windows import windows
 
 _FIRST_STEP, _SMALLEST_STEP = 0.3, 0.02
 _LONGER, _SHORTER = 1.5, 0.9

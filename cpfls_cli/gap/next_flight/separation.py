@@ -12,9 +12,9 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, nuisance
-from cpfls_cli.gap.balance.windows import Windows
 from cpfls_cli.gap.naming.ranking import least_gain, least_margin
 from cpfls_cli.gap.naming.scoring import candidates_of
+from cpfls_cli.weak_form.windows import Windows
 
 SURE = 0.975
 """Probability from which a flight is said to settle a question."""

@@ -10,8 +10,8 @@ from numpy.polynomial import chebyshev
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.resampling import about_flight_mean, folds, mirror_shifted
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 
 _DEGREE = 4
 _HARMONICS = (1, 2, 3)

@@ -11,8 +11,8 @@ from scipy.ndimage import binary_closing, find_objects, label, uniform_filter1d
 from scipy.special import chdtrc
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.gap.balance.resampling import about_flight_mean
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.weak_form.resampling import about_flight_mean
 
 _AVERAGED_WINDOWS = 5
 _OUTSTANDING_SHARE = 0.1

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cpfls_cli.config.load import load_study
-from cpfls_cli.flights.contradictions import contradictions
+from cpfls_cli.consistency.check import contradictions
 from cpfls_cli.flights.playback import flights_to_play
 from tests.builders.command_line import run
 from tests.builders.recorded_flights import path_of_log

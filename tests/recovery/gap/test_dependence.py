@@ -8,11 +8,11 @@ from scipy.ndimage import gaussian_filter1d
 
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.resampling import blocks_of
 from cpfls_cli.gap.balance.weak_flight import weak_flight
-from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.resampling import blocks_of
+from cpfls_cli.weak_form.windows import windows
 
 VEHICLE = VehicleSettings()
 TENSOR = inertia_tensor(VEHICLE)

@@ -7,9 +7,9 @@ from scipy.signal import lfilter
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
-from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.residual.narrow_band import narrow_band
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import windows
 
 VEHICLE = VehicleSettings()
 TENSOR = inertia_tensor(VEHICLE)

@@ -11,8 +11,8 @@ from scipy.signal import butter, filtfilt, lfilter
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, known_up_to, modulated, noise_floor
-from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import windows
 
 PERIOD, SAMPLES = 0.01, 6000
 THROUGH = windows(PERIOD, 0.4, 0.5)

@@ -16,7 +16,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.flights import flight_source as sources
 from cpfls_cli.flights import playback, recordings
-from cpfls_cli.flights.contradictions import contradictions_of
+from cpfls_cli.flights.recordings import contradictions_of
 
 SAMPLES = 30
 

@@ -10,13 +10,13 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.balance.windows import Recording
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, extend, plain
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import Recording
 
 VEHICLE = VehicleSettings()
 INERTIA = np.array([0.6, 0.6, 1.2])

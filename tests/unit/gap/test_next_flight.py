@@ -7,7 +7,6 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError, InputError, SettingError
-from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
 from cpfls_cli.gap.next_flight.rivals import (
@@ -33,6 +32,7 @@ from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.harmonics import HarmonicPath
 from cpfls_cli.trajectory.limits import LimitSettings
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
+from cpfls_cli.weak_form.windows import windows
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
 FLOOR = np.array([0.02, 0.02, 0.02, 0.1, 0.1, 0.1])

@@ -5,8 +5,8 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binned_statistic_2d, kstest
 
-from cpfls_cli.gap.balance.windows import windows
 from cpfls_cli.gap.residual.views import heat_map, stretches, whiteness
+from cpfls_cli.weak_form.windows import windows
 
 HOP = 0.2
 CENTRES = np.tile(0.3 + HOP * np.arange(200), 2)

@@ -5,12 +5,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from cpfls_cli.consistency import audit as audit_module
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.hooks import Actuation, FaultFit, ReadingError, RotorMotion, SensorLog, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.windows import windows
-from cpfls_cli.gap.sensors import audit as audit_module
 from cpfls_cli.simulation import model
+from cpfls_cli.weak_form.windows import windows
 from tests.builders.closed_loop_flights import PERIOD, flown, signals_of
 
 

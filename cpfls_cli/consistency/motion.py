@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.consistency.channels import AXES, SAME, frame_warnings
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.resampling import blocks_of
-from cpfls_cli.gap.balance.windows import Windows
-from cpfls_cli.gap.sensors.channels import AXES, SAME, frame_warnings
+from cpfls_cli.weak_form.resampling import blocks_of
+from cpfls_cli.weak_form.windows import Windows
 
 _SCALE_OFF = 0.2
 _GRAVITY_OFF_M_S2 = 3.0

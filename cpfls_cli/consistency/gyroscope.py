@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.hooks import FaultFit
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.resampling import blocks_of, folds
-from cpfls_cli.gap.balance.windows import Windows
+from cpfls_cli.weak_form.resampling import blocks_of, folds
+from cpfls_cli.weak_form.windows import Windows
 
 FEWEST_BLOCKS = 7
 """Blocks below which a jackknife says too little about significance of one in a thousand."""

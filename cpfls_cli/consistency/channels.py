@@ -9,8 +9,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals
+from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.stretches import clipped
-from cpfls_cli.gap.balance.noise_floor import known_up_to
 
 # No gyroscope of a multirotor has its limit lower; a common smallest range is 125 deg/s.
 _LOWEST_LIMIT_RAD_S = 1.0
@@ -107,6 +108,24 @@ def frame_warnings(name: str, first: Array, second: Array, floor: float) -> list
         elif abs(same) < _OTHER and alike[axis]:
             sentences.append(f"{name} do not belong together along {AXES[axis]}: their correlation is {same:.2f}")
     return [f"{sentence[0].upper()}{sentence[1:]}." for sentence in sentences]
+
+
+def known_up_to(signals: Signals) -> dict[str, float]:
+    """Find the cut-offs of the low-pass filters that the signals of a flight went through before they were logged.
+
+    Returns
+    -------
+    dict from field of `Signals` to float, Hz
+        Signals without a cliff in their spectrum, and those that are updated slower than the clock, are left out.
+    """
+    return signals.once(known_up_to, lambda: _known_up_to(signals))
+
+
+def _known_up_to(signals: Signals) -> dict[str, float]:
+    logged = {name: values for name in _CHANNEL_WORDS if (values := getattr(signals, name)) is not None}
+    if "body_rate" not in signals.available:
+        del logged["body_rate"]
+    return cut_offs(logged, 1 / signals.period, slow_signals(SignalTable(signals.time, logged)))
 
 
 def filter_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:

@@ -11,20 +11,17 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.consistency.channels import channel_warnings, filter_warnings, frame_warnings
+from cpfls_cli.consistency.clocks import ActuationDelay, actuation_delay, attitude_on_clock, rotors_on_clock
+from cpfls_cli.consistency.faults import AuditFinding, CheckedFault, findings
+from cpfls_cli.consistency.gyroscope import GyroFit, fit_gyro, kinematics, scan
+from cpfls_cli.consistency.majority import settled
+from cpfls_cli.consistency.motion import ChannelMatch
+from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.effects.hooks import FaultFit, ReadingError, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
-from cpfls_cli.gap.balance.windows import Recording, Windows
-from cpfls_cli.gap.sensors.channels import channel_warnings, filter_warnings, frame_warnings
-from cpfls_cli.gap.sensors.clocks import ActuationDelay, actuation_delay, attitude_on_clock, rotors_on_clock
-from cpfls_cli.gap.sensors.findings import AuditFinding, CheckedFault, findings
-from cpfls_cli.gap.sensors.gyro import GyroFit, fit_gyro, kinematics, scan
-from cpfls_cli.gap.sensors.majority import settled
-from cpfls_cli.gap.sensors.motion import ChannelMatch
-from cpfls_cli.gap.sensors.repairs import ChannelRepair, shifted
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.weak_form.windows import Windows
 
 # Agreement that no independent attitude reaches, rad/s in a window; every fault of practical size is larger.
 _ROUNDING = 1e-4
@@ -285,34 +282,3 @@ def _gyro_notes(fit: GyroFit) -> tuple[str, ...]:
         square = np.abs(fit.value[9:12])[cross].max()
         notes.append(f"The axes of gyroscope or attitude are not square to each other, by {square:.3f}.")
     return tuple(notes)
-
-
-@dataclass(frozen=True)
-class Preparation:
-    """Windows, model, settings and sensor repair that all flights of a diagnosis share.
-
-    Attributes
-    ----------
-    windows : Windows
-    model : InertiaModel or None
-        None for the rigid body of the vehicle.
-    settings : GapSettings
-    audit : Audit
-        Faults that are repaired.
-    """
-
-    windows: Windows
-    model: InertiaModel | None
-    settings: GapSettings
-    audit: Audit
-
-    def logged(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
-        """Prepare flights with the faults of their sensors, but with channels that belong together."""
-        return [self._weak(recording.name, self.audit.consistent(recording.signals)) for recording in recordings]
-
-    def repaired(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
-        """Prepare flights with the named faults of their sensors repaired."""
-        return [self._weak(recording.name, self.audit.repaired(recording.signals)) for recording in recordings]
-
-    def _weak(self, name: str, signals: Signals) -> WeakFlight:
-        return weak_flight(name, signals, self.windows, self.model, self.settings.force, self.settings.axes)

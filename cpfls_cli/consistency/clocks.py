@@ -9,12 +9,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.alignment import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
-from cpfls_cli.gap.balance.windows import Windows
-from cpfls_cli.gap.sensors.repairs import ChannelRepair, shifted
+from cpfls_cli.weak_form.windows import Windows
 
 _LONGEST_S = 0.1
 _STEPS = 41

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.gap.balance.windows import windows
-from cpfls_cli.gap.sensors.audit import audit
+from cpfls_cli.consistency.audit import audit
 from cpfls_cli.vehicle.rotors import body_wrench
+from cpfls_cli.weak_form.windows import windows
 from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight
 
 WINDOWS = windows(0.01, 0.4, 0.5)

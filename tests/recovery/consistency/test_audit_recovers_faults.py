@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.gap.balance.windows import windows
-from cpfls_cli.gap.sensors.audit import audit
+from cpfls_cli.consistency.audit import audit
+from cpfls_cli.weak_form.windows import windows
 from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight, faulty_flights
 
 WINDOWS = windows(0.01, 0.4, 0.5)

@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.resampling import blocks_of, folds
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import scoring
 from cpfls_cli.gap.naming.scoring import PlacedCandidate
+from cpfls_cli.weak_form.resampling import blocks_of, folds
 
 WINDOWS, CHANNELS, COLUMNS, BLOCKS = 60, 6, 5, 4
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.flights.contradictions import beyond_belief, contradictions
+from cpfls_cli.consistency.check import beyond_belief, contradictions
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -12,7 +13,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.settings import GapSettings
 
 _FEWEST_SAMPLES = 8
 FEWEST_WINDOWS = 16
@@ -137,7 +137,19 @@ class Recording:
     signals: Signals
 
 
-def common_windows(recordings: Sequence[Recording], settings: GapSettings) -> Windows:
+class WindowSettings(Protocol):
+    """Length of windows in s, and the share that neighbours have in common."""
+
+    @property
+    def window_s(self) -> float:
+        """Length, s."""
+
+    @property
+    def overlap(self) -> float:
+        """Share that neighbours have in common."""
+
+
+def common_windows(recordings: Sequence[Recording], settings: WindowSettings) -> Windows:
     """Make the windows that all flights share.
 
     Raises

@@ -7,19 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpfls_cli.config.study import Study
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.consistency.audit import gross_faults
+from cpfls_cli.consistency.majority import settled
+from cpfls_cli.consistency.motion import PairCheck, by_thrust
+from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import RotorPlace, airframe_from_motion, disagreement_on_rotors
 from cpfls_cli.flightlog.quality import warn_of_disagreement
-from cpfls_cli.flights.recordings import ReadFlight, doubts_on_voltage, signals_of, stretch_of
-from cpfls_cli.gap.balance.windows import FEWEST_WINDOWS, windows
-from cpfls_cli.gap.sensors.audit import gross_faults
-from cpfls_cli.gap.sensors.majority import settled
-from cpfls_cli.gap.sensors.motion import PairCheck, by_thrust
-from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, WindowSettings, windows
 
 # A wrong unit or a slipped digit is farther from the weight.
 _THRUST_TO_WEIGHT = 5.0
@@ -37,16 +34,6 @@ _OF_THRUST = (
 _TOO_WIDE = 5.0
 _ENOUGH = 50_000
 """Samples that tell units, axes and which rotor is where."""
-
-
-def contradictions_of(flight: ReadFlight, study: Study) -> tuple[str, ...]:
-    """Say what of an imported flight or its vehicle cannot be; nothing of a flight that nothing drives."""
-    try:
-        signals, _ = signals_of(flight, flight.signals, study)
-    except InputError:
-        return ()
-    doubts = doubts_on_voltage(flight.signals, flight.units)
-    return (*beyond_belief(study.vehicle), *doubts, *contradictions([signals], study.gap))
 
 
 def beyond_belief(vehicle: VehicleSettings) -> tuple[str, ...]:
@@ -67,7 +54,7 @@ def beyond_belief(vehicle: VehicleSettings) -> tuple[str, ...]:
     )
 
 
-def contradictions(parts: Sequence[Signals], settings: GapSettings) -> tuple[str, ...]:
+def contradictions(parts: Sequence[Signals], settings: WindowSettings) -> tuple[str, ...]:
     """Hold the channels of a flight against each other and against its vehicle; nothing is set right.
 
     Parameters
@@ -98,7 +85,7 @@ def _middle(parts: Sequence[Signals]) -> list[Signals]:
     return [stretch_of(longest, slice(first, first + _ENOUGH))]
 
 
-def _found(parts: Sequence[Signals], settings: GapSettings) -> Iterator[str]:
+def _found(parts: Sequence[Signals], settings: WindowSettings) -> Iterator[str]:
     yield from _too_fast(parts)
     about_thrust = _of_thrust(parts)
     if about_thrust:

@@ -10,12 +10,12 @@ from itertools import product
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.consistency.channels import AXES
+from cpfls_cli.consistency.motion import NAMES, PairCheck, by_thrust, checked
+from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
-from cpfls_cli.gap.balance.windows import FEWEST_WINDOWS, Windows
-from cpfls_cli.gap.sensors.channels import AXES
-from cpfls_cli.gap.sensors.motion import NAMES, PairCheck, by_thrust, checked
-from cpfls_cli.gap.sensors.repairs import ChannelRepair, is_derived
+from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows
 
 _ROUNDS = 3
 _PARTS, _SIGMAS = 16, 4.0

@@ -8,10 +8,10 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt, lfilter
 
 from cpfls_cli.artifacts.gap_flights import AuditGroup
-from cpfls_cli.gap.balance.windows import Recording, windows
+from cpfls_cli.consistency.audit import audit
 from cpfls_cli.gap.diagnose import diagnose
-from cpfls_cli.gap.sensors.audit import audit
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.weak_form.windows import Recording, windows
 from tests.builders.closed_loop_flights import PERIOD, flown, signals_of
 
 WINDOWS = windows(PERIOD, 0.4, 0.5)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from cpfls_cli.consistency.faults import CheckedFault, findings
+from cpfls_cli.consistency.gyroscope import GyroFit
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.sensors.findings import CheckedFault, findings
-from cpfls_cli.gap.sensors.gyro import GyroFit
 
 NAMES = ("gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay")
 

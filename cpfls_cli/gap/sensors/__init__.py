@@ -1,1 +1,0 @@
-"""Checks of the sensors of a flight against each other, without any torque."""
