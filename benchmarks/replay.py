@@ -30,7 +30,8 @@ from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.model import VehicleModel, remainder_terms
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.parameters import LEARNED, Layout, blocks_of
-from cpfls_cli.playback.replay import Played, Player, free_runs, player_of, replay, rotation_vectors
+from cpfls_cli.playback.player import Player, free_runs, player_of, rotation_vectors
+from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.rotations import turns
 from tests.builders.playback_flights import KINDS, MIDDLING, STATED, flown, truth
 

@@ -32,7 +32,7 @@ from cpfls_cli.export.vehicle_forms import vehicle_c, vehicle_python
 from cpfls_cli.export.verify import verified
 from cpfls_cli.flights.playback import flights_to_play
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.replay import player_of
+from cpfls_cli.playback.player import player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.playback_flights import MIDDLING, ROTORPY, ROTORPY_HIDDEN, flown, rotorpy_flight, truth

@@ -10,7 +10,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Motion
 from cpfls_cli.playback.motion import State
-from cpfls_cli.playback.replay import rotation_vectors
+from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.playback.rotors import RotorResponse, rotor_terms_at_samples
 
 
@@ -76,7 +76,7 @@ class Course:
         return replace(self.flight, motion=own, speed=_finer_speed(self.flight, finer), stretches=stretches)
 
     def errors(self, states: State) -> Array:
-        """Compare runs with what was measured, as `cpfls_cli.playback.replay.Runs` does.
+        """Compare runs with what was measured, as `cpfls_cli.playback.player.Runs` does.
 
         Parameters
         ----------

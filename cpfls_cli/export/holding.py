@@ -16,7 +16,7 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Body, Motion
 from cpfls_cli.playback.model import Remainder, VehicleModel
-from cpfls_cli.playback.replay import Player, apart, free_runs, player_of, rotor_terms_along
+from cpfls_cli.playback.player import Player, apart, free_runs, player_of, rotor_terms_along
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rotations import rotation_matrix
 

@@ -14,7 +14,7 @@ from cpfls_cli.export.course import Course
 from cpfls_cli.export.holding import Held
 from cpfls_cli.export.registry import TARGETS, Exported
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.replay import Player, free_runs, in_the_air
+from cpfls_cli.playback.player import Player, free_runs, in_the_air
 
 AGREES = 1e-6
 """Largest distance in SI at which the equations of a target are those that were exported."""

@@ -36,7 +36,8 @@ from cpfls_cli.gap.playback import extended_player
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.replay import Played, Player, player_of
+from cpfls_cli.playback.player import Player, player_of
+from cpfls_cli.playback.replay import Played
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.vehicle.rotors import require_control
 from cpfls_cli.weak_form.windows import Recording

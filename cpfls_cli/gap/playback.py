@@ -22,20 +22,8 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of
 from cpfls_cli.gap.extended import Corrected, ExtendedModel, FittedEffect, instantaneous
 from cpfls_cli.playback.flight import PlaybackFlight, playback_flight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel, body_of, lever_weights, rotor_weights
-from cpfls_cli.playback.replay import (
-    MODEL,
-    STATED,
-    Played,
-    Player,
-    Replay,
-    Runs,
-    apart,
-    drawn_runs,
-    free_runs,
-    replay,
-    rotor_terms_along,
-    stated_along,
-)
+from cpfls_cli.playback.player import Player, Runs, apart, free_runs, rotor_terms_along, stated_along
+from cpfls_cli.playback.replay import MODEL, STATED, Played, Replay, drawn_runs, replay
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording

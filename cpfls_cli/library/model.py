@@ -221,7 +221,7 @@ class Model:
         """
         import numpy as np
 
-        from cpfls_cli.playback.replay import one_step
+        from cpfls_cli.playback.player import one_step
         from cpfls_cli.playback.rotors import steady_terms
 
         speed = np.atleast_2d(np.asarray(rotor_speed, dtype=float))
@@ -255,7 +255,7 @@ class Model:
         import numpy as np
 
         from cpfls_cli.playback.motion import State
-        from cpfls_cli.playback.replay import one_step
+        from cpfls_cli.playback.player import one_step
 
         speed = np.atleast_2d(np.asarray(rotor_speed, dtype=float))
         self._require_rotors(speed)

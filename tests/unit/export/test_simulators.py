@@ -11,7 +11,7 @@ from cpfls_cli.export.holding import FUZZY, Missing, Off, of_a_body, probe_fligh
 from cpfls_cli.export.registry import TARGETS, exported, require_package
 from cpfls_cli.export.verify import AGREES, verified
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.replay import player_of
+from cpfls_cli.playback.player import player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.exported_models import CASES, model_of
 from tests.builders.exported_vehicles import sheet_of_vehicle

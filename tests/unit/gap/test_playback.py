@@ -11,7 +11,8 @@ from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
 from cpfls_cli.gap.playback import errors_by_horizon, extended_player, played_pairs, worst_stretch
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.replay import Played, player_of, replay
+from cpfls_cli.playback.player import player_of
+from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.simulation.model import simulated_effects
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders.closed_loop_flights import VEHICLE, flown, signals_of

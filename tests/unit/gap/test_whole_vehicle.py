@@ -15,7 +15,7 @@ from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
 from cpfls_cli.gap.playback import extended_player, left_out
 from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.replay import free_runs, player_of
+from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.weak_form.windows import Recording
 from tests.builders import vehicle_models
 from tests.builders.vehicle_models import QUAD

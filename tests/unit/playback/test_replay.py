@@ -13,19 +13,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Motion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.playback.replay import (
-    MODEL,
-    NOTHING_MOVES,
-    RATE_STAYS,
-    SIGNALS,
-    STATED,
-    Played,
-    free_runs,
-    player_of,
-    replay,
-    rotation_vectors,
-    where_better,
-)
+from cpfls_cli.playback.player import free_runs, player_of, rotation_vectors
+from cpfls_cli.playback.replay import MODEL, NOTHING_MOVES, RATE_STAYS, SIGNALS, STATED, Played, replay, where_better
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.rotations import euler_angles
 from cpfls_cli.vehicle.rotors import body_wrench

@@ -1,0 +1,395 @@
+"""A model made ready to be played back along a flight, and its free runs from many samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from cpfls_cli import rotations
+from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
+from cpfls_cli.effects.polynomial import STATE_TERMS, state_terms
+from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.kernels import Body, Motion, Terms, errors_of_runs
+from cpfls_cli.playback.model import (
+    Remainder,
+    VehicleModel,
+    airflow_of,
+    remainder_terms,
+    used_terms,
+    weights_by_step,
+    wrench_of,
+)
+from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.motion import step as step_of_rigid_body
+from cpfls_cli.playback.rotors import RotorResponse, rotor_terms_by_step
+from cpfls_cli.regressor.regressor import InertiaValues
+
+_FASTEST = 300.0
+_TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class Player:
+    """A model made ready to be played back along one flight.
+
+    Attributes
+    ----------
+    table : array, shape (6, terms, 1 + 4 rotors)
+        Torque and force by term of the motion and term of the rotors.
+    rotor : array, shape (time, 1 + 4 rotors)
+        Terms of the rotors over each step.
+    body : Body
+    along : array, shape (time, 6), N m and N, or None
+        What acts over each step beside: stated, or evaluated along the measured motion.
+    remainder : Remainder or None
+    fuzzy : InertiaModel or None
+        Stands in the place of the inertia of `body`.
+    wind : tuple of float, m/s, world frame
+    """
+
+    table: Array
+    rotor: Array
+    body: Body
+    along: Array | None = None
+    remainder: Remainder | None = None
+    fuzzy: InertiaModel | None = None
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def feels_air(self) -> bool:
+        """Whether torque or force depend on the velocity through the air."""
+        airs = [index for index, term in enumerate(STATE_TERMS) if set("uvw") & set(term)]
+        return self.remainder is not None or bool(np.any(self.table[:, airs]))
+
+    def step_weights(self, part: slice) -> tuple[Terms, Array]:
+        """Evaluate the weights of the terms of the motion over each step of a part of the flight.
+
+        Returns
+        -------
+        terms : Terms
+            Those in use, the constant always.
+        weights : array, shape (time, 6, active)
+        """
+        found = used_terms(self.table, airflow_of(self.remainder))
+        used = found._replace(active=np.union1d([0], found.active).astype(np.int64))
+        weights = weights_by_step(self.table, used, self.rotor[part])
+        if self.along is not None:
+            weights[:, :, 0] += self.along[part]
+        return used, weights
+
+    def wrench(self, flight: PlaybackFlight) -> Array:
+        """Evaluate torque and force along the measured motion, shape (time, 6), N m and N, body frame."""
+        motion = flight.motion
+        air = np.einsum("tji,tj->ti", motion.rotation, motion.velocity - self.wind)
+        terms = np.hstack([state_terms(air, motion.rate), remainder_terms(self.remainder, air)])
+        wrench = wrench_of(self.table, terms, self.rotor)
+        return wrench if self.along is None else wrench + self.along
+
+
+def player_of(model: VehicleModel, flight: PlaybackFlight) -> Player:
+    """Make a model ready for a flight.
+
+    Parameters
+    ----------
+    model : VehicleModel
+        A flight without rotor speeds plays what its log states, late by the response of the model's rotors.
+    """
+    return Player(
+        table=model.weights,
+        rotor=rotor_terms_along(flight, model.response),
+        body=model.body,
+        along=stated_along(flight, model.response),
+        remainder=model.remainder,
+        fuzzy=model.fuzzy,
+        wind=model.wind,
+    )
+
+
+def rotor_terms_along(flight: PlaybackFlight, response: RotorResponse) -> Array:
+    """Evaluate the terms of the rotors over each step, stretch by stretch, shape (time, 1 + 4 rotors)."""
+    return np.concatenate([_late(flight.speed[part], flight, response) for part in flight.stretches])
+
+
+def stated_along(flight: PlaybackFlight, response: RotorResponse) -> Array | None:
+    """Evaluate the stated torque and force over each step, shape (time, 6); None of a flight with rotor speeds."""
+    wrench = flight.wrench
+    if wrench is None:
+        return None
+    return np.concatenate([_late(wrench[part], flight, response)[:, 1:7] for part in flight.stretches])
+
+
+def _late(values: Array, flight: PlaybackFlight, response: RotorResponse) -> Array:
+    terms = rotor_terms_by_step(
+        values, flight.motion.period, flight.hold, response.delay_s, response.lag_s, response.slow_s
+    )
+    return np.asarray(terms, dtype=float)
+
+
+def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> State:
+    """Take one step of any model, by the rule of its free runs.
+
+    Parameters
+    ----------
+    rotor : array, shape (samples, 1 + 4 rotors)
+        See `VehicleModel.rotor_terms`.
+    period : float, s
+
+    Returns
+    -------
+    State
+        Not a number where an inertia that depends on the attitude is none of a body.
+    """
+    if model.fuzzy is None:
+        return step_of_rigid_body(model, state, rotor, period)
+    if any(model.wind):
+        # Seen from the air there is no wind.
+        wind = np.array(model.wind)
+        still = replace(model, wind=(0.0, 0.0, 0.0))
+        after = one_step(still, state._replace(velocity=state.velocity - wind), rotor, period)
+        return after._replace(position=after.position + period * wind, velocity=after.velocity + wind)
+    player = Player(table=model.weights, rotor=rotor, body=model.body, remainder=model.remainder, fuzzy=model.fuzzy)
+    used, weights = player.step_weights(slice(None))
+    return _FuzzyRuns(player, model.fuzzy, Motion(*state, period), used, weights, translates=True).one_step()
+
+
+class Runs(NamedTuple):
+    """Errors of free runs.
+
+    Attributes
+    ----------
+    errors : array, shape (run, horizon, 4, 3)
+        Predicted less measured position, velocity, rotation vector (body frame) and rate.
+    diverged : array of int, shape (run,)
+        Step at which a run was stopped; -1 for those that went on.
+    """
+
+    errors: Array
+    diverged: IntArray
+
+
+def apart(first: Runs, second: Runs) -> Array:
+    """Compute how far runs end from each other: mean norms of position, velocity, attitude and rate, shape (4,), SI."""
+    return np.asarray(np.linalg.norm(second.errors[:, -1] - first.errors[:, -1], axis=2).mean(axis=0))
+
+
+def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon: int) -> Runs:
+    """Play a model back from samples of a flight.
+
+    Parameters
+    ----------
+    starts : array of int, shape (run,)
+        Ascending.
+    horizon : int
+        Samples.
+    """
+    first, part = int(starts[0]), slice(int(starts[0]), int(starts[-1]) + horizon + 1)
+    motion = _part(in_the_air(flight, player.wind).motion, part)
+    used, weights = player.step_weights(part)
+    errors = np.empty((len(starts), horizon, 4, 3))
+    if player.fuzzy is None:
+        moved = errors_of_runs(motion, player.body, used, weights, starts - first, flight.translates, errors)
+        return Runs(errors, moved)
+    runs = _FuzzyRuns(player, player.fuzzy, motion, used, weights, flight.translates)
+    return Runs(errors, runs.written(starts - first, errors))
+
+
+def in_the_air(flight: PlaybackFlight, wind: tuple[float, float, float]) -> PlaybackFlight:
+    """See a flight from the air, which moves with a steady wind: the errors of runs are the same there."""
+    if not any(wind):
+        return flight
+    motion = flight.motion
+    gone = motion.period * np.arange(len(flight))[:, None] * wind
+    return replace(
+        flight, motion=motion._replace(position=motion.position - gone, velocity=motion.velocity - np.array(wind))
+    )
+
+
+def still_runs(flight: PlaybackFlight, starts: IntArray, horizon: int, *, rate_stays: bool) -> Runs:
+    """Predict that the whole state stays what it was, or that rates and velocity do and the vehicle goes on with them.
+
+    Parameters
+    ----------
+    starts : array of int, shape (run,)
+    horizon : int
+        Samples.
+    rate_stays : bool
+        Whether attitude and position follow the rates and the velocity of the start.
+    """
+    motion, moves = flight.motion, float(rate_stays)
+    velocity, rate, held = motion.velocity[starts], motion.rate[starts], motion.rotation[starts]
+    turn = rotations.turns(moves * motion.period * rate)
+    errors = np.empty((len(starts), horizon, 4, 3))
+    for step in range(horizon):
+        at = starts + step + 1
+        held = held @ turn if rate_stays else held
+        gone = moves * (step + 1) * motion.period * velocity
+        errors[:, step, 0] = motion.position[starts] + gone - motion.position[at]
+        errors[:, step, 1] = velocity - motion.velocity[at]
+        errors[:, step, 2] = rotation_vectors(motion.rotation[at], held)
+        errors[:, step, 3] = rate - motion.rate[at]
+    return Runs(errors, np.full(len(starts), -1))
+
+
+def _part(motion: Motion, part: slice) -> Motion:
+    return Motion(motion.position[part], motion.velocity[part], motion.rotation[part], motion.rate[part], motion.period)
+
+
+def rotation_vectors(measured: Array, predicted: Array) -> Array:
+    """Compute the rotations from measured to predicted attitudes.
+
+    Parameters
+    ----------
+    measured, predicted : array, shape (..., 3, 3)
+        Body to world.
+
+    Returns
+    -------
+    array, shape (..., 3), rad
+        In the measured body frame; its length is the geodesic distance.
+    """
+    away = measured.swapaxes(-1, -2) @ predicted
+    skew = 0.5 * np.stack(
+        [away[..., 2, 1] - away[..., 1, 2], away[..., 0, 2] - away[..., 2, 0], away[..., 1, 0] - away[..., 0, 1]],
+        axis=-1,
+    )
+    sine: Array = np.sqrt((skew**2).sum(axis=-1))
+    cosine: Array = 0.5 * (away[..., 0, 0] + away[..., 1, 1] + away[..., 2, 2] - 1.0)
+    angle = np.arctan2(sine, cosine)
+    vector = skew * np.expand_dims(np.where(sine > _TINY, angle / np.maximum(sine, _TINY), 1.0), -1)
+    # Half a turn: the axis does not show in the skew part, its length is all that is used.
+    half_turn = np.asarray((sine <= _TINY) & (cosine < 0.0), dtype=bool)
+    return np.asarray(np.where(np.expand_dims(half_turn, -1), [np.pi, 0.0, 0.0], vector))
+
+
+class _Fuzzy(NamedTuple):
+    """A model in Euler coordinates at the attitudes of the runs.
+
+    Attributes
+    ----------
+    rate : array, shape (run, 3), rad/s
+        That has the momentum.
+    direct : array, shape (run, 3), N m
+        Torque that the motion takes beside the change of momentum.
+    exists : array of bool, shape (run,)
+        False where no body has the inertia.
+    """
+
+    rate: Array
+    direct: Array
+    exists: BoolArray
+
+
+class _BodyInertia(NamedTuple):
+    """Inertia at the attitudes of the runs, and the matrices from rate to momentum, ``W^-T J W^-1``."""
+
+    attitude: Array
+    values: InertiaValues
+    matrices: Array
+
+
+class _State(NamedTuple):
+    """Free runs in momentum form: no inertia that depends on the attitude has to be differentiated in time."""
+
+    position: Array
+    velocity: Array
+    rotation: Array
+    momentum: Array
+
+
+@dataclass(frozen=True)
+class _FuzzyRuns:
+    """Free runs under an inertia that depends on the attitude, all at once, by the step rule of the compiled ones."""
+
+    player: Player
+    fuzzy: InertiaModel
+    motion: Motion
+    used: Terms
+    weights: Array
+    translates: bool
+
+    def written(self, starts: IntArray, errors: Array) -> IntArray:
+        """Simulate, write the errors, and give the steps at which runs diverged."""
+        motion, diverged = self.motion, np.full(len(starts), -1)
+        state, rate, now = self._begun(starts)
+        for step in range(errors.shape[1]):
+            with np.errstate(all="ignore"):
+                moved, after = self._step(state, rate, now, self.weights[starts + step])
+            fastest = np.maximum(np.abs(after.rate).max(axis=1), np.abs(moved.velocity).max(axis=1))
+            good = (diverged < 0) & after.exists & (fastest < _FASTEST)
+            # A run that no body flies stands still from there on, as that of a rigid body does.
+            diverged[(diverged < 0) & ~good] = step
+            state = _State(*(_kept(good, new, old) for new, old in zip(moved, state, strict=True)))
+            rate, now = _kept(good, after.rate, rate), after
+            at = starts + step + 1
+            errors[:, step, 0] = state.position - motion.position[at]
+            errors[:, step, 1] = state.velocity - motion.velocity[at]
+            errors[:, step, 2] = rotation_vectors(motion.rotation[at], state.rotation)
+            errors[:, step, 3] = rate - motion.rate[at]
+        return diverged
+
+    def one_step(self) -> State:
+        """Take one step from each sample; not a number where it meets an attitude at which no body has the inertia."""
+        state, rate, now = self._begun(np.arange(len(self.motion.rate)))
+        with np.errstate(all="ignore"):
+            moved, after = self._step(state, rate, now, self.weights)
+        parts = (moved.position, moved.velocity, moved.rotation, after.rate)
+        return State(*(_kept(after.exists, part, np.full_like(part, np.nan)) for part in parts))
+
+    def _begun(self, starts: IntArray) -> tuple[_State, Array, _Fuzzy]:
+        motion = self.motion
+        rate, rotation = motion.rate[starts], motion.rotation[starts]
+        momentum = rotations.multiply(np.nan_to_num(self._body_inertia(rotation).matrices), rate)
+        state = _State(motion.position[starts], motion.velocity[starts], rotation, momentum)
+        return state, rate, self._fuzzy(state.rotation, state.momentum)
+
+    def _step(self, state: _State, rate: Array, now: _Fuzzy, weights: Array) -> tuple[_State, _Fuzzy]:
+        period = self.motion.period
+        middle = self._moved(state, state, rate, now.direct, weights, 0.5 * period)
+        there = self._fuzzy(middle.rotation, middle.momentum)
+        end = self._moved(state, middle, there.rate, there.direct, weights, period)
+        after = self._fuzzy(end.rotation, end.momentum)
+        return end, after._replace(exists=now.exists & there.exists & after.exists)
+
+    def _moved(self, start: _State, at: _State, rate: Array, direct: Array, weights: Array, interval: float) -> _State:
+        """Move a state for an interval with the derivatives at another one."""
+        air = np.einsum("nji,nj->ni", at.rotation, at.velocity)
+        terms = np.hstack([state_terms(air, rate), remainder_terms(self.player.remainder, air)])[:, self.used.active]
+        wrench = np.einsum("nka,na->nk", weights, terms)
+        momentum = start.momentum + interval * (wrench[:, :3] - direct)
+        rotation = start.rotation @ rotations.turns(interval * rate)
+        if not self.translates:
+            return _State(start.position, start.velocity, rotation, momentum)
+        acceleration = rotations.multiply(at.rotation, wrench[:, 3:]) / self.player.body.mass
+        acceleration[:, 2] -= self.player.body.gravity
+        position = start.position + interval * at.velocity
+        return _State(position, start.velocity + interval * acceleration, rotation, momentum)
+
+    def _fuzzy(self, rotation: Array, momentum: Array) -> _Fuzzy:
+        inertia = self._body_inertia(rotation)
+        exists = _positive_definite(inertia.matrices)
+        safe = np.where(exists[:, None, None], inertia.matrices, np.eye(3))
+        rate: Array = np.asarray(np.linalg.solve(safe, momentum[..., None])[..., 0], dtype=float)
+        _, direct = momentum_form(inertia.attitude, rate, inertia.values)
+        return _Fuzzy(rate, direct, exists)
+
+    def _body_inertia(self, rotation: Array) -> _BodyInertia:
+        attitude = rotations.euler_angles(np.nan_to_num(rotation))
+        values = self.fuzzy.inertia(attitude)
+        axes = [rotations.attitude_rate(attitude, np.broadcast_to(axis, attitude.shape)) for axis in np.eye(3)]
+        inverse = np.stack(axes, axis=2)
+        return _BodyInertia(attitude, values, inverse.swapaxes(1, 2) @ values.value @ inverse)
+
+
+def _kept(good: BoolArray, new: Array, old: Array) -> Array:
+    return np.where(good.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+
+
+def _positive_definite(matrices: Array) -> BoolArray:
+    """Flag positive definite matrices by their leading minors (Sylvester); what is not finite is none."""
+    first, minor = matrices[:, 0, 0], matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] ** 2
+    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)), dtype=bool)
+    whole = np.linalg.det(np.where(finite[:, None, None], matrices, 0.0))
+    return np.asarray(finite & (first > 0) & (minor > 0) & (whole > 0))
