@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import ceil, exp, log, pi, sqrt
+from math import ceil, log, pi, sqrt
 
 import numpy as np
 from scipy.interpolate import BPoly
@@ -12,6 +12,7 @@ from scipy.interpolate import BPoly
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics.equations_of_motion import TorqueModel
 from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.lag import after_step
 from cpfls_cli.regressor.motion import Motion
 
 VERTICAL = 0.1
@@ -215,7 +216,7 @@ class TorqueActuators:
         return command if self.torque_max is None else np.clip(command, -self.torque_max, self.torque_max)
 
     def torque(self, before: Array, command: Array, after: float) -> Array:
-        """Compute the torque some time after a command, ``c + (before - c) exp(-t / T)``.
+        """Compute the torque some time after a command.
 
         Parameters
         ----------
@@ -226,6 +227,4 @@ class TorqueActuators:
         -------
         array, shape (vehicle, 3), N m
         """
-        if self.time_constant == 0:
-            return command
-        return np.asarray(command + (before - command) * exp(-after / self.time_constant))
+        return after_step(before, command, after, self.time_constant)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from math import exp, pi, tan
+from dataclasses import dataclass, field, replace
+from math import pi, tan
 
 import numpy as np
 
@@ -13,45 +13,8 @@ from cpfls_cli.effects.effect import Columns, stack
 from cpfls_cli.effects.hooks import Link, RotorMotion
 from cpfls_cli.effects.signals import Signals
 
-_NODES = 8
-"""Of the quadrature over a sample, exact for any lag that is not much shorter than one."""
-
 _HIGHEST = 0.45
 """Frequency of a filter over that of the sampling, above which it is taken to be there."""
-
-
-def lagged(values: Array, period: float, time_constant: float) -> Array:
-    """Filter signals by a first-order lag, ``tau y' + y = u``, exactly for u cubic between samples.
-
-    Straight lines between samples would weaken 3 Hz at 100 Hz by as much as half a millisecond of lag does.
-
-    Parameters
-    ----------
-    values : array, shape (time, ...)
-        u; y starts at its first value.
-    period : float, s
-    time_constant : float, s
-        tau, greater than 0.
-
-    Returns
-    -------
-    array, shape (time, ...)
-        y.
-    """
-    # Slow to load, and who lists or shows effects filters nothing.
-    from scipy.signal import lfilter
-
-    decay = exp(-period / time_constant)
-    nodes, lengths = np.polynomial.legendre.leggauss(_NODES)
-    place = 0.5 * (nodes + 1)
-    weight = 0.5 * lengths * period / time_constant * np.exp(-(1 - place) * period / time_constant)
-    taps = weight @ _cubic(place)
-    # A constant stays what it is, however short the lag is beside a sample.
-    taps *= (1 - decay) / taps.sum()
-    extended = _extended(values)
-    driven = sum(tap * extended[first : len(values) - 1 + first] for first, tap in enumerate(taps))
-    rest = lfilter([1.0], [1.0, -decay], driven, axis=0, zi=decay * values[:1])[0]
-    return np.concatenate([values[:1], rest])
 
 
 @dataclass(frozen=True)
@@ -99,53 +62,6 @@ class SecondOrder:
         return np.asarray(lfilter(self.over, self.under, values, axis=0, zi=self.settled(values[0]))[0])
 
 
-def delayed(values: Array, time: Array, delay: float) -> Array:
-    """Shift signals in time by cubic interpolation; beyond the ends the last known value is held.
-
-    Parameters
-    ----------
-    values : array, shape (time,) or (time, channel)
-    time : array, shape (time,), s
-        Evenly spaced.
-    delay : float, s
-        Below 0 brings them forward.
-
-    Returns
-    -------
-    array, shape of `values`
-    """
-    if len(time) < 2:
-        return values
-    last, period = len(time) - 1, float(time[1] - time[0])
-    place = np.arange(len(time)) - delay / period
-    rows = np.clip(np.floor(place).astype(int), 0, last - 1)
-    # All samples lie at the same place between two; those beyond the ends at an end.
-    weights = _cubic(np.clip(place - rows, 0.0, 1.0))
-    extended = _extended(values)
-    across = (-1, *[1] * (values.ndim - 1))
-    moved = (extended[rows + first] * weight.reshape(across) for first, weight in enumerate(weights.T))
-    return np.asarray(sum(moved))
-
-
-def _extended(values: Array) -> Array:
-    """Continue signals by one sample at either end, in a straight line."""
-    return np.concatenate([2 * values[:1] - values[1:2], values, 2 * values[-1:] - values[-2:-1]])
-
-
-def _cubic(place: Array) -> Array:
-    """Weigh the samples at -1, 0, 1 and 2 for places between 0 and 1 on a cubic, shape (place, 4)."""
-    before, first, second, after = place + 1, place, place - 1, place - 2
-    return np.stack(
-        [
-            -first * second * after / 6,
-            before * second * after / 2,
-            -before * first * after / 2,
-            before * first * second / 6,
-        ],
-        axis=1,
-    )
-
-
 def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signals:
     """Change the rotor speeds, or the stated torque and thrust of a flight without rotor speeds.
 
@@ -171,6 +87,35 @@ def wrench_change(before: Signals, after: Signals) -> Columns:
         One column.
     """
     return Columns(stack(after.wrench - before.wrench))
+
+
+@dataclass
+class DelayLine:
+    """Rotors behind a delay, step by step, in straight lines; before the first have arrived they keep their speed.
+
+    Attributes
+    ----------
+    steps : float
+        Delay in steps, at least 0.
+    past : list of RotorMotion
+        What is still under way.
+    """
+
+    steps: float
+    past: list[RotorMotion] = field(default_factory=list)
+
+    def __call__(self, rotors: RotorMotion) -> RotorMotion:
+        """Take up the rotors of a step, and give those that arrive."""
+        if self.steps == 0:
+            return rotors
+        self.past.append(rotors)
+        whole = int(self.steps)
+        del self.past[: max(len(self.past) - whole - 2, 0)]
+        first, second = self.past[0], self.past[min(1, len(self.past) - 1)]
+        if len(self.past) < whole + 2:
+            return RotorMotion(first.speed, np.zeros_like(first.speed))
+        share = self.steps - whole
+        return RotorMotion(*((1 - share) * new + share * old for old, new in zip(first, second, strict=True)))
 
 
 @dataclass(frozen=True)

@@ -121,6 +121,11 @@ class TrueMotion(NamedTuple):
     body_rate: Array
     body_acceleration: Array
 
+    @property
+    def period(self) -> float:
+        """Sampling period, s."""
+        return float(self.time[1] - self.time[0])
+
 
 @dataclass(frozen=True, kw_only=True)
 class SensorLog:

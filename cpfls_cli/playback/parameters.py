@@ -15,6 +15,7 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.polynomial import STATE_TERMS, Probe, polynomial
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, symmetric
+from cpfls_cli.lag import Numbers
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.kernels import Airflow, Body, Parameters, Terms, airflow_terms
 from cpfls_cli.playback.model import (
@@ -28,7 +29,7 @@ from cpfls_cli.playback.model import (
     used_terms,
     weights_by_step,
 )
-from cpfls_cli.playback.rotors import Numbers, RotorResponse, rotor_terms_by_step
+from cpfls_cli.playback.rotors import RotorResponse, rotor_terms_by_step
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 INERTIA = "inertia"

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.lag import Numbers, delayed, lagged
 
 Hold = Literal["linear", "previous"]
-Numbers = NDArray[Any]
-"""Real, or complex for a derivative by a complex step."""
 
 _SHORTEST_S = 1e-5
 
@@ -58,9 +56,9 @@ def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, l
     array, shape (time, 1 + 4 rotors)
         1, speeds, squared speeds, accelerations, and slow less present squared speeds.
     """
-    mean, end, start = _lagged(_delayed(speed, delay_s / period), period, lag_s, hold)
+    mean, end, start = lagged(delayed(speed, delay_s / period, hold), lag_s / period, hold)
     squared = mean**2
-    slow, _, _ = _lagged(squared, period, slow_s, "previous")
+    slow = lagged(squared, slow_s / period, "previous").mean
     one = np.ones((len(speed), 1), dtype=mean.dtype)
     return np.hstack([one, mean, squared, (end - start) / period, slow - squared])
 
@@ -93,43 +91,11 @@ def rotor_terms_at_samples(speed: Array, period: float, hold: Hold, response: Ro
     -------
     array, shape (time, 1 + 4 rotors)
     """
-    mean, end, start = _lagged(_delayed(speed, response.delay_s / period), period, response.lag_s, hold)
+    mean, end, start = lagged(delayed(speed, response.delay_s / period, hold), response.lag_s / period, hold)
     jumps = hold == "previous" and response.lag_s < _SHORTEST_S
     acting = 0.5 * (start + mean) if jumps else start
-    _, _, slow = _lagged(mean**2, period, response.slow_s, "previous")
+    slow = lagged(mean**2, response.slow_s / period, "previous").start
     change = (end - start) / period
     acceleration = 0.5 * (change + np.concatenate([change[:1], change[:-1]]))
     one = np.ones((len(speed), 1))
     return np.asarray(np.hstack([one, acting, acting**2, acceleration, slow - acting**2]), dtype=float)
-
-
-def _delayed(values: Array, steps: Any) -> Numbers:
-    """Shift by a number of steps; before the first sample there is its value."""
-    if steps == 0:
-        return values
-    whole = int(np.floor(np.real(steps)))
-    share = steps - whole
-    padded = np.concatenate([np.repeat(values[:1], whole + 1, axis=0), values])
-    late, later = padded[1 : 1 + len(values)], padded[: len(values)]
-    return np.asarray((1 - share) * late + share * later)
-
-
-def _lagged(values: Numbers, period: float, time_constant: Any, hold: Hold) -> tuple[Numbers, Numbers, Numbers]:
-    """Filter by a first-order lag: mean over each step, value at its end, value at its start."""
-    after = np.concatenate([values[1:], values[-1:]]) if hold == "linear" else values
-    if np.real(time_constant) < _SHORTEST_S and not np.imag(time_constant):
-        before = values if hold == "linear" else np.concatenate([values[:1], values[:-1]])
-        return 0.5 * (values + after) if hold == "linear" else values, after, before
-    from scipy.signal import lfilter
-
-    constant = time_constant if np.real(time_constant) > _SHORTEST_S else _SHORTEST_S + 1j * np.imag(time_constant)
-    ratio = constant / period
-    decay = np.exp(-1 / ratio)
-    spread = ratio * (1 - decay)
-    first, second = (spread - decay, 1 - spread) if hold == "linear" else (1 - decay, 0.0)
-    drive = first * values + second * after
-    end = lfilter([1.0], [1.0, -decay], drive, axis=0, zi=decay * values[:1])[0]
-    start = np.concatenate([values[:1], end[:-1]])
-    slope = (after - values) * ratio if hold == "linear" else 0.0
-    mean = values + 0.5 * (after - values) - slope + (start - values + slope) * spread
-    return mean, end, start

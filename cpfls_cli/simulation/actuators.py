@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
-from math import exp, prod
+from math import prod
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.effects.actuation import DelayLine
 from cpfls_cli.effects.hooks import Link, RotorMotion
 from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.lag import HeldLag
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.model import SimulatedModel
 from cpfls_cli.simulation.settings import ClosedLoopSettings
@@ -155,19 +157,22 @@ class Response:
 
     Attributes
     ----------
-    of : RotorResponse
+    delay : DelayLine
+    lag, slow : HeldLag
+        Of speeds in rad/s, and of squared speeds in rad^2/s^2.
     step : float, s
-    speed, slow : array, shape (rotor,), rad/s and rad^2/s^2
-        After the lag, and squared after the slow actuation, at the start of the next step.
-    past : list of RotorMotion
-        What is still under way.
     """
 
-    of: RotorResponse
+    delay: DelayLine
+    lag: HeldLag
+    slow: HeldLag
     step: float
-    speed: Array
-    slow: Array
-    past: list[RotorMotion] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, response: RotorResponse, step: float, speed: Array) -> Response:
+        """Begin as if the rotors had long turned at a speed, shape (rotor,), rad/s."""
+        lag, slow = HeldLag(response.lag_s / step, speed), HeldLag(response.slow_s / step, speed**2)
+        return cls(DelayLine(response.delay_s / step), lag, slow, step)
 
     def advance(self, measured: RotorMotion) -> tuple[RotorMotion, Array]:
         """Take one step, exactly for speeds that stay the same during it.
@@ -182,28 +187,16 @@ class Response:
         acting : RotorMotion
         slow : array, shape (rotor,), rad^2/s^2
         """
-        acting = self._delayed(measured)
-        if self.of.lag_s > 0:
-            wanted, half = acting.speed, exp(-0.5 * self.step / self.of.lag_s)
-            late = wanted + half * (self.speed - wanted)
-            acting = RotorMotion(late, (wanted - late) / self.of.lag_s)
-            self.speed = wanted + half**2 * (self.speed - wanted)
-        squared, half = acting.speed**2, exp(-0.5 * self.step / self.of.slow_s)
-        slow = squared + half * (self.slow - squared)
-        self.slow = squared + half**2 * (self.slow - squared)
-        return acting, slow
+        acting = self.delay(measured)
+        if self.lag.ratio > 0:
+            acting = _behind(self.lag, acting.speed, self.step)
+        return acting, self.slow.middle(acting.speed**2)
 
-    def _delayed(self, measured: RotorMotion) -> RotorMotion:
-        """Interpolate the past linearly; before it there is the first speed, standing still."""
-        self.past.append(measured)
-        steps = self.of.delay_s / self.step
-        whole = int(steps)
-        del self.past[: max(len(self.past) - whole - 2, 0)]
-        if len(self.past) < whole + 2:
-            first = self.past[0].speed
-            return measured if steps == 0 else RotorMotion(first, np.zeros_like(first))
-        share, late, later = steps - whole, self.past[1], self.past[0]
-        return RotorMotion(*((1 - share) * new + share * old for old, new in zip(later, late, strict=True)))
+
+def _behind(lag: HeldLag, wanted: Array, step: float) -> RotorMotion:
+    """Take one step of rotors behind a lag."""
+    reached = lag.middle(wanted)
+    return RotorMotion(reached, (wanted - reached) / (lag.ratio * step))
 
 
 @dataclass
@@ -212,26 +205,24 @@ class Actuators:
 
     Attributes
     ----------
-    time_constant : float, s
+    lag : HeldLag
+        Of the commanded speeds, rad/s.
     links : tuple of callable
     supplies : tuple of callable
         Factors on the speed at a voltage.
     battery : Battery
     step : float, s
-    speed : array, shape (rotor,), rad/s
-        After the lag, at the start of the next step.
     response : Response
         Of the model of a whole vehicle.
     steps : int
         Taken so far.
     """
 
-    time_constant: float
+    lag: HeldLag
     links: tuple[Link, ...]
     supplies: tuple[Callable[[float], float], ...]
     battery: Battery
     step: float
-    speed: Array
     response: Response
     steps: int = 0
 
@@ -248,10 +239,7 @@ class Actuators:
         Rotors
             In the middle of the step.
         """
-        half = exp(-0.5 * self.step / self.time_constant)
-        lagged = command + half * (self.speed - command)
-        motion = RotorMotion(lagged, (command - lagged) / self.time_constant)
-        self.speed = command + half**2 * (self.speed - command)
+        lagged = motion = _behind(self.lag, command, self.step)
         self.steps += 1
         for link in self.links:
             motion = link(motion)
@@ -259,7 +247,7 @@ class Actuators:
         factor = prod(supply(voltage) for supply in self.supplies)
         measured = RotorMotion(factor * motion.speed, factor * motion.acceleration)
         acting, slow = self.response.advance(measured)
-        return Rotors(command, lagged, measured.speed, acting.speed, acting.acceleration, slow, voltage)
+        return Rotors(command, lagged.speed, measured.speed, acting.speed, acting.acceleration, slow, voltage)
 
 
 def actuators(
@@ -286,11 +274,10 @@ def actuators(
     lags = [each.lag(values) for each, values in acting if each.lag is not None]
     hover = len(vehicle.rotors) * hover_speed(vehicle) ** 3
     return Actuators(
-        time_constant=lags[-1] if lags else settings.rotor_time_constant_s,
+        lag=HeldLag((lags[-1] if lags else settings.rotor_time_constant_s) / step, speed),
         links=tuple(each.link(values, step) for each, values in acting if each.link is not None),
         supplies=tuple(partial(each.supply, values) for each, values in acting if each.supply is not None),
         battery=Battery(settings.battery_use, settings.battery_load, duration, hover),
         step=step,
-        speed=speed,
-        response=Response(RotorResponse() if model.whole is None else model.whole.response, step, speed, speed**2),
+        response=Response.of(RotorResponse() if model.whole is None else model.whole.response, step, speed),
     )

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.actuation import delayed, with_actuation, wrench_change
+from cpfls_cli.effects.actuation import with_actuation, wrench_change
 from cpfls_cli.effects.effect import Columns, Effect, Shape
 from cpfls_cli.effects.hooks import ReadingError, SensorLog, SensorTest, TrueMotion
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.lag import delayed
 
 
 def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
-    return with_actuation(signals, lambda values: delayed(values, signals.time, shape["delay_s"]))
+    return with_actuation(signals, lambda values: delayed(values, shape["delay_s"] / signals.period))
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
@@ -20,7 +21,7 @@ def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
 
 
 def _log(signals: Mapping[str, Array], motion: TrueMotion, values: Mapping[str, float]) -> dict[str, Array]:
-    return {"rotor_speed": delayed(signals["rotor_speed"], motion.time, -values["delay_s"])}
+    return {"rotor_speed": delayed(signals["rotor_speed"], -values["delay_s"] / motion.period)}
 
 
 EFFECT = Effect(

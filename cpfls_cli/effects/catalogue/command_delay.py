@@ -3,40 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import floor
 
-import numpy as np
-
-from cpfls_cli.effects.actuation import delayed, with_actuation, wrench_change
+from cpfls_cli.effects.actuation import DelayLine, with_actuation, wrench_change
 from cpfls_cli.effects.effect import Columns, Effect, Shape
-from cpfls_cli.effects.hooks import Actuation, Link, RotorMotion
+from cpfls_cli.effects.hooks import Actuation
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.lag import delayed
 
 
 def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
-    return with_actuation(signals, lambda values: delayed(values, signals.time, shape["delay_s"]))
+    return with_actuation(signals, lambda values: delayed(values, shape["delay_s"] / signals.period))
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
     return wrench_change(signals, _apply(signals, shape))
-
-
-def _link(values: Mapping[str, float], step: float) -> Link:
-    """Delay the rotors; before the first command has arrived they keep the speed that they had."""
-    past: list[RotorMotion] = []
-
-    def link(rotors: RotorMotion) -> RotorMotion:
-        past.append(rotors)
-        index = len(past) - 1 - values["delay_s"] / step
-        if index <= 0:
-            return RotorMotion(past[0].speed, np.zeros_like(past[0].speed))
-        first = floor(index)
-        if first == index:
-            return past[first]
-        share, before, after = index - first, past[first], past[first + 1]
-        return RotorMotion(*((1 - share) * old + share * new for old, new in zip(before, after, strict=True)))
-
-    return link
 
 
 EFFECT = Effect(
@@ -58,5 +38,7 @@ EFFECT = Effect(
     shapes=(Shape("delay_s", "s", (0.004, 0.008, 0.012, 0.02, 0.03, 0.04, 0.055, 0.07, 0.09, 0.12), "time of travel"),),
     unit_coefficient=True,
     apply=_apply,
-    actuation=Actuation(link=_link, delay=lambda values: values["delay_s"]),
+    actuation=Actuation(
+        link=lambda values, step: DelayLine(values["delay_s"] / step), delay=lambda values: values["delay_s"]
+    ),
 )

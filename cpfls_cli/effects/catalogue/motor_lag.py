@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from cpfls_cli.effects.actuation import lagged, with_actuation, wrench_change
+from cpfls_cli.effects.actuation import with_actuation, wrench_change
 from cpfls_cli.effects.effect import Columns, Effect, Shape
 from cpfls_cli.effects.hooks import Actuation
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.lag import lagged
 
 
 def _apply(signals: Signals, shape: Mapping[str, float]) -> Signals:
-    return with_actuation(signals, lambda values: lagged(values, signals.period, shape["time_constant_s"]))
+    return with_actuation(signals, lambda values: lagged(values, shape["time_constant_s"] / signals.period).start)
 
 
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:

@@ -1,40 +1,15 @@
-"""Late and weak actuation against an integrator, exact shifts and the law of the battery."""
+"""Late and weak actuation, filters, and the law of the battery."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.actuation import SecondOrder, delayed, lagged
+from cpfls_cli.effects.actuation import DelayLine, SecondOrder
 from cpfls_cli.effects.hooks import RotorMotion
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.vehicle.rotors import body_wrench
-
-
-def test_lag_is_the_solution_of_its_equation():
-    time, turn, tau = np.arange(0, 4, 0.01), 2 * np.pi * 3.0, 0.03
-    lag = turn * tau
-    settled = (np.sin(turn * time) - lag * np.cos(turn * time)) / (1 + lag**2)
-    expected = settled - settled[0] * np.exp(-time / tau)
-    # Straight lines between samples would be off by 0.002.
-    np.testing.assert_allclose(lagged(np.sin(turn * time), 0.01, tau), expected, atol=1e-4)
-
-
-def test_delay_does_not_weaken_a_fast_signal():
-    time, turn = np.arange(0, 4, 0.01), 2 * np.pi * 3.0
-    found = delayed(np.sin(turn * time), time, 0.015)
-    np.testing.assert_allclose(found[5:-5], np.sin(turn * (time - 0.015))[5:-5], atol=1e-4)
-
-
-def test_lag_leaves_a_constant_alone():
-    np.testing.assert_allclose(lagged(np.full((50, 4), 348.0), 0.01, 0.03), 348.0)
-
-
-@pytest.mark.parametrize("delay", [0.02, 0.0025, -0.02])
-def test_delay_shifts_a_line_exactly_and_holds_its_ends(delay):
-    time = np.arange(100) * 0.005
-    expected = np.clip(3.0 * (time - delay), 0.0, 3.0 * time[-1])
-    np.testing.assert_allclose(delayed(3.0 * time, time, delay), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +28,7 @@ def test_stated_torque_lags_where_rotor_speeds_are_not_logged(columns, flight):
     stated = np.sin(np.outer(flight.time, [3.0, 4.0, 5.0]))
     known = replace(flight, rotor_speed=None, stated_torque=stated, commanded=True)
     found = columns("motor_lag", known, time_constant_s=0.05).direct[..., 0]
-    np.testing.assert_allclose(found[:, :3], lagged(stated, 0.005, 0.05) - stated, atol=1e-12)
+    np.testing.assert_allclose(found[:, :3], lagged(stated, 10.0).start - stated, atol=1e-12)
     assert not found[:, 3:].any()
 
 
@@ -108,3 +83,10 @@ def test_what_is_applied_before_other_columns_is_what_its_column_says(columns, f
         shape = {one.name: one.grid[-1] for one in entry.shapes}
         change = entry.apply(known, shape).wrench - known.wrench
         np.testing.assert_allclose(columns(entry.name, known, **shape).direct[..., 0], change, atol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [0.0, 2.0, 2.3])
+def test_a_delay_taken_step_by_step_is_that_along_a_flight(commanded, steps):
+    line, still = DelayLine(steps), np.zeros_like(commanded.speed[0])
+    passed = [line(RotorMotion(speed, still)) for speed in commanded.speed]
+    np.testing.assert_allclose([one.speed for one in passed], delayed(commanded.speed, steps, "linear"), rtol=1e-12)

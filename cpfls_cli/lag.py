@@ -1,0 +1,161 @@
+"""Sampled signals that come late: a pure delay and a first-order lag, by one formula for all rooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cpfls_cli.arrays import Array
+
+Between = Literal["cubic", "linear", "previous"]
+"""What a signal is between samples.
+
+``cubic`` is the curve through the four samples around, for whatever moves smoothly: measured speeds, and commands of a
+controller that runs faster than its log. ``linear`` needs no sample behind the next one, so an exported model can take
+it step by step. ``previous`` is a command that stays until the next sample.
+
+Beside the exact delay of signals of up to 8 Hz, sampled at 100 Hz, cubics are off by 0.04 % of the signal, a global
+spline by 0.004 %, monotone cubics by 0.4 %, straight lines by 1 %, the nearest sample by 8 %; a lag of 30 ms alike. A
+spline overshoots a step by 10 % and spreads an outlier over the flight, cubics by 6 % and over four samples.
+"""
+
+Numbers = NDArray[Any]
+"""Real, or complex for a derivative by a complex step."""
+
+# Powers of the time since a sample, in samples, by which the samples at -1, 0, 1 and 2 count until the next one.
+_CURVES: dict[Between, Array] = {
+    "cubic": np.array([[0, -2, 3, -1], [6, -3, -6, 3], [0, 6, 3, -3], [0, -1, 0, 1]]) / 6.0,
+    "linear": np.array([[0, 0, 0, 0], [1, -1, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]], dtype=float),
+    "previous": np.array([[0, 0, 0, 0], [1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]], dtype=float),
+}
+_FORGOTTEN = 0.02
+"""Lag in samples below which nothing of a sample is left at the next one: ``exp(-1 / 0.02)`` is 2e-22."""
+_NODES, _LENGTHS = (0.5 * part for part in np.polynomial.legendre.leggauss(8))
+"""Quadrature over a sample about its middle, exact to rounding for lags of a sample and more."""
+
+
+def delayed(values: Numbers, steps: Any, between: Between = "cubic") -> Numbers:
+    """Shift signals in time; beyond the ends the first or the last value is held.
+
+    What is held and moved by a part of a sample has the mix of two samples as its mean over a sample, so ``previous``
+    gives the same as ``linear``.
+
+    Parameters
+    ----------
+    values : array, shape (time, ...)
+        Evenly sampled.
+    steps : float or complex
+        Delay in samples; below 0 brings the signals forward. A complex one carries a derivative.
+    between : {"cubic", "linear", "previous"}
+
+    Returns
+    -------
+    array, shape of `values`
+    """
+    if steps == 0 or len(values) < 2:
+        return values
+    whole, length = int(np.floor(np.real(steps))), len(values)
+    # All samples lie at the same place between two: this far behind the earlier one.
+    taps = _CURVES["cubic" if between == "cubic" else "linear"] @ (1 - (steps - whole)) ** np.arange(4)
+    extended, early = _extended(values, between), max(whole + 1, 0)
+    held = np.repeat(extended[:1], early, axis=0), np.repeat(extended[-1:], max(-whole - 1, 0), axis=0)
+    extended, first = np.concatenate([held[0], extended, held[1]]), early - whole - 1
+    moved = _sum(taps, [extended[first + tap : first + tap + length] for tap in range(4)])
+    moved[: max(whole + (steps != whole), 0)] = values[0]
+    moved[max(length + whole, 0) :] = values[-1]
+    return moved
+
+
+class Lagged(NamedTuple):
+    """Signals behind a lag, each of the shape of the signals: over the step from each sample, at its end, its start."""
+
+    mean: Numbers
+    end: Numbers
+    start: Numbers
+
+
+def lagged(values: Numbers, ratio: Any, between: Between = "cubic") -> Lagged:
+    """Filter signals by a first-order lag, ``tau y' + y = u``, exactly for what u is between samples.
+
+    Parameters
+    ----------
+    values : array, shape (time, ...)
+        u, evenly sampled; y starts at its first value.
+    ratio : float or complex
+        tau in samples, at least 0. A complex one carries a derivative.
+    between : {"cubic", "linear", "previous"}
+    """
+    # Slow to load, and who lists or shows effects filters nothing.
+    from scipy.signal import lfilter
+
+    extended = _extended(values, between)
+    parts = [extended[first : first + len(values)] for first in range(4)]
+    decay = np.exp(-1 / ratio) if np.real(ratio) > _FORGOTTEN else 0.0
+    end = _sum(_CURVES[between] @ _moments(ratio, decay), parts)
+    if decay != 0.0:
+        end = lfilter([1.0], [1.0, -decay], end, axis=0, zi=decay * values[:1])[0]
+    start = np.concatenate([values[:1], end[:-1]])
+    # The equation of the lag, averaged over the step.
+    mean = _sum(_CURVES[between] @ (1.0 / np.arange(1, 5)), parts) - ratio * (end - start)
+    return Lagged(mean, end, start)
+
+
+@dataclass
+class HeldLag:
+    """A first-order lag taken step by step: `lagged` of what stays the same during each step.
+
+    Attributes
+    ----------
+    ratio : float
+        tau in steps; 0 for none.
+    value : array
+        At the start of the next step.
+    """
+
+    ratio: float
+    value: Array
+
+    def middle(self, wanted: Array) -> Array:
+        """Take one step towards a value, and give what is reached in its middle."""
+        begin = self.value
+        self.value = after_step(begin, wanted, 1.0, self.ratio)
+        return after_step(begin, wanted, 0.5, self.ratio)
+
+
+def after_step(before: Array, wanted: Array, elapsed: float, time_constant: float) -> Array:
+    """Compute what a first-order lag has reached some time after a step, ``w + (b - w) exp(-t / tau)``.
+
+    Parameters
+    ----------
+    before, wanted : array
+    elapsed, time_constant : float
+        In one unit; a time constant of 0 is no lag.
+    """
+    return wanted if time_constant == 0 else np.asarray(wanted + (before - wanted) * exp(-elapsed / time_constant))
+
+
+def _moments(ratio: Any, decay: Any) -> Numbers:
+    """Compute what powers 0 to 3 of the time since a sample have left behind the lag at the next one."""
+    if np.real(ratio) > 1:
+        weight = _LENGTHS / ratio * np.exp((_NODES - 0.5) / ratio)
+        return np.asarray(weight @ (_NODES[:, None] + 0.5) ** np.arange(4))
+    moments = [1 - decay]
+    for power in (1, 2, 3):
+        moments.append(1 - power * ratio * moments[-1])
+    return np.array(moments)
+
+
+def _sum(taps: Numbers, parts: list[Numbers]) -> Numbers:
+    return np.asarray(sum(tap * part for tap, part in zip(taps, parts, strict=True) if tap != 0))
+
+
+def _extended(values: Numbers, between: Between) -> Numbers:
+    """Continue signals by one sample before and two after: cubics in a straight line, others as they are."""
+    first, last = values[:1], values[-1:]
+    if between == "cubic" and len(values) > 1:
+        first, last = 2 * first - values[1:2], 2 * last - values[-2:-1]
+    return np.concatenate([first, values, last, last])
