@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.spec import Format, Record, dataset, group, record
+from cpfls_cli.rounding import levelled
 
 if TYPE_CHECKING:
     from cpfls_cli.identification.identify import Identification
@@ -306,7 +307,7 @@ class SettingRuns:
     @property
     def best(self) -> int | None:
         """The run with the smallest mean squared error; None where no run found a model."""
-        return int(np.nanargmin(self.mse[:, 0])) if np.isfinite(self.mse[:, 0]).any() else None
+        return int(np.nanargmin(levelled(self.mse[:, 0]))) if np.isfinite(self.mse[:, 0]).any() else None
 
     def best_of(self, values: Array) -> float:
         """Pick the value of the best run."""

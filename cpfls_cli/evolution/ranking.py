@@ -6,6 +6,21 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.evolution.settings import Ranking
+from cpfls_cli.rounding import levelled
+
+
+def comparable(objectives: Array) -> Array:
+    """Give objectives that compare alike on every machine: the worst where not finite, and one value to those tied.
+
+    Parameters
+    ----------
+    objectives : array, shape (individuals, objectives)
+
+    Returns
+    -------
+    array, shape (individuals, objectives)
+    """
+    return np.stack([levelled(cost) for cost in worst_where_not_finite(objectives).T], axis=1)
 
 
 def worst_where_not_finite(objectives: Array) -> Array:
@@ -39,7 +54,7 @@ def dominance_matrix(objectives: Array) -> BoolArray:
     ----------
     Paper, section 6.
     """
-    costs = worst_where_not_finite(objectives)
+    costs = comparable(objectives)
     nowhere_worse = np.ones((len(costs), len(costs)), dtype=np.bool_)
     for cost in costs.T:
         nowhere_worse &= cost[:, np.newaxis] <= cost
@@ -58,7 +73,7 @@ def pareto_front(objectives: Array) -> IntArray:
     array of int, shape (front,)
         Indices in increasing order. Of equal vectors of objectives only the first is kept.
     """
-    costs = worst_where_not_finite(objectives)
+    costs = comparable(objectives)
     front = []
     # In lexicographic order nobody is dominated by a later one, so the first of the remaining is always kept.
     remaining = np.lexsort(costs.T[::-1])
@@ -114,7 +129,7 @@ def quantity_dominance_ranks(objectives: Array, first_weight: int = 1) -> IntArr
     ----------
     Paper, section 6, after its reference [6].
     """
-    costs = worst_where_not_finite(objectives)
+    costs = comparable(objectives)
     # With ties averaged, position p of n has (smaller - larger) = 2 p - (n + 1), a whole number.
     signs = np.column_stack([2.0 * positions(cost) - (len(costs) + 1) for cost in costs.T]).astype(np.int64)
     signs[:, 0] *= first_weight

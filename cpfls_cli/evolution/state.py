@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Archive
 from cpfls_cli.evolution.settings import EvolutionSettings
+from cpfls_cli.rounding import at_most
 
 End = Literal["generations", "converged"]
 
@@ -188,4 +189,5 @@ def stalled(history: History, generations: int | None, improvement: float) -> bo
     known = np.isfinite(before)
     if np.any(np.isfinite(now[~known])):
         return False
-    return bool(np.all(before[known] - now[known] <= improvement * np.abs(before[known])))
+    size = np.abs(before[known])
+    return bool(np.all(at_most(before[known] - now[known], improvement * size, size)))

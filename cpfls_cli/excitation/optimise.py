@@ -11,6 +11,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.excitation.objective import Objective, condition_number
 from cpfls_cli.excitation.variables import path_of, variables_of
 from cpfls_cli.regressor import ModelStructure, StructureSettings, model_structure
+from cpfls_cli.rounding import at_most, levelled
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -91,7 +92,7 @@ def optimised_rotation(
     samples, report = _samples(structure, duration), _Report(progress, settings.starts + settings.iterations)
     paths = [full_rotation(settings, duration, rng, vehicle.inertia_kg_m2) for _ in range(settings.starts)]
     random = [report(condition_number(path, structure, samples)) for path in paths]
-    path = best = paths[int(np.argmin(random))]
+    path = best = paths[int(np.argmin(levelled(np.array(random))))]
     objective = Objective(best, structure, limits, samples, settings.iterations, rng)
     for variables in adam(objective.gradient, variables_of(best), settings.iterations, _STEP):
         report(objective.history[-1])
@@ -109,7 +110,7 @@ def _better(
 ) -> tuple[float, RotationPath]:
     """Choose by condition number: enforced limits may cost a path what it had gained."""
     one, two = (condition_number(either, structure, samples) for either in (path, other))
-    return (one, path) if one <= two else (two, other)
+    return (one, path) if at_most(one, two) else (two, other)
 
 
 class _Report:

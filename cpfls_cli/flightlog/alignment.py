@@ -16,6 +16,7 @@ from cpfls_cli.flightlog.results import DelayEstimate, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
 from cpfls_cli.inertia import body_torque_columns
+from cpfls_cli.rounding import less, levelled
 
 _COMMANDS = ("body_torque", "thrust", "rotor_command")
 _MOTION = (
@@ -197,7 +198,7 @@ def estimate_delay(
     delays = np.arange(0.0, delay_max_s, time[1] - time[0])
     delays = np.append(delays, delay_max_s)
     curve = np.array([fit.r2(delay)[0] for delay in delays])
-    delay = _refine(fit, delays, int(np.argmax(curve)))
+    delay = _refine(fit, delays, int(np.argmin(levelled(-curve))))
     pooled, r2 = fit.r2(delay)
     at_bound = bool(delay > delays[-2])
     return DelayEstimate(delay, r2, pooled, fit.inertia(delay), delays, curve, at_bound)
@@ -246,7 +247,7 @@ def _refine(fit: _Fit, delays: Array, best: int) -> float:
     low, high = delays[max(best - 1, 0)], delays[min(best + 1, len(delays) - 1)]
     minimum = minimize_scalar(lambda delay: -fit.r2(float(delay))[0], bounds=(low, high), method="bounded")
     refined, on_grid = float(minimum.x), float(delays[best])
-    return refined if fit.r2(refined)[0] > fit.r2(on_grid)[0] else on_grid
+    return refined if less(fit.r2(on_grid)[0], fit.r2(refined)[0]) else on_grid
 
 
 def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:

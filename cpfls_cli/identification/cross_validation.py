@@ -13,6 +13,7 @@ from cpfls_cli.identification.data import sample_times
 from cpfls_cli.identification.samples import Products, Samples
 from cpfls_cli.identification.settings import RidgeSettings
 from cpfls_cli.regressor.motion import RIGID
+from cpfls_cli.rounding import at_most, levelled
 
 SMALLEST_ERROR = 1e-12
 """Share of the mean squared torque below which sums of products cannot tell errors apart."""
@@ -116,9 +117,9 @@ def ridge_curve(learned: Products, judged: Products, left_out: BoolArray, weight
     errors = np.array([_fold_errors(learned.sum(~left_out[fold]), judged, fold, weights, size) for fold in folds])
     mean = np.average(errors, axis=0, weights=judged.rows)
     spread = np.std(errors, axis=0, ddof=1) / np.sqrt(len(errors)) if len(errors) > 1 else np.zeros_like(mean)
-    best = int(np.argmin(mean))
+    best = int(np.argmin(levelled(mean)))
     # The more ridge the safer: a fuzzy part must earn its place.
-    chosen = int(np.flatnonzero(mean <= mean[best] + spread[best])[-1])
+    chosen = int(np.flatnonzero(at_most(mean, mean[best] + spread[best]))[-1])
     return RidgeCurve(np.append(weights, np.inf), mean, spread, chosen)
 
 

@@ -13,6 +13,7 @@ from cpfls_cli.identification.excitation import AxisEvidence, RuleExcitation, Sw
 from cpfls_cli.identification.judge import Score
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.solver import Fit
+from cpfls_cli.rounding import less
 
 AXES = ("roll", "pitch", "yaw")
 BADLY_EXPLAINED_R2 = 0.5
@@ -159,7 +160,7 @@ def _beaten(diagnostics: FitDiagnostics) -> Iterator[str]:
         ours = by_model["model"].r2_body
         for rival, words in RIVALS.items():
             theirs = by_model[rival].r2_body if rival in by_model else ours
-            better = (1 - theirs) < (1 - ours) * (1 - 1e-9)
+            better = less(1 - theirs, 1 - ours, 1.0)
             if np.sum(better) > 1:
                 axes = ", ".join(np.array(AXES)[better])
                 shares = f"{_percent(1 - theirs[better])}; the model {_percent(1 - ours[better])}"

@@ -19,6 +19,7 @@ from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.identification.evaluator import OBJECTIVES, Evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import Choice, IdentificationSettings
+from cpfls_cli.rounding import at_most, levelled
 from cpfls_cli.workers.employ import employ
 from cpfls_cli.workers.workforce import Workforce, gathered
 
@@ -320,13 +321,13 @@ def choose(objectives: Array, rule: Choice, held_out: Array | None = None) -> in
     """
     require_flights(rule, given=held_out is not None)
     if held_out is not None:
-        return int(np.argmin(held_out))
+        return int(np.argmin(levelled(held_out)))
     if rule == "max-error":
-        return int(np.argmin(objectives[:, 1]))
+        return int(np.argmin(levelled(objectives[:, 1])))
     candidates = np.arange(len(objectives))
     if rule == "mse-below-median-condition":
-        candidates = np.flatnonzero(objectives[:, 2] <= np.median(objectives[:, 2]))
-    return int(candidates[np.argmin(objectives[candidates, 0])])
+        candidates = np.flatnonzero(at_most(objectives[:, 2], np.median(objectives[:, 2])))
+    return int(candidates[np.argmin(levelled(objectives[candidates, 0]))])
 
 
 def require_flights(rule: Choice, *, given: bool) -> None:

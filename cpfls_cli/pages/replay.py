@@ -26,6 +26,7 @@ from cpfls_cli.report.canvas import (
 )
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import joined, number, sentence, whole_percent
+from cpfls_cli.rounding import tied
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -240,7 +241,11 @@ def told_at(replay: ReplayRecord, sources: Sources) -> str | None:
 
 def _same_errors(first: ErrorsByHorizon, second: ErrorsByHorizon) -> bool:
     groups = zip(first.errors.values(), second.errors.values(), strict=True)
-    return all(a is b if a is None or b is None else np.array_equal(a.mae, b.mae) for a, b in groups)
+    return all(a is b if a is None or b is None else _same(a.mae, b.mae) for a, b in groups)
+
+
+def _same(first: Array, second: Array) -> bool:
+    return first.shape == second.shape and bool(tied(first, second).all())
 
 
 def _section(sources: Sources, replay: Source[ReplayRecord], index: int) -> Iterator[Block]:

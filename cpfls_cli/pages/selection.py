@@ -14,6 +14,7 @@ from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.canvas import BASELINE, legend_above, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import change, count, number, percent
+from cpfls_cli.rounding import at_most, less
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,13 +54,18 @@ def _warnings(selection: Source[SelectionRecord]) -> Iterator[str]:
             f"{selection.label} is rank deficient: rank {record.rank}, where all samples reach {record.rank_full}; do "
             "not train on it, use another reduction.criterion or more samples"
         )
-    elif record.condition_number >= record.random_median:
+    elif _is_a_choice(record) and at_most(record.random_median, record.condition_number):
         yield f"{selection.label} is no better than a random choice of equal size"
-    if target is not None and record.condition_number > target:
+    if target is not None and less(target, record.condition_number):
         yield (
             f"the target reduction.condition_number = {target:g} is not reached, the selection has "
             f"{number(record.condition_number, 5)}: {_limit(record)}"
         )
+
+
+def _is_a_choice(record: SelectionRecord) -> bool:
+    """Tell whether others could have been selected: all samples are the only choice of their size."""
+    return len(record.indices) < record.candidates
 
 
 def _limit(record: SelectionRecord) -> str:
@@ -156,7 +162,7 @@ def _rows(selection: Source[SelectionRecord]) -> Iterator[_Row]:
 def _better_than_all(sources: Sources) -> Iterator[Text]:
     for selection in sources.selections:
         record = selection.record
-        if not record.deficient and record.condition_number < record.condition_number_full:
+        if not record.deficient and less(record.condition_number, record.condition_number_full):
             yield Text(
                 f"{selection.label} is better conditioned than the full set: the paper's floor, that a reduced set "
                 "cannot be, does not hold."

@@ -14,12 +14,14 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
+from cpfls_cli.evolution.ranking import comparable
 from cpfls_cli.playback.fit import Fitted, Windows, fit, stays_error, window_errors, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointLayout
 from cpfls_cli.playback.kernels import Airflow
 from cpfls_cli.playback.parameters import INERTIA, LEARNED, Layout, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.rounding import ascending, at_most, less, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
@@ -198,12 +200,13 @@ class _Bench:
         """Find the known structure that differs in the fewest blocks; the better one of two."""
         asked = set(structure.blocks)
 
-        def away(judged: Judged) -> tuple[int, float]:
+        def away(judged: Judged) -> int:
             other = judged.structure
             rules = structure.learns and other.learns and structure.rules != other.rules
-            return len(asked ^ set(other.blocks)) + 2 * int(rules), judged.error
+            return len(asked ^ set(other.blocks)) + 2 * int(rules)
 
-        return min(self.known.values(), key=away, default=None)
+        known = ascending(self.known.values(), lambda each: each.error)
+        return min(known, key=away, default=None)
 
     def _known(self, structure: Structure, part: int, near: Judged | None) -> dict[str, float]:
         """Give the values that a fit starts from."""
@@ -283,7 +286,7 @@ def choose(
     try:
         shrunk = [bench.judge(structure) for structure in _shrinking(everything)]
         path.extend(_greedy(bench, blocks, nothing))
-        first = min(bench.known.values(), key=lambda each: each.error)
+        first = smallest(bench.known.values(), lambda each: each.error)
         _evolve(bench, blocks, [*path, *shrunk, *_neighbours(bench, first)], settings, rng)
         _refine(bench, blocks)
     except SearchStoppedError:
@@ -337,17 +340,17 @@ def _greedy(bench: _Bench, blocks: tuple[str, ...], start: Judged) -> Iterator[J
     yield present
     while promise:
         best: Judged | None = None
-        for block in sorted(promise, key=lambda name: -promise[name]):
-            if best is not None and not all_tried and promise[block] < present.error - best.error:
+        for block in ascending(promise, lambda name: -promise[name]):
+            if best is not None and not all_tried and less(promise[block], present.error - best.error, present.error):
                 break
             tried = bench.judge(_with(present.structure, block, blocks))
             promise[block] = present.error - tried.error
-            if best is None or tried.error < best.error:
+            if best is None or less(tried.error, best.error):
                 best = tried
         if best is None:
             return
         better, uncertain = present.worse_than(best)
-        if better <= uncertain:
+        if at_most(better, uncertain, present.error):
             if all_tried:
                 return
             all_tried = True
@@ -379,7 +382,7 @@ def _shrinking(everything: Judged) -> Iterator[Structure]:
     gone: list[str] = []
     while len(gone) + 1 < len(structure.blocks):
         kept = [block for block in structure.blocks if block not in gone]
-        gone.append(min(kept, key=lambda block: missed([*gone, block])))
+        gone.append(smallest(kept, lambda block: missed([*gone, block])))
         yield Structure(tuple(block for block in structure.blocks if block not in gone), structure.rules)
 
 
@@ -412,8 +415,8 @@ def _named_instead(bench: _Bench, judged: Judged, blocks: tuple[str, ...]) -> No
 
 def _preferred(bench: _Bench) -> tuple[list[Judged], Judged, Judged]:
     """Sort what is judged by numbers, and give the best and the choice."""
-    judged = sorted(bench.known.values(), key=lambda each: (each.numbers, each.error))
-    best = min(judged, key=lambda each: each.error)
+    judged = sorted(ascending(bench.known.values(), lambda each: each.error), key=lambda each: each.numbers)
+    best = smallest(judged, lambda each: each.error)
     return judged, best, _simplest(judged, best, min(_VISIBLE * best.error, _VISIBLE_OF_STAYS * bench.stays))
 
 
@@ -457,7 +460,7 @@ def _evolve(
         judged = [bench.judge(_decoded(chromosome, blocks)) for chromosome in genes]
         return Evaluation(genes, np.array([_objectives(each) for each in judged]))
 
-    ranked = sorted({each.structure: each for each in first}.values(), key=lambda each: each.error)
+    ranked = ascending({each.structure: each for each in first}.values(), lambda each: each.error)
     initial = np.array([_encoded(each.structure, blocks) for each in ranked[: settings.population]], dtype=np.int64)
     for _ in evolve(evaluate, len(blocks) + 1, evolution, rng, initial):
         pass
@@ -483,14 +486,14 @@ def _simplest(judged: Sequence[Judged], best: Judged, visible: float) -> Judged:
     """Choose the fewest numbers within one standard error of the best, or not visibly worse."""
     for each in judged:
         worse, uncertain = each.worse_than(best)
-        if worse <= max(uncertain, visible):
+        if at_most(worse, max(uncertain, visible), best.error):
             return each
     return best
 
 
 def _front(judged: Sequence[Judged]) -> tuple[Judged, ...]:
     """Keep what nothing else beats in error, numbers and condition number."""
-    values = np.array([_objectives(each) for each in judged])
+    values = comparable(np.array([_objectives(each) for each in judged]))
     beaten = [np.any(np.all(values <= row, axis=1) & np.any(values < row, axis=1)) for row in values]
     return tuple(each for each, lost in zip(judged, beaten, strict=True) if not lost)
 

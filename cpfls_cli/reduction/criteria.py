@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.reduction.factor import TriangularFactor
-from cpfls_cli.reduction.lazy_search import eigenvalues_below, first_best, lazy_best
+from cpfls_cli.reduction.lazy_search import TIE_TOLERANCE, eigenvalues_below, first_best, lazy_best
 from cpfls_cli.reduction.settings import CriterionName
 from cpfls_cli.reduction.survey import RowSpace, project
 
@@ -16,8 +16,6 @@ from cpfls_cli.reduction.survey import RowSpace, project
 _BOUND_VECTORS = (6, 24)
 # Updates lose a little accuracy each; an exact refresh costs as much as some ten of them.
 _REFRESH_STEPS = 100
-# A rise below this fraction is rounding.
-_SMALLEST_RISE = 1e-12
 _ROWS = 3
 EXCHANGE_INFORMATION: dict[str, float] = {"K-exchange": 0.0, "KD-exchange": 2.0}
 """Weight of the information kept, for the criteria that choose by exchange. Without it models come out several times
@@ -242,7 +240,7 @@ class PrintedRule:
         stacked = np.vstack([np.diag(factor.singular_values), self._rows[index] @ factor.singular_vectors])
         values = np.linalg.svd(stacked, compute_uv=False)[:rows]
         nonzero = values[-1] > self._tolerance * values[0]
-        return bool(nonzero and values[-1] > least * (1.0 + _SMALLEST_RISE))
+        return bool(nonzero and values[-1] > least * (1.0 + TIE_TOLERANCE))
 
     def _thin(self, factor: TriangularFactor, available: BoolArray, rows: int) -> int:
         """Name the sample with the largest of the eigenvalues of ``G + R_i^T R_i`` that is the last of the rows'."""

@@ -12,6 +12,7 @@ import scipy.linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.reduction.survey import RowSpace
+from cpfls_cli.rounding import at_most, less, levelled
 
 # The six different elements of a symmetric 3 x 3 matrix, and where in it each of them stands.
 _ELEMENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -147,7 +148,7 @@ def exchange_samples(
         if design.size >= size or target is not None:
             design, exchanged = _exchange(design, information)
             exchanges += exchanged
-        if design.size >= size or (target is not None and design.condition_number <= target):
+        if design.size >= size or (target is not None and at_most(design.condition_number, target)):
             return Exchanged(np.flatnonzero(design.chosen), exchanges)
         outside = design.ranked(np.flatnonzero(~design.chosen), Compound(_POWERS[0], information))
         design = design.swapped(outside[: min(design.size, size - design.size)], outside[:0]).refreshed()
@@ -194,7 +195,7 @@ class _Design:
         """Sort samples, all of them in the set or all outside, by falling merit."""
         chosen = bool(self.chosen[indices[:1]].any())
         merits = criterion.merits(self._space.rows[indices], *self._decomposition, chosen=chosen)
-        return indices[np.argsort(-merits, kind="stable")]
+        return indices[np.argsort(levelled(-merits), kind="stable")]
 
     def swapped(self, entering: IntArray, leaving: IntArray) -> _Design:
         chosen, rows = self.chosen.copy(), self._space.rows
@@ -248,7 +249,7 @@ def _swap(design: _Design, candidates: IntArray, count: int, criterion: Compound
     level = design.value(criterion) - _SMALLEST_FALL
     for entering, leaving in _proposals(inside, outside, count, singles=criterion.power == _POWERS[-1]):
         swapped = design.swapped(entering, leaving)
-        if swapped.value(criterion) < level:
+        if less(swapped.value(criterion), level):
             return swapped.refreshed(), len(entering)
     return design, 0
 

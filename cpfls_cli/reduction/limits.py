@@ -10,6 +10,7 @@ from cpfls_cli.reduction.lazy_search import TIE_TOLERANCE, first_best
 from cpfls_cli.reduction.selection import Run, StopReason
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
 from cpfls_cli.reduction.survey import RowSpace
+from cpfls_cli.rounding import at_most
 
 # The Gram matrix of a residual squares its singular values, so below this fraction they are rounding.
 _SMALLEST_RATIO = 1e-7
@@ -71,7 +72,7 @@ def stop_reason(run: Run, settings: ReductionSettings, limit: int) -> StopReason
         Most samples that may be chosen.
     """
     target = settings.condition_number
-    if target is not None and run.indices and run.factor.condition_number <= target:
+    if target is not None and run.indices and at_most(run.factor.condition_number, target):
         return "condition-number"
     if len(run.indices) < limit:
         return None

@@ -13,6 +13,7 @@ from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.next_flight.logged import Logging, planned_signals
 from cpfls_cli.gap.next_flight.room import Room
 from cpfls_cli.gap.next_flight.separation import Evidence, Judgement, Question, gathered, judged, shared_noise
+from cpfls_cli.rounding import ascending, less
 from cpfls_cli.trajectory.harmonics import HarmonicPath
 from cpfls_cli.weak_form.windows import windows
 
@@ -144,14 +145,15 @@ def next_flight(
         path = room.drawn(rng)
         scored.append((asked.score(path), path))
         progress(number + 1, total, f"best random path {max(score for score, _ in scored):.3f}")
-    scored.sort(key=lambda pair: pair[0])
+    scored = ascending(scored, lambda pair: pair[0])
     best, path = scored[-1]
     history, step = [], _FIRST_STEP
     for number in range(settings.iterations):
         trial = room.fitted(_changed(path, step, room, rng))
         score = asked.score(trial)
-        step = min(max(step * (_LONGER if score > best else _SHORTER), _SMALLEST_STEP), 1.0)
-        best, path = (score, trial) if score > best else (best, path)
+        better = less(best, score)
+        step = min(max(step * (_LONGER if better else _SHORTER), _SMALLEST_STEP), 1.0)
+        best, path = (score, trial) if better else (best, path)
         history.append(best)
         progress(settings.starts + number + 1, total, f"best path {best:.3f}")
     return NextFlight(path, tuple(path for _, path in scored), np.array(history))
