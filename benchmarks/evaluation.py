@@ -25,15 +25,16 @@ pin_threads()
 import numpy as np
 
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
-from cpfls_cli.identification import least_squares, reference
+from cpfls_cli.identification import least_squares
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import Evaluator, Problem, refine
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.reference import ReferenceEvaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.regressor import Motion, StructureSettings, data_ranges, model_structure, uniform_breakpoints
+from tests.builders import reference_evaluator as reference
+from tests.builders.reference_evaluator import ReferenceEvaluator
 
 CHROMOSOMES = 80
 LARGEST_CONDITION = 1e6

@@ -2,7 +2,7 @@
 
 python benchmarks/reproduction_time.py [--out FILE]
 
-With FILE the rows go there and nowhere else, as one line for `--set report.evaluation_times=`: no artifact holds a
+With FILE the rows go there and nowhere else, as JSON for `benchmarks/paper/report.py --times`: no artifact holds a
 time, so that equal content stays an equal file. Seconds of processor time, medians.
 """
 
@@ -25,11 +25,11 @@ pin_threads()
 
 import numpy as np
 
+from benchmarks.paper.claims import line_through
 from benchmarks.shared.studies import paper_flight, paper_study, regressor_matrix
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.reference import ReferenceEvaluator
-from cpfls_cli.pages.claims import line_through
+from tests.builders.reference_evaluator import ReferenceEvaluator
 
 SIZES = (343, 485, 685, 970, 1170, 1940, 2743, 3880, 5487)
 COLUMNS = ("samples", "svd_s", "evaluation_s", "compiled_s")
@@ -37,7 +37,7 @@ COLUMNS = ("samples", "svd_s", "evaluation_s", "compiled_s")
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
-    parser.add_argument("--out", type=Path, help="write the rows here, as one line of YAML")
+    parser.add_argument("--out", type=Path, help="write the rows here, as JSON")
     parser.add_argument("--repeats", type=int, default=7)
     options = parser.parse_args()
     rows = measured(options.repeats)

@@ -36,7 +36,7 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
     files = {path: inputs[str(path)].sha256 for path in artifacts}
     distinct = {sha256: path for path, sha256 in reversed(files.items())}
     kept = [path for path, sha256 in files.items() if distinct[sha256] == path]
-    sources = _sources(kept, [files[path] for path in kept])
+    sources = read_sources(kept, [files[path] for path in kept])
     if job.dry_run:
         return nothing_written(job)
     given = Sources(sources, job.study.vehicle, job.study.report)
@@ -47,7 +47,14 @@ def run(job: Job, artifacts: Sequence[Path], form: Form | None = None) -> Outcom
     return _outcome(job.output, page, [*again, *equal])
 
 
-def _sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
+def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
+    """Read artifacts of any format for a report, each under a name of its own.
+
+    Parameters
+    ----------
+    hashes : sequence of str
+        SHA-256 of the files.
+    """
     labels = unique_labels([_printable(path.name) for path in paths], hashes)
     given = zip(paths, labels, hashes, strict=True)
     return [source_of_record(read_any(path), path, label, sha256) for path, label, sha256 in given]

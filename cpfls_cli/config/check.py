@@ -19,6 +19,9 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.identification.settings import PRESETS
 from cpfls_cli.inertia import symmetric
 
+_GONE = {("report", "paper"), ("report", "evaluation_times")}
+"""Sections and keys that configs of before hold, also those inside artifacts; they say nothing any more."""
+
 _PRESET_SECTION = "identification"
 _UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
 _LENGTH = {"too_short", "too_long"}
@@ -57,7 +60,7 @@ def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[st
         One line for each wrong key.
     """
     # A section that is named but left empty means its defaults.
-    named = {key: {} if value is None and key in SECTIONS else value for key, value in data.items()}
+    named = {key: {} if value is None and key in SECTIONS else _known(key, value) for key, value in data.items()}
     filled = with_guesses(_with_preset(named))
     missing = [_missing_line(source, key) for key in _left_out(named)]
     try:
@@ -67,6 +70,12 @@ def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[st
         return None, [*missing, *_describe_errors(errors, filled, source)]
     wrong = missing or [f"{source}: {line}" for line in _no_body(study)]
     return (None if wrong else study), wrong
+
+
+def _known(section: str, values: Any) -> Any:
+    if not isinstance(values, dict):
+        return values
+    return {key: value for key, value in values.items() if (section, key) not in _GONE}
 
 
 def _no_body(study: Study) -> Iterator[str]:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from annotated_types import Gt
 from pydantic import BaseModel, ConfigDict, Field
 from typing_extensions import Doc
 
@@ -42,26 +41,11 @@ SECTIONS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluationTime(Settings):
-    """Duration of an evaluation on a number of samples."""
-
-    samples: Annotated[int, Gt(0), Doc("samples learned from and judged on")]
-    svd_s: Annotated[float, Gt(0), Doc("singular value decomposition of the regressor, s")]
-    evaluation_s: Annotated[float, Gt(0), Doc("evaluation as the paper does it, s")]
-    compiled_s: Annotated[float, Gt(0), Doc("evaluation by the compiled code, s")]
-
-
-@dataclass(frozen=True, kw_only=True)
 class ReportSettings(Settings):
     """Settings of the report."""
 
     title: Annotated[str, Doc("heading of the page")] = "Identification of rotational dynamics"
     notes: Annotated[tuple[str, ...], Doc("what a reader should know about this study, one sentence each")] = ()
-    paper: Annotated[bool, Doc("show the figures that the paper prints beside ours")] = False
-    evaluation_times: Annotated[
-        tuple[EvaluationTime, ...],
-        Doc("times measured elsewhere, for the paper's claims about time; no artifact holds any"),
-    ] = ()
 
 
 class Study(BaseModel):

@@ -38,8 +38,6 @@ _NO_TORQUE_BUT_ROTORS = (
     " import.torque_source names rotor-speed or rotor-command, which needs the factors of the rotors as numbers"
 )
 _ORIGINS = {"trajectory": "simulated along", "log": "imported from", "model": "with"}
-_PAPER_VEHICLE = ("9.81", "6", "4", "0.3", "121.5 × 10⁻⁶", "2.7 × 10⁻⁶", "0.6", "0.6", "1.2")
-_PAPER_DURATION = "55"
 
 
 def answer(flight: Source[FlightRecord], index: int = 1) -> Iterator[Block]:
@@ -195,20 +193,17 @@ def torque_figure(name: str, flight: Source[FlightRecord]) -> Plot:
 
 
 def vehicle_section(sources: Sources) -> Section:
-    """Show the vehicle of the study, beside the paper's where that is asked for.
+    """Show the vehicle of the study.
 
     References
     ----------
     Table 3 of the paper.
     """
-    paper = sources.settings.paper
-    rows = [[quantity, value, *([printed] if paper else [])] for quantity, value, printed in _vehicle_rows(sources)]
-    header = ("Quantity", "Study", *(("Paper",) if paper else ()))
     caption = (
         "Table 3. The vehicle of the study config. A range means that the rotors differ; the arm is the distance of a "
         "rotor from the z axis."
     )
-    blocks: list[Block] = [Table("table-3-vehicle", caption, header, rows)]
+    blocks: list[Block] = [Table("table-3-vehicle", caption, ("Quantity", "Study"), _vehicle_rows(sources))]
     unknown = sources.vehicle.unknown
     if unknown:
         names = joined(name.replace("_", " ") for name in unknown)
@@ -219,15 +214,14 @@ def vehicle_section(sources: Sources) -> Section:
     return Section("vehicle", "Vehicle", blocks)
 
 
-def _vehicle_rows(sources: Sources) -> list[tuple[str, str, str]]:
+def _vehicle_rows(sources: Sources) -> list[tuple[str, str]]:
     vehicle = sources.vehicle
     values = [plain(vehicle.gravity_m_s2), plain(vehicle.mass_kg), *_rotors(vehicle)]
     values += [plain(moment) for moment in vehicle.inertia_kg_m2]
     names = ["gravity g, m/s²", "mass m, kg", "rotors", "arm l, m", "thrust factor k, N s²", "drag factor b, N m s²"]
     names += [f"{name}, kg m²" for name in INERTIA_PARAMETERS[: len(vehicle.inertia_kg_m2)]]
-    printed = [*_PAPER_VEHICLE, *["0"] * (len(values) - len(_PAPER_VEHICLE))]
-    rows = list(zip(names, values, printed, strict=True))
-    return rows if sources.only_gap else [*rows, ("flight time T, s", _durations(sources), _PAPER_DURATION)]
+    rows = list(zip(names, values, strict=True))
+    return rows if sources.only_gap else [*rows, ("flight time T, s", _durations(sources))]
 
 
 def _rotors(vehicle: VehicleSettings) -> list[str]:

@@ -1,4 +1,4 @@
-"""The fuzzy part of models: its input (Figure 1), partitions (Figure 6) and coefficients, and the rules excited."""
+"""The fuzzy part of models: its partitions and coefficients, and the rules excited."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.model import ModelGroup, ModelRecord
-from cpfls_cli.fuzzy.inputs import seesaw
 from cpfls_cli.fuzzy.membership import join_ends, memberships
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.pages.printed import PRINTED_SEESAW
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.report.canvas import line, plot, style_of
+from cpfls_cli.report.canvas import plot, style_of
 from cpfls_cli.report.content import Block, Facts, Folded, Heading, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import count, number, percent
 
@@ -124,29 +122,6 @@ def _rules(model: Source[ModelRecord], index: int) -> Iterator[Block]:
     if model.record.fuzzy_part_off:
         caption += " The fuzzy part is off, so the model uses none of them."
     yield Table(f"silent-rules-{index}", caption, ("Rule", "Largest firing", "Determined"), rows)
-
-
-def seesaw_figure(name: str) -> Plot:
-    """Draw the piecewise linear seesaw over two turns, with the values that the paper prints.
-
-    References
-    ----------
-    Figure 1 and equation (11) of the paper.
-    """
-    half_turns = np.linspace(-1.0, 3.0, 801)
-
-    def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        line(axes, half_turns, seesaw(np.pi * half_turns)[0], **style_of(0))
-        axes.plot(list(PRINTED_SEESAW), list(PRINTED_SEESAW.values()), "o", color=style_of(1)["color"])
-        axes.set_xlabel("angle, π rad")
-        axes.set_ylabel("seesaw")
-
-    caption = (
-        "Figure 1. The seesaw of equation (11) over two turns: equal where an angle and 2π meet. Dots: the values that "
-        "the equation prints at the quarters of a turn. It takes each value twice in a turn."
-    )
-    return plot(name, caption, "A triangle wave between -1 and 1 over two turns", 2.3, draw)
 
 
 def partitions_figure(name: str, model: Source[ModelRecord]) -> Plot:

@@ -1,4 +1,4 @@
-"""How models were identified: Table 5 beside the paper's, the baselines by axis, the search and its Pareto front."""
+"""How models were identified: their errors, the baselines by axis, the search and its Pareto front."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ import numpy as np
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.scores import AXES, MODEL, RIGID_BODY, TRAINING, JudgedGroup
 from cpfls_cli.pages.model import MODELS, SQUARED_TORQUE, TORQUE
-from cpfls_cli.pages.printed import RELATIVE_ERROR, SMALLEST_MAX_ERROR, TABLE_5, PrintedColumn
 from cpfls_cli.pages.source import Source, Sources, section_of_each
-from cpfls_cli.pages.sweep import repeats_table_5
 from cpfls_cli.report.canvas import legend_above, plain_ticks, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, count, number, percent, r_squared
+from cpfls_cli.report.numbers import count, number, percent, r_squared
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +29,6 @@ _ROWS = (
     "its condition number",
     "relative error",
 )
-_RELATIVE_BOUND = 0.1
 _MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("mse", f"MSE, {SQUARED_TORQUE}", lambda value: number(value, 3)),
     ("max_error", f"Largest error, {TORQUE}", lambda value: number(value, 3)),
@@ -42,7 +39,7 @@ _MEASURES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
 
 
 def identification_section(sources: Sources) -> Section | None:
-    """Show the models beside each other, the paper's, and their baselines.
+    """Show the models beside each other, and their baselines.
 
     Returns
     -------
@@ -56,8 +53,6 @@ def identification_section(sources: Sources) -> Section | None:
     if not sources.models:
         return None
     blocks: list[Block] = [_table(sources)]
-    if sources.settings.paper:
-        blocks.append(Text(_scale_sentence(sources), "note"))
     for index, model in enumerate(sources.models, start=1):
         blocks += _baselines(model, index)
     return Section("identification", "Identification", blocks)
@@ -66,17 +61,12 @@ def identification_section(sources: Sources) -> Section | None:
 def _table(sources: Sources) -> Table:
     columns = [_column(model) for model in sources.models]
     header = ["Quantity", *(model.label for model in sources.models)]
-    elsewhere = repeats_table_5(sources.sweeps)
-    if sources.settings.paper and not elsewhere:
-        columns += [_printed(column) for column in TABLE_5]
-        header += ["Paper"] * len(TABLE_5)
     rows = [[name, *(column[index] for column in columns)] for index, name in enumerate(_ROWS)]
     caption = (
-        "Results of the identification on the whole training part: mean squared error over the axes, largest error and "
-        "condition number of the selected model, and its largest error over the largest torque (worst axis)."
+        "Table 5. Results of the identification on the whole training part: mean squared error over the axes, largest "
+        "error and condition number of the selected model, and its largest error over the largest torque (worst axis)."
     )
-    numbered = caption if elsewhere else f"Table 5. {caption}"
-    return Table("table-5-identification", numbered, header, rows, sentences=frozenset(range(1, len(header))))
+    return Table("table-5-identification", caption, header, rows, sentences=frozenset(range(1, len(header))))
 
 
 def _column(model: Source[ModelRecord]) -> list[str]:
@@ -92,28 +82,6 @@ def _column(model: Source[ModelRecord]) -> list[str]:
         number(record.solve.condition_number, 5),
         percent(judged.worst(MODEL, TRAINING)[0]),
     ]
-
-
-def _printed(column: PrintedColumn) -> list[str]:
-    size = [str(value) for value in (column.samples, column.population, column.generations)]
-    return [column.system, *size, UNKNOWN, column.mse, column.max_error, column.condition_number, RELATIVE_ERROR]
-
-
-def _scale_sentence(sources: Sources) -> str:
-    """Compare the size of the torques: the paper prints absolute errors, and its torques must have been larger."""
-    ours = max(_largest_torque(model.record.judged) for model in sources.models)
-    theirs = SMALLEST_MAX_ERROR / _RELATIVE_BOUND
-    return (
-        f"Compare the relative errors, not MSE and largest error: the largest torque here is {number(ours, 2)} N m, "
-        f"whereas an error of {SMALLEST_MAX_ERROR} N m that is below 10 % means more than {number(theirs, 2)} N m in "
-        "the paper. Its condition numbers belong to its own training path, which it does not define in full."
-    )
-
-
-def _largest_torque(judged: JudgedGroup) -> float:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        torque = judged.of_axes("max_error", MODEL, TRAINING) / judged.of_axes("relative_error", MODEL, TRAINING)
-    return float(np.max(torque[np.isfinite(torque)], initial=0.0))
 
 
 def _baselines(model: Source[ModelRecord], index: int) -> Iterator[Block]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from cpfls_cli.pages.comparison import comparison_section
@@ -15,7 +16,6 @@ from cpfls_cli.pages.identification import identification_section, search_sectio
 from cpfls_cli.pages.prediction import prediction_section
 from cpfls_cli.pages.provenance import missing, provenance_section
 from cpfls_cli.pages.replay import replay_section
-from cpfls_cli.pages.reproduction import reproduction_section
 from cpfls_cli.pages.residuals import residuals_section
 from cpfls_cli.pages.selection import reduction_section
 from cpfls_cli.pages.sensors import sensors_section, unseen_section
@@ -36,7 +36,6 @@ _SECTIONS = (
     summary_section,
     comparison_section,
     models_section,
-    reproduction_section,
     diagnosis_section,
     extension_section,
     found_vehicle_section,
@@ -103,7 +102,11 @@ def report_page(sources: Sources, version: str, form: Form = Form.HTML) -> Page:
     Page
         Equal text for equal artifacts and settings.
     """
-    sections = sections_of(sources)
+    return page_of(sources, sections_of(sources), version, form)
+
+
+def page_of(sources: Sources, sections: Sequence[Section], version: str, form: Form = Form.HTML) -> Page:
+    """Write sections about artifacts as one page: those of `sections_of`, and what a study adds of its own."""
     return Page(
         text=_WRITE[form](Document(sources.title, version, sections, sources.all)),
         sections=tuple(section.name for section in sections),

@@ -197,7 +197,6 @@ _LACKS: tuple[_Lack, ...] = (
         "cpfls predict CONFIG model.h5 flight.h5 -o prediction.h5",
     ),
 )
-_SWEEP: _Lack = (SweepRecord, "Table 5 with its means over several seeds", "cpfls sweep CONFIG flight.h5 -o sweep.h5")
 _GAP_LACKS: tuple[_Lack, ...] = (
     (
         DisagreementRecord,
@@ -230,8 +229,6 @@ def _wanted(sources: Sources) -> Iterator[_Lack]:
     """List what a report of these artifacts could show: nobody who looks for a gap wants a training path."""
     if not sources.only_gap:
         yield from _LACKS
-    if sources.settings.paper:
-        yield _SWEEP
     if sources.gap:
         yield from _GAP_LACKS[:2]
         if any(diagnosis.record.effects.names() for diagnosis in sources.diagnoses):

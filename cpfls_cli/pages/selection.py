@@ -1,4 +1,4 @@
-"""The page of a selection: what the reduced training set keeps, Table 4 and Figure 5 of the paper."""
+"""The page of a selection: what the reduced training set keeps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.selection import SelectionRecord
-from cpfls_cli.pages.printed import TABLE_4
 from cpfls_cli.pages.source import Source, Sources
 from cpfls_cli.report.canvas import BASELINE, legend_above, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Heading, Plot, Section, Table, Text
@@ -29,7 +28,6 @@ _HEADER = (
     "Change",
     "Random choice of equal size",
 )
-_PAPER = ("Paper: condition number", "Paper: change")
 _Row = list[str | Cell]
 
 
@@ -77,7 +75,7 @@ def _limit(record: SelectionRecord) -> str:
 
 
 def reduction_section(sources: Sources) -> Section | None:
-    """Show the reduced training sets, beside the paper's where that is asked for.
+    """Show the reduced training sets.
 
     Returns
     -------
@@ -113,34 +111,14 @@ def _undetermined(selection: Source[SelectionRecord]) -> Iterator[Text]:
 
 
 def _table(sources: Sources) -> Table:
-    ours = [row for selection in sources.selections for row in _rows(selection)]
+    rows = [row for selection in sources.selections for row in _rows(selection)]
     # Selections from one flight share its full set, which then stands once.
-    ours = [row for index, row in enumerate(ours) if row not in ours[:index]]
-    rows = _beside_the_paper(ours) if sources.settings.paper else ours
+    rows = [row for index, row in enumerate(rows) if row not in rows[:index]]
     caption = (
         "Table 4. Condition number of the regressor with uniform partitions, all samples against reduced sets. Change "
         "is against the full set of the same flight; random is the median of random choices."
     )
-    header = (*_HEADER, *(_PAPER if sources.settings.paper else ()))
-    return Table("table-4-reduction", caption, header, rows)
-
-
-def _beside_the_paper(ours: list[_Row]) -> list[_Row]:
-    """Add the printed columns by number of samples, largest sets first; those that nobody repeats stand alone."""
-    printed = {str(column.samples): [str(column.condition_number), change(column.change)] for column in TABLE_4}
-    shown = {_samples(row) for row in ours}
-    rows = [[*row, *printed.get(_samples(row), ["", ""])] for row in ours]
-    full = TABLE_4[0].samples
-    rows += [
-        [f"Paper, {'full set' if int(samples) == full else 'reduced'}", samples, percent(int(samples) / full), "", "",
-         "", "", *columns]
-        for samples, columns in printed.items() if samples not in shown
-    ]  # fmt: skip
-    return sorted(rows, key=lambda row: -int(_samples(row)))
-
-
-def _samples(row: _Row) -> str:
-    return str(row[1])
+    return Table("table-4-reduction", caption, _HEADER, rows)
 
 
 def _rows(selection: Source[SelectionRecord]) -> Iterator[_Row]:
@@ -163,12 +141,7 @@ def _better_than_all(sources: Sources) -> Iterator[Text]:
     for selection in sources.selections:
         record = selection.record
         if not record.deficient and less(record.condition_number, record.condition_number_full):
-            yield Text(
-                f"{selection.label} is better conditioned than the full set: the paper's floor, that a reduced set "
-                "cannot be, does not hold."
-                if sources.settings.paper
-                else f"{selection.label} is better conditioned than the full set."
-            )
+            yield Text(f"{selection.label} is better conditioned than the full set.")
 
 
 def reduction_figure(name: str, selections: Sequence[Source[SelectionRecord]]) -> Plot:

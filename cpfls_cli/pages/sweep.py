@@ -1,4 +1,4 @@
-"""The page of a sweep: the errors of each setting, how far its seeds lie apart, and Table 5 of the paper."""
+"""The page of a sweep: the errors of each setting, and how far its seeds lie apart."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns, SweepRecord, spread
+from cpfls_cli.artifacts.sweep import SettingRuns, SweepRecord, spread
 from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
-from cpfls_cli.pages.printed import RELATIVE_ERROR, TABLE_5, PrintedColumn
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import plain_ticks, plot, style_of
 from cpfls_cli.report.content import Block, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, number, percent
+from cpfls_cli.report.numbers import number, percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +24,23 @@ _DIGITS = 3
 _DEVIATION = "standard deviation of the"
 _DECADE = 10.0
 _TICKS = 4
-_Row = tuple[str, Callable[[SettingRuns], str], Callable[[PrintedColumn], str] | None]
+_ROWS: tuple[tuple[str, Callable[[SettingRuns], str]], ...] = (
+    ("system", lambda s: {"cpfls": "cpFLS", "fls": "FLS"}[s.structure]),
+    ("training points", lambda s: str(s.samples)),
+    ("population × generations", lambda s: f"{s.population} × {s.generations}"),
+    ("runs", lambda s: str(s.runs)),
+    (f"best run: MSE, {SQUARED_TORQUE}", lambda s: _best(s, s.mse[:, 0])),
+    (f"best run: largest error, {TORQUE}", lambda s: _best(s, s.max_error[:, 0])),
+    ("best run: condition number", lambda s: _best(s, s.condition_number)),
+    (f"mean MSE, {SQUARED_TORQUE}", lambda s: _mean(s.mse[:, 0])),
+    (f"{_DEVIATION} MSE, {SQUARED_TORQUE}", lambda s: _deviation(s.mse[:, 0])),
+    (f"mean largest error, {TORQUE}", lambda s: _mean(s.max_error[:, 0])),
+    (f"{_DEVIATION} largest error, {TORQUE}", lambda s: _deviation(s.max_error[:, 0])),
+    ("mean condition number", lambda s: _mean(s.condition_number)),
+    (f"{_DEVIATION} condition number", lambda s: _deviation(s.condition_number)),
+    ("mean relative error", lambda s: percent(spread(s.relative_error[:, 0]).mean)),
+)
+"""Quantities of the large table, and how each is shown of a setting."""
 
 
 def answer(sweep: Source[SweepRecord]) -> Iterator[Block]:
@@ -60,7 +75,7 @@ def _overview(sweep: Source[SweepRecord]) -> Table:
 
 
 def replicates_section(sources: Sources) -> Section | None:
-    """Show the settings of sweeps beside each other and beside the paper's.
+    """Show the settings of sweeps beside each other.
 
     Returns
     -------
@@ -71,23 +86,7 @@ def replicates_section(sources: Sources) -> Section | None:
     ----------
     Table 5 of the paper.
     """
-    if not sources.sweeps:
-        return None
-    sweeps, paper = joined_sweeps(sources.sweeps), sources.settings.paper
-    # Sweeps over readings of the paper stand beside its claims.
-    shown = [sweep for sweep in sweeps if not (paper and compares_readings(sweep.record.settings))]
-    blocks = [block for index, sweep in enumerate(shown, start=1) for block in _sweep(sweep, index, paper)]
-    return Section("replicates", "Replicates of the search", blocks) if blocks else None
-
-
-def reading_of(setting: SettingRuns) -> tuple[str, str]:
-    """Name what chose the samples of a setting, and on which of them it was judged."""
-    return setting.criterion, setting.judged_on
-
-
-def compares_readings(settings: Sequence[SettingRuns]) -> bool:
-    """Tell whether searches choose equally many samples in several ways, or judge on different ones."""
-    return len({reading_of(setting) for setting in settings if setting.criterion != ALL_SAMPLES}) > 1
+    return section_of_each("replicates", "Replicates of the search", joined_sweeps(sources.sweeps), _sweep)
 
 
 def joined_sweeps(sweeps: Sequence[Source[SweepRecord]]) -> list[Source[SweepRecord]]:
@@ -120,16 +119,14 @@ def _with_seeds_of(config: Mapping[str, Any], other: Mapping[str, Any]) -> dict[
     return {**config, "sweep": {**config["sweep"], "seeds": seeds}}
 
 
-def _sweep(sweep: Source[SweepRecord], index: int, paper: bool) -> Iterator[Block]:
+def _sweep(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
     # Table 5 holds more than the one that a terminal has room for.
     yield from (block for block in answer(sweep) if not isinstance(block, Table))
     if not sweep.record.complete:
         yield Text(
             f"Unfinished: {_finished(sweep)} of {sweep.label}. The same command with --resume goes on.", "warning"
         )
-    yield _table(sweep, index, paper)
-    if paper and _repeats_table_5(sweep.record):
-        yield Text(_PAPER_NOTE, "note")
+    yield _table(sweep, index)
     yield replicates_figure(f"replicates-{index}", sweep)
     yield from _held_out(sweep, index)
     yield Text(
@@ -138,58 +135,15 @@ def _sweep(sweep: Source[SweepRecord], index: int, paper: bool) -> Iterator[Bloc
     )
 
 
-_PAPER_NOTE = (
-    "Ours above, the paper's below, over ten runs each. It says “variance” where it must mean the standard deviation: "
-    "a variance of 0.0001 about a mean of 0.0008 would be a deviation of 0.01. Compare how figures change from setting "
-    "to setting, and relative errors: its absolute errors belong to torques of more than 1.5 N m, and its condition "
-    "numbers to a path that it does not define in full."
-)
-
-
-def _table(sweep: Source[SweepRecord], index: int, paper: bool) -> Table:
+def _table(sweep: Source[SweepRecord], index: int) -> Table:
     settings = sweep.record.settings
-    printed = printed_beside(settings) if paper else [None for _ in settings]
-    rows: list[list[str]] = []
-    for title, ours, theirs in _rows():
-        rows.append([title, *(ours(setting) for setting in settings)])
-        if theirs is not None and any(printed):
-            rows.append(["· paper", *(theirs(column) if column else UNKNOWN for column in printed)])
-    numbered = "Table 5. " if _repeats_table_5(sweep.record) else ""
+    rows = [[title, *(shown(setting) for setting in settings)] for title, shown in _ROWS]
     caption = (
-        f"{numbered}Results of {sweep.label} on the whole training part. The best run of a setting is that of the "
+        f"Results of {sweep.label} on the whole training part. The best run of a setting is that of the "
         "smallest mean squared error; mean and standard deviation are over its seeds; the "
         "variance is the square of the standard deviation shown."
     )
     return Table(f"table-5-replicates-{index}", caption, ["Quantity", *(setting.name for setting in settings)], rows)
-
-
-def _rows() -> Iterator[_Row]:
-    yield "system", lambda s: {"cpfls": "cpFLS", "fls": "FLS"}[s.structure], lambda p: p.system
-    yield "training points", lambda s: str(s.samples), lambda p: str(p.samples)
-    yield "population × generations", lambda s: f"{s.population} × {s.generations}", _size
-    yield "runs", lambda s: str(s.runs), lambda _: "10"
-    yield f"best run: MSE, {SQUARED_TORQUE}", lambda s: _best(s, s.mse[:, 0]), lambda p: p.mse
-    yield f"best run: largest error, {TORQUE}", lambda s: _best(s, s.max_error[:, 0]), lambda p: p.max_error
-    yield "best run: condition number", lambda s: _best(s, s.condition_number), lambda p: p.condition_number
-    yield f"mean MSE, {SQUARED_TORQUE}", lambda s: _mean(s.mse[:, 0]), lambda p: p.mse_of_runs[0]
-    yield f"{_DEVIATION} MSE, {SQUARED_TORQUE}", lambda s: _deviation(s.mse[:, 0]), lambda p: p.mse_of_runs[1]
-    yield f"mean largest error, {TORQUE}", lambda s: _mean(s.max_error[:, 0]), lambda p: p.max_error_of_runs[0]
-    yield (
-        f"{_DEVIATION} largest error, {TORQUE}",
-        lambda s: _deviation(s.max_error[:, 0]),
-        lambda p: p.max_error_of_runs[1],
-    )
-    yield "mean condition number", lambda s: _mean(s.condition_number), lambda p: p.condition_number_of_runs[0]
-    yield (
-        f"{_DEVIATION} condition number",
-        lambda s: _deviation(s.condition_number),
-        lambda p: p.condition_number_of_runs[1],
-    )
-    yield "mean relative error", lambda s: percent(spread(s.relative_error[:, 0]).mean), lambda _: RELATIVE_ERROR
-
-
-def _size(column: PrintedColumn) -> str:
-    return f"{column.population} × {column.generations}"
 
 
 def _best(setting: SettingRuns, values: Array) -> str:
@@ -222,37 +176,6 @@ def _held_out(sweep: Source[SweepRecord], index: int) -> Iterator[Block]:
         header = ("Setting", "Runs", f"MSE, {SQUARED_TORQUE}", f"Largest error, {TORQUE}", "Relative error")
         caption = f"Models of {sweep.label} on {part}: mean ± standard deviation over the seeds."
         yield Table(f"held-out-{index}-{number_of}", caption, header, rows)
-
-
-def printed_beside(settings: Sequence[SettingRuns]) -> list[PrintedColumn | None]:
-    """Find the column of the paper that each setting repeats.
-
-    Returns
-    -------
-    list of PrintedColumn or None
-        Of equal structure and samples; of those of equal population and generations too, else the first in order.
-    """
-    columns: dict[int, PrintedColumn] = {}
-    for exact in (True, False):
-        for index, setting in enumerate(settings):
-            free = (column for column in TABLE_5 if column not in columns.values() and _fits(setting, column, exact))
-            if index not in columns and (column := next(free, None)) is not None:
-                columns[index] = column
-    return [columns.get(index) for index in range(len(settings))]
-
-
-def repeats_table_5(sweeps: Sequence[Source[SweepRecord]]) -> bool:
-    """Tell whether sweeps repeat any column of the paper."""
-    return any(_repeats_table_5(sweep.record) for sweep in sweeps)
-
-
-def _repeats_table_5(sweep: SweepRecord) -> bool:
-    return any(printed_beside(sweep.settings))
-
-
-def _fits(setting: SettingRuns, column: PrintedColumn, exact: bool) -> bool:
-    keys = ("structure", "samples", "population", "generations") if exact else ("structure", "samples")
-    return all(getattr(setting, key) == getattr(column, key) for key in keys)
 
 
 def replicates_figure(name: str, sweep: Source[SweepRecord]) -> Plot:

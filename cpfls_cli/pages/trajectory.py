@@ -1,4 +1,4 @@
-"""The page of a planned path: its moves and peaks, what it asks of the vehicle, Figures 2 and 3 of the paper."""
+"""The page of a planned path: its moves and peaks, and what it asks of the vehicle."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.scores import AXES
 from cpfls_cli.artifacts.trajectory import DERIVATIVES, LegGroup, TrajectoryRecord
 from cpfls_cli.pages.next_flight import question_blocks
-from cpfls_cli.pages.printed import PRINTED_PEAKS
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, legend_above, line, plot, stacked, style_of
 from cpfls_cli.report.content import Block, Plot, Section, Table, Text
@@ -32,17 +31,13 @@ _MOVES_SHOWN = 20
 _TURN = 360.0
 
 
-def answer(
-    trajectory: Source[TrajectoryRecord], index: int = 1, printed: Mapping[str, float] | None = None
-) -> Iterator[Block]:
+def answer(trajectory: Source[TrajectoryRecord], index: int = 1) -> Iterator[Block]:
     """Say what a path asks for: its peaks and its moves, or how a held vehicle turns.
 
     Parameters
     ----------
     index : int
         Number of the path on its page.
-    printed : mapping of str to float, optional
-        What the paper prints of the peaks, by name of the derivative.
     """
     record = trajectory.record
     if record.held:
@@ -51,7 +46,7 @@ def answer(
         return
     if record.question is not None:
         yield from question_blocks(f"questions-{index}", record.question)
-    yield _peaks(f"peaks-{index}", trajectory, printed)
+    yield _peaks(f"peaks-{index}", trajectory)
     if record.leg is not None and any(record.leg.limited_by):
         yield _moves(f"legs-{index}", trajectory.label, record.leg)
 
@@ -137,15 +132,12 @@ def path_section(sources: Sources) -> Section | None:
     Section or None
         None where no trajectory was given.
     """
-    printed = PRINTED_PEAKS if sources.settings.paper else None
-    return section_of_each(
-        "path", "Training path", sources.trajectories, lambda path, index: _path(path, index, printed)
-    )
+    return section_of_each("path", "Training path", sources.trajectories, _path)
 
 
-def _path(trajectory: Source[TrajectoryRecord], index: int, printed: Mapping[str, float] | None) -> Iterator[Block]:
+def _path(trajectory: Source[TrajectoryRecord], index: int) -> Iterator[Block]:
     record, label = trajectory.record, trajectory.label
-    yield from answer(trajectory, index, printed)
+    yield from answer(trajectory, index)
     if record.held:
         yield rotation_figure(f"figure-rotation-{index}", label, record.time, record.attitude, record.attitude_rate)
     else:
@@ -153,17 +145,11 @@ def _path(trajectory: Source[TrajectoryRecord], index: int, printed: Mapping[str
         yield attitude_figure(f"figure-3-attitude-{index}", label, record.time, record.attitude)
 
 
-def _peaks(name: str, trajectory: Source[TrajectoryRecord], printed: Mapping[str, float] | None) -> Table:
+def _peaks(name: str, trajectory: Source[TrajectoryRecord]) -> Table:
     peaks = trajectory.record.peaks()
-    rows = [
-        [derivative, unit, _peak(derivative, peaks), *([number(printed[derivative])] if printed else [])]
-        for derivative, unit in zip(DERIVATIVES, _UNITS, strict=True)
-    ]
+    rows = [[derivative, unit, _peak(derivative, peaks)] for derivative, unit in zip(DERIVATIVES, _UNITS, strict=True)]
     caption = f"Largest length of each derivative at the samples of {trajectory.label}, along the path."
-    if printed:
-        caption += " The paper prints its maxima for intervals of P = 1 s."
-    header = ("Derivative", "Unit", "Largest", *(("Paper",) if printed else ()))
-    return Table(name, caption, header, rows, frozenset({0, 1}))
+    return Table(name, caption, ("Derivative", "Unit", "Largest"), rows, frozenset({0, 1}))
 
 
 def _peak(name: str, peaks: Mapping[str, float]) -> str:

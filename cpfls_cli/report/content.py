@@ -166,12 +166,15 @@ class Plot:
         Unique on the page.
     description : str
         What the figure shows, for those who do not see it.
+    see : tuple of (str, str), or None
+        Where on the page more is said of it: an anchor, and the words that lead there.
     """
 
     name: str
     caption: str
     picture: Picture
     description: str = ""
+    see: tuple[str, str] | None = None
     kind: ClassVar[str] = "plot"
 
 

@@ -103,12 +103,12 @@ def test_an_unknown_key_does_not_hide_a_rule_between_keys(wrong):
 
 
 def test_errors_of_all_sections_come_together(wrong):
-    lines = wrong("seed: x\nvehicle: {mass_kg: x}\nreduction: {size: x}\nreport: {paper: 1}\n", whole=True)
+    lines = wrong("seed: x\nvehicle: {mass_kg: x}\nreduction: {size: x}\nreport: {notes: 1}\n", whole=True)
     assert [line.split(" = ")[0] for line in lines] == [
         "FILE: seed",
         "FILE: vehicle.mass_kg",
         "FILE: reduction.size",
-        "FILE: report.paper",
+        "FILE: report.notes",
     ]
 
 

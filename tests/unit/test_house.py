@@ -183,7 +183,6 @@ SMALL_ALL_THE_SAME = {
     "control/controllers.py": "the laws, beside the loop that they close",
     "excitation/optimise.py": "what the room is for",
     "gap/next_flight/search.py": "what the room is for",
-    "identification/reference.py": "the slow, plain evaluation that tests hold the compiled one against",
     "regressor/table.py": "loads without compiled loops",
     "report/json_page.py": "a form",
     "report/markdown.py": "a form",

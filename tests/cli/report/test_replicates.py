@@ -1,13 +1,12 @@
-"""Table 5 of the report from a sweep."""
+"""The tables of the report from a sweep."""
 
 import json
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.store import read_artifact, write_artifact
+from cpfls_cli.artifacts.store import read_artifact
 from cpfls_cli.report.numbers import number
 from tests.builders.pages import table_cells
 
@@ -35,36 +34,8 @@ def test_table_shows_means_and_deviations_of_the_runs(cpfls, swept):
     after = rows[[row[0].startswith("mean MSE") for row in rows].index(True) + 1]
     assert after[0].replace("\N{NO-BREAK SPACE}", " ") == "standard deviation of the MSE, (N m)²"
     assert after[1:] == [number(float(np.std(group, ddof=1)), 2) for group in groups]
-    assert "· paper" not in shown
     assert len(shown) == len(rows)
     assert "the variance is the square of the standard deviation shown" in " ".join(html.split())
-
-
-def with_settings(swept, name, **values):
-    """Write a sweep that claims other settings."""
-    artifact = read_artifact(swept / "sweep.h5")
-    data = {path.replace("__", "/"): np.array(value) for path, value in values.items()}
-    write_artifact(swept / name, replace(artifact, data={**artifact.data, **data}))
-    return name
-
-
-def test_paper_stands_beside_settings_of_equal_structure_and_samples(cpfls, swept):
-    claimed = with_settings(swept, "paper.h5", setting__samples=[685, 5487], setting__structure=["cpfls", "fls"])
-    _, html = page(cpfls, swept, "--set", "report.paper=true", sweep=claimed)
-    rows = table_cells(html, "table-5-replicates-1")
-    places = {row[0].replace("\N{NO-BREAK SPACE}", " "): place for place, row in enumerate(rows)}
-    assert rows[places["best run: MSE, (N m)²"] + 1] == ["· paper", "0.0008", "0.0007"]
-    assert rows[places["best run: largest error, N m"] + 1] == ["· paper", "0.1952", "0.1531"]
-    assert rows[places["mean condition number"] + 1] == ["· paper", "5368.1", "3815.5"]
-    assert rows[places["mean condition number"] + 3] == ["· paper", "2434.5", "1701.2"]
-    assert "Table 5. Results of paper.h5" in html
-    assert "standard deviation: a variance" in html
-
-
-def test_other_settings_stand_alone(cpfls, swept):
-    _, html = page(cpfls, swept, "--set", "report.paper=true")
-    assert "· paper" not in [row[0] for row in table_cells(html, "table-5-replicates-1")]
-    assert "Table 5. Results" not in html
 
 
 def test_held_out_part_has_its_table(cpfls, swept):

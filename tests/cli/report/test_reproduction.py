@@ -2,21 +2,26 @@
 
 import json
 import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from benchmarks.paper.claims import EvaluationTime
+from benchmarks.paper.report import paper_page
+from cpfls_cli.artifacts.store import read_artifact, write_artifact
 from tests.builders.pages import table_cells
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-TIMES = "[{samples: 10, svd_s: 1.0, evaluation_s: 2.0, compiled_s: 1.0}, {samples: 20, svd_s: 2.0, evaluation_s: 4.0, \
-compiled_s: 1.0}, {samples: 40, svd_s: 4.0, evaluation_s: 8.0, compiled_s: 1.0}]"
+TIMES = [EvaluationTime(samples=n, svd_s=n / 10, evaluation_s=n / 5, compiled_s=1.0) for n in (10, 20, 40)]
 
 
 @pytest.fixture(scope="module")
 def folder(cpfls, swept, tmp_path_factory):
     """The sweep whole, and in two parts."""
     folder = tmp_path_factory.mktemp("reproduction")
+    (folder / "study.yaml").symlink_to(swept / "study.yaml")
     (folder / "trajectory.h5").symlink_to(swept / "trajectory.h5")
     (folder / "whole.h5").symlink_to(swept / "sweep.h5")
     words = ("sweep", swept / "study.yaml", swept / "flight.h5", "-o")
@@ -28,37 +33,28 @@ def folder(cpfls, swept, tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def page(cpfls, swept, folder):
-    """Write a report on a study of the paper, unless another is asked for."""
-
-    def call(*names, options=(), paper=True):
-        output = folder / "r.html"
-        given = [folder / name for name in names]
-        options = ("--set", f"report.paper={json.dumps(paper)}", *options)
-        result = cpfls("report", swept / "study.yaml", *given, "-o", output, "--force", "--json", *options)
-        assert result.exit_code == 0, result.stderr
-        return json.loads(result.stdout), output.read_text(encoding="utf-8")
-
-    return call
+def page(folder, *names, times=()):
+    """Write a report on the paper."""
+    made = paper_page(folder / "study.yaml", [folder / name for name in names], times)
+    return made, made.text
 
 
-def test_parts_of_a_sweep_stand_as_the_whole(page):
-    _, whole = page("whole.h5")
-    summary, parts = page("first.h5", "rest.h5")
-    assert [name for name in summary["tables"] if "replicates" in name] == ["table-5-replicates-1"]
+def test_parts_of_a_sweep_stand_as_the_whole(folder):
+    _, whole = page(folder, "whole.h5")
+    summary, parts = page(folder, "first.h5", "rest.h5")
+    assert [name for name in summary.tables if "replicates" in name] == ["table-5-replicates-1"]
     assert table_cells(parts, "table-5-replicates-1") == table_cells(whole, "table-5-replicates-1")
     assert "first.h5 and rest.h5" in parts
 
 
-def test_sweeps_that_share_a_seed_stand_apart(page):
-    summary, _ = page("whole.h5", "first.h5")
-    assert [n for n in summary["tables"] if "replicates" in n] == ["table-5-replicates-1", "table-5-replicates-2"]
+def test_sweeps_that_share_a_seed_stand_apart(folder):
+    summary, _ = page(folder, "whole.h5", "first.h5")
+    assert [n for n in summary.tables if "replicates" in n] == ["table-5-replicates-1", "table-5-replicates-2"]
 
 
-def test_every_claim_and_every_figure_has_its_line(page):
-    summary, html = page("trajectory.h5", "whole.h5", options=("--set", f"report.evaluation_times={TIMES}"))
-    assert "figure-1-seesaw" in summary["figures"]
+def test_every_claim_and_every_figure_has_its_line(folder):
+    summary, html = page(folder, "trajectory.h5", "whole.h5", times=TIMES)
+    assert "figure-1-seesaw" in summary.figures
     rows = table_cells(html, "claims")[1:]
     verdicts = [row[1] for row in rows]
     assert set(verdicts) <= {"PASS", "FAIL", "UNDECIDED", "NOT MEASURED"}
@@ -69,12 +65,41 @@ def test_every_claim_and_every_figure_has_its_line(page):
     assert [row[0].split(":")[0] for row in table_cells(html, "figures-of-the-paper")[1:]] == [
         f"Figure {number}" for number in range(1, 8)
     ]
-    assert html.count('href="#figures-of-the-paper"') == len(
-        [n for n in summary["figures"] if re.match(r"figure-\d", n)]
-    )
+    assert html.count('href="#figures-of-the-paper"') == len([n for n in summary.figures if re.match(r"figure-\d", n)])
 
 
-def test_only_a_study_of_the_paper_is_held_against_it(page):
-    summary, html = page("trajectory.h5", paper=False)
-    assert "reproduction" not in summary["sections"]
+def test_a_report_of_the_package_holds_nothing_against_the_paper(cpfls, folder):
+    output = folder / "r.html"
+    given = [folder / "trajectory.h5", folder / "whole.h5"]
+    result = cpfls("report", folder / "study.yaml", *given, "-o", output, "--json")
+    html = output.read_text(encoding="utf-8")
+    assert "reproduction" not in json.loads(result.stdout)["sections"]
     assert "figures-of-the-paper" not in html
+    assert "· paper" not in html
+
+
+def with_settings(folder, name, **values):
+    """Write a sweep that claims other settings."""
+    artifact = read_artifact(folder / "whole.h5")
+    data = {path.replace("__", "/"): np.array(value) for path, value in values.items()}
+    write_artifact(folder / name, replace(artifact, data={**artifact.data, **data}))
+    return name
+
+
+def test_paper_stands_beside_settings_of_equal_structure_and_samples(folder):
+    claimed = with_settings(folder, "paper.h5", setting__samples=[685, 5487], setting__structure=["cpfls", "fls"])
+    _, html = page(folder, claimed)
+    rows = table_cells(html, "table-5-replicates-1")
+    places = {row[0].replace("\N{NO-BREAK SPACE}", " "): place for place, row in enumerate(rows)}
+    assert rows[places["best run: MSE, (N m)²"] + 1] == ["· paper", "0.0008", "0.0007"]
+    assert rows[places["best run: largest error, N m"] + 1] == ["· paper", "0.1952", "0.1531"]
+    assert rows[places["mean condition number"] + 1] == ["· paper", "5368.1", "3815.5"]
+    assert rows[places["mean condition number"] + 3] == ["· paper", "2434.5", "1701.2"]
+    assert "Table 5. Results of paper.h5" in html
+    assert "standard deviation: a variance" in html
+
+
+def test_other_settings_stand_alone(folder):
+    _, html = page(folder, "whole.h5")
+    assert "· paper" not in [row[0] for row in table_cells(html, "table-5-replicates-1")]
+    assert "Table 5. Results" not in html

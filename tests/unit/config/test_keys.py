@@ -4,7 +4,7 @@ from typing import get_args
 
 from cpfls_cli.config.keys import commented_default, keys_of, known_keys
 from cpfls_cli.config.load import parse_config, validate
-from cpfls_cli.config.study import SECTIONS, Study
+from cpfls_cli.config.study import SECTIONS, Study, resolved
 from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.units import KNOWN_UNITS
 
@@ -82,3 +82,9 @@ def test_signals_come_with_their_names_units_and_an_example_that_is_a_study():
     signals = validate(parse_config(example, "example"), "example").import_.signals
     assert set(signals) == {"attitude", "body_torque"}
     assert signals["body_torque"].sign == (1, -1, -1)
+
+
+def test_keys_that_say_nothing_any_more_are_left_out():
+    """Configs of before hold them, and so do artifacts."""
+    study = validate({"report": {"title": "A study", "paper": True, "evaluation_times": []}}, "study.yaml")
+    assert resolved(study)["report"] == {"title": "A study", "notes": []}

@@ -11,11 +11,11 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import Problem, refine, stepped
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
-from cpfls_cli.identification.reference import ReferenceEvaluator
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.regressor import Motion, Regressor, data_ranges, model_structure
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings
+from tests.builders.reference_evaluator import ReferenceEvaluator
 
 PAPER = {"base": "none", "consequents": "seesaw", "products": "additive", "input_map": "data-range"}
 OFF = LocalSearchSettings(enabled=False)

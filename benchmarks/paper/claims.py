@@ -8,13 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.model import ModelRecord
-from cpfls_cli.artifacts.scores import MODEL, TRAINING
-from cpfls_cli.artifacts.selection import SelectionRecord
-from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
-from cpfls_cli.artifacts.trajectory import TrajectoryRecord
-from cpfls_cli.pages.printed import (
+from benchmarks.paper.printed import (
     PRINTED_CONTRIBUTION,
     PRINTED_JERK_INTEGRAL,
     PRINTED_MOVE_S,
@@ -24,13 +18,54 @@ from cpfls_cli.pages.printed import (
     PRINTED_SHARE,
     TABLE_4,
 )
+from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.model import ModelRecord
+from cpfls_cli.artifacts.scores import MODEL, TRAINING
+from cpfls_cli.artifacts.selection import SelectionRecord
+from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
+from cpfls_cli.artifacts.trajectory import TrajectoryRecord
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.sweep import compares_readings, joined_sweeps
+from cpfls_cli.pages.sweep import joined_sweeps
 from cpfls_cli.report.numbers import UNKNOWN, change, joined, number, percent
 
 Settings = Sequence[SettingRuns]
 Searches = Sequence[Settings]
 """Settings with their runs, by sweep."""
+
+
+@dataclass(frozen=True)
+class EvaluationTime:
+    """Duration of an evaluation on a number of samples.
+
+    Attributes
+    ----------
+    samples : int
+        Learned from and judged on.
+    svd_s : float, s
+        Singular value decomposition of the regressor.
+    evaluation_s : float, s
+        Evaluation as the paper does it.
+    compiled_s : float, s
+        Evaluation by the compiled code.
+    """
+
+    samples: int
+    svd_s: float
+    evaluation_s: float
+    compiled_s: float
+
+
+@dataclass(frozen=True)
+class PaperSources(Sources):
+    """Everything that a report on the paper is about.
+
+    Attributes
+    ----------
+    times : sequence of EvaluationTime
+        Measured beside the artifacts, of which none holds a time.
+    """
+
+    times: Sequence[EvaluationTime] = ()
 
 
 class ClaimVerdict(StrEnum):
@@ -86,8 +121,18 @@ class Claim:
     words: str
     rule: str
     paper: str
-    measure: Callable[[Sources], Measurement]
+    measure: Callable[[PaperSources], Measurement]
     of_searches: Callable[[Searches], Measurement] | None = None
+
+
+def reading_of(setting: SettingRuns) -> tuple[str, str]:
+    """Name what chose the samples of a setting, and on which of them it was judged."""
+    return setting.criterion, setting.judged_on
+
+
+def compares_readings(settings: Settings) -> bool:
+    """Tell whether searches choose equally many samples in several ways, or judge on different ones."""
+    return len({reading_of(setting) for setting in settings if setting.criterion != ALL_SAMPLES}) > 1
 
 
 def searches(sources: Sources) -> Searches:
@@ -187,25 +232,25 @@ def line_through(x: Array, y: Array) -> Line:
     return Line(slope, float(np.corrcoef(x, y)[0, 1] ** 2))
 
 
-def _times(sources: Sources) -> dict[str, Array] | None:
-    """Gather the times of the config (no artifact holds a time, so that equal content stays an equal file).
+def _times(sources: PaperSources) -> dict[str, Array] | None:
+    """Gather the times of evaluations.
 
     Returns
     -------
     dict of str to array, shape (sizes,), or None
-        By key of ``report.evaluation_times``; None for too few sizes.
+        By attribute of `EvaluationTime`; None for too few sizes.
     """
-    times = sources.settings.evaluation_times
+    times = sources.times
     if len({time.samples for time in times}) < _FEWEST_SIZES:
         return None
     keys = ("samples", "svd_s", "evaluation_s", "compiled_s")
     return {key: np.array([getattr(time, key) for time in times]) for key in keys}
 
 
-def _evaluation_time(sources: Sources) -> Measurement:
+def _evaluation_time(sources: PaperSources) -> Measurement:
     times = _times(sources)
     if times is None:
-        return not_measured("report.evaluation_times", _TIMING_COMMAND)
+        return not_measured("times of evaluations", _TIMING_COMMAND)
     samples, svd, evaluation, compiled = times.values()
     fitted = line_through(np.log(svd), np.log(evaluation))
     most, fewest = int(np.argmax(samples)), int(np.argmin(samples))
@@ -231,10 +276,10 @@ EVALUATION_TIME_CLAIM = Claim(
 )
 
 
-def _decomposition_time(sources: Sources) -> Measurement:
+def _decomposition_time(sources: PaperSources) -> Measurement:
     times = _times(sources)
     if times is None:
-        return not_measured("report.evaluation_times", _TIMING_COMMAND)
+        return not_measured("times of evaluations", _TIMING_COMMAND)
     samples, svd = times["samples"], times["svd_s"]
     power = line_through(np.log(samples), np.log(svd))
     exponential = line_through(samples.astype(float), np.log(svd))

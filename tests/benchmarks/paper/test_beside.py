@@ -1,10 +1,10 @@
-"""Which column of the paper a setting stands beside, and which run is the best."""
+"""Which column of the paper a setting stands beside."""
 
 import numpy as np
 
+from benchmarks.paper.beside import printed_beside
+from benchmarks.paper.printed import TABLE_5
 from cpfls_cli.artifacts.sweep import SettingRuns
-from cpfls_cli.pages.printed import TABLE_5
-from cpfls_cli.pages.sweep import printed_beside
 
 
 def setting(structure="cpfls", samples=685, population=500, generations=200, mse=(1.0,)):
@@ -29,10 +29,3 @@ def test_smaller_searches_take_the_columns_in_order_but_leave_exact_ones():
 
 def test_other_settings_have_none():
     assert printed_beside([setting(samples=80), setting("fls", 685)]) == [None, None]
-
-
-def test_best_run():
-    assert setting(mse=(3.0, np.nan, 1.0)).best == 2
-    assert setting(mse=(3.0, np.nan, 1.0)).best_of(np.array([7.0, 8.0, 9.0])) == 9.0
-    assert setting(mse=(np.nan,)).best is None
-    assert np.isnan(setting(mse=(np.nan,)).best_of(np.array([7.0])))

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cpfls_cli.artifacts.scores import MODEL, TRAINING
-from cpfls_cli.fuzzy.inputs import seesaw
-from cpfls_cli.fuzzy.membership import breakpoints
-from cpfls_cli.pages.claims import (
+from benchmarks.paper.claims import (
     CONTINUITY_CLAIM,
     CONTRIBUTION_CLAIM,
     DECOMPOSITION_TIME_CLAIM,
@@ -23,9 +20,9 @@ from cpfls_cli.pages.claims import (
     Claim,
     ClaimVerdict,
     Measurement,
+    PaperSources,
 )
-from cpfls_cli.pages.fuzzy_part import seesaw_figure
-from cpfls_cli.pages.printed import (
+from benchmarks.paper.printed import (
     LEAST_TORQUE,
     PRINTED_BREAKPOINTS,
     PRINTED_RELATIVE_ERROR,
@@ -34,8 +31,8 @@ from cpfls_cli.pages.printed import (
     SMALLEST_MAX_ERROR,
     TABLE_4,
 )
-from cpfls_cli.pages.readings import readings_blocks
-from cpfls_cli.pages.search_claims import (
+from benchmarks.paper.readings import readings_blocks
+from benchmarks.paper.search_claims import (
     CLASSIC_CLAIM,
     CONVERGENCE_CLAIM,
     RANKING_CLAIM,
@@ -44,9 +41,15 @@ from cpfls_cli.pages.search_claims import (
     TYPICAL_CONDITION_CLAIM,
     TYPICAL_ERRORS_CLAIM,
 )
-from cpfls_cli.pages.source import Sources
-from cpfls_cli.report.content import Block, Cell, Folded, Section, Table, Text, Tone
+from cpfls_cli.artifacts.scores import MODEL, TRAINING
+from cpfls_cli.fuzzy.inputs import seesaw
+from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.report.canvas import line, plot, style_of
+from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text, Tone
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CLAIMS: tuple[Claim, ...] = (
     RELATIVE_ERROR_CLAIM,
@@ -82,20 +85,13 @@ _PRECISION = 1e-5
 _Measured = Sequence[tuple[Claim, Measurement]]
 
 
-def reproduction_section(sources: Sources) -> Section | None:
-    """Check the claims of the paper and compare its figures, where that is asked for.
-
-    Returns
-    -------
-    Section or None
-        None where the report is not about the paper.
+def reproduction_section(sources: PaperSources) -> Section:
+    """Check the claims of the paper and compare its figures.
 
     References
     ----------
     Sections 8, 10 and 11 and Figures 1 to 7 of the paper.
     """
-    if not sources.settings.paper or sources.only_gap:
-        return None
     measured = [(claim, claim.measure(sources)) for claim in CLAIMS]
     answer, grounds = readings_blocks(sources, CLAIMS)
     blocks: list[Block] = [
@@ -168,7 +164,7 @@ class ComparedFigure:
     why: str
 
 
-def compared_figures(sources: Sources) -> list[ComparedFigure]:
+def compared_figures(sources: PaperSources) -> list[ComparedFigure]:
     """Compare the figures of a report with what the paper's text says of its own.
 
     Returns
@@ -227,7 +223,7 @@ def seesaw_compared() -> ComparedFigure:
     return ComparedFigure("1: seesaw", values, f"largest difference {number(off, 2)}", _reading(agrees), why)
 
 
-def _derivatives_compared(sources: Sources) -> ComparedFigure:
+def _derivatives_compared(sources: PaperSources) -> ComparedFigure:
     """Compare Figure 2: the derivatives of the base move."""
     move = MOVE_CLAIM.measure(sources)
     printed = "peaks 2π, 2, 1, 1, 2, 8, 64; 16 s; integral of |jerk| 8 m/s²"
@@ -243,7 +239,7 @@ def _derivatives_compared(sources: Sources) -> ComparedFigure:
     return ComparedFigure(title, printed, f"largest difference {move.ours}", _agreement(agrees), why)
 
 
-def _attitude_compared(sources: Sources) -> ComparedFigure:
+def _attitude_compared(sources: PaperSources) -> ComparedFigure:
     """Compare Figure 3: roll and pitch."""
     title, printed = "3: roll and pitch", "about 55 s; no angle in the text"
     moving = [trajectory.record for trajectory in sources.trajectories if trajectory.record.position is not None]
@@ -259,7 +255,7 @@ def _attitude_compared(sources: Sources) -> ComparedFigure:
     return ComparedFigure(title, printed, ours, "cannot be compared", why)
 
 
-def _torque_compared(sources: Sources) -> ComparedFigure:
+def _torque_compared(sources: PaperSources) -> ComparedFigure:
     """Compare Figure 4: the torques."""
     title = "4: torques"
     printed = f"more than {number(LEAST_TORQUE, 2)} N m (an error of {SMALLEST_MAX_ERROR} N m is below 10 %)"
@@ -275,7 +271,7 @@ def _torque_compared(sources: Sources) -> ComparedFigure:
     return ComparedFigure(title, printed, f"up to {number(largest, 2)} N m", _agreement(agrees), "" if agrees else why)
 
 
-def _reduction_compared(sources: Sources) -> ComparedFigure:
+def _reduction_compared(sources: PaperSources) -> ComparedFigure:
     """Compare Figure 5: the condition number while samples are chosen."""
     title = f"5: condition number, {_DRAWN.samples} samples"
     printed = f"{_DRAWN.condition_number}, {change(_DRAWN.change)} against all samples"
@@ -307,7 +303,7 @@ def partitions_compared() -> ComparedFigure:
     return ComparedFigure("6: partitions", printed, ours, _reading(agrees), why)
 
 
-def _error_compared(sources: Sources) -> ComparedFigure:
+def _error_compared(sources: PaperSources) -> ComparedFigure:
     """Compare Figure 7: the torque error."""
     title, printed = "7: torque error", "below 10 % of the torque along the training path"
     shown = [
@@ -322,3 +318,26 @@ def _error_compared(sources: Sources) -> ComparedFigure:
     agrees = largest < PRINTED_RELATIVE_ERROR
     why = "Relative to the largest torque of each axis; the absolute errors belong to torques of other sizes."
     return ComparedFigure(title, printed, f"at most {percent(largest, 2)} ({axis})", _agreement(agrees), why)
+
+
+def seesaw_figure(name: str) -> Plot:
+    """Draw the piecewise linear seesaw over two turns, with the values that the paper prints.
+
+    References
+    ----------
+    Figure 1 and equation (11) of the paper.
+    """
+    half_turns = np.linspace(-1.0, 3.0, 801)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        line(axes, half_turns, seesaw(np.pi * half_turns)[0], **style_of(0))
+        axes.plot(list(PRINTED_SEESAW), list(PRINTED_SEESAW.values()), "o", color=style_of(1)["color"])
+        axes.set_xlabel("angle, π rad")
+        axes.set_ylabel("seesaw")
+
+    caption = (
+        "Figure 1. The seesaw of equation (11) over two turns: equal where an angle and 2π meet. Dots: the values that "
+        "the equation prints at the quarters of a turn. It takes each value twice in a turn."
+    )
+    return plot(name, caption, "A triangle wave between -1 and 1 over two turns", 2.3, draw)

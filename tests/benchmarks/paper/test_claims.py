@@ -7,11 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cpfls_cli.artifacts.selection import SelectionRecord, TraceGroup
-from cpfls_cli.artifacts.spec import Header
-from cpfls_cli.artifacts.sweep import RunGroup, SettingGroup, SettingRuns, SweepRecord
-from cpfls_cli.config.study import EvaluationTime, ReportSettings
-from cpfls_cli.pages.claims import (
+from benchmarks.paper.claims import (
     CONTINUITY_CLAIM,
     CONTRIBUTION_CLAIM,
     DECOMPOSITION_TIME_CLAIM,
@@ -19,10 +15,12 @@ from cpfls_cli.pages.claims import (
     FLOOR_CLAIM,
     RELATIVE_ERROR_CLAIM,
     ClaimVerdict,
+    EvaluationTime,
+    PaperSources,
 )
-from cpfls_cli.pages.readings import readings, readings_blocks, readings_figure
-from cpfls_cli.pages.reproduction import CLAIMS, partitions_compared, seesaw_compared
-from cpfls_cli.pages.search_claims import (
+from benchmarks.paper.readings import readings, readings_blocks, readings_figure
+from benchmarks.paper.reproduction import CLAIMS, partitions_compared, seesaw_compared
+from benchmarks.paper.search_claims import (
     AS_GOOD,
     CLASSIC_CLAIM,
     CONVERGENCE_CLAIM,
@@ -33,7 +31,11 @@ from cpfls_cli.pages.search_claims import (
     TYPICAL_ERRORS_CLAIM,
     paired_ratio,
 )
-from cpfls_cli.pages.source import Source, Sources
+from cpfls_cli.artifacts.selection import SelectionRecord, TraceGroup
+from cpfls_cli.artifacts.spec import Header
+from cpfls_cli.artifacts.sweep import RunGroup, SettingGroup, SettingRuns, SweepRecord
+from cpfls_cli.config.study import ReportSettings
+from cpfls_cli.pages.source import Source
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
@@ -51,7 +53,7 @@ def setting(mse, structure="cpfls", samples=5487, size=(40, 10), seeds=None):
 def sources(*records, times=()):
     """A report about records."""
     given = [Source.of("s.h5", "", record.with_header(Header("1", 0, "")), {}, None, 0) for record in records]
-    return Sources(given, VehicleSettings(), ReportSettings(evaluation_times=times))
+    return PaperSources(given, VehicleSettings(), ReportSettings(), times)
 
 
 def sweep(*settings):

@@ -10,10 +10,10 @@ from itertools import chain
 import numpy as np
 from scipy.special import stdtrit
 
+from benchmarks.paper.claims import Claim, Measurement, Searches, Settings, decided, not_measured, searches, undecided
+from benchmarks.paper.printed import TABLE_5, TYPICAL_MAX_ERROR, TYPICAL_MSE, PrintedColumn
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns
-from cpfls_cli.pages.claims import Claim, Measurement, Searches, Settings, decided, not_measured, searches, undecided
-from cpfls_cli.pages.printed import TABLE_5, TYPICAL_MAX_ERROR, TYPICAL_MSE, PrintedColumn
 from cpfls_cli.report.numbers import number, percent
 
 _CONFIDENCE = 0.95

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.paper.claims import Claim, ClaimVerdict, Measurement, Settings, compares_readings, reading_of
+from benchmarks.paper.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColumn
+from benchmarks.paper.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.sweep import ALL_SAMPLES, SettingRuns, SweepRecord, spread
-from cpfls_cli.pages.claims import Claim, ClaimVerdict, Measurement, Settings
 from cpfls_cli.pages.model import SQUARED_TORQUE, TORQUE
-from cpfls_cli.pages.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColumn
-from cpfls_cli.pages.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.pages.source import Source, Sources
-from cpfls_cli.pages.sweep import compares_readings, joined_sweeps, reading_of
+from cpfls_cli.pages.sweep import joined_sweeps
 from cpfls_cli.report.canvas import GREY, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent

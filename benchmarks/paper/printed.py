@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+PRINTED_VEHICLE = ("9.81", "6", "4", "0.3", "121.5 × 10⁻⁶", "2.7 × 10⁻⁶", "0.6", "0.6", "1.2")
+PRINTED_DURATION_S = "55"
+"""Table 3 of the paper: gravity, mass, rotors, arm, thrust and drag factor, moments of inertia; the flight time."""
+
 
 @dataclass(frozen=True)
 class PrintedSet:

@@ -1,0 +1,72 @@
+"""The report on the paper: the page of `cpfls report`, the paper's figures beside ours, and its claims one by one.
+
+python benchmarks/paper/report.py CONFIG ARTIFACT... -o report.html [--times times.json]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from benchmarks.paper.beside import with_the_paper
+from benchmarks.paper.claims import EvaluationTime, PaperSources, compares_readings
+from benchmarks.paper.reproduction import reproduction_section
+from cpfls_cli.artifacts.output import write_text
+from cpfls_cli.artifacts.store import file_sha256
+from cpfls_cli.commands.report import read_sources
+from cpfls_cli.config.load import load_study
+from cpfls_cli.pages.page import Page, page_of, sections_of
+from cpfls_cli.pages.sweep import replicates_section
+from cpfls_cli.report.content import Section
+from cpfls_cli.version import __version__
+
+_BEFORE = {"summary", "comparison", "models"}
+"""Sections that stand before the reproduction."""
+
+
+def paper_page(config: Path, artifacts: Sequence[Path], times: Sequence[EvaluationTime] = ()) -> Page:
+    """Write a report on the paper.
+
+    Parameters
+    ----------
+    times : sequence of EvaluationTime
+        Measured beside the artifacts, of which none holds a time.
+    """
+    study = load_study(config)
+    given = read_sources(artifacts, [file_sha256(path) for path in artifacts])
+    sources = PaperSources(given, study.vehicle, study.report, times)
+    sections = [_without_readings(section, sources) for section in sections_of(sources)]
+    place = sum(section.name in _BEFORE for section in sections if section)
+    ordered = [*sections[:place], reproduction_section(sources), *sections[place:]]
+    return page_of(sources, [with_the_paper(section, sources) for section in ordered if section], __version__)
+
+
+def _without_readings(section: Section, sources: PaperSources) -> Section | None:
+    """Leave out of the replicates the sweeps over readings of the paper, which stand beside its claims."""
+    if section.name != "replicates":
+        return section
+    readings = [sweep for sweep in sources.sweeps if compares_readings(sweep.record.settings)]
+    return replicates_section(replace(sources, all=[source for source in sources.all if source not in readings]))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
+    parser.add_argument("config", type=Path)
+    parser.add_argument("artifacts", type=Path, nargs="+")
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--times", type=Path, help="written by benchmarks/reproduction_time.py --out")
+    options = parser.parse_args()
+    measured = json.loads(options.times.read_text(encoding="utf-8")) if options.times else []
+    page = paper_page(options.config, options.artifacts, [EvaluationTime(**row) for row in measured])
+    write_text(options.output, page.text)
+    print(f"{len(page.sections)} sections, {len(page.figures)} figures, {len(page.tables)} tables")
+
+
+if __name__ == "__main__":
+    main()
