@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
+from scipy.special import stdtr
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.blocks import half_width
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.hooks import FaultFit, SensorTest
 
@@ -137,7 +138,7 @@ def _holm(p_values: Array) -> Array:
 
 def _finding(fault: CheckedFault, p_values: Array, period: float) -> AuditFinding:
     fit, test = fault.fit, fault.test
-    reach = float(stdtrit(fit.blocks - 1, 0.975)) * fit.error + fit.pull
+    reach = half_width(fit.error, fit.blocks) + fit.pull
     named = fit.known & (p_values < _SIGNIFICANCE) & (np.abs(fit.value) > fault.smallest(period))
     numbers = tuple(
         FaultNumber(

@@ -13,6 +13,7 @@ from scipy.linalg import polar
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.hooks import FaultFit
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.resampling import blocks_of, folds
@@ -144,7 +145,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
 
     References
     ----------
-    Frisch 1934 (bounds of regression with noise on both sides); Kunsch 1989 (jackknife over blocks).
+    Frisch 1934 (bounds of regression with noise on both sides).
     """
     index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])
     block = _blocks(index, np.concatenate([flight.centres for flight in flights]))
@@ -163,11 +164,10 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     left_out = _padded(normal.solve(columns)[0][..., 0], columns)
     turns = _turns_right(np.vstack([solution, left_out]))
     draws = np.array([_faults(each, base) if turns else each for each in left_out])
-    spread = ((draws - draws.mean(axis=0)) ** 2).sum(axis=0) * (len(draws) - 1) / len(draws)
     bias, error = _flight_bias(rest, index, block)
     return GyroFit(
         value=_faults(solution, base) if turns else np.zeros_like(solution),
-        error=np.sqrt(spread),
+        error=jackknife_error(draws),
         pull=_pull(scanned.read, variance),
         known=_known(scanned.excited) & turns,
         blocks=len(draws),

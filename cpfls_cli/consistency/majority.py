@@ -10,6 +10,7 @@ from itertools import product
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.blocks import mean_error
 from cpfls_cli.consistency.channels import AXES
 from cpfls_cli.consistency.motion import NAMES, PairCheck, by_thrust, checked
 from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
@@ -176,7 +177,7 @@ def _simple(tuned: _Tuned, other: _Tuned) -> bool:
 def _surely_less(after: Array, before: Array) -> bool:
     """Tell whether squares are less by more than their scatter along the flights."""
     parts = np.array([part.sum() for part in np.array_split(before - after, _PARTS)])
-    return bool(parts.mean() > _SIGMAS * parts.std(ddof=1) / np.sqrt(_PARTS))
+    return bool(parts.mean() > _SIGMAS * mean_error(parts))
 
 
 def _suspects(checks: Sequence[PairCheck]) -> list[tuple[str, bool]]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.consistency.channels import AXES, SAME, frame_warnings
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.resampling import blocks_of
@@ -244,8 +245,7 @@ def _ratio(top: Array, bottom: Array, block: IntArray) -> Sure:
     if len(tops) < 2 or not bottoms.sum():
         return Sure(0.0, np.inf)
     left_out = (tops.sum() - tops) / np.where(bottoms.sum() == bottoms, 1.0, bottoms.sum() - bottoms)
-    error = np.sqrt((len(tops) - 1) / len(tops) * ((left_out - left_out.mean()) ** 2).sum())
-    return Sure(float(tops.sum() / bottoms.sum()), float(error))
+    return Sure(float(tops.sum() / bottoms.sum()), float(jackknife_error(left_out)))
 
 
 def _problems(

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import contiguous, mean_error
 from cpfls_cli.errors import SettingError
 from cpfls_cli.identification.data import sample_times
 from cpfls_cli.identification.samples import Products, Samples
@@ -76,7 +77,7 @@ def contiguous_blocks(judged: Array, learned: Array, folds: int, embargo: float)
         If a block and its embargo leave no sample to train on.
     """
     folds = max(min(folds, len(judged)), 1)
-    label: IntArray = np.arange(len(judged)) * folds // max(len(judged), 1)
+    label = contiguous(len(judged), folds)
     validation = np.arange(folds)[:, None] == label
     spans = [(judged[block][0] - embargo, judged[block][-1] + embargo) for block in validation]
     left_out = np.array([(learned >= start) & (learned <= end) for start, end in spans])
@@ -116,7 +117,7 @@ def ridge_curve(learned: Products, judged: Products, left_out: BoolArray, weight
     folds = range(len(left_out))
     errors = np.array([_fold_errors(learned.sum(~left_out[fold]), judged, fold, weights, size) for fold in folds])
     mean = np.average(errors, axis=0, weights=judged.rows)
-    spread = np.std(errors, axis=0, ddof=1) / np.sqrt(len(errors)) if len(errors) > 1 else np.zeros_like(mean)
+    spread = mean_error(errors) if len(errors) > 1 else np.zeros_like(mean)
     best = int(np.argmin(levelled(mean)))
     # The more ridge the safer: a fuzzy part must earn its place.
     chosen = int(np.flatnonzero(at_most(mean, mean[best] + spread[best]))[-1])

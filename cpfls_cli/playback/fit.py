@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointLayout
@@ -375,18 +376,15 @@ def uncertainty(fitted: Fitted, windows: Sequence[Windows]) -> Uncertainty:
     sums = []
     for window in windows:
         blocks = max(2, round(_BLOCKS * len(window.starts) / count))
-        group = np.arange(len(window.starts), dtype=np.int64) * blocks // len(window.starts)
-        sums.append(evaluations.sums(window, group)[1:])
+        sums.append(evaluations.sums(window, contiguous(len(window.starts), blocks))[1:])
     gradient, hessian = (np.concatenate(each) for each in zip(*sums, strict=True))
-    number = len(gradient)
     # The prior stays in the difference, so that it can be inverted whatever a block takes with it.
     without = fitted.hessian * count - hessian * scale[:, None] * scale
     moved = np.linalg.solve(without, (gradient * scale)[:, :, None])[:, :, 0]
-    centred = moved - moved.mean(axis=0)
-    covariance = (number - 1) / number * (centred.T @ centred) * scale[:, None] * scale
+    covariance = jackknife_covariance(moved * scale)
     belief = _PRIOR / layout.spreads**2
     conditional = np.diag(fitted.hessian) - belief
-    return Uncertainty(covariance, number, np.asarray(conditional > _INFORMED * belief))
+    return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * belief))
 
 
 def window_errors(fitted: Fitted, window: Windows) -> Array:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.blocks import mean_error
 from cpfls_cli.evolution import Evaluation, EvolutionSettings, evolve
 from cpfls_cli.evolution.ranking import comparable
 from cpfls_cli.playback.fit import Fitted, Windows, fit, stays_error, window_errors, windows_of
@@ -99,7 +100,7 @@ class Judged:
     def worse_than(self, other: Judged) -> tuple[float, float]:
         """Compare on the same blocks: mean difference, and its standard error."""
         difference = self.by_block - other.by_block
-        return float(difference.mean()), float(difference.std(ddof=1) / np.sqrt(len(difference)))
+        return float(difference.mean()), float(mean_error(difference))
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import stdtrit
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.inertia import beyond_any_body
 from cpfls_cli.playback.fit import AnyLayout, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -238,11 +238,10 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
         count = max(2, _FORCE_BLOCKS // len(flights))
         products += [part.sum() for part in np.array_split(lift * force, count)]
         squares += [part.sum() for part in np.array_split(lift**2, count)]
-    above, below, number = np.array(products), np.array(squares), len(products)
+    above, below = np.array(products), np.array(squares)
     value = float(above.sum() / below.sum())
     without = (above.sum() - above) / (below.sum() - below)
-    deviation = float(np.sqrt((number - 1) / number * np.sum((without - without.mean()) ** 2)))
-    low, high = _interval(value, float(stdtrit(number - 1, 0.975)) * deviation, positive=True)
+    low, high = _interval(value, float(half_width(jackknife_error(without), len(products))), positive=True)
     return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < _KNOWN * low, False)
 
 
@@ -276,7 +275,7 @@ def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
     physical = layout.physical(values)
     stated = layout.physical(layout.starts)
     half = _half_intervals(layout.physical, fitted, spread)
-    own = stdtrit(spread.blocks - 1, 0.975) * np.sqrt(np.diag(spread.covariance))
+    own = half_width(np.sqrt(np.diag(spread.covariance)), spread.blocks)
     for place, (number, (name, found)) in enumerate(zip(layout.numbers, physical.items(), strict=True)):
         span = _AT_BOUND * number.scale
         bound = min(values[place] - number.low, number.high - values[place]) <= span
@@ -309,7 +308,7 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
 def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
     """Turn the covariance of a fit into half widths of 95 % intervals of what follows from its numbers."""
     deviation = np.sqrt(np.diag(_covariance(physical, fitted, spread)))
-    return np.asarray(stdtrit(spread.blocks - 1, 0.975) * deviation)
+    return half_width(deviation, spread.blocks)
 
 
 def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:

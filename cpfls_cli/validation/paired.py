@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import fft
-from scipy.special import stdtrit
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.blocks import contiguous, half_width, mean_error
 from cpfls_cli.dynamics.rigid_body import vertical
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
 
 _FEWEST_BLOCKS = 4
-_CONFIDENCE = 0.975
 # What two solutions of the same equations may differ by, and rounding as a share of what is predicted, squared.
 _SAME, _ROUNDING = 1e-6, 1e-18
 
@@ -90,7 +89,7 @@ def _chance(values: Array) -> float:
     """Half the width of the 95 % interval of a mean; infinite for too few."""
     if len(values) < _FEWEST_BLOCKS:
         return float("inf")
-    return float(stdtrit(len(values) - 1, _CONFIDENCE) * np.std(values, ddof=1) / np.sqrt(len(values)))
+    return float(half_width(mean_error(values), len(values)))
 
 
 def _block_means(errors: Array, block: IntArray) -> Array:
@@ -199,7 +198,7 @@ def compare_torque(
     chunks = (_errors(data, (ours, theirs)) for data in source.chunks())
     both = [np.concatenate(errors) / scale for errors in zip(*chunks, strict=True)]
     samples = len(both[0])
-    block = np.arange(samples) * block_count(np.hstack(both)) // max(samples, 1)
+    block = contiguous(samples, block_count(np.hstack(both)))
     own, rival = (_block_means(np.sum(errors**2, axis=1), block) for errors in both)
     # Each of three axes has a mean square of 1 after scaling.
     return compare_errors(own, rival, size=3.0)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtri, stdtr
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import mean_error
 from cpfls_cli.fuzzy.inputs import wrap
 from cpfls_cli.identification.data import TorqueData, TorqueSource
 from cpfls_cli.regressor.motion import Motion
@@ -221,7 +222,7 @@ def mean_p_value(errors: Array, without: BoolArray) -> Array:
     if len(errors) < blocks:
         return np.full(errors.shape[1], np.nan)
     means = np.array([block.mean(axis=0) for block in np.array_split(errors, blocks)])
-    middle, spread = means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(blocks)
+    middle, spread = means.mean(axis=0), mean_error(means)
     # A constant without any noise is not chance.
     ratio = np.where(middle == 0, 0.0, np.abs(middle) / np.maximum(spread, np.finfo(float).tiny))
     return np.where(without, np.nan, 2 * stdtr(blocks - 1, -ratio))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import mean_error
 from cpfls_cli.errors import SettingError
 from cpfls_cli.fuzzy.inputs import InputMap
 from cpfls_cli.identification.cross_validation import SMALLEST_ERROR, RidgeChoice, ridge_curve, with_folds
@@ -203,7 +204,7 @@ class StructureFolds:
             _fold_error(learned.sum(~left_out), judged, fold, columns, self.rank_tolerance)
             for fold, left_out in enumerate(self.choice.left_out)
         ]
-        spread = np.std(errors, ddof=1) / np.sqrt(len(errors))
+        spread = mean_error(np.array(errors))
         return FoldResult(float(np.average(errors, weights=judged.rows)), float(spread), weight)
 
     def _fewest_rows(self) -> int:

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import contiguous
 
 _LARGEST_NUMBER = 24
 _RIDGE = 1e-9
@@ -315,8 +316,7 @@ def blocks_of(flight_index: IntArray, centres: Array, block_s: float) -> IntArra
     for flight, span in zip(np.unique(flight_index), spans, strict=True):
         in_flight = flight_index == flight
         number = max(1, round(span / length))
-        order = np.arange(in_flight.sum()) * number // max(1, in_flight.sum())
-        block[in_flight] = first + order
+        block[in_flight] = first + contiguous(int(in_flight.sum()), number)
         first += number
     return block
 

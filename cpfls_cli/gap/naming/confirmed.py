@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.blocks import mean_error
 from cpfls_cli.gap.balance.balance_system import is_free, relative_scatter, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
@@ -115,7 +116,7 @@ class Judge:
         count = np.maximum(unseen.known.sum(axis=0), 1)
         difference, block = squares[0] - squares[1], block_index(there, self.settings)
         sums = np.array([difference[block == number].sum(axis=0) for number in np.unique(block)])
-        spread = sums.std(axis=0, ddof=1) * np.sqrt(len(sums)) if len(sums) > 1 else np.zeros(6)
+        spread = len(sums) * mean_error(sums) if len(sums) > 1 else np.zeros(6)
         return Without(difference.sum(axis=0) / count, spread / count, np.sqrt(squares[0].sum(axis=0) / count))
 
 

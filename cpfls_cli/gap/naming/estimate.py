@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import stdtrit
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, is_free, system, window_noise
@@ -71,7 +71,7 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
 
     References
     ----------
-    Efron and Tibshirani 1993, chapter 11 (delete-a-group jackknife). JCGM 100:2008, 4.3 (uncertainty of what is
+    JCGM 100:2008, 4.3 (uncertainty of what is
     assumed).
     """
     free = _estimated(hypothesis, weight, block, *fit_within_bounds(hypothesis, weight))
@@ -214,11 +214,9 @@ def _of(
 
 def _interval(value: Array, left_out: Array) -> Array:
     """Compute half the width of the 95 % confidence interval: by the jackknife, and what no flight tells."""
-    blocks = len(left_out)
-    if blocks < 2:
+    if len(left_out) < 2:
         return np.full(len(value), np.inf)
-    error = np.sqrt((blocks - 1) / blocks * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0))
-    return np.asarray(np.hypot(stdtrit(blocks - 1, 0.975) * error, _KNOWN_TO * value))
+    return np.asarray(np.hypot(half_width(jackknife_error(left_out), len(left_out)), _KNOWN_TO * value))
 
 
 def _one_step(rows: Equations, block: IntArray) -> Array:

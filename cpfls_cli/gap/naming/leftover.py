@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, left_over, scatter_size, scatter_variance
@@ -168,7 +169,7 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
         return ["neither"] * torque.shape[1]
     power = (torque - torque.mean(axis=0)) * (body_rate - body_rate.mean(axis=0))
     means = np.array([power[block == number].mean(axis=0) for number in numbers])
-    mean, error = means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(len(numbers))
+    mean, error = means.mean(axis=0), mean_error(means)
     sure = np.abs(mean) > _SURE * error
     return ["neither" if not s else "feeds" if m > 0 else "drains" for m, s in zip(mean, sure, strict=True)]
 

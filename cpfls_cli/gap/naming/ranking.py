@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import fit
@@ -170,7 +171,7 @@ def surely_less(one: Scored, other: Scored) -> bool:
     margin = other.block_error - one.block_error
     if len(margin) < 2 or margin.sum() <= 0:
         return False
-    spread = float(np.std(margin, ddof=1) * np.sqrt(len(margin)))
+    spread = len(margin) * float(mean_error(margin))
     # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
     return bool(margin.sum() > _ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
 

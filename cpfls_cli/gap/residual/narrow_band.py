@@ -11,6 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.blocks import mean_error
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 
 Energy = Literal["feeds", "drains", "neither"]
@@ -160,7 +161,7 @@ def _mean_power(
     )
     if len(products) < 2:
         return float(products.mean()) if len(products) else 0.0, float(np.inf)
-    return float(products.mean()), float(products.std(ddof=1) / np.sqrt(len(products)))
+    return float(products.mean()), float(mean_error(products))
 
 
 def _products(residual: Array, rate: Array, length: int, cycles_per_row: float) -> Array:

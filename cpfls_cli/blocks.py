@@ -1,0 +1,55 @@
+"""Blocks of neighbouring samples, which stand for independent ones: how they are cut, and how far they scatter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cpfls_cli.arrays import Array, IntArray
+
+_CONFIDENCE = 0.975
+"""Two-sided 95 %."""
+
+
+def contiguous(samples: int, blocks: int) -> IntArray:
+    """Cut samples into blocks of about equal length: the number of the block of each, shape (samples,)."""
+    return np.arange(samples, dtype=np.int64) * blocks // max(samples, 1)
+
+
+def jackknife_covariance(left_out: Array) -> Array:
+    """Compute the covariance of numbers from their values without each block.
+
+    It holds whatever correlates within blocks, and for noise of unequal size.
+
+    Parameters
+    ----------
+    left_out : array, shape (block, number)
+
+    Returns
+    -------
+    array, shape (number, number)
+
+    References
+    ----------
+    Efron and Tibshirani 1993, chapter 11 (delete-a-group jackknife); Kunsch 1989.
+    """
+    blocks, apart = len(left_out), left_out - left_out.mean(axis=0)
+    return np.asarray((blocks - 1) / blocks * (apart.T @ apart))
+
+
+def jackknife_error(left_out: Array) -> Array:
+    """Compute the standard errors of numbers from their values without each block, shape (block, ...) to (...)."""
+    blocks, apart = len(left_out), left_out - left_out.mean(axis=0)
+    return np.asarray(np.sqrt((blocks - 1) / blocks * (apart**2).sum(axis=0)))
+
+
+def mean_error(values: Array) -> Array:
+    """Compute the standard error of the mean of two or more independent values, shape (value, ...) to (...)."""
+    return np.asarray(np.std(values, axis=0, ddof=1) / np.sqrt(len(values)))
+
+
+def half_width(error: Array, blocks: int) -> Array:
+    """Compute half of a 95 % interval from a standard error that so many blocks tell, by Student's t."""
+    # Slow to load for who cuts blocks alone.
+    from scipy.special import stdtrit
+
+    return np.asarray(stdtrit(blocks - 1, _CONFIDENCE) * error)
