@@ -17,6 +17,7 @@ from cpfls_cli.config.study import Study, generator
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
+from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.recordings import Flights, read_flights
 from cpfls_cli.flights.same_vehicle import base_of, read_of_vehicle, read_vehicle
 from cpfls_cli.gap.compare import compare
@@ -37,7 +38,7 @@ def run(job: Job, flights: Sequence[Path], model: Path | None) -> Outcome:
     model : Path or None
         Identified, with effects, or of a whole vehicle; None for the rigid body of the vehicle.
     """
-    inputs = begin(job, flight_roles("flight", flights) | ({} if model is None else {"model": model}))
+    inputs = begin(job, numbered_roles("flight", flights) | ({} if model is None else {"model": model}))
     check_ignored(job.study)
     require_known(job.study, "compare", whole=model is not None and holds(model, VehicleRecord))
     given, extended, base = _with_model(read_flights(flights, job.study), model, job.study)
@@ -72,11 +73,6 @@ def compared(
     """
     disagreement = compare(given.recordings, model, study.gap, generator(study, "compare"), progress)
     return DisagreementRecord.of(disagreement, given.recordings, given.warnings, base)
-
-
-def flight_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
-    """Give flights the roles of numbered inputs."""
-    return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}
 
 
 def check_ignored(study: Study) -> None:

@@ -11,9 +11,10 @@ from cpfls_cli.artifacts.disagreement import DisagreementRecord
 from cpfls_cli.artifacts.gap_effects import effect_summary, estimate_summary
 from cpfls_cli.artifacts.gap_flights import BaseGroup
 from cpfls_cli.artifacts.job import Job, begin, finish
-from cpfls_cli.commands.compare import check_ignored, flight_roles, progress_of
+from cpfls_cli.commands.compare import check_ignored, progress_of
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.recordings import FlightSplit, read_flights, seen_twice, split_flights
 from cpfls_cli.flights.same_vehicle import read_of_vehicle
 from cpfls_cli.gap.before_after import before_after
@@ -37,7 +38,7 @@ def run(job: Job, disagreement: Path, held_out: Sequence[Path]) -> Outcome:
     held_out : sequence of Path
         Flights to judge on.
     """
-    inputs = begin(job, {"disagreement": disagreement} | flight_roles("held-out", held_out))
+    inputs = begin(job, {"disagreement": disagreement} | numbered_roles("held-out", held_out))
     check_ignored(job.study)
     compared = read_of_vehicle(disagreement, DisagreementRecord, job.study)
     if compared.has_effects:

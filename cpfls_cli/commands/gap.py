@@ -15,10 +15,11 @@ from cpfls_cli.artifacts.job import Job, finish, input_file, take_inputs
 from cpfls_cli.artifacts.output import check_folder, filled_folder, refuse_inputs, write_text
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.commands import report
-from cpfls_cli.commands.compare import check_ignored, compared, flight_roles, progress_of
+from cpfls_cli.commands.compare import check_ignored, compared, progress_of
 from cpfls_cli.commands.diagnose import diagnosed, folded_notes, whole_answer, whole_summary
 from cpfls_cli.commands.extend import extended
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.recordings import Flights, FlightSplit, read_flights, seen_twice, split_flights
 from cpfls_cli.flights.same_vehicle import base_of
 from cpfls_cli.gap.extended import plain as without_effects
@@ -93,7 +94,7 @@ def run(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path
 
 
 def _begin(job: Job, flights: Sequence[Path], held_out: Sequence[Path], model: Path | None) -> _Given:
-    roles = flight_roles("flight", flights) | flight_roles("held-out", held_out)
+    roles = numbered_roles("flight", flights) | numbered_roles("held-out", held_out)
     inputs = take_inputs(job, roles | ({} if model is None else {"model": model}))
     check_folder(job.output, job.force, FILES)
     for name in FILES:

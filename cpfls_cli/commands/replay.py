@@ -9,9 +9,9 @@ from cpfls_cli.artifacts.job import Job, begin, finish
 from cpfls_cli.artifacts.replay import ReplayRecord
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.artifacts.store import read_header
-from cpfls_cli.commands.compare import flight_roles
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import ModelToPlay, flights_to_play, is_vehicle, model_to_play
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.replay import answer
@@ -34,7 +34,7 @@ def run(job: Job, model: Path, flights: Sequence[Path], options: ReplayOptions) 
     """
     require_known(job.study, "replay", whole=not is_vehicle(model))
     of_model = {} if is_vehicle(model) else {"model": model}
-    inputs = begin(job, of_model | flight_roles("flight", flights))
+    inputs = begin(job, of_model | numbered_roles("flight", flights))
     to_play = model_to_play(model, job.study)
     given = flights_to_play(flights, job.study, options.hold)
     played = [to_play.played(flight) for flight in given]

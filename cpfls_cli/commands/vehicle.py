@@ -14,11 +14,11 @@ from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.parameters import vehicle_section
 from cpfls_cli.artifacts.replay import HeldOutGroup
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
-from cpfls_cli.commands.compare import flight_roles
 from cpfls_cli.commands.stopped import stopped, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.errors import ConfigError, InputError
+from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, whole
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.pages.source import source_of
@@ -75,7 +75,7 @@ def run(
         asked for, or cannot be resumed.
     """
     study = job.study
-    learned, unseen = flight_roles("flight", flights), flight_roles("held-out", held_out)
+    learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", held_out)
     inputs, checkpoint, kept = begin_vehicle_search(job, learned | unseen, resume=resume)
     twice = seen_twice(*([inputs[role] for role in roles] for roles in (learned, unseen)))
     if config is not None:

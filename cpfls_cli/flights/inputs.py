@@ -30,10 +30,10 @@ def input_roles(
         That the model is chosen on.
     """
     roles = flight_roles(flights) | ({"selection": selection} if selection else {})
-    return roles | _numbered("choose-on", choose_on) | _numbered("validate", validate)
+    return roles | numbered_roles("choose-on", choose_on) | numbered_roles("validate", validate)
 
 
-def _numbered(role: str, flights: Sequence[Path]) -> dict[str, Path]:
+def numbered_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
     """Give flights of one role numbers: ``choose-on-1``, ``choose-on-2`` and so on."""
     return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}
 
@@ -56,7 +56,7 @@ def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) ->
     InputError
         If one of them is another input too: what was chosen on a flight has been fitted to it.
     """
-    for role, path in _numbered("choose-on", flights).items():
+    for role, path in numbered_roles("choose-on", flights).items():
         others = {other: file for other, file in inputs.items() if other != role}
         same = next((other for other, file in others.items() if file.sha256 == inputs[role].sha256), None)
         if same is not None:
@@ -100,7 +100,7 @@ def held_out_parts(
         )
     parts = dict(rests)
     learned = {file.sha256 for role, file in inputs.items() if role.startswith("flight")}
-    for role, path in _numbered("validate", validate).items():
+    for role, path in numbered_roles("validate", validate).items():
         if inputs[role].sha256 in learned:
             raise InputError(f"--validate {path}: is the flight that trains; validate on another one")
         parts[_free_name(path.name, {TRAINING, *parts})] = flight_source(path)

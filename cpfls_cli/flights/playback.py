@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import find_objects
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.extended import ExtendedRecord
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.replay import VEHICLE
@@ -23,8 +22,11 @@ from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputErr
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import (
+    FEWEST,
     ReadFlight,
+    all_known,
     doubts_on_voltage,
+    known_stretches,
     read_flight,
     read_import,
     signals_of,
@@ -45,12 +47,6 @@ from cpfls_cli.weak_form.windows import Recording
 _STATE = ("body_rate", "attitude", "velocity", "position")
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")
 _BESIDE = ("acceleration", "specific_force", "voltage", "thrust")
-_PAUSE = 1.5
-"""Steps of the clock from which on there is a pause."""
-
-_FEWEST = 8
-"""Samples of a stretch, which effects with derivatives need."""
-
 _MOST_PARTS = 50
 _SAME_PERIOD = 1e-3
 
@@ -116,7 +112,7 @@ def _around(part: ImportedFlight, crop: tuple[float, float]) -> list[tuple[float
         return []
     begin, end = part.report.span_s
     apart = 0.5 / part.report.log_rate_hz
-    return [(a, b) for a, b in ((crop[0], begin - apart), (end + apart, crop[1])) if b - a > _FEWEST * apart]
+    return [(a, b) for a, b in ((crop[0], begin - apart), (end + apart, crop[1])) if b - a > FEWEST * apart]
 
 
 def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight:
@@ -128,7 +124,8 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
         )
     if actuation != "body_torque":
         _require_control(study)
-    stretches = _stretches(flight, actuation)
+    driven = {name: flight.signals[name] for name in ("time", *_STATE, actuation) if name in flight.signals}
+    stretches = known_stretches(flight.name, all_known(driven), driven["time"])
     made = [signals_of(flight, _known(flight, actuation, part), study) for part in stretches]
     parts = tuple(signals for signals, _ in made)
     warnings = [
@@ -156,32 +153,11 @@ def _require_control(study: Study) -> None:
         raise ConfigError(str(error)) from None
 
 
-def _stretches(flight: ReadFlight, actuation: str) -> list[slice]:
-    """Find the stretches without pauses in which all that is played back is known."""
-    time = flight.signals["time"]
-    known = np.ones(len(time), dtype=bool)
-    for name in (*_STATE, actuation):
-        if name in flight.signals:
-            known &= _finite(flight.signals[name])
-    steps = np.diff(time)
-    paused = steps > _PAUSE * np.median(steps) if len(steps) else np.zeros(0, dtype=bool)
-    number = np.concatenate([[1], 1 + np.cumsum(paused | (known[1:] != known[:-1]))])
-    found = [part for (part,) in find_objects(number) if known[part.start]]
-    long = [stretch for stretch in found if stretch.stop - stretch.start >= _FEWEST]
-    if not long:
-        raise InputError(f"{flight.name}: no {_FEWEST} samples one after another at which all of its signals are known")
-    return long
-
-
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:
     """Cut out a stretch, with what is known in all of it."""
     names = [name for name in ("time", *_STATE, actuation) if name in flight.signals]
-    beside = [name for name in _BESIDE if name in flight.signals and _finite(flight.signals[name][part]).all()]
+    beside = [name for name in _BESIDE if name in flight.signals and np.isfinite(flight.signals[name][part]).all()]
     return {name: flight.signals[name][part] for name in (*names, *beside)}
-
-
-def _finite(values: Array) -> BoolArray:
-    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(axis=1))
 
 
 def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) -> list[str]:

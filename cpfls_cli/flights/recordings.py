@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import find_objects, label
+from scipy.ndimage import find_objects
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.artifacts.flight import FlightRecord
@@ -29,6 +29,10 @@ from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
 _UNIFORM = 0.01
+_PAUSE = 1.5
+"""Step over the usual one from which on the clock has paused."""
+FEWEST = 8
+"""Samples of a stretch, which effects with derivatives need."""
 # A charger fills a cell to a few percent more than is usual; a cell of 3 V that is taken for a share is more.
 _FULL = 1.5
 
@@ -204,10 +208,7 @@ def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], 
 
 def _known_part(flight: ReadFlight) -> tuple[dict[str, Array], tuple[str, ...]]:
     """Keep the longest stretch in which everything is known."""
-    known = all_known(flight.signals)
-    if known.all() and len(known):
-        return dict(flight.signals), flight.warnings
-    best, note = longest_known(flight.name, known, flight.signals["time"])
+    best, note = longest_known(flight.name, all_known(flight.signals), flight.signals["time"])
     return {name: values[best] for name, values in flight.signals.items()}, (*flight.warnings, *note)
 
 
@@ -220,8 +221,8 @@ def all_known(signals: Mapping[str, Array]) -> BoolArray:
     return known
 
 
-def longest_known(name: str, known: BoolArray, time: Array) -> tuple[slice, tuple[str, ...]]:
-    """Find the longest stretch in which everything is known, and say so where it is not all.
+def known_stretches(name: str, known: BoolArray, time: Array) -> list[slice]:
+    """List the stretches without a pause in which everything is known: what of a flight can be used.
 
     Parameters
     ----------
@@ -233,12 +234,21 @@ def longest_known(name: str, known: BoolArray, time: Array) -> tuple[slice, tupl
     Raises
     ------
     InputError
-        If there is none.
+        If none has as many samples as effects with derivatives need.
     """
-    runs = [parts[0] for parts in find_objects(label(known)[0])]
-    if not runs:
-        raise InputError(f"{name}: no sample at which all of its signals are known")
-    best = max(runs, key=lambda run: run.stop - run.start)
+    steps = np.diff(time)
+    paused = steps > _PAUSE * np.median(steps) if len(steps) else np.zeros(0, dtype=bool)
+    number = np.concatenate([[1], 1 + np.cumsum(paused | (known[1:] != known[:-1]))])
+    long = [part for (part,) in find_objects(number[: len(known)]) if known[part.start] and len(known[part]) >= FEWEST]
+    if not long:
+        wanted = f"{FEWEST} samples one after another" if known.any() else "sample"
+        raise InputError(f"{name}: no {wanted} at which all of its signals are known")
+    return long
+
+
+def longest_known(name: str, known: BoolArray, time: Array) -> tuple[slice, tuple[str, ...]]:
+    """Find the longest of the `known_stretches`, and say so where it is not all of the flight."""
+    best = max(known_stretches(name, known, time), key=lambda run: run.stop - run.start)
     if best.stop - best.start == len(known):
         return best, ()
     first, last = time[best.start], time[best.stop - 1]
