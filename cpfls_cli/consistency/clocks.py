@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
@@ -161,10 +160,9 @@ def _shifts(signals: Signals, part: slice, windows: Windows) -> Iterator[float]:
     assert torque is not None, "rotors turn"
     if motion is None or not np.ptp(torque[part, :2], axis=0).all():
         return
-    curve = CubicSpline(time, torque[part, :2])
 
     def left(delay: float) -> Array:
-        turned = windows.average(curve(np.clip(time + delay, time[0], time[-1])))
+        turned = windows.average(shifted(torque[part, :2], time, delay))
         return np.array([1 - _share(turned[:, axis], motion[axis]) for axis in (0, 1)])
 
     as_logged = left(0.0)

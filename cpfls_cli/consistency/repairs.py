@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.lag import delayed
 
 _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDING = 1e-6
@@ -111,4 +111,4 @@ def shifted(reading: Array, time: Array, delay: float) -> Array:
     """
     if delay == 0:
         return reading
-    return np.asarray(CubicSpline(time, reading)(np.clip(time + delay, time[0], time[-1])))
+    return delayed(reading, -delay / (time[1] - time[0]))

@@ -9,11 +9,11 @@ from math import cos, hypot, pi, radians, sin
 from typing import Final
 
 import numpy as np
-from scipy.signal import lfilter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
+from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.units import STANDARD_GRAVITY
 
 Parameters = Mapping[str, float | str]
@@ -291,8 +291,8 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     acceleration = derivative(np.arange(len(rate)) / rate_hz, rate)
     squared = (speed / np.mean(speed)) ** 2
     # Motors follow a command late; stamps of a measured speed may be late or early.
-    moved = [_lagged(squared, lag, rate_hz) for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
-    moved += [] if is_command else [_shifted(squared, rate_hz, seconds) for seconds in _SHIFTS_S]
+    moved = [lagged(squared, rate_hz * lag).start for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
+    moved += [] if is_command else [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]
     tried = [_shares(acceleration, rate, low_pass(own, rate_hz, cutoff, 2)) for own in moved]
     shares = max(tried, key=lambda found: max(sum(share) for _, share in found))
     layout, explained, clear = _chosen(shares, ("X", "plus"))
@@ -316,20 +316,6 @@ def _chosen(
     others = max(sum(share[:2]) for other, share in own if [rotor.name for rotor in other.rotors] != places)
     clear = sum(explained[:2]) > max(_LEAST_OF_BOTH, _LEAST_TIMES * others) and explained[2] > _LEAST_EXPLAINED
     return layout, explained, clear
-
-
-def _shifted(values: Array, rate_hz: float, seconds: float) -> Array:
-    """Move values in time, later where the seconds are positive; at the end left open the nearest one stays."""
-    places = np.arange(len(values)) - round(rate_hz * seconds)
-    return values[np.clip(places, 0, len(values) - 1)]
-
-
-def _lagged(values: Array, lag_s: float, rate_hz: float) -> Array:
-    if lag_s == 0.0:
-        return values
-    keep = float(np.exp(-1 / (rate_hz * lag_s)))
-    first = values[:1] * keep
-    return np.asarray(lfilter([1 - keep], [1.0, -keep], values, axis=0, zi=first)[0])
 
 
 def _shares(acceleration: Array, rate: Array, squared: Array) -> list[tuple[_Layout, tuple[float, float, float]]]:

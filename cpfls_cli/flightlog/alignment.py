@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError, SettingError
@@ -16,6 +13,7 @@ from cpfls_cli.flightlog.results import DelayEstimate, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
 from cpfls_cli.inertia import body_torque_columns
+from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import less, levelled
 
 _COMMANDS = ("body_torque", "thrust", "rotor_command")
@@ -110,25 +108,30 @@ def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSign
     for name in (*_COMMANDS, *_MOTION):
         values = getattr(signals, name)
         if values is not None:
-            # A monotone interpolant does not overshoot at the steps of a command.
-            cut[name] = PchipInterpolator(signals.time, values)(time - delay) if name in commands else values[first:]
+            cut[name] = (_within(values, delay / period) if name in commands else values)[first:]
     begin, end = signals.report.span_s
     report = replace(signals.report, samples=len(time), span_s=(begin + float(time[0]), end))
     return replace(signals, time=time - time[0], report=report, **cut)
+
+
+def _within(values: Array, steps: float) -> Array:
+    """Delay a command, whose steps a cubic overshoots, within what was commanded."""
+    return np.clip(delayed(values, steps), values.min(axis=0), values.max(axis=0))
 
 
 @dataclass(frozen=True)
 class _Fit:
     """Regression of the shifted torque on the columns of a rigid body."""
 
-    time: Array
-    torque: CubicSpline
+    window: slice
+    period: float
+    torque: Array
     scale: Array
     regressor: Array
     basis: Array
 
     def scaled_torque(self, delay: float) -> Array:
-        moved = self.torque(self.time - delay) / self.scale
+        moved = delayed(self.torque, delay / self.period)[self.window] / self.scale
         centred: Array = moved - moved.mean(axis=0)
         return centred
 
@@ -219,7 +222,7 @@ def _prepare(
     scale[scale == 0] = np.inf
     columns = body_torque_columns(smooth_rate, derivative(time, smooth_rate))[window] / scale[:, None]
     regressor = (columns - columns.mean(axis=0)).reshape(-1, 6)
-    return _Fit(time[window], CubicSpline(time, smooth_torque), scale, regressor, _orthonormal(regressor))
+    return _Fit(window, 1 / rate_hz, smooth_torque, scale, regressor, _orthonormal(regressor))
 
 
 def _window(time: Array, delay_max_s: float, lowpass_hz: float | None) -> slice:
@@ -263,7 +266,5 @@ def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:
     command = signals.rotor_command
     if command is None or time_constant == 0:
         return signals
-    decay = exp(-(signals.time[1] - signals.time[0]) / time_constant)
-    # A sample acts from its own stamp on, so the rotors see it one sample later.
-    speed = lfilter([0.0, 1 - decay], [1.0, -decay], command, axis=0, zi=command[:1])[0]
-    return replace(signals, rotor_command=np.asarray(speed))
+    ratio = time_constant / (signals.time[1] - signals.time[0])
+    return replace(signals, rotor_command=lagged(command, ratio, "previous").start)
