@@ -52,7 +52,7 @@ def _judged(folder, compared):
         "alternatives": [vars(rival) for rival in found.alternatives],
         "unexplained": [vars(left) for left in found.unexplained],
         "differences": list(found.differences),
-        "impossible": list(found.impossible),
+        "contradictions": list(found.contradictions),
         "share": found.share,
         "gap_before": {"value": found.before.value.tolist(), "floors": found.before.floors.tolist()},
         "gap_after": {"value": found.after.value.tolist(), "floors": found.after.floors.tolist()},

@@ -206,7 +206,7 @@ def outcome(key, said):
         names |= {"rotor_drag"} if "wind" in names else set()
         truth |= {"rotor_drag"}
     if names == truth:
-        return PARTIAL if said["verdict"] in ("PARTIAL", "UNEXPLAINED") else RIGHT
+        return PARTIAL if said["verdict"] in ("PARTIAL", "UNEXPLAINED", "CONTRADICTED") else RIGHT
     if said["verdict"] == "AMBIGUOUS" and _with_rivals(said, names, truth):
         return RIVAL
     if truth and names > truth:

@@ -263,8 +263,11 @@ class DiagnosisRecord(Record):
     not_excited: NotExcitedGroup = group("not_excited")
     audit: AuditGroup = group("")
     note: tuple[str, ...] = dataset("note", "what a reader should know", "note")
-    impossible: tuple[str, ...] = dataset(
-        "impossible", "numbers that no vehicle has, so that the log looks wrong", "impossible", default=()
+    contradiction: tuple[str, ...] = dataset(
+        "impossible",
+        "what of the log contradicts itself or its vehicle, numbers that no vehicle has among it",
+        "impossible",
+        default=(),
     )
     warning: tuple[str, ...] = dataset("warning", "what to know about the flights", "warning", default=())
     base: BaseGroup = group("base")
@@ -328,7 +331,7 @@ class DiagnosisRecord(Record):
             not_excited=NotExcitedGroup.of(diagnosis.not_excited),
             audit=AuditGroup.of(diagnosed.audit),
             note=diagnosis.notes,
-            impossible=diagnosis.impossible,
+            contradiction=diagnosis.contradictions,
             warning=tuple(warnings),
             base=base,
             flights=FlightsGroup.of([*training, *held], [TRAINING] * len(training) + [HELD_OUT] * len(held)),
@@ -366,7 +369,7 @@ class DiagnosisRecord(Record):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Notes on the diagnosis itself, without what the sensors say about each other."""
-        told = {*self.audit.warning, *self.audit.note, *self.impossible, *(self.difference or ())}
+        told = {*self.audit.warning, *self.audit.note, *self.contradiction, *(self.difference or ())}
         return tuple(note for note in self.note if note not in told)
 
     @property
@@ -375,7 +378,7 @@ class DiagnosisRecord(Record):
         where = self.largest_gap
         return {
             "verdict": self.verdict,
-            "log_looks_wrong": list(self.impossible),
+            "contradictions": list(self.contradiction),
             "share": self.share,
             "share_by_kind": None if self.shares is None else dict(zip(KINDS, self.shares.tolist(), strict=True)),
             "differences": list(self.difference or ()),

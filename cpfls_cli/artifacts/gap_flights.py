@@ -127,6 +127,9 @@ class AuditGroup:
     )
     note: tuple[str, ...] = dataset("audit/note", "for information", "audit_note")
     repair: AuditRepairGroup | None = group("audit_repair", default=None)
+    contradiction: tuple[str, ...] | None = dataset(
+        "audit/contradiction", "what no verdict can stand beside; nothing repairs it", "contradiction", default=None
+    )
 
     @classmethod
     def of(cls, audit: Audit) -> Self:
@@ -142,6 +145,7 @@ class AuditGroup:
             warning=audit.warnings,
             note=audit.notes,
             repair=AuditRepairGroup.of(audit.repairs),
+            contradiction=audit.contradictions or None,
         )
 
     def audit(self) -> Audit:
@@ -149,7 +153,17 @@ class AuditGroup:
         from cpfls_cli.consistency.audit import Audit
 
         repairs = () if self.repair is None else self.repair.repairs()
-        return Audit(self.findings, self.untested_because, self.warning, self.note, None, (), None, repairs)
+        return Audit(
+            self.findings,
+            self.untested_because,
+            self.warning,
+            self.note,
+            gyro=None,
+            matches=(),
+            actuation=None,
+            repairs=repairs,
+            contradictions=self.contradiction or (),
+        )
 
     @property
     def findings(self) -> tuple[AuditFinding, ...]:
@@ -189,6 +203,7 @@ class AuditGroup:
             "findings": [_finding_summary(finding) for finding in self.findings],
             "untested": self.untested_because,
             "warnings": list(self.warning),
+            "contradictions": list(self.contradiction or ()),
             "notes": list(self.note),
             "repairs": [] if self.repair is None else rows_of(self.repair),
         }

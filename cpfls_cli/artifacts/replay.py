@@ -241,6 +241,11 @@ def better_to(errors: ErrorsByHorizon, signal: str) -> float:
     return float(errors.horizon_s[less[-1]]) if len(less) else 0.0
 
 
+def contradictions_of(flights: Sequence[LoggedFlight]) -> tuple[str, ...] | None:
+    """Gather what no verdict can stand beside; None where there is nothing."""
+    return tuple(each for flight in flights for each in flight.contradictions) or None
+
+
 @record
 class PlayedFlightsGroup:
     """Flights that a model was played back along."""
@@ -394,6 +399,9 @@ class ReplayRecord(Record):
     worst: WorstGroup = group("worst")
     drawn: DrawnGroup = group("drawn")
     warning: tuple[str, ...] = dataset("warning", "what to know about flights and model", "warning")
+    contradiction: tuple[str, ...] | None = dataset(
+        "contradiction", "what of the flights contradicts itself or the vehicle", "contradiction", default=None
+    )
 
     @classmethod
     def of(
@@ -431,6 +439,7 @@ class ReplayRecord(Record):
             worst=WorstGroup.of(windows, played, horizon),
             drawn=DrawnGroup.of(windows, played, horizon),
             warning=tuple(warnings),
+            contradiction=contradictions_of(flights),
             **groups,  # type: ignore[arg-type]  # only the body rate is always known
         )
 
@@ -482,6 +491,7 @@ class ReplayRecord(Record):
                 }
                 for index in self.worst.window
             ],
+            "contradictions": list(self.contradiction or ()),
             "warnings": list(self.warning),
         }
 

@@ -392,13 +392,22 @@ class VehicleRecord(Record):
         "guess", "numbers of /vehicle that are guesses still: no flight tells them", "guess", default=None
     )
     difference: DifferencesGroup | None = group("difference", default=None)
+    contradiction: tuple[str, ...] | None = dataset(
+        "contradiction", "what of the flights contradicts itself or the vehicle", "contradiction", default=None
+    )
     commanded: bool | None = dataset(
         "commanded", "1 where its rotors were driven by commands, 0 by measured speeds", default=None
     )
 
     @classmethod
     def of(
-        cls, found: FoundVehicle, held_out: HeldOutGroup | None, warnings: Sequence[str], *, commanded: bool
+        cls,
+        found: FoundVehicle,
+        held_out: HeldOutGroup | None,
+        warnings: Sequence[str],
+        contradictions: Sequence[str] | None = None,
+        *,
+        commanded: bool,
     ) -> Self:
         """Arrange a vehicle that was found, and how well it predicts flights that it was not found in."""
         return cls(
@@ -424,6 +433,7 @@ class VehicleRecord(Record):
             warning=tuple(warnings),
             guess=found.guessed or None,
             difference=columns_of(DifferencesGroup, found.differences) if found.differences else None,
+            contradiction=None if contradictions is None else tuple(contradictions),
             commanded=commanded,
         )
 
@@ -433,8 +443,10 @@ class VehicleRecord(Record):
 
         Good for simulation where errors of rates, attitude, velocity and position, as far as the flights know them, add
         up to less over the horizon than those of what knows no model; for control where those of the rates do, over
-        0.1 s at least.
+        0.1 s at least. For nothing where the flights contradict themselves, however well it repeats them.
         """
+        if self.contradiction:
+            return "do-not-use"
         if self.held_out is None:
             return "not-judged"
         last, known = float(self.held_out.horizon_s[-1]), self.held_out.errors
@@ -461,6 +473,7 @@ class VehicleRecord(Record):
             "shares": {row.pop("name"): row for row in rows_of(self.share)},
             "evaluated": self.evaluated,
             "complete": self.complete,
+            "contradictions": list(self.contradiction or ()),
             "warnings": list(self.warning),
         }
 

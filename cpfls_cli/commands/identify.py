@@ -13,8 +13,10 @@ from cpfls_cli.artifacts.job import Job, finish
 from cpfls_cli.artifacts.model import ModelRecord
 from cpfls_cli.artifacts.store import read_header
 from cpfls_cli.commands.stopped import stopped, without_model
-from cpfls_cli.config.study import generator, settings_of
+from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
+from cpfls_cli.flights.flight_source import check_file
 from cpfls_cli.flights.inputs import choosing_source, held_out_parts, input_roles
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.flights.training import TrainingData, read_training
@@ -31,6 +33,7 @@ from cpfls_cli.report.outcome import Outcome, nothing_written
 from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
 from cpfls_cli.validation.validate import Validation
 from cpfls_cli.validation.validate import validate as examine
+from cpfls_cli.validation.verdict import contradicted
 from cpfls_cli.workers.workforce import WorkerError
 
 
@@ -61,6 +64,7 @@ def run(
     with settings_of("identification", job.study):
         require_flights(job.study.identification.choice, given=kept is not None)
     held_out = held_out_parts(job.study, data.rests, inputs, validate)
+    wrong = _contradictions([*flights, *choose_on, *validate], job.study)
     others = other_vehicles([*flights, *choose_on, *validate], job.study)
     if job.dry_run:
         return nothing_written(job)
@@ -73,7 +77,7 @@ def run(
         raise without_model(result.stop_reason, watch.signal) or _of(flights, result)
     result = _with_length(result, flights, data)
     with search.kept():
-        evidence, signal = _evidence(job, result, data, held_out, watch.signal)
+        evidence, signal = _evidence(job, result, data, held_out, wrong, watch.signal)
         base, vehicle = job.study.identification.base, job.study.vehicle
         record = finish(job, ModelRecord.of(result, base, data.indices, evidence, vehicle), inputs)
     search.end(result.stop_reason)
@@ -83,6 +87,12 @@ def run(
     outcome = Outcome(summary, (*warnings, *answer(source_of(job, record))))
     unjudged = evidence is None and job.study.identification.validation.enabled
     return stopped(outcome, result.stop_reason, signal, job.output, unjudged=unjudged)
+
+
+def _contradictions(flights: Sequence[Path], study: Study) -> tuple[str, ...]:
+    """Say what of recorded flights contradicts itself; a simulated one cannot."""
+    recorded = (path for path in flights if "log" in read_header(path).inputs)
+    return contradictions(finding.of(path.name) for path in recorded for finding in check_file(path, study))
 
 
 def _identify(
@@ -141,7 +151,12 @@ def _note(step: SearchStep) -> str:
 
 
 def _evidence(
-    job: Job, result: Identification, data: TrainingData, held_out: Mapping[str, TorqueSource], signal: int | None
+    job: Job,
+    result: Identification,
+    data: TrainingData,
+    held_out: Mapping[str, TorqueSource],
+    wrong: Sequence[str],
+    signal: int | None,
 ) -> tuple[Validation | None, int | None]:
     """Gather the evidence on a model; an interrupt leaves the model without it.
 
@@ -149,6 +164,8 @@ def _evidence(
     ----------
     held_out : mapping of str to TorqueSource
         What nothing was learned from, by name.
+    wrong : sequence of str
+        What of the flights contradicts itself.
     signal : int or None
         Number of a signal that came before.
 
@@ -166,6 +183,7 @@ def _evidence(
     try:
         with settings_of("identification", job.study):
             tell = partial(job.progress, total, total)
-            return examine(data.training, data.learned, held_out, settings, result, rng, tell), None
+            found = examine(data.training, data.learned, held_out, settings, result, rng, tell)
+            return replace(found, verdict=contradicted(found.verdict, wrong)), None
     except KeyboardInterrupt as interrupt:
         return None, next(iter(interrupt.args), SIGINT)

@@ -7,9 +7,10 @@ from typing import Any
 
 from cpfls_cli.artifacts.flight import FlightRecord
 from cpfls_cli.artifacts.job import Job, begin, finish
+from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.flightlog.results import ImportReport
 from cpfls_cli.flights.imported import imported, log_findings
-from cpfls_cli.flights.recordings import contradictions_of, read_import
+from cpfls_cli.flights.recordings import check_flight, doubts_on_voltage, read_import
 from cpfls_cli.pages.flight import answer, import_blocks, missing_signals
 from cpfls_cli.pages.source import source_of
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -36,8 +37,10 @@ def run(job: Job, log: Path) -> Outcome:
     if job.dry_run:
         return nothing_written(job)
     record = FlightRecord.of_import(flight, log_findings(flight.report))
-    doubts = contradictions_of(read_import(log.name, [flight], job.study), job.study)
-    record = finish(job, record.with_warnings((*missing_signals(record), *doubts)), inputs)
+    read = read_import(log.name, [flight], job.study)
+    findings = (*beyond_belief(job.study.vehicle), *check_flight(read, job.study))
+    wrong = (*doubts_on_voltage(read.signals, read.units), *(finding.sentence for finding in findings))
+    record = finish(job, record.with_warnings((*missing_signals(record), *wrong)), inputs)
     blocks = (*import_blocks(flight.report), *answer(source_of(job, record)))
     return Outcome(_summary(flight.report, record), blocks)
 

@@ -22,11 +22,12 @@ from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.unknown import require_known
+from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel, coriolis_matrix
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.flight_source import Stretch, Stretches, flight_source, flight_stretches
+from cpfls_cli.flights.flight_source import Stretch, Stretches, check_file, flight_source, flight_stretches
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles, read_of_vehicle, read_vehicle
 from cpfls_cli.gap.extended import ExtendedModel, inertial_force
 from cpfls_cli.gap.whole_vehicle import of_vehicle, with_effects
@@ -35,6 +36,7 @@ from cpfls_cli.identification.model import Model
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.pages.model import trust_notes
 from cpfls_cli.pages.prediction import answer
+from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome, nothing_written
@@ -59,7 +61,8 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     require_known(job.study, "predict", whole=holds(model, VehicleRecord))
     with_more = {ExtendedRecord: _with_effects, VehicleRecord: _of_vehicle}
     predicting = next((kind for record, kind in with_more.items() if holds(model, record)), None)
-    found = Findings()
+    found, wrong = Findings(), contradictions(check_file(flight, job.study, driven=predicting is not None))
+    said = [Text(contradicted(each), "warning") for each in wrong]
     if predicting is not None:
         predicted, stretches = predicting(model, flight, job.study), flight_stretches(flight, job.study)
         if job.dry_run:
@@ -67,7 +70,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
             return nothing_written(job)
         finish_parts(job, _by_stretches(predicted, stretches, found, job.progress), len(stretches), inputs)
         about = (Text(f"{stretches.name}: {warning}", "warning") for warning in stretches.warnings)
-        return Outcome(found.summary, (*about, *answer(found)))
+        return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *about, *answer(found)))
     identified = read_record(model, ModelRecord)
     rebuilt = identified.rebuilt(model)
     torque = count_rows(flight, FlightRecord.spec(), FlightRecord.path("torque")) is not None
@@ -77,7 +80,7 @@ def run(job: Job, model: Path, flight: Path) -> Outcome:
     finish_parts(job, _along(rebuilt, identified.draws(), flown, torque, found, job.progress), len(flown), inputs)
     others = (*model_of_another(model, job.study), *other_vehicles([flight], job.study))
     notes = (*trust_notes(identified, model), *(Text(note, "warning") for note in others))
-    return Outcome(found.summary, (*notes, *answer(found, identified)))
+    return Outcome(found.summary | {"contradictions": list(wrong)}, (*said, *notes, *answer(found, identified)))
 
 
 def _along(

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from cpfls_cli.artifacts.job import Job, check_outputs, finish
 from cpfls_cli.artifacts.output import refuse_own, write_text
 from cpfls_cli.artifacts.parameters import vehicle_section
-from cpfls_cli.artifacts.replay import HeldOutGroup
+from cpfls_cli.artifacts.replay import HeldOutGroup, contradictions_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.commands.stopped import stopped, without_model
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -98,7 +98,9 @@ def run(
         judged = _judged(found, rest, job) if rest else None
         warnings = [*twice, *(warning for flight in read for warning in flight.warnings)]
         commanded = any(flight.parts[0].commanded for flight in training)
-        record = finish(job, VehicleRecord.of(found, judged, warnings, commanded=commanded), inputs)
+        record = finish(
+            job, VehicleRecord.of(found, judged, warnings, contradictions_of(read), commanded=commanded), inputs
+        )
     written: tuple[Text, ...] = ()
     if record.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.

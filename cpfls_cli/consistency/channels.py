@@ -1,4 +1,4 @@
-"""Checks of single channels, broken or filtered, and of the axes of two."""
+"""Checks of single channels: constant, clipped, coarsely rounded, filtered before they were logged."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from math import comb
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.consistency.axes import AXES
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals
 from cpfls_cli.flightlog.repair import SignalTable
@@ -17,7 +18,6 @@ from cpfls_cli.flightlog.stretches import clipped
 _LOWEST_LIMIT_RAD_S = 1.0
 # Rounding to this step adds as much noise as a poor gyroscope has.
 _COARSE_STEP_RAD_S = 0.02
-AXES = ("x", "y", "z")
 _ANGLES = ("roll", "pitch", "yaw")
 _CHANNEL_WORDS = {
     "attitude": "attitude",
@@ -29,9 +29,6 @@ _CHANNEL_WORDS = {
 }
 # A tenth of the noise of the best gyroscopes of multirotors, and a hundredth of their usual resolution.
 _NO_NOISE_RAD_S = 2e-5
-# Correlations that noise does not reach over a flight, and that noise does not hide where the motion is worth a look.
-SAME = 0.9
-_OTHER = 0.5
 
 
 def channel_warnings(flights: Sequence[Signals]) -> tuple[str, ...]:
@@ -75,39 +72,6 @@ def _gyro_warnings(body_rate: Array) -> Iterator[str]:
         step = float(np.diff(np.unique(column)).min())
         if step > _COARSE_STEP_RAD_S:
             yield f"The gyroscope about {axis} is rounded to steps of {step:.3g} rad/s."
-
-
-def frame_warnings(name: str, first: Array, second: Array, floor: float) -> list[str]:
-    """Detect axes that are swapped, reversed or missing.
-
-    Parameters
-    ----------
-    name : str
-        The two channels, "one and other".
-    first, second : array, shape (window, 3)
-        What should be the same.
-    floor : float
-        Standard deviation above which something moves.
-    """
-    moving = (first.std(axis=0) > floor) & (second.std(axis=0) > 0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = np.nan_to_num(np.corrcoef(first.T, second.T)[:3, 3:])
-    # Noise on one side that brings the correlation below a half makes that side more than twice as large.
-    larger, smaller = (
-        np.maximum(first.std(axis=0), second.std(axis=0)),
-        np.minimum(first.std(axis=0), second.std(axis=0)),
-    )
-    alike = (smaller > floor) & (larger < 2 * smaller)
-    sentences = []
-    for axis in np.flatnonzero(moving):
-        same, best = correlation[axis, axis], int(np.argmax(np.abs(correlation[axis])))
-        if same < -SAME:
-            sentences.append(f"{name} have opposite signs along {AXES[axis]}")
-        elif abs(same) < _OTHER and abs(correlation[axis, best]) > SAME:
-            sentences.append(f"{AXES[axis]} of the one is {AXES[best]} of the other in {name}: axes are swapped")
-        elif abs(same) < _OTHER and alike[axis]:
-            sentences.append(f"{name} do not belong together along {AXES[axis]}: their correlation is {same:.2f}")
-    return [f"{sentence[0].upper()}{sentence[1:]}." for sentence in sentences]
 
 
 def known_up_to(signals: Signals) -> dict[str, float]:

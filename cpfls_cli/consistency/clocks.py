@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
@@ -117,11 +118,18 @@ def attitude_on_clock(
         return (), ()
     if abs(delay) + unsure >= 0.5 * abs(gyro_delay):
         return (), (_UNDECIDED,)
-    sentence = (
-        f"The attitude is {'late' if gyro_delay < 0 else 'early'} by {abs(1000 * gyro_delay):.0f} ms, judged by "
-        "gyroscope and rotors, which keep one time. It is set right before the balance; mend its clock in the log."
+    finding = Finding(
+        f"the attitude is {'late' if gyro_delay < 0 else 'early'} by {abs(1000 * gyro_delay):.0f} ms, judged by "
+        "gyroscope and rotors, which keep one time",
+        "mend its clock in the log",
+        ("attitude", "gyroscope", "rotors"),
+        -gyro_delay,
+        "s",
+        contradiction=False,
+        repairable=True,
     )
-    return (ChannelRepair("attitude", delay_s=-gyro_delay, sentence=sentence),), ()
+    repair = ChannelRepair("attitude", delay_s=-gyro_delay).told(finding, "It is set right before the balance")
+    return (repair,), ()
 
 
 def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepair | None:
@@ -142,16 +150,17 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
     delay = float(np.median(told))
     if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(told) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
         return None
-    off = (
-        f"The rotor speeds are {'late' if delay > 0 else 'early'} by {abs(1000 * delay):.0f} ms, judged by the "
-        "gyroscope"
+    finding = Finding(
+        f"the rotor speeds are {'late' if delay > 0 else 'early'} by {abs(1000 * delay):.0f} ms, judged by the "
+        "gyroscope",
+        "mend their clock in the log",
+        ("rotors", "gyroscope"),
+        delay,
+        "s",
+        contradiction=False,
+        repairable=True,
     )
-    return ChannelRepair(
-        "rotor_speed",
-        delay_s=delay,
-        sentence=f"{off}. They are set right before the balance; mend their clock in the log.",
-        unrepaired=f"{off}; mend their clock in the log",
-    )
+    return ChannelRepair("rotor_speed", delay_s=delay).told(finding, "They are set right before the balance")
 
 
 def _shifts(signals: Signals, part: slice, windows: Windows) -> Iterator[float]:

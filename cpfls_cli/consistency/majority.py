@@ -11,8 +11,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.consistency.channels import AXES
-from cpfls_cli.consistency.motion import NAMES, PairCheck, by_thrust, checked
+from cpfls_cli.consistency.axes import AXES
+from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.motion import ANOTHER_NORTH, KEYS, NAMES, TURNED_RAD, PairCheck, by_thrust, checked
 from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
@@ -25,7 +26,6 @@ _MOVES_M_S2 = 0.1
 # Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
 # and more along z.
 _TOGETHER, _APART, _REVERSED = 0.8, 0.5, 0.6
-_ANOTHER_NORTH = np.radians(20.0)
 _MENDED = ("velocity", "acceleration", "specific_force")
 _SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
@@ -35,14 +35,7 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "acceleration": {"g": _STANDARD_GRAVITY, "ft/s^2": 0.3048, "cm/s^2": 0.01, "mm/s^2": 0.001, "mg": 0.00980665},
 }
 _EXPLAINED = 0.8
-_TURNED = np.radians(3.0)
 _FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
-_KEYS = {
-    "velocity": "import.signals.velocity and import.world_frame",
-    "acceleration": "import.signals.acceleration and import.acceleration_frame",
-    "specific_force": "import.signals.acceleration, import.acceleration_frame and import.body_frame",
-}
-
 
 _Tuned = tuple[ChannelRepair, tuple[str, ...]]
 
@@ -56,19 +49,25 @@ class Settled:
     repairs : tuple of ChannelRepair
     checks : tuple of PairCheck
         Of the repaired flights.
-    against_thrust : str
-        Sentence on a world that is upside down, turned or mirrored against thrust and attitude; empty where it is not.
+    against_thrust : Finding or None
+        That the world is upside down, turned or mirrored against thrust and attitude; None where it is not.
     """
 
     repairs: tuple[ChannelRepair, ...]
     checks: tuple[PairCheck, ...]
-    against_thrust: str = ""
+    against_thrust: Finding | None = None
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Contradictions that stay; those with the thrust are what a diagnosis is about, but for the way it points."""
-        stays = (problem for check in self.checks if check.pair.exact for problem in check.problems)
-        return (*([self.against_thrust] if self.against_thrust else []), *stays)
+    def findings(self) -> tuple[Finding, ...]:
+        """What is wrong; of what stays between thrust and motion, which a diagnosis is about, the way it points."""
+        mended = [repair.finding for repair in self.repairs if repair.finding is not None]
+        return (*mended, *self.stays)
+
+    @property
+    def stays(self) -> tuple[Finding, ...]:
+        """What no repair takes away."""
+        among = [problem for check in self.checks if check.pair.exact for problem in check.problems]
+        return (*([] if self.against_thrust is None else [self.against_thrust]), *among)
 
 
 def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
@@ -89,7 +88,7 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
     now = tuple(replace(signals, acceleration=None) if is_derived(signals) else signals for signals in flights)
     checks = checked(now, windows)
     against_thrust = _against_thrust(checks)
-    if against_thrust:
+    if against_thrust is not None:
         # Judged by the thrust every channel of such a world is wrong.
         return Settled((), checks, against_thrust)
     for _ in range(_ROUNDS):
@@ -102,26 +101,33 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
     return Settled(repairs, checks)
 
 
-def _against_thrust(checks: Sequence[PairCheck]) -> str:
+def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
     """Tell of a world whose channels agree, and all lie otherwise than thrust and attitude: drag and wind turn none."""
     against = by_thrust(checks)
     if not against or any(len(check.first) < FEWEST_WINDOWS for check in against):
-        return ""
-    who = " and ".join(NAMES[check.pair.second] for check in against)
+        return None
+    moved = [NAMES[check.pair.second] for check in against]
+    who, held = " and ".join(moved), ("thrust of the rotors", "attitude", *moved)
     if all(_reversed_along_z(check) for check in against):
-        return f"Along z the thrust of the rotors is opposite to {who}: check import.world_frame and import.body_frame."
+        what = f"along z the thrust of the rotors is opposite to {who}"
+        return Finding(what, "check import.world_frame and import.body_frame", held)
     turned, mirrored = zip(*(_about_the_vertical(check) for check in against), strict=True)
-    if all(abs(turn) > _TOGETHER and abs(np.angle(turn)) > _ANOTHER_NORTH for turn in turned):
-        return (
-            f"By thrust and attitude {who} lie turned by {np.degrees(np.angle(turned[0])):.0f} deg about the vertical: "
-            "check the yaw of import.signals.attitude (or quaternion), the order of x and y, and import.world_frame."
+    if all(abs(turn) > _TOGETHER and abs(np.angle(turn)) > ANOTHER_NORTH for turn in turned):
+        angle = float(np.angle(turned[0]))
+        return Finding(
+            f"by thrust and attitude {who} lie turned by {np.degrees(angle):.0f} deg about the vertical",
+            "check the yaw of import.signals.attitude (or quaternion), the order of x and y, and import.world_frame",
+            held,
+            angle,
+            "rad",
         )
     if all(abs(turn) < _APART and abs(mirror) > _TOGETHER for turn, mirror in zip(turned, mirrored, strict=True)):
-        return (
-            f"By thrust and attitude {who} lie mirrored: check order and signs of their x and y, import.world_frame "
-            "and import.body_frame."
+        return Finding(
+            f"by thrust and attitude {who} lie mirrored",
+            "check order and signs of their x and y, import.world_frame and import.body_frame",
+            held,
         )
-    return ""
+    return None
 
 
 def _reversed_along_z(check: PairCheck) -> bool:
@@ -347,7 +353,7 @@ def _with_turn(repair: ChannelRepair, check: PairCheck) -> _Tuned:
     if repair.channel == "specific_force" or not check.pair.exact:
         return repair, ()
     angle = float(np.arctan(check.turn.value)) * (1 if check.pair.second == repair.channel else -1)
-    if abs(angle) < _TURNED or check.turn.error > 0.1 * abs(angle):
+    if abs(angle) < TURNED_RAD or check.turn.error > 0.1 * abs(angle):
         return repair, ()
     cos, sin = np.cos(angle), np.sin(angle)
     matrix = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
@@ -370,15 +376,15 @@ def _told(
     first, *others = _with_position(repair, checks)
     way = "late" if repair.delay_s > 0 else "early"
     clock = [f"is {way} by {abs(1000 * repair.delay_s):.0f} ms"] if repair.delay_s else []
-    who = f"The {NAMES[repair.channel]}" if not others else "The world of velocity and position"
-    finding = f"{who} {_joined([*what, *clock])}, judged by the {_joined(witnesses)}"
-    remedy = f"mend the log, or {_KEYS[repair.channel]}."
-    told = replace(
-        first,
-        sentence=f"{finding}. It is set right before the balance; {remedy}",
-        unrepaired=f"{finding}; {remedy}",
+    who = f"the {NAMES[repair.channel]}" if not others else "the world of velocity and position"
+    finding = Finding(
+        f"{who} {_joined([*what, *clock])}, judged by the {_joined(witnesses)}",
+        f"mend the log, or {KEYS[repair.channel]}",
+        (NAMES[repair.channel], *witnesses),
+        contradiction=bool(what),
+        repairable=True,
     )
-    return (told, *others)
+    return (first.told(finding, "It is set right before the balance"), *others)
 
 
 def _left_out(channel: str, witnesses: Sequence[str]) -> ChannelRepair:
@@ -387,13 +393,11 @@ def _left_out(channel: str, witnesses: Sequence[str]) -> ChannelRepair:
         "acceleration": "the force comes from other channels, if there are any",
         "specific_force": "the force comes from other channels, if there are any",
     }[channel]
-    finding = (
-        f"The {NAMES[channel]} contradicts the {_joined(witnesses)}, and neither unit, gravity, axes nor delay "
-        "explains it"
+    finding = Finding(
+        f"the {NAMES[channel]} contradicts the {_joined(witnesses)}, and neither unit, gravity, axes nor delay "
+        "explains it",
+        f"check {KEYS[channel]}",
+        (NAMES[channel], *witnesses),
+        repairable=True,
     )
-    return ChannelRepair(
-        channel,
-        dropped=True,
-        sentence=f"{finding}. It is left out: {without}. Check {_KEYS[channel]}.",
-        unrepaired=f"{finding}; check {_KEYS[channel]}.",
-    )
+    return ChannelRepair(channel, dropped=True).told(finding, f"It is left out: {without}")

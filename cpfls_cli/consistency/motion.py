@@ -9,7 +9,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import jackknife_error
-from cpfls_cli.consistency.channels import AXES, SAME, frame_warnings
+from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
+from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.resampling import blocks_of
 from cpfls_cli.weak_form.windows import Windows
@@ -20,10 +21,13 @@ _GRAVITY_OFF_M_S2 = 3.0
 _THRUST_OFF = 1.0
 # From here on a delay costs more force than noise does, and a turn more than the mounting of a sensor.
 _DELAY_OFF_S = 0.005
-_TURNED_RAD = np.radians(3.0)
+TURNED_RAD = np.radians(3.0)
 # A jackknife over few blocks has heavy tails.
 _SIGMAS = 6.0
 _BLOCK_S = 4.0
+ANOTHER_NORTH = np.radians(20.0)
+"""Turn about the vertical from which on a world has another north; 23 real flights are turned by 4 degrees at most."""
+
 _TOGETHER = 0.5
 _ALIKE = 1.05
 _LENGTHS = {"mm": 0.001, "cm": 0.01, "ft": 0.3048}
@@ -76,6 +80,15 @@ class _Pair(NamedTuple):
         return f"{NAMES[self.first]} and {NAMES[self.second]}"
 
     @property
+    def channels(self) -> tuple[str, str]:
+        return NAMES[self.first], NAMES[self.second]
+
+    @property
+    def remedy(self) -> str:
+        keys = dict.fromkeys(KEYS[name] for name in self[:2])
+        return f"check {', '.join(keys)}"
+
+    @property
     def exact(self) -> bool:
         """Whether only sensors decide whether the two agree, and no model."""
         return "thrust" not in self
@@ -95,8 +108,8 @@ class PairCheck(NamedTuple):
         Of the second against the first, s.
     turn : Sure
         Of the second against the first about the vertical, rad.
-    problems : tuple of str
-        Sentences on contradictions; empty where there is none.
+    problems : tuple of Finding
+        What is wrong between the two; empty where nothing is.
     agrees : bool
         Whether what moves moves together.
     """
@@ -107,7 +120,7 @@ class PairCheck(NamedTuple):
     matches: tuple[ChannelMatch, ...]
     delay: Sure
     turn: Sure
-    problems: tuple[str, ...]
+    problems: tuple[Finding, ...]
     agrees: bool
 
 
@@ -119,6 +132,15 @@ NAMES = {
     "thrust": "thrust of the rotors",
 }
 """Channels of the motion in words."""
+
+KEYS = {
+    "position": "import.signals.position",
+    "velocity": "import.signals.velocity and import.world_frame",
+    "acceleration": "import.signals.acceleration and import.acceleration_frame",
+    "specific_force": "import.signals.acceleration, import.acceleration_frame and import.body_frame",
+    "thrust": "vehicle.rotors",
+}
+"""What of the config says how each is read."""
 
 _PAIRS = (
     _Pair("position", "velocity", 0.2),
@@ -250,8 +272,8 @@ def _ratio(top: Array, bottom: Array, block: IntArray) -> Sure:
 
 def _problems(
     pair: _Pair, first: Array, second: Array, matches: Sequence[ChannelMatch], delay: Sure, turn: Sure
-) -> Iterator[str]:
-    frames = frame_warnings(pair.words, first, second, pair.floor)
+) -> Iterator[Finding]:
+    frames = axes_apart(pair.words, pair.channels, first, second, pair.floor, pair.remedy)
     if frames:
         yield from frames
         return
@@ -259,26 +281,30 @@ def _problems(
     off = [each for each in matches if each.r2 > SAME**2 and _scale_off(each, allowed)]
     scales = [each.scale for each in off]
     if off and 0 < max(scales) < _ALIKE * min(scales):
-        yield _of_scale([each.axis for each in off], off[0].channels, float(np.median(scales)))
+        yield _of_scale(pair, [each.axis for each in off], float(np.median(scales)))
     else:
-        yield from (_of_scale([each.axis], each.channels, each.scale) for each in off)
+        yield from (_of_scale(pair, [each.axis], each.scale) for each in off)
     for each in matches:
         if pair.first != "position" and abs(each.offset) > _GRAVITY_OFF_M_S2:
-            yield f"{each.channels.capitalize()} differ by {each.offset:.1f} m/s^2 along {each.axis}: gravity?"
+            what = f"{each.channels} differ by {each.offset:.1f} m/s^2 along {each.axis}, as gravity would make them"
+            yield Finding(what, pair.remedy, pair.channels, each.offset, "m/s^2")
     if pair.exact and delay.beyond(_DELAY_OFF_S):
         late = "late" if delay.value > 0 else "early"
-        yield f"In {pair.words}, the second is {late} by {abs(1000 * delay.value):.0f} ms."
-    if pair.exact and pair.second != "specific_force" and turn.beyond(_TURNED_RAD):
-        degrees = abs(np.degrees(np.arctan(turn.value)))
-        yield f"{pair.words.capitalize()} are turned against each other by {degrees:.0f} deg about the vertical."
+        what = f"in {pair.words}, the second is {late} by {abs(1000 * delay.value):.0f} ms"
+        yield Finding(what, pair.remedy, pair.channels, delay.value, "s", contradiction=False)
+    if pair.exact and pair.second != "specific_force" and turn.beyond(TURNED_RAD):
+        angle = float(np.arctan(turn.value))
+        what = f"{pair.words} are turned against each other by {abs(np.degrees(angle)):.0f} deg about the vertical"
+        yield Finding(what, pair.remedy, pair.channels, angle, "rad", contradiction=abs(angle) > ANOTHER_NORTH)
 
 
-def _of_scale(axes: Sequence[str], channels: str, scale: float) -> str:
+def _of_scale(pair: _Pair, axes: Sequence[str], scale: float) -> Finding:
     *most, last = axes
     along = f"{', '.join(most)} and {last}" if most else last
     unit = next((unit for unit, metres in _LENGTHS.items() if 1 / _ALIKE < scale / metres < _ALIKE), "")
-    asked = f": is the position in {unit}" if unit and channels.startswith(NAMES["position"]) else ""
-    return f"The scales of {channels} along {along} differ by a factor of {scale:#.3g}{asked}."
+    asked = f": is the position in {unit}" if unit and pair.first == "position" else ""
+    what = f"the scales of {pair.words} along {along} differ by a factor of {scale:#.3g}{asked}"
+    return Finding(what, pair.remedy, pair.channels, scale, contradiction=not 1 / TWICE < scale < TWICE)
 
 
 def _scale_off(match: ChannelMatch, allowed: float) -> bool:

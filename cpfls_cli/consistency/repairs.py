@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.lag import delayed
 
@@ -35,8 +36,8 @@ class ChannelRepair:
     gravity_m_s2 : float
         Added along the vertical, m/s^2.
     sentence : str
-        What is wrong, who says so, what is done and what to mend.
-    unrepaired : str
+        What is wrong, who says so, what is done and what to mend; empty for a channel that goes along with another.
+    finding : Finding or None
         The same where nothing is done about it.
     """
 
@@ -47,7 +48,12 @@ class ChannelRepair:
     matrix: Array = field(default_factory=lambda: np.eye(3))
     gravity_m_s2: float = 0.0
     sentence: str = ""
-    unrepaired: str = ""
+    finding: Finding | None = None
+
+    def told(self, finding: Finding, done: str) -> ChannelRepair:
+        """Say what is wrong, and what is done about it."""
+        what = f"{finding.what[0].upper()}{finding.what[1:]}"
+        return replace(self, finding=finding, sentence=f"{what}. {done}; {finding.remedy}.")
 
     @property
     def is_mistake(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import permutations
 from math import cos, hypot, pi, radians, sin
@@ -236,29 +236,7 @@ class MovedBy:
 _ON_AN_AXIS = 0.2
 
 
-def disagreement_on_rotors(moved: MovedBy, stated: Sequence[RotorPlace]) -> str:
-    """Say where the motion puts rotors that are stated elsewhere, or turning the other way.
-
-    Parameters
-    ----------
-    stated : sequence of RotorPlace
-        As many, in the same order; directions of any length.
-
-    Returns
-    -------
-    str
-        Empty where the motion does not tell clearly, or where the stated ones are no X or plus such as it tells of.
-    """
-    told = [(rotor.name, rotor.spin) for rotor in moved.airframe.rotors]
-    known = [(_place(rotor.direction), rotor.spin) for rotor in stated]
-    if not moved.clear or told == known or {name for name, _ in told} != {name for name, _ in known}:
-        return ""
-    words = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in told)
-    shares = ", ".join(f"{100 * share:.0f} %" for share in moved.explained)
-    return f"{words} (which explains {shares} of the acceleration about roll, pitch and yaw)"
-
-
-def _place(direction: tuple[float, float]) -> str:
+def place_of(direction: tuple[float, float]) -> str:
     """Name a place, of whose direction a small part is none."""
     least = _ON_AN_AXIS * hypot(*direction)
     x, y = (part if abs(part) > least else 0.0 for part in direction)

@@ -17,13 +17,6 @@ from cpfls_cli.flightlog.alignment import align_commands, apply_rotor_lag
 from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals, warn_of_cut_offs, warn_of_slow
 from cpfls_cli.flightlog.clock import longest_stretch
 from cpfls_cli.flightlog.conversion import drop_absent_signals, select_columns, to_program_frames
-from cpfls_cli.flightlog.quality import (
-    count_values,
-    refuse_steep_pitch,
-    warn_of_angles,
-    warn_of_disagreement,
-    warn_of_values,
-)
 from cpfls_cli.flightlog.repair import (
     SignalTable,
     crop_and_order,
@@ -36,7 +29,15 @@ from cpfls_cli.flightlog.repair import (
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport, LogSignals
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
-from cpfls_cli.flightlog.stretches import rotors_at_rest, warn_of_dead, warn_of_rest
+from cpfls_cli.flightlog.stretches import (
+    count_values,
+    refuse_steep_pitch,
+    rotors_at_rest,
+    warn_of_angles,
+    warn_of_dead,
+    warn_of_rest,
+    warn_of_values,
+)
 
 _STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10
@@ -210,7 +211,7 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
     smooth = _filtered(signals, settings)
     arrays = _arrays(smooth) | _derived(smooth)
     time = smooth.time
-    report = replace(signals.report, lowpass_hz=settings.lowpass_hz, warnings=_warnings(signals))
+    report = replace(signals.report, lowpass_hz=settings.lowpass_hz)
     if settings.rate_hz is not None:
         time = _clock(time, settings.rate_hz, report.log_rate_hz)
         arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
@@ -221,12 +222,6 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
             warnings=report.warnings + _warn_of_aliasing(settings, report.log_rate_hz),
         )
     return ImportedFlight(time=time, report=report, **arrays)
-
-
-def _warnings(signals: LogSignals) -> tuple[str, ...]:
-    if signals.attitude is None or signals.body_rate is None:
-        return signals.report.warnings
-    return signals.report.warnings + warn_of_disagreement(signals.time, signals.attitude, signals.body_rate)
 
 
 def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:

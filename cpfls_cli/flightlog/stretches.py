@@ -1,14 +1,17 @@
-"""Parts of a log that measure no flight: rotors at rest or below zero; columns dead, clipped or at a standstill."""
+"""Parts of a log that measure no flight: bad values, rotors at rest or below zero, columns dead, clipped or still."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from math import ceil, floor
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil, floor, pi
+from typing import Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.flightlog.repair import SignalTable
+from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.repair import SignalTable, count_saturated
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.units import KNOWN_UNITS
 
@@ -30,6 +33,11 @@ _MEASURED = frozenset(
 _SHORTEST_PAUSE_S = 0.5
 _FEWEST_IN_PAUSE = 20
 _USUAL_STEPS = 10
+_NEVER_SATURATED = {"quaternion", "voltage"}
+# A quarter turn, and a margin for noise and filters.
+_LARGEST_PITCH = pi / 2 + 0.05
+_FULL_TURN = 7.0
+_ANGLE_QUANTILE = 0.99
 
 
 def rotors_at_rest(table: SignalTable, settings: ImportSettings) -> dict[str, BoolArray]:
@@ -218,3 +226,128 @@ def _runs(marked: BoolArray) -> list[tuple[int, int]]:
     """List the first and the last row of each run of marked rows."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
     return [(int(first), int(after) - 1) for first, after in edges.reshape(-1, 2)]
+
+
+@dataclass(frozen=True)
+class ValueCounts:
+    """Bad values by column of the log; columns without are left out.
+
+    Attributes
+    ----------
+    missing : dict from str to int
+        Absent.
+    spikes, suspected_spikes : dict from str to int
+        Spikes that are interpolated, and spikes that are left alone; one of the two is empty.
+    saturated : dict from str to int
+        In long runs at an extreme; not of a quaternion or a voltage, and not of rotors at rest.
+    """
+
+    missing: dict[str, int]
+    spikes: dict[str, int]
+    suspected_spikes: dict[str, int]
+    saturated: dict[str, int]
+
+
+def count_values(
+    table: SignalTable, spikes: Mapping[str, BoolArray], resting: Mapping[str, BoolArray], settings: ImportSettings
+) -> ValueCounts:
+    """Count the bad values of each column of the log.
+
+    Parameters
+    ----------
+    table : Table
+        The part that is kept, as logged.
+    spikes : mapping from signal name to array of bool, shape (sample, column)
+        Where its spikes are.
+    resting : mapping from signal name to array of bool, shape (sample,)
+        Where no rotor turns, which is not saturated.
+    settings : ImportSettings
+        The names of the columns, `spike_deviations` and `saturation_samples`.
+    """
+    counts = _by_column(spikes, settings, lambda column: int(column.sum()))
+    repaired = settings.spike_deviations is not None
+    return ValueCounts(
+        missing=_by_column(table.signals, settings, lambda column: int(np.isnan(column).sum())),
+        spikes=counts if repaired else {},
+        suspected_spikes={} if repaired else counts,
+        saturated=_saturated(table, resting, settings),
+    )
+
+
+def _saturated(table: SignalTable, resting: Mapping[str, BoolArray], settings: ImportSettings) -> dict[str, int]:
+    """Count saturated values, but not a quaternion at hover (1), parked rotors (0), or a coarse voltage."""
+    length = settings.saturation_samples
+    rotors = {name: np.where(rest[:, None], np.nan, table.signals[name]) for name, rest in resting.items()}
+    others = {name: signal for name, signal in table.signals.items() if name not in _NEVER_SATURATED | rotors.keys()}
+    return _by_column(rotors, settings, lambda column: count_saturated(column, length, rest=0.0)) | _by_column(
+        others, settings, lambda column: count_saturated(column, length)
+    )
+
+
+def warn_of_values(counts: ValueCounts) -> tuple[str, ...]:
+    """Describe the columns whose suspicious values are used unchanged."""
+    saturated = (
+        f"column {column} stands at its extreme for {count} samples in all: saturated?"
+        for column, count in counts.saturated.items()
+    )
+    suspected = (
+        f"{count} suspected {'spike' if count == 1 else 'spikes'} in column {column}, used as logged: set"
+        " import.spike_deviations to interpolate"
+        for column, count in counts.suspected_spikes.items()
+    )
+    return (*saturated, *suspected)
+
+
+def _by_column(
+    signals: Mapping[str, Array | BoolArray], settings: ImportSettings, count: Callable[[Any], int]
+) -> dict[str, int]:
+    counts = {
+        column: count(values)
+        for name, signal in settings.signals.items()
+        if name in signals
+        for column, values in zip(signal.names, signals[name].T, strict=True)
+    }
+    return {column: number for column, number in counts.items() if number}
+
+
+def refuse_steep_pitch(signals: Mapping[str, Array]) -> None:
+    """Refuse an attitude whose pitch exceeds a quarter turn, which roll, pitch, yaw angles cannot.
+
+    Parameters
+    ----------
+    signals : mapping from signal name to array, shape (time, column), SI
+        Repaired, in the frames of the log.
+
+    Raises
+    ------
+    InputError
+    """
+    if "attitude" not in signals:
+        return
+    largest = float(np.abs(signals["attitude"][:, 1]).max())
+    if largest > _LARGEST_PITCH:
+        raise InputError(
+            f"attitude reaches {largest:.3g} rad of pitch, and no pitch is larger than a quarter turn, 1.57 rad: is"
+            " import.signals.attitude.unit deg? Otherwise check the order of its columns, and spikes"
+            " (import.spike_deviations)"
+        )
+
+
+def warn_of_angles(signals: Mapping[str, Array]) -> tuple[str, ...]:
+    """Warn of roll or yaw beyond a full turn where no gyroscope confirms their unit.
+
+    Parameters
+    ----------
+    signals : mapping from signal name to array, shape (sample, column), SI
+        As logged; absent values are NaN.
+    """
+    if "attitude" not in signals or {"body_rate", "attitude_rate"} & signals.keys():
+        return ()
+    # A single spike says nothing about the unit.
+    roll, _, yaw = np.nanquantile(np.abs(signals["attitude"]), _ANGLE_QUANTILE, axis=0)
+    return tuple(
+        f"attitude reaches {angle:.3g} rad of {name}: is import.signals.attitude.unit deg? (good where the angle counts"
+        " on over full turns)"
+        for name, angle in (("roll", float(roll)), ("yaw", float(yaw)))
+        if angle > _FULL_TURN
+    )

@@ -14,12 +14,16 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.flight import MOTION, FlightRecord
 from cpfls_cli.artifacts.spec import PART
 from cpfls_cli.artifacts.store import check_rows, count_rows, read_header, read_record, read_rows
+from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
+from cpfls_cli.consistency.check import ENOUGH
+from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import (
     ReadFlight,
     all_known,
+    check_flight,
     doubts_on_voltage,
     full_battery,
     in_volts,
@@ -247,6 +251,39 @@ def flight_stretches(path: Path, study: Study) -> Stretches:
     notes = (*notes, *doubts, *([full_battery(full)] if full and not doubts else []))
     overlap = round(_OVERLAP_S / max(float(np.median(np.diff(clock[best], append=np.inf))), 1e-6))
     return Stretches(path.name, rows, flight.units, best, overlap, full, (*flight.warnings, *notes), study)
+
+
+def check_file(path: Path, study: Study, *, driven: bool = False) -> tuple[Finding, ...]:
+    """Hold a flight against itself, its middle where it stays in its file; nothing of a flight of another vehicle.
+
+    Parameters
+    ----------
+    driven : bool
+        Whether what drives it is held against the vehicle of the config in any case; else where the rotors of the
+        config give its torque.
+    """
+    try:
+        return check_flight(_enough_of(path, study), study, driven=driven or _rotors_tell_torque(path, study))
+    except InputError:
+        return ()
+
+
+def _rotors_tell_torque(path: Path, study: Study) -> bool:
+    if is_log(path):
+        return study.import_.torque_source in ("rotor-speed", "rotor-command")
+    made = read_header(path)
+    config = parse_config(made.config, f"{path}: /config")
+    return "log" in made.inputs and config["import"]["torque_source"] in ("rotor-speed", "rotor-command")
+
+
+def _enough_of(path: Path, study: Study) -> ReadFlight:
+    samples = None if is_log(path) else count_rows(path, FlightRecord.spec(), FlightRecord.path("time"))
+    if samples is None or samples <= IN_MEMORY:
+        return read_flight(path, study)
+    spec, first = FlightRecord.spec(), (samples - ENOUGH) // 2
+    names = [name for name in FlightRecord.signal_names() if count_rows(path, spec, name) is not None]
+    units = units_of(path, read_header(path), study)
+    return ReadFlight(path.name, _rows_in(path, names, first, first + ENOUGH), units, ())
 
 
 def _rows_of(signals: Mapping[str, Array], start: int, stop: int) -> Mapping[str, Array]:

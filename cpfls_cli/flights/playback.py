@@ -16,7 +16,9 @@ from cpfls_cli.artifacts.replay import VEHICLE
 from cpfls_cli.artifacts.store import holds
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.study import Study
-from cpfls_cli.consistency.check import beyond_belief, contradictions
+from cpfls_cli.consistency.check import check
+from cpfls_cli.consistency.findings import contradictions, doubts
+from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
@@ -80,7 +82,8 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
                 f"{flight.name}: sampled at {rates[0]}, {first.name} at {rates[1]}; play them back one by one, or "
                 "import them with import.rate_hz"
             )
-    return (replace(first, warnings=(*beyond_belief(study.vehicle), *first.warnings)), *flights[1:])
+    stated = doubts(beyond_belief(study.vehicle))
+    return (replace(first, warnings=(*stated, *first.warnings)), *flights[1:])
 
 
 def _parts(path: Path, study: Study) -> list[ImportedFlight]:
@@ -128,12 +131,13 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     stretches = known_stretches(flight.name, all_known(driven), driven["time"])
     made = [signals_of(flight, _known(flight, actuation, part), study) for part in stretches]
     parts = tuple(signals for signals, _ in made)
+    findings = check(parts, study.gap)
     warnings = [
         *flight.warnings,
         *made[0][1],
         *_warnings(flight, stretches, parts[0]),
         *doubts_on_voltage(flight.signals, flight.units),
-        *contradictions(parts, study.gap),
+        *doubts(findings),
     ]
     usual: Hold = "linear" if actuation == "rotor_speed" else "previous"
     words = {
@@ -142,7 +146,8 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
         "body_torque": "stated torque" if parts[0].stated_thrust is None else "stated torque and thrust",
     }
     named = tuple(f"{flight.name}: {warning}" for warning in warnings)
-    return LoggedFlight(flight.name, parts, hold or usual, words[actuation], named)
+    wrong = contradictions(finding.of(flight.name) for finding in findings)
+    return LoggedFlight(flight.name, parts, hold or usual, words[actuation], named, wrong)
 
 
 def _require_control(study: Study) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ from cpfls_cli.artifacts.spec import Header, InputFile
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study
-from cpfls_cli.consistency.check import beyond_belief, contradictions
+from cpfls_cli.consistency.check import check
+from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.results import ImportedFlight
@@ -166,6 +168,11 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
     InputError
         If it is not uniform in time, or has no actuation.
     """
+    signals, notes = _of_motion(flight, known, study)
+    return _actuated(signals, flight, known, study), notes
+
+
+def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> tuple[Signals, tuple[str, ...]]:
     time = known["time"]
     notes: tuple[str, ...] = ()
     steps = np.diff(time)
@@ -176,7 +183,7 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
         rate = np.zeros((len(time), 3))
         notes = ("neither body rates nor attitude; taken as level and at rest, so only the balance is judged",)
     optional: dict[str, Any] = {name: known.get(name) for name in _LOGGED}
-    signals = Signals(
+    made = Signals(
         time=time,
         body_rate=rate,
         vehicle=study.vehicle,
@@ -184,7 +191,7 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
         ground_height_m=study.gap.ground_height_m,
         **optional,
     )
-    return _actuated(signals, flight, known, study), notes
+    return made, notes
 
 
 def _actuated(signals: Signals, flight: ReadFlight, known: Mapping[str, Array], study: Study) -> Signals:
@@ -299,14 +306,17 @@ def doubts_on_voltage(signals: Mapping[str, Array], units: Mapping[str, str]) ->
     return ()
 
 
-def contradictions_of(flight: ReadFlight, study: Study) -> tuple[str, ...]:
-    """Say what of an imported flight or its vehicle cannot be; nothing of a flight that nothing drives."""
+def check_flight(flight: ReadFlight, study: Study, *, driven: bool = True) -> tuple[Finding, ...]:
+    """Hold a flight against itself and its vehicle; alone where nothing drives it, or not `driven`."""
     try:
-        signals, _ = signals_of(flight, flight.signals, study)
+        known, _ = _known_part(flight)
+        signals, _ = _of_motion(flight, known, study)
     except InputError:
         return ()
-    doubts = doubts_on_voltage(flight.signals, flight.units)
-    return (*beyond_belief(study.vehicle), *doubts, *contradictions([signals], study.gap))
+    if driven:
+        with suppress(InputError):
+            signals = _actuated(signals, flight, known, study)
+    return check([signals], study.gap)
 
 
 def full_battery(volts: float) -> str:

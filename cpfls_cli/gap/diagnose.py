@@ -9,13 +9,22 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit, audit
+from cpfls_cli.consistency.findings import contradictions
+from cpfls_cli.consistency.numbers import impossible
 from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
-from cpfls_cli.gap.naming.causes import JudgedEffect, impossible, judge_effect, sensor_fault, shares, wrong_numbers
+from cpfls_cli.gap.naming.causes import (
+    JudgedEffect,
+    impossible_ratios,
+    judge_effect,
+    sensor_fault,
+    shares,
+    wrong_numbers,
+)
 from cpfls_cli.gap.naming.confirmed import Judge, Judgement, differences
 from cpfls_cli.gap.naming.earned import Fitted, Refusal, earned
 from cpfls_cli.gap.naming.estimate import Estimates
@@ -229,12 +238,13 @@ def _concluded(
         _excited(hypothesis, steps[-1].floor),
         settings,
     )
-    wrong = impossible(estimates.parameters)
-    if differ:
+    # A fit that asks for numbers that no vehicle has says that the log is wrong, not the vehicle.
+    wrong = (*audited.contradictions, *contradictions(impossible(impossible_ratios(estimates.parameters))))
+    if wrong:
+        verdict = GapVerdict.CONTRADICTED
+    elif differ:
         verdict = GapVerdict.FLIGHTS_DIFFER
-    elif wrong:
-        verdict = GapVerdict.UNEXPLAINED
-    refused = verdict in (GapVerdict.UNEXPLAINED, GapVerdict.FLIGHTS_DIFFER)
+    refused = verdict in (GapVerdict.UNEXPLAINED, GapVerdict.FLIGHTS_DIFFER, GapVerdict.CONTRADICTED)
     return Diagnosis(
         verdict,
         tuple(faults if refused else effects),

@@ -12,11 +12,11 @@ from cpfls_cli.artifacts.disagreement import DependenceGroup, DisagreementRecord
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.replay import beside_rivals, playback_figure
-from cpfls_cli.pages.sensors import sensors_answer, settled_channels, unseen_answer
+from cpfls_cli.pages.sensors import contradicted, sensors_answer, settled_channels, unseen_answer
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import line, plain_ticks, plot, stacked
 from cpfls_cli.report.content import Block, Box, Cell, Heading, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import joined, number, plain, whole_percent
+from cpfls_cli.report.numbers import joined, number, plain, sentence, whole_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,6 +73,9 @@ def where(disagreement: Source[DisagreementRecord]) -> Iterator[Block]:
 def verdict_box(disagreement: Source[DisagreementRecord]) -> Box:
     """Say how large the largest gap is, and how to go on."""
     record, gap = disagreement.record, disagreement.record.gap
+    if record.audit.contradiction:
+        first, *others = record.audit.contradiction
+        return Box("GAP", contradicted(first), [sentence(each) for each in others], "warning")
     if gap.largest is None:
         return Box("GAP", f"{disagreement.label}: no gap could be measured.", [], "warning")
     if not gap.above_noise.any():

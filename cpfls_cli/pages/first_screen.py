@@ -24,6 +24,7 @@ from cpfls_cli.pages.effects import (
 )
 from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.replay import prediction_words, signal_scale
+from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Folded, Table, Text, Tone
 from cpfls_cli.report.numbers import joined, number, plain, sentence
 
@@ -37,6 +38,7 @@ _TONES: dict[str, Tone] = {
     GapVerdict.AMBIGUOUS: "note",
     GapVerdict.PARTIAL: "note",
     GapVerdict.UNEXPLAINED: "warning",
+    GapVerdict.CONTRADICTED: "warning",
     GapVerdict.FLIGHTS_DIFFER: "warning",
 }
 _ENERGY = {"feeds": ", feeds energy into the motion", "drains": ", drains energy from the motion"}
@@ -77,13 +79,13 @@ def verdict_box(record: DiagnosisRecord) -> Box:
 
 
 def _headline(record: DiagnosisRecord) -> str:
+    if record.contradiction:
+        return contradicted(record.contradiction[0])
     match record.verdict:
         case GapVerdict.NO_GAP:
             return "Nothing is missing that these flights can show."
         case GapVerdict.NOT_EXCITED:
             return "These flights move too little to show whether anything is missing."
-        case _ if record.impossible:
-            return f"The log looks wrong: {sentence(record.impossible[0])}"
         case GapVerdict.UNEXPLAINED:
             return "There is a gap that nothing in the catalogue explains."
         case GapVerdict.FLIGHTS_DIFFER:
@@ -128,7 +130,7 @@ def model_words(record: DiagnosisRecord) -> str:
 
 
 def _facts(record: DiagnosisRecord) -> Iterator[tuple[str, str]]:
-    sure = [sentence(each) for each in (*_taken_off(record), *_rivals(record), *record.impossible[1:])]
+    sure = [sentence(each) for each in (*_taken_off(record), *_rivals(record), *record.contradiction[1:])]
     if sure:
         yield "How sure", " ".join(sure)
     yield from (("Differs", sentence(difference)) for difference in record.difference or ())
@@ -218,8 +220,8 @@ def _unexplained(channel: Unexplained) -> str:
 
 def next_steps(record: DiagnosisRecord) -> list[str]:
     """Say what to do next, in sentences."""
-    if record.impossible:
-        return ["Correct what looks wrong, in the section `import` of the config or in `vehicle`, and run this again."]
+    if record.contradiction:
+        return ["Correct what is wrong, in the section `import` of the config or in `vehicle`, and run this again."]
     usual = _NEXT.get(record.verdict)
     first = [f"to tell {flight}" for flight in _telling_flights(record)]
     # A rival that was not tried wants a signal, and two that do what one does another log; else a flight is planned.

@@ -11,6 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.replay import VEHICLE, DrawnGroup, ErrorsByHorizon, ReplayRecord, SignalErrorGroup
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
+from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import (
     BASELINE,
@@ -85,6 +86,7 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     """Say to which horizon a model is better than what it has to beat, and by how much."""
     record = replay.record
     rivals = _rivals(record)
+    wrong = record.contradiction or ()
     sentences = [*beside_rivals(record), *_beside_stated(record)]
     better = {name: group.total[_MODEL] < group.total[rival] for name, (group, rival) in rivals.items()}
     moving = [name for name, (group, rival) in rivals.items() if group.total[rival] > 0]
@@ -94,6 +96,8 @@ def verdict_box(replay: Source[ReplayRecord]) -> Box:
     signals = joined(_SIGNALS[name][0] for name in moving if better[name] == good)
     title = f"{_name(record)} predicts {'better' if good else 'worse'} than what it has to beat"
     whole = sentence(f"{title}, summed over all horizons to {_seconds(record.horizon_s[-1])}: {signals}")
+    if wrong:
+        return Box("REPLAY", contradicted(wrong[0]), [*map(sentence, wrong[1:]), whole, *sentences], "warning")
     return Box("REPLAY", whole, sentences, "good" if good else "warning")
 
 

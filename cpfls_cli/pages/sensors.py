@@ -24,10 +24,20 @@ def settled_channels(audit: AuditGroup) -> Iterator[Text]:
     return (Text(repair, "warning") for repair in audit.settled)
 
 
+def contradicted(first: str) -> str:
+    """Say before anything else that a log contradicts itself, and where it does so first."""
+    return f"The log contradicts itself: {sentence(first)}"
+
+
+def contradictions_told(audit: AuditGroup) -> Iterator[Text]:
+    """Say what no verdict can stand beside."""
+    return (Text(contradicted(each), "warning") for each in audit.contradiction or ())
+
+
 def _faults(audit: AuditGroup) -> Iterator[Block]:
     for fault in audit.faults:
         yield Box("SENSOR FAULT", f"{fault} The diagnosis repairs it before it looks at the model.", [], "warning")
-    if audit.finding and not audit.faults and not audit.settled:
+    if audit.finding and not (audit.faults or audit.settled or audit.contradiction):
         yield Text("The sensors agree with each other: no fault that matters.", "good")
     for reason, names in audit.untested_by_reason.items():
         yield Text(f"Not tested for {joined(titles(names))}: {reason.rstrip('.')}.")
@@ -52,13 +62,13 @@ def sensors_section(sources: Sources) -> Section | None:
     for index, source in enumerate(reversed(distinct.values()), start=1):
         audit = source.record.audit
         blocks += [Heading(source.label)] if len(distinct) > 1 else []
-        blocks += [*settled_channels(audit), *_faults(audit), *sensor_warnings(audit)]
+        blocks += [*contradictions_told(audit), *settled_channels(audit), *_faults(audit), *sensor_warnings(audit)]
         blocks += [_numbers(audit, f"sensor-numbers-{index}")] if audit.coefficient.name else []
     return Section("sensors", _SENSORS, blocks) if blocks else None
 
 
 def _words(audit: AuditGroup) -> tuple[str, ...]:
-    return (*audit.settled, *audit.sentence, *audit.untested, *audit.warning, *audit.note)
+    return (*(audit.contradiction or ()), *audit.settled, *audit.sentence, *audit.untested, *audit.warning, *audit.note)
 
 
 def _numbers(audit: AuditGroup, name: str) -> Table:

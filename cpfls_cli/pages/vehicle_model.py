@@ -27,10 +27,11 @@ from cpfls_cli.artifacts.spec import rows_of
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.pages.replay import beside_rivals, errors_table, horizon_figure
+from cpfls_cli.pages.sensors import contradicted
 from cpfls_cli.pages.source import Source, Sources, section_of_each
 from cpfls_cli.report.canvas import BASELINE, GREY, legend_over, line, plot, style_of
 from cpfls_cli.report.content import Block, Box, Cell, Facts, Heading, Listing, Plot, Section, Table, Text, Tone
-from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent, whole_percent
+from cpfls_cli.report.numbers import UNKNOWN, joined, number, percent, sentence, whole_percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,6 +123,12 @@ def _guessed(record: VehicleRecord) -> bool:
 def _verdict(record: VehicleRecord) -> Iterator[str]:
     """Say what the vehicle is good for, to which horizon, and where; by playback alone."""
     held = record.held_out
+    if record.contradiction:
+        first, *others = record.contradiction
+        yield f"Do not use it. {contradicted(first)}"
+        yield from map(sentence, others)
+        yield from () if held is None else beside_rivals(held)
+        return
     if held is None:
         yield "No flight was held out, so what it is good for is open; --held-out FLIGHT says it."
         return

@@ -102,6 +102,8 @@ class LoggedFlight:
     actuation : str
         What drives the playback, in words.
     warnings : tuple of str
+    contradictions : tuple of str
+        What of it no verdict can stand beside.
     group : str
         See `PlaybackFlight`.
     """
@@ -111,6 +113,7 @@ class LoggedFlight:
     hold: Hold
     actuation: str
     warnings: tuple[str, ...]
+    contradictions: tuple[str, ...] = ()
     group: str = ""
 
     @property

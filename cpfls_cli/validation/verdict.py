@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -65,6 +66,21 @@ def verdict(grounds: Grounds) -> Verdict:
     label, decisive = _decided(grounds)
     listed = (decisive, *reasons(grounds))
     return Verdict(label, _region(grounds, label), tuple(r.text for r in listed), tuple(r.speaks for r in listed))
+
+
+def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
+    """Take back the verdict on a model whose flights contradict themselves: it repeats what is wrong with them.
+
+    Parameters
+    ----------
+    contradictions : sequence of str
+        Sentences on the flights; nothing is taken back where there are none.
+    """
+    if not contradictions:
+        return found
+    wrong = tuple(f"the log contradicts itself: {each}" for each in contradictions)
+    against = (AGAINST,) * len(wrong)
+    return replace(found, label="do-not-use", reason=(*wrong, *found.reason), speaks=(*against, *found.speaks))
 
 
 def good_axes(grounds: Grounds, predictor: str) -> BoolArray:

@@ -149,6 +149,11 @@ class WindowSettings(Protocol):
         """Share that neighbours have in common."""
 
 
+def fitting_windows(period: float, settings: WindowSettings) -> Windows:
+    """Make windows as long as asked for, or as long as a slow log needs."""
+    return windows(period, max(settings.window_s, _FEWEST_SAMPLES * period), settings.overlap)
+
+
 def common_windows(recordings: Sequence[Recording], settings: WindowSettings) -> Windows:
     """Make the windows that all flights share.
 

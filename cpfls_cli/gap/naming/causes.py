@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,13 +32,6 @@ _LEAST_SHARE = 0.2
 """Share of the gap of its own channel that a refitted number of the vehicle has to take off unseen flights."""
 
 _CHANNEL = {"inertia_x": 0, "inertia_y": 1, "inertia_z": 2, "thrust_scale": 5}
-
-_INERTIAS = ("inertia_x", "inertia_y", "inertia_z")
-_REVERSED = 0.005
-"""Ratio below which a torque has the wrong sign, or belongs to another axis."""
-
-_ALIKE = 0.3
-"""Largest logarithm of a ratio of two numbers that one mistake makes wrong."""
 
 _PULLS = 2.0
 """Multiple of the pull of noise that an error has to exceed."""
@@ -177,65 +170,15 @@ def wrong_numbers(
     return NamedEffect(name, None, np.zeros(0), tuple(wrong), p_value, share, 1.0, sentence)
 
 
-def impossible(numbers: Sequence[Estimate]) -> tuple[str, ...]:
-    """List the numbers of the vehicle with impossible estimates: then the log is wrong, not the vehicle.
+def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:
+    """Give the numbers of the vehicle that no vehicle has, as ratios to the config.
 
     Parameters
     ----------
     numbers : sequence of Estimate
         Relative errors.
-
-    Returns
-    -------
-    tuple of str
-        Sentences.
     """
-    off = {number.name: 1 + number.value for number in numbers if number.name in NUMBERS and number.impossible}
-    return tuple(
-        f"{NUMBERS[name]} would have to be {ratio:.3g} times that of the config, which no vehicle has: {_suspect(off)}"
-        for name, ratio in off.items()
-    )
-
-
-def _suspect(off: Mapping[str, float]) -> str:
-    """Say what makes just these numbers impossible, by their ratios to the config.
-
-    Motion shows torque over inertia: a torque or an inertia of the config that is wrong changes one ratio, a unit all.
-    """
-    thrust, inertias = off.get("thrust_scale"), [off[name] for name in _INERTIAS if name in off]
-    if min(off.values()) < _REVERSED:
-        return _reversed(off)
-    if thrust is not None and off.keys() == {"thrust_scale", "inertia_z"} and _alike(thrust * off["inertia_z"], 1.0):
-        return f"the rotor speeds look {_times(1 / np.sqrt(thrust))}: check the unit of their columns (rpm for rad/s?)"
-    if off.keys() == {"thrust_scale"} and thrust is not None:
-        return f"thrust_factor_n_s2 of vehicle.rotors looks {_times(1 / thrust)}, or mass_kg {_times(thrust)}"
-    if off.keys() == {"inertia_z"}:
-        ratio = off["inertia_z"]
-        return (
-            f"x and y fit, and about z only drag factor over inertia shows, so drag_factor_n_m_s2 of vehicle.rotors "
-            f"looks {_times(ratio)}, or inertia_kg_m2 about z {_times(1 / ratio)}"
-        )
-    if off.keys() == set(_INERTIAS) and all(_alike(each, inertias[0]) for each in inertias):
-        return f"all axes alike, so the gyroscope looks {_times(1 / inertias[0])}: check its unit (deg/s for rad/s?)"
-    if off.keys() <= {"inertia_x", "inertia_y"}:
-        return "z fits, so the suspects are inertia_kg_m2 about it and position_m of vehicle.rotors"
-    return "check signs, units and order of the gyroscope's and the rotors' columns"
-
-
-def _reversed(off: Mapping[str, float]) -> str:
-    if off.keys() == {"inertia_z"}:
-        return "x and y fit, so check spin of vehicle.rotors, the order of the rotors' columns and the sign of yaw"
-    if off.keys() == {"thrust_scale"}:
-        return "check the sign and the frame of the acceleration, and thrust_factor_n_s2 of vehicle.rotors"
-    return "check signs and order of the gyroscope's and the rotors' columns"
-
-
-def _alike(one: float, other: float) -> bool:
-    return bool(abs(np.log(one / other)) < _ALIKE)
-
-
-def _times(ratio: float) -> str:
-    return f"{ratio:.3g} times too large" if ratio > 1 else f"{1 / ratio:.3g} times too small"
+    return {number.name: 1 + number.value for number in numbers if number.name in NUMBERS and number.impossible}
 
 
 def _is_wrong(number: Estimate, effects: Sequence[NamedEffect]) -> bool:

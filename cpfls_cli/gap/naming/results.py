@@ -31,6 +31,7 @@ class GapVerdict(StrEnum):
     PARTIAL = "PARTIAL"
     AMBIGUOUS = "AMBIGUOUS"
     UNEXPLAINED = "UNEXPLAINED"
+    CONTRADICTED = "CONTRADICTED"
     FLIGHTS_DIFFER = "FLIGHTS_DIFFER"
     NO_GAP = "NO_GAP"
     NOT_EXCITED = "NOT_EXCITED"
@@ -193,8 +194,8 @@ class Diagnosis:
         First choices of a look at the torques alone, and the share that each would explain.
     notes : tuple of str
         What a reader should know, in sentences.
-    impossible : tuple of str
-        Numbers of the vehicle that would have to be what no vehicle has, in sentences: the log is wrong.
+    contradictions : tuple of str
+        What of the log contradicts itself or its vehicle, in sentences; numbers that no vehicle has among them.
     differences : tuple of str
         What differs between the flights that were learned from and those held out, in sentences.
     shares : mapping of str to float
@@ -214,7 +215,7 @@ class Diagnosis:
     floor: Array
     torque_alone: tuple[tuple[str, float], ...]
     notes: tuple[str, ...]
-    impossible: tuple[str, ...] = ()
+    contradictions: tuple[str, ...] = ()
     differences: tuple[str, ...] = ()
     shares: Mapping[str, float] = field(default_factory=dict)
 

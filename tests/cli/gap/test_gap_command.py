@@ -60,7 +60,7 @@ def test_unseen_gap_shrinks_to_the_noise_where_the_offset_acts(found):
 def test_json_has_every_promised_key(found):
     promised = {"verdict", "effects", "alternatives", "unexplained", "not_excited", "gap_before", "gap_after", "audit"}
     assert promised <= set(found.summary)
-    assert {"headline", "where", "playback", "next", "log_looks_wrong", "warnings"} <= set(found.summary)
+    assert {"headline", "where", "playback", "next", "contradictions", "warnings"} <= set(found.summary)
     assert found.summary["headline"] == "What the model misses is offset of the centre of mass."
     assert found.summary["next"] == ["Take the model with it, extended.h5, that `cpfls gap` and `cpfls extend` write."]
     assert found.summary["where"]["channels"] == ["torque y", "torque x"]

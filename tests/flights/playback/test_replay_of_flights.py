@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cpfls_cli.config.load import load_study
-from cpfls_cli.consistency.check import contradictions
+from cpfls_cli.consistency.check import check
 from cpfls_cli.flights.playback import flights_to_play
 from tests.builders.command_line import run
 from tests.builders.recorded_flights import path_of_log
@@ -60,6 +60,10 @@ def logged(config, folder, name):
     return flight.parts, study.gap
 
 
+def said_of(parts, settings):
+    return [finding.sentence for finding in check(parts, settings)]
+
+
 SCALES = "differ by a factor of"
 
 
@@ -82,20 +86,18 @@ SCALES = "differ by a factor of"
     ],
 )
 def test_a_flight_in_its_right_units_does_not_contradict_itself(config, folder, name, said):
-    found = contradictions(*logged(config, folder, name))
+    found = check(*logged(config, folder, name))
     assert len(found) == len(said)
-    assert all(words in sentence for words, sentence in zip(said, found, strict=True))
+    assert all(words in finding.what for words, finding in zip(said, found, strict=True))
+    assert not any(finding.contradiction for finding in found)
 
 
 @pytest.mark.parametrize("name", ["none", "com", "drag"])
 def test_a_flight_of_another_simulator_with_a_wrong_unit_is_said(name):
     (part,), settings = logged("rotorpy", "rotorpy", name)
-    assert "the velocity is in km/h" in contradictions([replace(part, velocity=3.6 * part.velocity)], settings)[0]
-    assert (
-        "the acceleration is in g"
-        in contradictions([replace(part, acceleration=part.acceleration / 9.81)], settings)[0]
-    )
-    in_rpm = contradictions([replace(part, rotor_speed=9.549 * part.rotor_speed)], settings)
+    assert "the velocity is in km/h" in said_of([replace(part, velocity=3.6 * part.velocity)], settings)[0]
+    assert "the acceleration is in g" in said_of([replace(part, acceleration=part.acceleration / 9.81)], settings)[0]
+    in_rpm = said_of([replace(part, rotor_speed=9.549 * part.rotor_speed)], settings)
     assert ["rotors turn" in in_rpm[0], "times the weight" in in_rpm[1], len(in_rpm)] == [True, True, 2]
 
 
@@ -111,7 +113,7 @@ def test_a_flight_of_another_simulator_with_a_wrong_unit_is_said(name):
 def test_columns_of_rotors_in_another_order_are_said_with_the_right_one(config, folder, name):
     parts, settings = logged(config, folder, name)
     part = max(parts, key=len)
-    (said,) = contradictions([replace(part, rotor_speed=part.rotor_speed[:, [1, 0, 2, 3]])], settings)
+    (said,) = said_of([replace(part, rotor_speed=part.rotor_speed[:, [1, 0, 2, 3]])], settings)
     places = said.partition("columns: ")[2].partition(" (which")[0].split("; ")
     sides = [place.partition(",")[0].split() for place in places]
     right = [part.vehicle.rotors[index] for index in (1, 0, 2, 3)]

@@ -81,12 +81,16 @@ def test_an_attitude_integrated_from_the_corrected_gyroscope_still_tells_the_bia
     assert "+0.0200 rad/s about x" in found.named[0].sentence
 
 
-def test_swapped_and_turned_axes_of_the_gyroscope_are_a_warning_not_a_fault(turning):
+def test_swapped_and_turned_axes_of_the_gyroscope_are_a_contradiction_not_a_fault(turning):
     swapped = audit([replace(turning, body_rate=turning.body_rate[:, [1, 0, 2]])], WINDOWS)
     turned = audit([replace(turning, body_rate=turning.body_rate * [1, -1, -1])], WINDOWS)
     assert swapped.findings == turned.findings == ()
-    assert any("axes are swapped" in sentence for sentence in swapped.warnings)
-    assert any("opposite signs along y" in sentence for sentence in turned.warnings)
+    assert any("axes are swapped" in sentence for sentence in swapped.contradictions)
+    assert [sentence.split(" the ")[0] for sentence in turned.contradictions] == [
+        "about body y (pitch)",
+        "about body z (yaw)",
+    ]
+    assert all("opposite signs" in sentence for sentence in turned.contradictions)
     assert set(turned.untested) == FAULTS
 
 
@@ -111,7 +115,7 @@ def test_channels_that_agree_are_not_warned_about(turning):
 )
 def test_channels_that_disagree_are_warned_about(turning, change, words):
     found = audit([change(moved(turning))], WINDOWS)
-    assert any(words in sentence for sentence in found.warnings)
+    assert any(words in sentence for sentence in (*found.warnings, *found.contradictions))
 
 
 def test_noise_of_a_hover_is_not_taken_for_disagreement(turning):

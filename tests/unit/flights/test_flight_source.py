@@ -16,7 +16,6 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.flights import flight_source as sources
 from cpfls_cli.flights import playback, recordings
-from cpfls_cli.flights.recordings import contradictions_of
 
 SAMPLES = 30
 
@@ -137,7 +136,7 @@ def test_a_voltage_that_no_battery_has_is_not_used_and_said(tmp_path, unit, volt
 
 def test_an_import_says_what_is_wrong_with_a_voltage(tmp_path):
     flight = recordings.read_flight(driven(tmp_path / "flight.h5", voltage=(12.5, 0.0)), Study())
-    assert "voltage is 0 or less at 1 of 90" in " ".join(contradictions_of(flight, Study()))
+    assert "voltage is 0 or less at 1 of 90" in " ".join(recordings.doubts_on_voltage(flight.signals, flight.units))
 
 
 def test_stretches_are_of_the_longest_part_in_which_all_is_known(tmp_path, monkeypatch):

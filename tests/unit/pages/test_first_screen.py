@@ -58,8 +58,8 @@ def screen(record):
             "A number of the vehicle is wrong: Izz +24.0 % against the config.",
         ),
         (
-            {"verdict": "UNEXPLAINED", "named": (), "impossible": made.texts(WRONG)},
-            f"The log looks wrong: T{WRONG[1:]}.",
+            {"verdict": "CONTRADICTED", "named": (), "impossible": made.texts(WRONG)},
+            f"The log contradicts itself: T{WRONG[1:]}.",
         ),
     ],
 )
@@ -126,8 +126,8 @@ def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tel
         ({"verdict": "NO_GAP", "named": ()}, "Nothing, unless you suspect one of the effects that these flights "),
         ({"verdict": "NOT_EXCITED", "named": ()}, "Fly more: roll, pitch and yaw sweeps at two amplitudes, "),
         (
-            {"verdict": "UNEXPLAINED", "named": (), "impossible": made.texts(WRONG)},
-            "Correct what looks wrong, in the section `import` of the config or in `vehicle`, and run this again.",
+            {"verdict": "CONTRADICTED", "named": (), "impossible": made.texts(WRONG)},
+            "Correct what is wrong, in the section `import` of the config or in `vehicle`, and run this again.",
         ),
     ],
 )
@@ -240,10 +240,10 @@ def test_flights_held_out_and_why_stand_below():
 
 def test_remarks_are_told_but_those_that_are_told_elsewhere():
     notes = made.texts("A note that readers need.", WRONG, "The motion follows the rotors by 12 ms.")
-    record = diagnosis("UNEXPLAINED", named=(), note=notes, impossible=made.texts(WRONG))
+    record = diagnosis("CONTRADICTED", named=(), note=notes, impossible=made.texts(WRONG))
     texts = [block.text for block in first_screen(record, 1) if isinstance(block, Text)]
     assert texts == ["A note that readers need."]
-    assert record.summary["log_looks_wrong"] == [WRONG]
+    assert record.summary["contradictions"] == [WRONG]
     assert record.summary["notes"] == notes.tolist()
 
 
@@ -298,4 +298,4 @@ def test_machines_read_what_people_read():
     assert set(summary["playback"]["models"]) == {"after", "nothing-moves", "rate-stays", "before"}
     assert summary["playback"]["models"]["before"]["attitude"][-1] == pytest.approx(0.3)
     assert summary["warnings"] == ["a.csv: gaps"]
-    assert summary["log_looks_wrong"] == []
+    assert summary["contradictions"] == []

@@ -1,0 +1,57 @@
+"""What a check finds: what is wrong with a log, how much, what mends it, and whether a verdict can stand beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is wrong with a log, or with what the config says of its vehicle.
+
+    Attributes
+    ----------
+    what : str
+        Who says so and what is wrong, with its numbers; begins small, to stand behind the name of a flight.
+    remedy : str
+        What would mend it: keys of the config, or a part of the log.
+    channels : tuple of str
+        What was held against each other.
+    size : float
+        Of the evidence: a correlation, a ratio, a share, s, rad or rad/s; NaN where there is no one number.
+    unit : str
+        Of the size; empty for a ratio.
+    contradiction : bool
+        Whether no verdict can stand beside it: a unit, an axis or a sign is wrong. What is late, noisy or a little off
+        is fitted, repaired or told, and spoils no verdict.
+    repairable : bool
+        Whether `cpfls gap` sets it right before it looks at the model.
+    """
+
+    what: str
+    remedy: str
+    channels: tuple[str, ...]
+    size: float = float("nan")
+    unit: str = ""
+    contradiction: bool = True
+    repairable: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """What is wrong and what would mend it, to stand behind the name of a flight."""
+        return f"{self.what}: {self.remedy}"
+
+    def of(self, flight: str) -> Finding:
+        """Say of which flight it is."""
+        return replace(self, what=f"{flight}: {self.what}")
+
+
+def contradictions(findings: Iterable[Finding]) -> tuple[str, ...]:
+    """Give the sentences of the findings that no verdict can stand beside."""
+    return tuple(finding.sentence for finding in findings if finding.contradiction)
+
+
+def doubts(findings: Iterable[Finding]) -> tuple[str, ...]:
+    """Give the sentences of the others."""
+    return tuple(finding.sentence for finding in findings if not finding.contradiction)

@@ -1,0 +1,137 @@
+"""Rotors and their thrust held against the motion and against what the config says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.motion import PairCheck, by_thrust
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.flightlog.airframe import MovedBy, RotorPlace, airframe_from_motion, place_of
+from cpfls_cli.vehicle.settings import VehicleSettings
+
+_THRUST_TO_WEIGHT = 5.0
+"""Thrust over weight, or the reverse, that no flight keeps up; a wrong unit or a slipped digit is farther off."""
+
+_ABOVE_THE_LIMIT = 1.5
+"""Measured speeds overshoot what a data sheet states; a wrong unit of speed is a factor of six at least."""
+
+_LIFTS = 1.25
+"""Of 23 real flights with attitude and measured speeds the thrust carries 0.94 to 1.02 of what it has to."""
+
+IDLE = 0.5
+"""Share of the largest thrust below which rotors idle."""
+
+_REMEDY = (
+    "check the unit of import.signals.rotor_speed (or rotor_command), vehicle.mass_kg, vehicle.gravity_m_s2 and "
+    "thrust_factor_n_s2 of vehicle.rotors"
+)
+
+
+def too_fast(parts: Sequence[Signals]) -> Finding | None:
+    """Hold the fastest rotor against the limit that the config states."""
+    fastest = max((float(part.rotor_speed.max()) for part in parts if part.rotor_speed is not None), default=0.0)
+    limit = parts[0].vehicle.rotor_speed_max_rad_s
+    if fastest <= _ABOVE_THE_LIMIT * limit:
+        return None
+    return Finding(
+        f"the rotors turn at up to {fastest:.4g} rad/s, and vehicle.rotor_speed_max_rad_s is {limit:.4g}",
+        "check the unit of import.signals.rotor_speed (rpm?), or the limit",
+        ("rotors", "vehicle.rotor_speed_max_rad_s"),
+        fastest / limit,
+    )
+
+
+def thrust_beside_weight(parts: Sequence[Signals]) -> Finding | None:
+    """Say how the thrust lies to the weight where no flight has it so; nothing where a guess states it."""
+    vehicle = parts[0].vehicle
+    if "thrust_factor" in vehicle.unknown:
+        return None
+    known = [part.thrust for part in parts if part.rotor_speed is not None and part.thrust is not None]
+    thrust = np.concatenate([*known, np.zeros(0)]) / (vehicle.mass_kg * vehicle.gravity_m_s2)
+    # A log may hold a long rest on the ground, so that its mean says nothing of too little.
+    mean, most = (float(thrust.mean()), float(thrust.max())) if len(thrust) else (1.0, 1.0)
+    if mean > _THRUST_TO_WEIGHT:
+        size, words = mean, "times the weight on average, which no flight keeps up"
+    elif most < 1 / _THRUST_TO_WEIGHT:
+        size, words = most, "times the weight at most, which lifts no vehicle"
+    else:
+        return None
+    return Finding(f"the thrust of the rotors is {size:.3g} {words}", _REMEDY, ("rotors", "vehicle"), size)
+
+
+def tells_thrust(parts: Sequence[Signals]) -> bool:
+    """Tell whether the size of the thrust says anything."""
+    return "thrust_factor" not in parts[0].vehicle.unknown and thrust_beside_weight(parts) is None
+
+
+def weighed(part: Signals) -> Signals:
+    """Scale thrust to the weight where its size says nothing, so that its direction still bears witness."""
+    if part.rotor_speed is None or part.thrust is None or not part.thrust.any():
+        return part
+    scale = part.vehicle.mass_kg * part.vehicle.gravity_m_s2 / float(part.thrust.mean())
+    rotors = tuple(replace(rotor, thrust_factor_n_s2=scale * rotor.thrust_factor_n_s2) for rotor in part.vehicle.rotors)
+    return replace(part, vehicle=replace(part.vehicle, rotors=rotors))
+
+
+def lift(checks: Sequence[PairCheck], vehicle: VehicleSettings) -> Finding | None:
+    """Hold the thrust against what the motion takes along the vertical, where the rotors do not idle.
+
+    A number of the vehicle that is a little off is what a diagnosis and a fit are about, and contradicts nothing.
+    """
+    against = by_thrust(checks)
+    if not against:
+        return None
+    given, taken = (part[:, 2] + vehicle.gravity_m_s2 for part in (against[0].first, against[0].second))
+    most = given.max()
+    if most < vehicle.gravity_m_s2 / _THRUST_TO_WEIGHT:
+        # On the ground, or told already.
+        return None
+    flown = given > IDLE * most
+    share = float(given[flown].mean() / taken[flown].mean())
+    if 1 / _LIFTS < share < _LIFTS:
+        return None
+    what = f"the thrust of the rotors is {share:.2f} times what the motion takes along the vertical"
+    return Finding(what, _REMEDY, ("rotors", "vehicle"), share, contradiction=False, repairable=True)
+
+
+def misplaced(part: Signals) -> Finding | None:
+    """Say where the motion puts rotors that the config has elsewhere, or turning the other way."""
+    if part.rotor_speed is None:
+        return None
+    moved = airframe_from_motion(part.body_rate, part.rotor_speed, 1 / part.period, part.commanded)
+    stated = [RotorPlace("", each.position_m[:2], each.spin) for each in part.vehicle.rotors]
+    elsewhere = "" if moved is None else _elsewhere(moved, stated)
+    if not elsewhere:
+        return None
+    return Finding(
+        f"by the motion the rotors are, in the order of their columns: {elsewhere}. vehicle.rotors says otherwise",
+        "check position_m and spin there, the order of the columns, the axes of gyroscope (or attitude), and "
+        "import.body_frame",
+        ("rotors", "gyroscope", "vehicle.rotors"),
+    )
+
+
+def _elsewhere(moved: MovedBy, stated: Sequence[RotorPlace]) -> str:
+    """Say where the motion puts rotors that are stated elsewhere, or turning the other way.
+
+    Parameters
+    ----------
+    stated : sequence of RotorPlace
+        As many, in the same order; directions of any length.
+
+    Returns
+    -------
+    str
+        Empty where the motion does not tell clearly, or where the stated ones are no X or plus such as it tells of.
+    """
+    told = [(rotor.name, rotor.spin) for rotor in moved.airframe.rotors]
+    known = [(place_of(rotor.direction), rotor.spin) for rotor in stated]
+    if not moved.clear or told == known or {name for name, _ in told} != {name for name, _ in known}:
+        return ""
+    words = "; ".join(f"{name}, {'counter-clockwise' if spin > 0 else 'clockwise'}" for name, spin in told)
+    shares = ", ".join(f"{100 * share:.0f} %" for share in moved.explained)
+    return f"{words} (which explains {shares} of the acceleration about roll, pitch and yaw)"

@@ -1,0 +1,198 @@
+"""What gyroscope, attitude, rotors and motion say of each other, each held against the others, before any torque."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import comb
+
+import numpy as np
+
+from cpfls_cli.consistency.axes import gyroscope_apart
+from cpfls_cli.consistency.clocks import attitude_on_clock, rotors_on_clock
+from cpfls_cli.consistency.faults import AuditFinding, CheckedFault, findings
+from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.gyroscope import GyroFit, fit_gyro, kinematics, scan
+from cpfls_cli.consistency.majority import Settled, settled
+from cpfls_cli.consistency.repairs import ChannelRepair
+from cpfls_cli.consistency.rotors import tells_thrust, weighed
+from cpfls_cli.effects.hooks import FaultFit, SensorTest
+from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.weak_form.windows import Windows
+
+# Agreement that no independent attitude reaches, rad/s in a window; every fault of practical size is larger.
+_ROUNDING = 1e-4
+# An independent attitude leaves at least the gyroscope's own noise; this share of it is left by one that contains it.
+_SHARE_OF_NOISE = 0.3
+# About twice the most that 23 real flights show, or more: rad/s, a share, rad, s.
+_GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 0.016}
+
+
+@dataclass(frozen=True)
+class Gyroscope:
+    """The gyroscope held against the attitude.
+
+    Attributes
+    ----------
+    faults : tuple of CheckedFault
+        What can be told.
+    untested : mapping of str to str
+        Faults that cannot, with the reason.
+    fit : GyroFit or None
+    apart : tuple of Finding
+        That the two do not show one motion in one unit.
+    """
+
+    faults: tuple[CheckedFault, ...] = ()
+    untested: Mapping[str, str] = field(default_factory=dict)
+    fit: GyroFit | None = None
+    apart: tuple[Finding, ...] = ()
+
+    @classmethod
+    def unjudged(cls, reason: str, apart: tuple[Finding, ...] = ()) -> Gyroscope:
+        """Say why none of its faults can be told."""
+        return cls(untested=dict.fromkeys(_of_gyroscope(), reason), apart=apart)
+
+    def late(self, windows: Windows) -> AuditFinding | None:
+        """Find the fault that shifts the gyroscope against the attitude."""
+        named = (each for each in findings(self.faults, windows.period) if each.named)
+        return next((each for each in named if _estimate(each.name) == "delay"), None)
+
+    def findings(self, windows: Windows) -> tuple[Finding, ...]:
+        """Say what is wrong with the gyroscope, far beyond what sensors of multirotors show."""
+        told = findings(self.faults, windows.period)
+        if self.apart:
+            scaled = any(each.named and _estimate(each.name) == "scale" for each in told)
+            return tuple(replace(each, repairable=scaled) for each in self.apart)
+        return tuple(_gross(each) for each in told if _is_gross(each))
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What the sensors of flights say of each other.
+
+    Attributes
+    ----------
+    gyroscope : Gyroscope
+        Once a late attitude is set right.
+    clocks : tuple of ChannelRepair
+        What sets a late attitude and late rotors right.
+    notes : tuple of str
+        What nobody knows of a clock.
+    flights : tuple of Signals
+        On one clock.
+    motion : Settled
+        What a majority says of the channels of the motion.
+    findings : tuple of Finding
+        What is wrong.
+    """
+
+    gyroscope: Gyroscope
+    clocks: tuple[ChannelRepair, ...]
+    notes: tuple[str, ...]
+    flights: tuple[Signals, ...]
+    motion: Settled
+    findings: tuple[Finding, ...]
+
+
+def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
+    """Hold the sensors of flights with the same hardware against each other.
+
+    Parameters
+    ----------
+    flights : sequence of Signals
+        At least one, with the sampling period of the windows.
+    windows : Windows
+    """
+    gyroscope = _gyroscope(flights, windows)
+    late = gyroscope.late(windows)
+    clocks, notes = attitude_on_clock(late.coefficients[0].value, flights, windows) if late else ((), ())
+    if clocks:
+        flights = [repair.applied(signals) for signals in flights for repair in clocks]
+        gyroscope = _gyroscope(flights, windows)
+    # Nothing is known of the rotors where nothing is known of the gyroscope's own clock.
+    rotors = None if gyroscope.late(windows) else rotors_on_clock(flights, windows)
+    if rotors is not None:
+        flights = [rotors.applied(signals) for signals in flights]
+        clocks = (*clocks, rotors)
+    told = tells_thrust(flights)
+    motion = settled(flights if told else [weighed(signals) for signals in flights], windows)
+    mended = [repair.finding for repair in clocks if repair.finding is not None]
+    wrong = (*gyroscope.findings(windows), *mended, *motion.findings)
+    return Sensors(gyroscope, clocks, notes, tuple(flights), motion, wrong)
+
+
+def _gross(fault: AuditFinding) -> Finding:
+    largest = max((number for number in fault.coefficients if number.named), key=lambda number: abs(number.value))
+    return Finding(
+        f"{fault.sentence[0].lower()}{fault.sentence[1:-1]}",
+        "check import.signals.body_rate",
+        ("gyroscope", "attitude"),
+        largest.value,
+        largest.unit,
+        contradiction=_estimate(fault.name) != "delay",
+        repairable=True,
+    )
+
+
+def _is_gross(fault: AuditFinding) -> bool:
+    largest = max((abs(number.value) for number in fault.coefficients if number.named), default=0.0)
+    return bool(largest > _GROSS[str(_estimate(fault.name))])
+
+
+def _estimate(name: str) -> object:
+    test = CATALOGUE[name].test
+    assert test is not None, "the audit tests what has a test"
+    return test.estimate
+
+
+def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
+    if all(signals.attitude is None for signals in flights):
+        return Gyroscope.unjudged("there is no attitude to judge the gyroscope by")
+    cut = [motion for signals in flights if (motion := kinematics(signals, windows)) is not None]
+    if not cut:
+        return Gyroscope.unjudged("the flights are too short")
+    scanned = scan(cut)
+    unlike, scaled = gyroscope_apart(scanned.seen, scanned.read)
+    apart = (*unlike, *scaled)
+    if unlike:
+        return Gyroscope.unjudged("the axes of gyroscope and attitude do not belong together", apart)
+    raw = scanned.seen - np.concatenate([flight.gyro_rate(0.0) for flight in cut])
+    if np.sqrt((raw**2).mean()) < _ROUNDING:
+        return Gyroscope.unjudged(
+            "the attitude agrees with the gyroscope to rounding, as if it were integrated from it"
+        )
+    fit = fit_gyro(cut, scanned)
+    if fit is None:
+        return Gyroscope.unjudged("the flights are too short", apart)
+    fits = {name: fit.of(str(test.estimate)) for name, test in _of_gyroscope().items()}
+    untested = _untestable(fits, fit, flights, windows)
+    faults = (CheckedFault(CATALOGUE[name], numbers) for name, numbers in fits.items() if name not in untested)
+    return Gyroscope(tuple(faults), untested, fit, apart)
+
+
+def _untestable(
+    fits: Mapping[str, FaultFit], fit: GyroFit, flights: Sequence[Signals], windows: Windows
+) -> Mapping[str, str]:
+    still = "the flights hardly turn, so it would not show"
+    untested = {name: still for name, numbers in fits.items() if not numbers.known.any()}
+    if np.sqrt(fit.variance.max()) < _SHARE_OF_NOISE * _gyro_noise(flights, windows):
+        derived = "the attitude contains the gyroscope's own noise, so it is integrated from it and would not show it"
+        untested |= {name: derived for name, test in _of_gyroscope().items() if test.integrated}
+    return untested
+
+
+def _gyro_noise(flights: Sequence[Signals], windows: Windows) -> float:
+    """Bound the noise of a window from below by fifth differences, which motion hardly reaches, rad/s."""
+    fifth = np.concatenate([np.diff(signals.body_rate, 5, axis=0) for signals in flights])
+    return float(np.sqrt((fifth**2).mean(axis=0).min() / comb(10, 5) * (windows.weight**2).sum()))
+
+
+def _of_gyroscope() -> dict[str, SensorTest]:
+    """List the effects whose numbers are those of the regression of the gyroscope."""
+    return {
+        name: effect.test
+        for name, effect in CATALOGUE.items()
+        if effect.test is not None and isinstance(effect.test.estimate, str)
+    }

@@ -1,0 +1,92 @@
+"""A log that contradicts itself gets no good verdict: axes, signs, units and numbers that are declared wrong."""
+
+import json
+
+import pytest
+
+from cpfls_cli.artifacts.store import read_record
+from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from tests.builders.command_line import run, undrawn
+from tests.builders.wrong_logs import WRONG, config_of, log_of
+
+SAID = "The log contradicts itself: "
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """Logs by the signs of their gyroscope, and the config that reads the right ones rightly."""
+    folder = tmp_path_factory.mktemp("wrong")
+    made = {}
+
+    def call(sign):
+        if sign not in made:
+            made[sign] = [log_of(folder / f"{len(made)}-{number}.csv", number, sign) for number in (1, 2)]
+        return config_of(folder), made[sign]
+
+    return call
+
+
+def asked(wrong):
+    return [word for setting in wrong.settings for word in ("--set", setting)]
+
+
+def told(command, config, *words):
+    with undrawn():
+        result = run(command, config, *words, "--json")
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_gap_names_no_gap_and_no_effect(logs, name, tmp_path):
+    wrong = WRONG[name]
+    config, (first, second) = logs(wrong.sign)
+    answer = told("gap", config, first, "--held-out", second, "-o", tmp_path / "gap", *asked(wrong))
+    assert answer["verdict"] == "CONTRADICTED"
+    assert wrong.words in answer["contradictions"][0]
+    assert answer["headline"].startswith(SAID)
+    assert wrong.words in answer["headline"]
+    assert answer["effects"] == []
+    assert answer["extended"]["written"] is False
+    assert answer["next"] == [
+        "Correct what is wrong, in the section `import` of the config or in `vehicle`, and run this again."
+    ]
+    assert answer["disagreement"]["audit"]["contradictions"][0] == answer["contradictions"][0]
+    page = (tmp_path / "gap" / "report.html").read_text()
+    assert "CONTRADICTED" in page
+    assert SAID in page
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
+    wrong = WRONG[name]
+    config, (first, second) = logs(wrong.sign)
+    words = (first, "--held-out", second, "-o", tmp_path / "vehicle.h5", *asked(wrong))
+    with undrawn():
+        result = run("vehicle", config, *words)
+    assert result.exit_code == 0, result.stderr
+    label, sentence = result.stdout.splitlines()[:2]
+    assert label.startswith("DO NOT USE: ")
+    assert sentence.startswith(f"  Do not use it. {SAID}{first.name}: ")
+    assert wrong.words in sentence
+    summary = read_record(tmp_path / "vehicle.h5", VehicleRecord).summary
+    assert summary["verdict"] == "do-not-use"
+    assert wrong.words in summary["contradictions"][0]
+
+
+def test_replay_and_predict_say_it_first(logs, tmp_path):
+    wrong = WRONG["ENU declared NED"]
+    config, (first, _) = logs(wrong.sign)
+    replayed = run("replay", config, "vehicle", first, "-o", tmp_path / "r.h5", "--every", "50", *asked(wrong))
+    assert replayed.exit_code == 0, replayed.stderr
+    assert replayed.stdout.startswith(f"REPLAY: {SAID}{first.name}: by its attitude {wrong.words}")
+
+
+def test_the_right_log_keeps_its_verdicts(logs, tmp_path):
+    config, (first, second) = logs((1.0, 1.0, 1.0))
+    gap = told("gap", config, first, "--held-out", second, "-o", tmp_path / "gap")
+    assert (gap["verdict"], gap["contradictions"]) == ("NO_GAP", [])
+    found = told("vehicle", config, first, "--held-out", second, "-o", tmp_path / "vehicle.h5")
+    assert (found["verdict"], found["contradictions"]) == ("good-for-simulation", [])
+    replayed = told("replay", config, "vehicle", first, "-o", tmp_path / "replay.h5", "--every", "50")
+    assert replayed["contradictions"] == []
