@@ -111,7 +111,7 @@ def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
     Raises
     ------
     yaml.constructor.ConstructorError
-        If there are too many, an anchor holds itself, or a text is none.
+        If there are too many, an anchor holds itself, or a text holds half a character (a lone surrogate).
     """
     if id(node) in known:
         if not known[id(node)]:

@@ -155,7 +155,7 @@ class Effect:
     rate_derivative : bool
         Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
     holds : frozenset of str
-        Effects that are special cases of this one; it is no rival of theirs.
+        Effects that are special cases of this one, which is then not their rival.
     scatter : callable or None
         For effects with a random part: ``scatter(signals, shape) -> array, shape (time, 6)``, variance of torque and
         force for a unit of relative scatter.
@@ -183,7 +183,7 @@ class Effect:
         What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
         would do as well, or with those that others depend on as shapes, under the same names.
     still : str
-        Effect with the same linear coefficients that it is in still air; empty for an effect that is no air.
+        Effect with the same linear coefficients that it is in still air; empty for an effect that is not of the air.
     lever : callable or None
         ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
         possible, a torque being no larger than its force on a lever as long as the body.

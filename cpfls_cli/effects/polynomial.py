@@ -122,7 +122,7 @@ def polynomial(known: Effect, probe: Probe, shape: Mapping[str, float]) -> Array
     Returns
     -------
     array, shape (coefficient, 6, state terms, rotor terms), or None
-        Torque and force for a unit of each coefficient, SI, body frame; None for an effect that is no such polynomial.
+        Torque and force for a unit of each coefficient, SI, body frame; None if the effect is not such a polynomial.
     """
     if known.columns is None or known.kind != "wrench" or known.missing(probe.signals):
         return None

@@ -171,8 +171,8 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
     """Add the free swing at the start, estimated from the force balance, to the driven swing.
 
     The horizontal pull on the vehicle is ``m_p g`` times the whole swing. Where forces are known, least squares find
-    ``m_p`` and the two free swings of each direction, over two periods: later ones hold what has drifted apart since,
-    and their start would be no start. Else the cable starts at rest.
+    ``m_p`` and the two free swings of each direction, over two periods: later ones hold what has drifted apart since
+    the start. Else the cable starts at rest.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def settled_swing(signals: Signals, length: float, damping: float, depth: float 
 
 
 def _driven_swing(signals: Signals, length: float, damping: float, depth: float) -> Array:
-    """Integrate the swing of a motion once, whatever the rotors do, shape (time, 2)."""
+    """Integrate the swing of a motion once, for any rotor speeds, shape (time, 2)."""
     key, kept = ("swing", length, damping, depth), signals.of_motion
     if key not in kept:
         _make_room(kept)

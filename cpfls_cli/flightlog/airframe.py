@@ -237,7 +237,7 @@ _ON_AN_AXIS = 0.2
 
 
 def place_of(direction: tuple[float, float]) -> str:
-    """Name a place, of whose direction a small part is none."""
+    """Name the place of a rotor; a small part of its direction along an axis is ignored."""
     least = _ON_AN_AXIS * hypot(*direction)
     x, y = (part if abs(part) > least else 0.0 for part in direction)
     return _name(x, y)
@@ -300,7 +300,7 @@ def _shares(acceleration: Array, rate: Array, squared: Array) -> list[tuple[_Lay
     """Tell of every layout which share of the angular acceleration about each axis it explains."""
     edge = max(1, len(rate) // 50)
     inner = slice(edge, len(rate) - edge)
-    # What turning itself does to the acceleration, and a constant torque, are no work of the rotors.
+    # What turning itself does to the acceleration, and a constant torque, are not the work of the rotors.
     basis = np.linalg.qr(np.column_stack([np.ones(len(rate[inner])), rate[inner]]))[0]
     wanted, rotors = (values[inner] - basis @ (basis.T @ values[inner]) for values in (acceleration, squared))
     together, own, total = rotors.T @ wanted, rotors.T @ rotors, (wanted**2).sum(axis=0)

@@ -208,7 +208,7 @@ def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) ->
     in_body = _as_body_vectors(signals, settings)
     converted = {name: signals[name] for name in _ROTOR_SIGNALS if name in signals}
     if "rotor_command" in signals and settings.rotor_command_is == "thrust":
-        # Thrust goes with the square of the speed; a share below 0 is none.
+        # Thrust goes with the square of the speed; a share below 0 gives none.
         converted["rotor_command"] = np.sqrt(np.maximum(signals["rotor_command"], 0.0))
     converted |= {name: signals[name][:, 0] for name in _SCALAR_SIGNALS if name in signals}
     converted |= {name: body_to_flu(in_body[name], settings.body_frame) for name in _BODY_SIGNALS if name in in_body}

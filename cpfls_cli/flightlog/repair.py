@@ -215,13 +215,13 @@ def find_spikes(values: Array, deviations: float, window: int) -> BoolArray:
 
     The scale is the largest of 1.4826 times the median departure from the median within the running window, 1.4826
     times the median departure of the whole channel from its running median, and the channel's mean step. The first is
-    large where the signal turns fast, so that a resolved crest is none; the last two keep a quiet stretch, and a
+    large where the signal turns fast, so that a resolved crest is not a spike; the last two keep a quiet stretch, and a
     signal of few distinct values, from being taken for spikes.
 
     Parameters
     ----------
     values : array, shape (sample,)
-        One channel; values that are not finite are no spikes.
+        One channel; values that are not finite are not spikes.
     deviations : float
         Threshold in robust standard deviations.
     window : int

@@ -73,7 +73,7 @@ class Body(NamedTuple):
 
 
 class Airflow(NamedTuple):
-    """Terms of a learned remainder over the direction of the airflow; none where there are no rules.
+    """Terms of a learned remainder over the direction of the airflow; empty without rules.
 
     Attributes
     ----------
@@ -405,7 +405,7 @@ def _to_end(state: _State, middle: _State, h: float, translates: bool, at: _Spac
 
 @_inlined
 def _lost(state: _State) -> bool:
-    """Tell whether a state is beyond what any vehicle flies; what is no number is."""
+    """Tell whether a state is beyond what any vehicle flies, or not a number."""
     fastest = 0.0
     for i in range(3):
         for value in (state.rate[i], state.velocity[i]):

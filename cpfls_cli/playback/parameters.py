@@ -165,7 +165,7 @@ def _probe(vehicle: VehicleSettings) -> Probe:
 def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
     """List the blocks that a vehicle can have: of rotors and body, polynomial effects, and the remainder's.
 
-    What is not known of it is no choice, and in every layout.
+    Numbers that the config does not know are in every layout, so they are not among the choices.
     """
     probe = _probe(vehicle)
     effects = (
@@ -299,7 +299,7 @@ class Layout(Numbered):
 
     @property
     def used_airflow(self) -> Airflow:
-        """Rules of the remainder; none where it is no block."""
+        """Rules of the remainder; empty where the remainder is not among the blocks."""
         return self.airflow if LEARNED.keys() & set(self.blocks) else Airflow(np.zeros(0), 0)
 
     def _numbers(self, block: str) -> tuple[Number, ...]:

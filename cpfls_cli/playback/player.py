@@ -140,7 +140,7 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
     Returns
     -------
     State
-        Not a number where an inertia that depends on the attitude is none of a body.
+        NaN where an inertia that depends on the attitude is not positive definite.
     """
     if model.fuzzy is None:
         return step_of_rigid_body(model, state, rotor, period)
@@ -388,7 +388,7 @@ def _kept(good: BoolArray, new: Array, old: Array) -> Array:
 
 
 def _positive_definite(matrices: Array) -> BoolArray:
-    """Flag positive definite matrices by their leading minors (Sylvester); what is not finite is none."""
+    """Flag positive definite matrices by their leading minors (Sylvester); those that are not finite are not."""
     first, minor = matrices[:, 0, 0], matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] ** 2
     finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)), dtype=bool)
     whole = np.linalg.det(np.where(finite[:, None, None], matrices, 0.0))

@@ -358,7 +358,7 @@ def _svg(figure: Figure) -> str:
     stream, canvas = io.StringIO(), FigureCanvasSVG(figure)
     figure.set_dpi(_POINTS)
     _lay_out(figure)
-    canvas.print_svg(stream, metadata={"Date": None})  # type: ignore[no-untyped-call]  # matplotlib types it not
+    canvas.print_svg(stream, metadata={"Date": None})  # type: ignore[no-untyped-call]  # matplotlib leaves it untyped
     return stream.getvalue()
 
 

@@ -33,8 +33,8 @@ def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = Non
     flat ones, as of rotors and angles; growing with the square, as of a gyroscope, whose derivative is taken; and both
     of noise that is correlated from sample to sample. The fit is read off at the frequencies that the windows average
     over. Longer windows tell frequencies apart better, so that the fit can start lower; the median over the windows
-    keeps bursts of motion out. Where a log was low-passed, noise is looked for below its cut-off only: a floor of what
-    a filter has removed is none.
+    keeps bursts of motion out. Where a log was low-passed, noise is looked for below its cut-off only: above
+    it the filter has removed the noise as well.
 
     Parameters
     ----------

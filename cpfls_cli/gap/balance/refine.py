@@ -55,7 +55,8 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
     # What took the place of a linear effect stands between no points of a grid.
     newest = [(index, shape) for index, shape in shapes if best[index].effect is chosen[-1].effect]
     # A second round where there are several: the best length of a cable depends on its damping.
-    for index, shape in newest * min(len(newest), 2):
+    rounds = 2 if len(newest) > 1 else 1
+    for index, shape in rounds * newest:
         best[index] = _improved(flights, best, index, shape, floor, rotor_wrench)
     return system(flights, _together(flights, best, shapes, floor, rotor_wrench) if len(shapes) > 1 else best)
 
@@ -232,8 +233,8 @@ def _held(change: Change, at: Array, least: BoolArray | None) -> BoolArray:
     near = _ON_BOUND * np.where(np.isfinite(change.high - change.low), change.high - change.low, 0.0)
     held = change.matrix.any(axis=0) & ((at <= change.low + near) | (at >= change.high - near))
     if least is not None:
-        both, either = held[:3] & held[3:6], held[:3] | held[3:6]
-        held[:6] = np.concatenate([both | least, either | least])
+        moments, couplings = held[:3], held[3:6]
+        held[:6] = np.concatenate([moments & couplings | least, moments | couplings | least])
     return held
 
 
@@ -260,7 +261,7 @@ def _change(hypothesis: System, shown: BoolArray, least: BoolArray | None) -> Ch
 
 
 def _without_lever(hypothesis: System, linear: Array) -> BoolArray | None:
-    """Mark torques that the force of their effect leaves impossible; None where there is none."""
+    """Mark torques that are impossible beside the force of their effect; None if all are possible."""
     out, first = np.zeros(len(linear), dtype=bool), 0
     if not any(flight.known[3:].any() for flight in hypothesis.flights):
         return None

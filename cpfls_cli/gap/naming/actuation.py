@@ -91,7 +91,7 @@ def without_companion(refitted: System, step: SearchStep, settings: GapSettings)
 def settled(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], index: int, step: SearchStep) -> list[Scored]:
     """Score an effect between command and rotors and its like beside another one, once all shapes have moved.
 
-    There a point of a grid is no test: where a lag stands for a delay, the width of a notch moves with it.
+    Points of a grid would not do: where a lag stands for a delay, the width of a notch moves with it.
 
     Parameters
     ----------

@@ -262,7 +262,7 @@ def differences(
 def _other_numbers(first: Judgement, judge: Judge, settings: GapSettings) -> tuple[str, ...]:
     """Say that the same effects explain the held-out flights with other numbers, if they do."""
     hypothesis, unseen = first.found.hypothesis, first.held_out
-    # Beyond what was learned other numbers are no difference between flights.
+    # Where no flight was learned from, other numbers do not mean that the flights differ.
     if unseen.unlearned or min(unseen.shares().values()) >= settings.named_share:
         return ()
     # Shapes are held: a load that swings from another start would ask for another cable, and is the same load.

@@ -71,7 +71,7 @@ def earned(
 ) -> tuple[Fitted, list[Refusal]]:
     """Fit chosen effects, and refit without those that have not earned a name on the flights that they were found in.
 
-    These are effects whose size does not differ from zero, which nobody has to hear of; effects that sit on a bound; of
+    These are effects whose size does not differ from zero, which are not told; effects that sit on a bound; of
     effects that cancel each other the one that explains less; and those that a bend of another one would surely beat.
     """
     found, refusals = fitted(flights, chosen, floor, settings), []
@@ -92,7 +92,7 @@ def earned(
 def on_bound(found: Fitted, floor: Array) -> tuple[list[Candidate], Refusal] | None:
     """Find an effect whose main number sits on a bound, or any number that is surely asked for beyond one.
 
-    Zero is no such bound: a coefficient that is there is zero at the least.
+    Zero is not such a bound: many coefficients cannot be less.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _reached(numbers: Sequence[Estimate]) -> dict[str, str]:
 
 
 def _main(found: Fitted, index: int, numbers: Sequence[Estimate], floor: Array) -> Sequence[Estimate]:
-    """Keep the coefficient that explains most; all numbers where they are no coefficients of columns."""
+    """Keep the coefficient that explains most; all numbers where they are not coefficients of columns."""
     candidate = found.hypothesis.chosen[index]
     linear = found.estimates.of_effect[index]
     names = [coefficient.name for coefficient in candidate.effect.coefficients]

@@ -191,7 +191,7 @@ class Beside(NamedTuple):
 def beside_the_unnamed(
     found: Fitted, last: SearchStep, effects: Sequence[Effect], settings: GapSettings, rng: np.random.Generator
 ) -> Beside:
-    """Widen the intervals of named effects by what is no chance and too small for a name.
+    """Widen the intervals of named effects by what is more than chance and too small for a name.
 
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
     formula that is right in slow flight bends in fast flight: where a bend shows, its number is another one beside it.
@@ -262,7 +262,7 @@ def not_excited(hypothesis: System, effects: Sequence[Effect], floor: Array) -> 
 def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSettings) -> tuple[Alternative, ...]:
     """List the rivals of named effects that the flights lack signals for: what was not tried is not beaten.
 
-    Effects that the user leaves out are none.
+    Effects that the user ignores are not listed.
     """
     rivals = []
     for effect in named:

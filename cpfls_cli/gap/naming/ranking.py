@@ -122,7 +122,7 @@ def rank_effects(
 def best_floor(hypothesis: System) -> Array:
     """Estimate the noise floors from the residual of a hypothesis.
 
-    The fit and the floors depend on each other; starting from equal weights, a second round changes nothing any more.
+    The fit and the floors depend on each other; starting from equal weights, a second round settles them.
 
     Returns
     -------

@@ -179,7 +179,7 @@ def _weight(hypothesis: System, candidate: Candidate) -> Array:
 
 
 def _error(placed: PlacedCandidate, columns: IntArray, beside: Beside) -> Array:
-    """Compute what a candidate leaves of each block; one that alone shows it is no evidence against it."""
+    """Compute what a candidate leaves of each block; a block that alone shows it does not count against it."""
     if placed.candidate.effect.unit_coefficient:
         return beside.subtracted(int(columns[0]), placed.weight)
     error = beside.unseen(columns)
@@ -212,8 +212,7 @@ def _scored(placed: PlacedCandidate, error: Array, beside: Beside, vehicle: Vehi
 def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleSettings) -> tuple[BoolArray, bool]:
     """Check coefficients against the bounds of their effect.
 
-    What the data leave open is no reason to refuse: a coefficient counts as beyond a bound only by more than its
-    uncertainty.
+    A coefficient counts as beyond a bound only by more than its uncertainty.
 
     Parameters
     ----------

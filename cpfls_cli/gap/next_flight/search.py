@@ -38,7 +38,7 @@ class Goal:
     ----------
     questions : tuple of Question
     known : tuple of Evidence
-        What flights that are there say on each question; no rows where there are none.
+        What the flights already flown say on each question; no rows without such flights.
     room : Room
     logging : Logging
     noise : float
@@ -73,7 +73,7 @@ class Goal:
         return self.logging.weak(planned_signals(self.room.planned(path), self.room, self.logging))
 
     def known_from(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
-        """Gather what flights that are there say; nothing where they lack a signal of an effect in question."""
+        """Gather what the flights already flown say; nothing where they lack a signal of an effect in question."""
         rival = [] if question.rival is None else [question.rival]
         effects = [question.true.candidate.effect, *rival, *(each.candidate.effect for each in question.besides)]
         seen = all(any(not effect.missing(flight.signals) for flight in flights) for effect in effects)

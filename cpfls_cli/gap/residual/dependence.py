@@ -180,7 +180,7 @@ def without_actuation(state: Mapping[str, Array]) -> dict[str, Array]:
     """Drop the signals of the rotors.
 
     The controller answers every disturbance with the rotors, and their noise is noise of the residual, so that a
-    residual nearly always follows their torque, whatever causes it. Causes are looked for among the other signals.
+    residual nearly always follows their torque, whichever its cause. Causes are looked for among the other signals.
 
     Parameters
     ----------

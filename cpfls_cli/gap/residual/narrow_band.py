@@ -191,7 +191,7 @@ class Grid:
     resolution : int
         Bins in the reciprocal of the longest flight.
     lowest : int
-        First bin that is no part of the mean.
+        First bin above those that the mean leaks into.
     """
 
     samples: int
