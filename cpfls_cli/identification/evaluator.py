@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Evaluation
+from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, encode, weight_jacobian
 from cpfls_cli.identification.least_squares import NormalEquations, quick_solution
 from cpfls_cli.identification.samples import Products, Samples
@@ -136,7 +137,9 @@ def refine(problem: Problem, genes: IntArray, products: Products, evaluations: i
     for _ in range(evaluations - 1):
         linear = linear or problem.linearised(best)
         weights = best.genes / LARGEST_GENE
-        tried = encode(stepped(weights, *linear, damping))
+        low = _KEPT * weights
+        step = damped_step(*linear, damping, low - weights, 1.0 - weights)
+        tried = encode(np.clip(weights + step, low, 1.0))
         if np.array_equal(tried, best.genes):
             break
         found = problem.solver.products(decode(structure, tried.astype(float)))
@@ -155,36 +158,6 @@ def _changed(before: Point, after: Point, normal: Array, gradient: Array) -> flo
     promised = -float(2.0 * gradient @ step + step @ normal @ step)
     came = before.square - after.square
     return _LOWER if came > _TRUSTED * promised else _RAISE if came < _DISTRUSTED * promised else 1.0
-
-
-def stepped(weights: Array, normal: Array, gradient: Array, damping: float) -> Array:
-    """Take a damped step: weights that it would take beyond a bound stay there, and the others move again.
-
-    Parameters
-    ----------
-    weights : array, shape (genes,)
-        On [0, 1], as is what they become.
-    normal : array, shape (genes, genes)
-        ``J^T J``.
-    gradient : array, shape (genes,)
-        ``J^T r``.
-    damping : float
-        Share of the diagonal that is added to it.
-    """
-    low, diagonal, step = _KEPT * weights, np.diag(normal), np.zeros_like(weights)
-    # A weight that moves nothing stays.
-    damped = normal + np.diag(damping * diagonal + np.where(diagonal > 0, 0.0, 1.0))
-    free: BoolArray = ~((weights >= 1.0) & (gradient < 0))
-    while free.any():
-        right_side = gradient[free] + damped[np.ix_(free, ~free)] @ step[~free]
-        step[free] = -np.linalg.solve(damped[np.ix_(free, free)], right_side)
-        ends = np.clip(weights + step, low, 1.0)
-        beyond = free & (ends != weights + step)
-        if not beyond.any():
-            break
-        step[beyond] = ends[beyond] - weights[beyond]
-        free &= ~beyond
-    return np.clip(weights + step, low, 1.0)
 
 
 @dataclass(frozen=True)

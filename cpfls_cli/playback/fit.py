@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointLayout
 from cpfls_cli.playback.kernels import Loss, Motion, errors_of_runs, sensitivities
@@ -307,28 +308,13 @@ def _better(
 ) -> tuple[_Point | None, float]:
     """Find a point with a smaller objective, with more damping where a step fails; None where none is found."""
     for _ in range(_TRIES):
-        step = _step(point, damping, bounds, layout.scales)
+        room = [(bound - point.values) / layout.scales for bound in bounds]
+        step = layout.scales * damped_step(point.hessian, point.gradient, damping, *room)
         following = _evaluated(layout, windows, np.clip(point.values + step, *bounds))
         if following.objective < point.objective:
             return following, max(damping / _DAMPING_DOWN, _LEAST_DAMPING)
         damping *= _DAMPING_UP
     return None, damping
-
-
-def _step(point: _Point, damping: float, bounds: tuple[Array, Array], scale: Array) -> Array:
-    """Solve for a step; numbers that it would push through a bound on which they lie stay."""
-    low, high = bounds
-    damped = point.hessian + damping * np.diag(np.diag(point.hessian))
-    free = np.ones(len(point.values), dtype=bool)
-    step = np.zeros(len(free))
-    while free.any():
-        step = np.zeros(len(free))
-        step[free] = -scale[free] * np.linalg.solve(damped[np.ix_(free, free)], point.gradient[free])
-        through = (step < 0) & (point.values <= low) | (step > 0) & (point.values >= high)
-        if not (through & free).any():
-            break
-        free &= ~through
-    return step
 
 
 @dataclass(frozen=True)

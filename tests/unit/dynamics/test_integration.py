@@ -5,8 +5,9 @@ import pytest
 
 from cpfls_cli import rotations
 from cpfls_cli.dynamics.equations_of_motion import RotationState, acceleration_law, momentum_form, rigid_plant
-from cpfls_cli.dynamics.integration import advance, free_runs
+from cpfls_cli.dynamics.integration import advance, free_runs, runge_kutta_step
 from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
+from cpfls_cli.effects.swing import integrate
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.regressor import InertiaValues
 
@@ -67,3 +68,33 @@ def test_momentum_form_of_a_rigid_body_is_that_of_newton_and_euler():
     momentum, direct = momentum_form(ATTITUDE, BODY_RATE, InEulerCoordinates().inertia(ATTITUDE))
     np.testing.assert_allclose(momentum, BODY_RATE @ TENSOR, atol=1e-12)
     np.testing.assert_allclose(direct, np.cross(BODY_RATE, BODY_RATE @ TENSOR), atol=1e-12)
+
+
+class Swing:
+    """A cable under a hook, with its direction kept at length 1 by the state."""
+
+    def __init__(self, step, length, damping):
+        self.step, self.length, self.damping = step, length, damping
+
+    def slope(self, state, felt):
+        direction, rate = state[:3], state[3:]
+        across = felt - (felt @ direction) * direction
+        return np.concatenate([rate, -across / self.length - (rate @ rate) * direction - self.damping * rate])
+
+    def moved(self, state, slope, share):
+        return state + share * self.step * slope
+
+    def joined(self, state, slopes):
+        first, second, third, fourth = slopes
+        after = state + self.step / 6 * (first + 2 * (second + third) + fourth)
+        direction = after[:3] / np.linalg.norm(after[:3])
+        return np.concatenate([direction, after[3:] - (after[3:] @ direction) * direction])
+
+
+def test_the_compiled_swing_of_a_load_takes_the_same_steps():
+    felt = np.array([0.0, 0.0, 9.81]) + np.random.default_rng(8).standard_normal((41, 3))
+    found = integrate(np.ascontiguousarray(felt[::2]), np.ascontiguousarray(felt[1::2]), 0.04, 0.7, 0.2)
+    state = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+    for number in range(20):
+        state = runge_kutta_step(Swing(0.04, 0.7, 0.2), state, tuple(felt[2 * number : 2 * number + 3]))
+        np.testing.assert_allclose(found[number + 1], state, atol=1e-12)

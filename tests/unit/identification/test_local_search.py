@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
-from scipy.optimize import lsq_linear
 
 from cpfls_cli.identification.chromosome import LARGEST_GENE, decode, weight_jacobian
-from cpfls_cli.identification.evaluator import Problem, refine, stepped
+from cpfls_cli.identification.evaluator import Problem, refine
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Samples
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
@@ -34,34 +33,6 @@ def test_all_partitions_at_once_are_those_one_by_one_to_the_last_bit(functions):
         for found, expected in zip(decode(structure, weights), ends, strict=True):
             np.testing.assert_array_equal(found, expected)
         np.testing.assert_array_equal(weight_jacobian(structure, weights), block_diag(*slopes))
-
-
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("damping", [1e-6, 1.0])
-def test_a_step_is_the_minimum_of_the_damped_model_between_the_bounds(seed, damping):
-    rng = np.random.default_rng(seed)
-    J, r, weights = rng.standard_normal((40, 6)), rng.standard_normal(40), rng.uniform(0.1, 1.0, 6)
-    weights[0] = 1.0
-    normal, gradient = J.T @ J, 3.0 * J.T @ r
-    damped = np.linalg.cholesky(normal + damping * np.diag(np.diag(normal))).T
-    low = 0.85 * weights - weights
-    expected = lsq_linear(damped, -np.linalg.solve(damped.T, gradient), (low, np.fmax(1.0 - weights, 1e-300)))
-    found = stepped(weights, normal, gradient, damping) - weights
-
-    def model(step):
-        return gradient @ step + 0.5 * step @ damped.T @ damped @ step
-
-    assert np.all(found >= low - 1e-15)
-    assert np.all(weights + found <= 1.0)
-    # Weights at a bound stay there, which the true minimum need not do: little is lost.
-    assert model(found) <= 0.9 * model(expected.x)
-    free = (found > low) & (weights + found < 1.0)
-    np.testing.assert_allclose((gradient + damped.T @ damped @ found)[free], 0.0, atol=1e-9)
-
-
-def test_weights_that_move_nothing_stay():
-    normal = np.diag([0.0, 2.0])
-    np.testing.assert_allclose(stepped(np.array([0.5, 0.5]), normal, np.array([0.0, 0.1]), 1e-9), [0.5, 0.45])
 
 
 @pytest.mark.parametrize("evaluations", [1, 2, 4])
