@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cpfls_cli.playback.replay import Played, Replay
 
 _GROWN = 1.05
-"""Ratio of the gaps after and before from which on a channel is marked as worse."""
+"""Ratio of the gaps after and before from which on a channel is marked; two digits show no less."""
 
 BEFORE, AFTER = "before", "after"
 """Predictions of held-out flights: by the model as given and with the effects."""

@@ -17,6 +17,7 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.replay import Replay
 from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
 
+# Shown around a stretch at least, and points in a window of a picture, which look like a curve.
 _SHORTEST_S = 4.0
 _PER_WINDOW = 16
 

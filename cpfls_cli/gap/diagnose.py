@@ -38,6 +38,7 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.weak_form.windows import Recording, common_windows
 
 _EXCITED_FLOORS = 3.0
+"""Standard deviation of the inertial torque, in floors, above which a flight moves: a third of it is noise at most."""
 
 
 @dataclass(frozen=True)

@@ -35,15 +35,9 @@ from cpfls_cli.gap.naming.held_out import HeldOut, judged_unseen
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.preparation import Preparation
-from cpfls_cli.gap.settings import CLEAR, GapSettings
+from cpfls_cli.gap.settings import CLEAR, VISIBLE, WORSE, GapSettings
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.weak_form.windows import Recording, common_windows
-
-_TOUCHED = 0.2
-"""Root mean square in floors by which effects and refit move a channel, from which on it has to get better."""
-
-_WORSE = 1.2
-"""Ratio from which on a gap has grown."""
 
 
 class FittedEffect(NamedTuple):
@@ -355,7 +349,7 @@ def extend(
 
 def _require_smaller(held_out: HeldOut) -> None:
     before, after = held_out.size(held_out.before).floors, held_out.size(held_out.after).floors
-    moved = held_out.size(held_out.before - held_out.after).floors > _TOUCHED
+    moved = held_out.size(held_out.before - held_out.after).floors > VISIBLE
     if not moved.any():
         raise ComputationError("not extended: what is named changes no channel of the held-out flights by its noise")
     if (after[moved] ** 2).sum() >= (before[moved] ** 2).sum():
@@ -370,7 +364,7 @@ def worse_axes(before: Array, after: Array) -> list[int]:
     ----------
     before, after : array, shape (6,), floors
     """
-    return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] > _WORSE * before[:3]))]
+    return [int(c) for c in np.flatnonzero((before[:3] > CLEAR) & (after[:3] > WORSE * before[:3]))]
 
 
 def _renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Estimates) -> list[NamedEffect]:

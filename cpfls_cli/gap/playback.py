@@ -28,7 +28,9 @@ from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
+# Samples between starts of free runs, which are alike.
 _EVERY = 5
+# Shown: two free runs of a second, which is when they part; an effect left out is measured where errors still add up.
 _STRETCH_S, _RUN_S, _LEFT_S = 2.0, 1.0, 0.5
 _ROUNDING = 1e-9
 _COUPLED = ("qr", "pr", "pq")

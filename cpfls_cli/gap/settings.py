@@ -17,6 +17,27 @@ CLEAR = 1.5
 Without a gap half of the channels exceed 1 floor, and floors of coloured noise are off by a third.
 """
 
+NOISE = 1.25
+"""Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
+
+LARGE = 3.0
+"""Root mean square in floors that no name for a gap may leave behind, twice what is clear."""
+
+VISIBLE = 0.3
+"""Root mean square in floors of one channel from which on an effect shows.
+
+Beside noise it makes the channel 4 % larger; less than that floors are off by.
+"""
+
+WORSE = 1.1
+"""Ratio of root mean squares from which on a channel got worse: halves of one flight differ by less."""
+
+ERRORS = 2.0
+"""Standard errors by which a difference is sure, 95 % two-sided."""
+
+COUNTS = 0.05
+"""Share of the whole gap, in squared floors, from which on a part of it is judged on its own."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class GapSettings(Settings):

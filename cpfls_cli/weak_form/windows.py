@@ -14,6 +14,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 
+# Of a window: fewer do not follow its curve.
 _FEWEST_SAMPLES = 8
 FEWEST_WINDOWS = 16
 """Windows below which a flight tells too little."""

@@ -13,16 +13,23 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.weak_form.windows import windows as make_windows
 
+# Four times as many as the spectra of a fit have numbers; windows twice as long resolve them.
 _FREQUENCIES = 16
 _LONGER = 2
+# In reciprocals of a window: from near the first zero of its spectrum, at 3, it passes nothing of slow motion.
 _LOWEST_PER_WINDOW = 2.8
+# Of the sampling rate: above, filters against aliasing bend a spectrum.
 _HIGHEST_OF_RATE = 0.4
 # Share of a cut-off up to which even gentle filters pass nearly all, and the band that a fit needs.
 _PASSED = 0.6
 _BAND = 1.5
+# From sample to sample; each halves the band of the one before about.
 _CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)
+# Ratio of misfits from which on colour is believed: estimates of 16 powers scatter by less.
 _CLEARLY_BETTER = 1.5
+# Frequencies for each that a window resolves, so that a sum over them is an integral.
 _PADDED = 8
+# Of the power of noise, over its mean: the median does not see lines.
 _MEDIAN_OF_EXPONENTIAL = float(np.log(2))
 
 

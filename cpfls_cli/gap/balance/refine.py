@@ -16,11 +16,15 @@ from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 
+# Of one shape between the neighbours of its grid point, to a thousandth of that; of all shapes from there.
 _EVALUATIONS = 14
 _JOINT_EVALUATIONS = 8
+# Of central differences, as a share of a shape: they are off by its square.
 _STEP = 1e-3
+# Gauss-Newton steps, which settle in two or three, and shares of one that are tried where it goes too far.
 _STEPS = 6
 _SHARES = (1.0, 0.5, 0.2)
+# Singular values, as a share of the largest, that are rounding.
 _LEAST_SIZE = 1e-9
 _MOST_NOISE = 0.5
 """Share of the squares of any combination of columns that is believed to be noise at most: beyond it, what is left of

@@ -31,6 +31,7 @@ _MATTERS = 0.02
 _LEAST_SHARE = 0.2
 """Share of the gap of its own channel that a refitted number of the vehicle has to take off unseen flights."""
 
+# In which a number of the vehicle shows.
 _CHANNEL = {"inertia_x": 0, "inertia_y": 1, "inertia_z": 2, "thrust_scale": 5}
 
 _PULLS = 2.0

@@ -15,15 +15,10 @@ from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.earned import Fitted, Refusal, fitted, on_bound
 from cpfls_cli.gap.naming.estimate import channel_weight, estimates
-from cpfls_cli.gap.naming.held_out import SEEN, HeldOut, held_out, share_removed
+from cpfls_cli.gap.naming.held_out import HeldOut, held_out, share_removed
 from cpfls_cli.gap.naming.leftover import Leftover, leftover
 from cpfls_cli.gap.naming.ranking import SearchStep, block_index
-from cpfls_cli.gap.settings import CLEAR, GapSettings
-
-_WORSE = 1.1
-"""Ratio of root mean squares from which on a channel got worse."""
-
-_ERRORS = 2.0
+from cpfls_cli.gap.settings import CLEAR, ERRORS, VISIBLE, WORSE, GapSettings
 
 _FILLS = 0.01
 """Share of what the largest effect takes off, in squares, below which another may fill what its formula is off by."""
@@ -102,7 +97,7 @@ class Judge:
         least = min(raised, key=lambda each: raised[each], default=None)
         if least is None:
             return None
-        if raised[least] < SEEN**2:
+        if raised[least] < VISIBLE**2:
             return Refusal(least, "on the flights held out the gap is as small without it")
         return _elsewhere(judgement, compared) or _filling(judgement, compared)
 
@@ -155,8 +150,8 @@ class Without(NamedTuple):
     def worse(self, unseen: HeldOut) -> Array:
         """Mark the channels that the effect makes visibly and surely worse."""
         after = unseen.size(unseen.after).floors
-        surely = -self.raised > _ERRORS * self.error
-        return np.asarray((after > CLEAR) & (after > _WORSE * self.left) & surely)
+        surely = -self.raised > ERRORS * self.error
+        return np.asarray((after > CLEAR) & (after > WORSE * self.left) & surely)
 
     def ratio(self, unseen: HeldOut) -> float:
         """Give how much worse the worst channel gets."""

@@ -14,17 +14,8 @@ from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.results import GapSize
 from cpfls_cli.gap.preparation import Preparation
-from cpfls_cli.gap.settings import CLEAR
+from cpfls_cli.gap.settings import CLEAR, COUNTS, NOISE, VISIBLE
 from cpfls_cli.weak_form.windows import Recording
-
-_MARGIN = 1.25
-"""Mean square in squared floors up to which a residual counts as noise: what an estimate of the floor is off by."""
-
-_COUNTS = 0.05
-"""Share of the whole gap, in squared floors, from which on the lesser of torque and force is judged on its own."""
-
-SEEN = 0.3
-"""Root mean square in floors of one channel that a name has to take off flights that the fit did not see."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +82,7 @@ class HeldOut:
         clear = {
             name: share
             for (name, share), kind, size in zip(of_kind.items(), kinds, sizes, strict=True)
-            if size > _COUNTS * sum(sizes) and _largest(before[:, kind]) > CLEAR
+            if size > COUNTS * sum(sizes) and _largest(before[:, kind]) > CLEAR
         }
         better = max(of_kind, key=lambda name: of_kind[name])
         return clear or {better: of_kind[better]}
@@ -107,7 +98,7 @@ class HeldOut:
         rows = np.maximum(self.known.sum(axis=0), 1)
         gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
         each = [share_removed(before[:, [c]], after[:, [c]], self.known[:, [c]]) for c in range(before.shape[1])]
-        return np.where(gone > SEEN**2, each, 0.0)
+        return np.where(gone > VISIBLE**2, each, 0.0)
 
 
 def _largest(residual: Array) -> float:
@@ -155,7 +146,7 @@ def share_removed(before: Array, after: Array, known: Array) -> float:
 
 def _above(residual: Array, known: Array) -> float:
     """Sum the mean squares of the channels above the floor, in squared floors."""
-    return float(np.maximum((residual**2 * known).sum(axis=0) - _MARGIN * known.sum(axis=0), 0.0).sum())
+    return float(np.maximum((residual**2 * known).sum(axis=0) - NOISE * known.sum(axis=0), 0.0).sum())
 
 
 def held_out(

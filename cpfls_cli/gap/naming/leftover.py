@@ -27,26 +27,22 @@ from cpfls_cli.gap.residual.dependence import (
     without_actuation,
 )
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import CLEAR, NOISE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-_LARGE = 1.5
-"""Root mean square in floors that is a gap whatever it depends on."""
-
-_SMALL = 1.12
-"""Root mean square in floors below which nothing is called a gap."""
-
 _PER_WINDOW = 6
+"""Hops in a window where bands are looked for: ten samples of the fastest wave that a window passes."""
 
 _TELLS = 0.05
 """Share that a signal or a band has to explain to be named."""
 _SURE = 3.0
+"""Standard errors by which power flows: more than for one number, because three axes are asked on few blocks."""
+
 _FEWEST_BLOCKS = 4
+"""Blocks whose scatter says something of an error."""
+
 _USUAL_OF_BOUND = 0.2
 """A coefficient that is large but not unheard of, as a share of its bound."""
-
-_VISIBLE = 0.2
-"""Root mean square in floors from which an effect is seen."""
 
 _CHANCE = 0.05
 """Probability of chance up to which an effect widens the intervals of others, which leave out as much."""
@@ -106,7 +102,7 @@ def leftover(
     unexplained = [
         _unexplained(channel, float(size), dependence, band, direction, settings)
         for channel, size, direction in zip(CHANNELS, sizes, directions, strict=True)
-        if size > _SMALL
+        if size > np.sqrt(NOISE)
     ]
     return Leftover(sizes, dependence, tuple(entry for entry in unexplained if entry is not None))
 
@@ -137,7 +133,7 @@ def _unexplained(
     band = band if band is not None and band.channel == channel else None
     follows = signal is not None and signal.p_value <= settings.significance and signal.r2 > _TELLS
     rings = band is not None and band.p_value <= settings.significance and band.share > _TELLS
-    if not (size > _LARGE or follows or rings):
+    if not (size > CLEAR or follows or rings):
         return None
     share = max(signal.r2 if follows and signal else 0.0, band.share if rings and band else 0.0)
     return Unexplained(
@@ -292,7 +288,7 @@ def _reason(hypothesis: System, effect: Effect, floor: Array) -> str:
         effect, hypothesis.flights[0].signals.vehicle, columns.shape[2]
     )
     # The best channel of the best coefficient decides.
-    if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= _VISIBLE:
+    if np.sqrt((new**2).mean(axis=0)).max(initial=0.0) >= VISIBLE:
         return ""
     return f"it would not show; {effect.excitation}"
 

@@ -20,7 +20,7 @@ from cpfls_cli.gap.naming.scoring import (
     normal_equations,
     score,
 )
-from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.gap.settings import ERRORS, VISIBLE, GapSettings
 from cpfls_cli.weak_form.resampling import blocks_of, mirror_shifted
 
 NEAR = 0.6
@@ -32,11 +32,11 @@ LEAST_SHARE = 0.05
 CLOSE = 0.01
 """Share of the gap by which two explanations are as good as each other."""
 
-_LEAST_IN_FLOORS = 0.3
-"""Root mean square that an effect has to explain of one channel, in floors."""
-_VISIBLE = 0.25
-_ERRORS = 2.0
+_OF_THE_REST = 0.25
+"""Share of what the better one leaves of a channel up to which another one is as good, in squares."""
+
 _CHANCE = 0.02
+"""Probability of ranks up to which one is better: of fewer than six blocks none can be."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ def surely_less(one: Scored, other: Scored) -> bool:
         return False
     spread = len(margin) * float(mean_error(margin))
     # Effects act in some blocks and not in others: where sizes differ that much, ranks tell more than the mean.
-    return bool(margin.sum() > _ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
+    return bool(margin.sum() > ERRORS * spread or wilcoxon(margin, alternative="greater").pvalue < _CHANCE)
 
 
 def least_gain(above_floor: float, windows: int) -> float:
@@ -185,7 +185,7 @@ def least_gain(above_floor: float, windows: int) -> float:
         The gap, in squared floors.
     windows : int
     """
-    return max(LEAST_SHARE * above_floor, _LEAST_IN_FLOORS**2 * windows)
+    return max(LEAST_SHARE * above_floor, VISIBLE**2 * windows)
 
 
 def least_margin(above_floor: float, left: float) -> float:
@@ -200,4 +200,4 @@ def least_margin(above_floor: float, left: float) -> float:
     left : float
         What the better one leaves, in squared floors.
     """
-    return min(CLOSE * above_floor, _VISIBLE * left / len(CHANNELS))
+    return min(CLOSE * above_floor, _OF_THE_REST * left / len(CHANNELS))

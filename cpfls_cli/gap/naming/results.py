@@ -10,15 +10,13 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.settings import CLEAR, GapSettings
+from cpfls_cli.gap.settings import CLEAR, COUNTS, LARGE, GapSettings
 
 _SECOND_CAUSE = 0.03
 """Share of the gap, in squared floors, from which on what is left is a cause of its own."""
 
-_PART = 0.05
-_LARGE = 3.0
 _REST = 0.1
-"""Root mean square that is left, in floors and as a share of the gap, that no name for the gap may leave behind."""
+"""Root mean square that is left, as a share of the gap, that no name for the gap may leave behind."""
 
 _MAIN = 0.1
 """Share of the gap from which on an effect that cannot be told from another makes the whole answer ambiguous."""
@@ -280,8 +278,8 @@ def gap_stays(before: Array, after: Array, named_share: float, effects: int) -> 
 
 
 def _stays(before: Array, after: Array, named_share: float) -> bool:
-    clear = (before > CLEAR) & (before**2 > _PART * np.nanmax(before, initial=0.0) ** 2)
-    large = (after > _LARGE) & (after > _REST * before)
+    clear = (before > CLEAR) & (before**2 > COUNTS * np.nanmax(before, initial=0.0) ** 2)
+    large = (after > LARGE) & (after > _REST * before)
     return bool((clear & (_is_left(after, before, named_share) | large)).any())
 
 

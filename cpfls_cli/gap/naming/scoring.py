@@ -14,11 +14,11 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.balance.refine import compensation, fit, free_shapes, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.settings import ERRORS
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.resampling import Beside, Folds, folds
 
 REFUSED = -np.inf
-_ERRORS = 2.0
 
 
 @dataclass(frozen=True)
@@ -233,14 +233,14 @@ def within_bounds(effect: Effect, linear: Array, error: Array, vehicle: VehicleS
     keep = np.ones(len(linear), dtype=bool)
     listed = effect.coefficients
     if effect.physical is not None:
-        ends = np.array([effect.physical(linear + way * _ERRORS * error) for way in (-1, 1)])
+        ends = np.array([effect.physical(linear + way * ERRORS * error) for way in (-1, 1)])
         physical = effect.physical(linear)
         low, high = np.array([each.bounds(vehicle) for each in listed])[: len(physical)].T
         unsure = np.isnan(ends).any(axis=0) | np.isnan(physical)
         return keep, bool(np.all(unsure | ((ends.max(axis=0) >= low) & (ends.min(axis=0) <= high))))
     low, high = np.array([each.bounds(vehicle) for each in listed]).T
     at_zero = ((linear < low) & (low == 0)) | ((linear > high) & (high == 0))
-    beyond = (linear + _ERRORS * error < low) | (linear - _ERRORS * error > high)
+    beyond = (linear + ERRORS * error < low) | (linear - ERRORS * error > high)
     # What is taken out changes the others first: a lever is judged in the round after.
     if effect.lever is not None and len(linear) == len(effect.coefficients) and not at_zero.any():
         at_zero |= ~effect.lever(np.where(at_zero, 0.0, linear), error, vehicle)

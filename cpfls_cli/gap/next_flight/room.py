@@ -23,9 +23,13 @@ TILT_MAX = np.radians(35.0)
 _ROTOR_SHARE = 0.85
 """Of the largest speed of a rotor, and of the way down from hovering to rest, in squares: the rest is for control."""
 _MOST_YAW = np.pi
+# Of the fastest wave: between them a load is at most 1 % larger.
 _SAMPLES_PER_PERIOD = 20
+# Waves of an axis, as many as a person could still fly.
 _HARMONICS = 10
+# Of a bisection: to 1 % for a path, to 12 % for one that is only drawn.
 _HALVINGS, _ROUGH = 7, 3
+# Of what an axis can do alone, at which it is as good as still.
 _LEAST_SHARE = 0.05
 
 

@@ -17,6 +17,7 @@ from cpfls_cli.rounding import ascending, less
 from cpfls_cli.trajectory.harmonics import HarmonicPath
 from cpfls_cli.weak_form.windows import windows
 
+# Shares of a path by which it is changed: first by what makes another one of it, then by what still shows.
 _FIRST_STEP, _SMALLEST_STEP = 0.3, 0.02
 _LONGER, _SHORTER = 1.5, 0.9
 """Of the step after a success and a failure: in balance where one trial in five succeeds."""
@@ -27,6 +28,7 @@ _ONE_AXIS, _ANEW = 0.5, 0.2
 _HOPELESS = 0.01
 """Share of enough below which a question hardly counts any more: no path may be able to tell."""
 
+# Size in m and rad, and duration in s, of a flight that nobody flies.
 _A_LITTLE, _A_WHILE = 0.01, 2.0
 
 

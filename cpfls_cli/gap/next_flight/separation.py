@@ -14,13 +14,11 @@ from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, nuisance
 from cpfls_cli.gap.naming.ranking import least_gain, least_margin
 from cpfls_cli.gap.naming.scoring import candidates_of
+from cpfls_cli.gap.settings import ERRORS
 from cpfls_cli.weak_form.windows import Windows
 
 SURE = 0.975
 """Probability from which a flight is said to settle a question."""
-
-_ERRORS = 2.0
-"""Standard errors by which the diagnosis wants one explanation to beat another."""
 
 
 @dataclass(frozen=True)
@@ -198,12 +196,12 @@ class Judgement:
     @property
     def _margin(self) -> float:
         """Difference from which on the diagnosis decides."""
-        return max(self.least, _ERRORS * self._error)
+        return max(self.least, ERRORS * self._error)
 
     @property
     def enough(self) -> float:
         """What `apart` has to be for an answer of probability `SURE`."""
-        by_noise = 4 * self.noise * (_ERRORS + ndtri(SURE)) ** 2
+        by_noise = 4 * self.noise * (ERRORS + ndtri(SURE)) ** 2
         # The root of apart - least = quantile * error, for errors of 2 sqrt(apart noise).
         root = ndtri(SURE) * np.sqrt(self.noise)
         return float(max(by_noise, (root + np.sqrt(root**2 + self.least)) ** 2))

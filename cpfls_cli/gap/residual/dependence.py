@@ -13,9 +13,12 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.weak_form.resampling import about_flight_mean, folds, mirror_shifted
 
+# Curves with two bends, and with six zeros around a circle: what formulas leave out is hardly more crooked.
 _DEGREE = 4
 _HARMONICS = (1, 2, 3)
+# Beyond them a curve stays constant.
 _OUTER_PERCENT = 0.5
+# Without one of two, a curve would know half of the flight only.
 _FEWEST_BLOCKS = 3
 ANGLES = ("roll", "yaw")
 """Signals that come back after a full turn."""

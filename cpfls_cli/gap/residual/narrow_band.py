@@ -13,16 +13,23 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.gap.settings import ERRORS
 
 Energy = Literal["feeds", "drains", "neither"]
 
+# Shorter flights have no background to stand out from.
 _FEWEST_ROWS = 64
+# Half width of the main lobe of a Hann taper, in reciprocals of the flight.
 _LOBE_CYCLES = 2
+# Power is averaged over segments, each long enough to be a band.
 _PERIODS_PER_SEGMENT = 4
-_SURE = 2.0
+# Frequencies for each reciprocal of the flight: between two, a line loses 2 % of its power.
 _FINER = 4
+# Slower is no band but a drift.
 _LOWEST_CYCLES = 2
+# Width of the running median, six times a line's.
 _MEDIAN_CYCLES = 24
+# A background is no steeper, or it would be taken for a line at 0.
 _STRONGEST_CORRELATION = 0.95
 
 
@@ -174,7 +181,7 @@ def _products(residual: Array, rate: Array, length: int, cycles_per_row: float) 
 
 
 def _energy(mean: float, error: float) -> Energy:
-    if not abs(mean) > _SURE * error:
+    if not abs(mean) > ERRORS * error:
         return "neither"
     return "feeds" if mean > 0 else "drains"
 

@@ -14,10 +14,14 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.weak_form.resampling import about_flight_mean
 
+# A zero crossing of the residual makes no gap small.
 _AVERAGED_WINDOWS = 5
+# Of the time is called worst, pauses up to this long with it.
 _OUTSTANDING_SHARE = 0.1
 _LONGEST_PAUSE_S = 1.0
+# Left out of the range of a map, or a few windows would make its cells wide.
 _OUTER_PERCENT = 1.0
+# Windows of the longest flight for each lag of its correlation.
 _FEWEST_PER_LAG = 4
 
 
