@@ -158,9 +158,6 @@ class AuditGroup:
             self.untested_because,
             self.warning,
             self.note,
-            gyro=None,
-            matches=(),
-            actuation=None,
             repairs=repairs,
             contradictions=self.contradiction or (),
         )

@@ -12,11 +12,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.channels import channel_warnings, filter_warnings
 from cpfls_cli.consistency.check import findings_of
-from cpfls_cli.consistency.clocks import ActuationDelay, actuation_delay
+from cpfls_cli.consistency.clocks import actuation_delay
 from cpfls_cli.consistency.faults import AuditFinding, CheckedFault, findings
 from cpfls_cli.consistency.findings import contradictions, doubts
 from cpfls_cli.consistency.gyroscope import GyroFit
-from cpfls_cli.consistency.motion import ChannelMatch
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.consistency.sensors import sensors_of
 from cpfls_cli.effects.hooks import ReadingError
@@ -46,10 +45,6 @@ class Audit:
         Sentences on what no verdict can stand beside; nothing repairs it.
     notes : tuple of str
         Sentences for information.
-    gyro : GyroFit or None
-        All that was estimated, with the symmetric cross-axis and the differences between flights.
-    matches : tuple of ChannelMatch
-    actuation : ActuationDelay or None
     repairs : tuple of ChannelRepair
         Channels that contradict two others, in the order in which they are set right or left out.
     filtered : tuple of str
@@ -60,9 +55,6 @@ class Audit:
     untested: Mapping[str, str]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
-    gyro: GyroFit | None
-    matches: tuple[ChannelMatch, ...]
-    actuation: ActuationDelay | None
     repairs: tuple[ChannelRepair, ...] = ()
     filtered: tuple[str, ...] = ()
     contradictions: tuple[str, ...] = ()
@@ -128,17 +120,12 @@ def audit(flights: Sequence[Signals], windows: Windows) -> Audit:
 def _audit(flights: Sequence[Signals], windows: Windows) -> Audit:
     sensors = sensors_of(flights, windows)
     fit = sensors.gyroscope.fit
-    actuation = actuation_delay(sensors.flights)
-    delay_note = () if actuation is None else (actuation.sentence,)
     stays = [finding for finding in findings_of(flights, sensors) if not finding.repairable]
     return Audit(
         findings=findings([*sensors.gyroscope.faults, *_others(sensors.flights)], windows.period),
         untested=sensors.gyroscope.untested,
         warnings=(*(_whole(each) for each in doubts(stays)), *channel_warnings(sensors.flights)),
-        notes=(*delay_note, *sensors.notes, *(_gyro_notes(fit) if fit is not None else ())),
-        gyro=fit,
-        matches=tuple(match for check in sensors.motion.checks if check.pair.exact for match in check.matches),
-        actuation=actuation,
+        notes=(*actuation_delay(sensors.flights), *sensors.notes, *(_gyro_notes(fit) if fit is not None else ())),
         repairs=(*sensors.clocks, *sensors.motion.repairs),
         filtered=filter_warnings(sensors.flights),
         contradictions=contradictions(stays),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.gyroscope import LONGEST_DELAY_S
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
@@ -16,66 +16,40 @@ from cpfls_cli.flightlog.alignment import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
 from cpfls_cli.weak_form.windows import Windows
 
-_LONGEST_S = 0.1
+# The gyroscope is shifted against rotors as far as against the attitude, by 5 ms.
 _STEPS = 41
 # Above the motion of a multirotor and below most of the noise of its derivative.
-_LOWPASS_HZ = 8.0
-_SHARE_OF_RATE = 0.2
+_LOWPASS_HZ, _SHARE_OF_RATE = 8.0, 0.2
+# Rotors of the largest multirotors follow within a fifth of a second.
 _DELAY_MAX_S = 0.2
 # A rigid body that explains less of the torque leaves the delay to chance.
 _SMALLEST_R2 = 0.3
 # Missing effects shift the motion against the torque by about this much; a damping is allowed for.
 _SURE_S = 0.002
+# Windows that a fit of five numbers wants, and estimates whose scatter can be told.
 _FEWEST_WINDOWS, _FEWEST_HALVES = 24, 2
 # Filters before a gyroscope, and a flow that lags behind a rotor, are a few milliseconds.
 _ROTORS_OFF_S = 0.008
+# Telemetry comes up to a quarter of a second late; steps of 20 ms, then of 5.
 _TELEMETRY_S, _TELEMETRY_STEPS, _FINER = 0.24, 25, 9
+# Estimates of one clock scatter by less than this, or by less than this share of it.
 _SCATTER_S, _SCATTER = 0.004, 0.2
+# Two halves of one flight about roll and pitch.
 _FEWEST_SHIFTS = 4
-_NEXT_TO_NOTHING = 0.01
-_HALF = 0.5
+# Share of the torque that is left where no shift can do better, and share of that which a shift has to leave at most.
+_NEXT_TO_NOTHING, _HALF = 0.01, 0.5
 _UNDECIDED = "Whether gyroscope or attitude is late these flights do not tell; the gyroscope is shifted."
 
 
-@dataclass(frozen=True)
-class ActuationDelay:
-    """Delay of the motion behind the logged torque, for information.
-
-    Attributes
-    ----------
-    commanded : bool
-        Whether that torque was commanded, not measured.
-    delay_s : float
-        Median over the flights, s.
-    spread_s : float
-        Largest less smallest over the flights, s.
-    sentence : str
-    """
-
-    commanded: bool
-    delay_s: float
-    spread_s: float
-    sentence: str
-
-
-def actuation_delay(flights: Sequence[Signals]) -> ActuationDelay | None:
-    """Estimate the delay of the motion behind the torque, flight by flight.
-
-    Returns
-    -------
-    ActuationDelay or None
-        None where no flight tells.
-    """
-    estimates = [(signals.commanded, estimate) for signals in flights if (estimate := _estimate(signals)) is not None]
+def actuation_delay(flights: Sequence[Signals]) -> tuple[str, ...]:
+    """Say how late the motion follows the logged torque, median over the flights; nothing where no flight tells."""
+    estimates = [estimate for signals in flights if (estimate := _estimate(signals)) is not None]
     if not estimates:
-        return None
-    delays = [estimate.delay_s for _, estimate in estimates]
-    commanded = estimates[0][0]
-    delay = float(np.median(delays))
-    whom = "commands" if commanded else "measured rotors"
-    bound = "at least" if any(estimate.at_bound for _, estimate in estimates) else "about"
-    sentence = f"The motion follows the {whom} by {bound} {1000 * delay:.0f} ms."
-    return ActuationDelay(commanded, delay, float(np.ptp(delays)), sentence)
+        return ()
+    delay = float(np.median([estimate.delay_s for estimate in estimates]))
+    whom = "commands" if flights[0].commanded else "measured rotors"
+    bound = "at least" if any(estimate.at_bound for estimate in estimates) else "about"
+    return (f"The motion follows the {whom} by {bound} {1000 * delay:.0f} ms.",)
 
 
 def _estimate(signals: Signals) -> DelayEstimate | None:
@@ -118,18 +92,9 @@ def attitude_on_clock(
         return (), ()
     if abs(delay) + unsure >= 0.5 * abs(gyro_delay):
         return (), (_UNDECIDED,)
-    finding = Finding(
-        f"the attitude is {'late' if gyro_delay < 0 else 'early'} by {abs(1000 * gyro_delay):.0f} ms, judged by "
-        "gyroscope and rotors, which keep one time",
-        "mend its clock in the log",
-        ("attitude", "gyroscope", "rotors"),
-        -gyro_delay,
-        "s",
-        contradiction=False,
-        repairable=True,
-    )
-    repair = ChannelRepair("attitude", delay_s=-gyro_delay).told(finding, "It is set right before the balance")
-    return (repair,), ()
+    what = f"the attitude is {_way(-gyro_delay)}, judged by gyroscope and rotors, which keep one time"
+    finding = _late(what, "mend its clock in the log", ("attitude", "gyroscope", "rotors"), -gyro_delay)
+    return (ChannelRepair("attitude", delay_s=-gyro_delay).told(finding, "It is set right before the balance"),), ()
 
 
 def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepair | None:
@@ -150,17 +115,17 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
     delay = float(np.median(told))
     if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(told) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
         return None
-    finding = Finding(
-        f"the rotor speeds are {'late' if delay > 0 else 'early'} by {abs(1000 * delay):.0f} ms, judged by the "
-        "gyroscope",
-        "mend their clock in the log",
-        ("rotors", "gyroscope"),
-        delay,
-        "s",
-        contradiction=False,
-        repairable=True,
-    )
+    what, remedy = f"the rotor speeds are {_way(delay)}, judged by the gyroscope", "mend their clock in the log"
+    finding = _late(what, remedy, ("rotors", "gyroscope"), delay)
     return ChannelRepair("rotor_speed", delay_s=delay).told(finding, "They are set right before the balance")
+
+
+def _way(delay: float) -> str:
+    return f"{'late' if delay > 0 else 'early'} by {abs(1000 * delay):.0f} ms"
+
+
+def _late(what: str, remedy: str, channels: tuple[str, ...], delay: float) -> Finding:
+    return Finding(what, remedy, channels, delay, "s", contradiction=False, repairable=True)
 
 
 def _shifts(signals: Signals, part: slice, windows: Windows) -> Iterator[float]:
@@ -218,7 +183,7 @@ def _delay(signals: Signals, part: slice, windows: Windows) -> float | None:
     assert torque is not None, "rotors turn"
     if motion is None:
         return None
-    delays = np.linspace(-_LONGEST_S, _LONGEST_S, _STEPS)
+    delays = np.linspace(-LONGEST_DELAY_S, LONGEST_DELAY_S, _STEPS)
     explained = np.array([_explained(windows.average(shifted(torque[part], time, -each)), motion) for each in delays])
     best = int(np.argmax(explained))
     if explained[best] < _SMALLEST_R2 or best in (0, _STEPS - 1):

@@ -55,3 +55,9 @@ def contradictions(findings: Iterable[Finding]) -> tuple[str, ...]:
 def doubts(findings: Iterable[Finding]) -> tuple[str, ...]:
     """Give the sentences of the others."""
     return tuple(finding.sentence for finding in findings if not finding.contradiction)
+
+
+def joined(words: Iterable[str]) -> str:
+    """List words, each once."""
+    *most, last = dict.fromkeys(words)
+    return f"{', '.join(most)} and {last}" if most else last

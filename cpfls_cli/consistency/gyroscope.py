@@ -16,21 +16,18 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.hooks import FaultFit
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.weak_form.resampling import blocks_of, folds
+from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of, folds
 from cpfls_cli.weak_form.windows import Windows
 
 FEWEST_BLOCKS = 7
 """Blocks below which a jackknife says too little about significance of one in a thousand."""
-_BLOCK_S = 4.0
-_SHORTEST_BLOCK_S = 1.5
-_WANTED_BLOCKS = 8
-_SCAN_STEP_S = 0.005
-_ROUNDS = 4
+# Short flights are cut into so many blocks, but into none that knows its neighbour.
+_WANTED_BLOCKS, _SHORTEST_BLOCK_S = 8, 1.5
+# A coarse delay that Gauss-Newton steps refine, and how many: the last one changes nothing.
+_SCAN_STEP_S, _ROUNDS = 0.005, 4
 # A rate about an axis counts as excited from this multiple of the variance of what is left; below it, noise of the
 # gyroscope would pull its scale by more than a tenth.
 _EXCITED = 10.0
-
-
 _NUMBERS = {"bias": slice(0, 3), "scale": slice(3, 6), "misalignment": slice(6, 9), "delay": slice(12, 13)}
 LONGEST_DELAY_S = 0.1
 """Longest shift between gyroscope and attitude that is looked for, s; a log beyond that is broken, not late."""
@@ -179,7 +176,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
 
 def _blocks(index: IntArray, centres: Array) -> IntArray:
     whole = sum(float(np.ptp(centres[index == flight])) for flight in np.unique(index))
-    return blocks_of(index, centres, min(_BLOCK_S, max(_SHORTEST_BLOCK_S, whole / _WANTED_BLOCKS)))
+    return blocks_of(index, centres, min(BLOCK_S, max(_SHORTEST_BLOCK_S, whole / _WANTED_BLOCKS)))
 
 
 def _columns(excited: BoolArray) -> IntArray:

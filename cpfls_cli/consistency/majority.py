@@ -12,28 +12,38 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.consistency.axes import AXES
-from cpfls_cli.consistency.findings import Finding
-from cpfls_cli.consistency.motion import ANOTHER_NORTH, KEYS, NAMES, TURNED_RAD, PairCheck, by_thrust, checked
+from cpfls_cli.consistency.findings import Finding, joined
+from cpfls_cli.consistency.motion import ANOTHER_NORTH, KEYS, NAMES, TINY, TURNED_RAD, PairCheck, by_thrust, checked
 from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
+from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows
 
+# Channels that are mended one after the other: there are no more.
 _ROUNDS = 3
+# Parts of the flights whose scatter says whether a reading surely fits better, and by how many standard errors.
 _PARTS, _SIGMAS = 16, 4.0
-_TINY = 1e-100
+# Below this a vehicle hovers, and noise points anywhere.
 _MOVES_M_S2 = 0.1
 # Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
 # and more along z.
 _TOGETHER, _APART, _REVERSED = 0.8, 0.5, 0.6
 _MENDED = ("velocity", "acceleration", "specific_force")
+# Logarithms: of a size that is no unit, and of what a unit may be off by beside a sensor and beside the thrust.
 _SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
-_STANDARD_GRAVITY = 9.80665
 _UNITS: Mapping[str, Mapping[str, float]] = {
     "velocity": {"km/h": 1 / 3.6, "ft/s": 0.3048, "cm/s": 0.01, "mm/s": 0.001},
-    "acceleration": {"g": _STANDARD_GRAVITY, "ft/s^2": 0.3048, "cm/s^2": 0.01, "mm/s^2": 0.001, "mg": 0.00980665},
+    "acceleration": {
+        "g": STANDARD_GRAVITY,
+        "ft/s^2": 0.3048,
+        "cm/s^2": 0.01,
+        "mm/s^2": 0.001,
+        "mg": STANDARD_GRAVITY / 1000,
+    },
 }
+# Share of a channel that other axes have to explain.
 _EXPLAINED = 0.8
 _FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
 
@@ -223,7 +233,7 @@ def _off_the_thrust(flights: Sequence[Signals], channel: str, windows: Windows) 
     if len(velocities) == len(flights):
         speed = np.concatenate([windows.average(velocity) for velocity in velocities])
         speed = speed - speed.mean(axis=0)
-        rest = rest - speed * ((rest * speed).sum(axis=0) / np.maximum((speed**2).sum(axis=0), _TINY))
+        rest = rest - speed * ((rest * speed).sum(axis=0) / np.maximum((speed**2).sum(axis=0), TINY))
     return np.asarray((rest**2).sum(axis=1))
 
 
@@ -245,7 +255,7 @@ def _witnesses(checks: Sequence[PairCheck], channel: str) -> list[str]:
 
 def _readings(channel: str) -> Iterator[tuple[ChannelRepair, tuple[str, ...]]]:
     """List the ways to read a channel, the nearest to what it is called first; as it is says nothing."""
-    gravity, plain = _STANDARD_GRAVITY, ChannelRepair(channel)
+    gravity, plain = STANDARD_GRAVITY, ChannelRepair(channel)
     yield plain, ()
     if channel == "specific_force":
         axes = {"": np.eye(3), "has its sign reversed": -np.eye(3), "has y and z reversed": _FORWARD_LEFT_UP}
@@ -330,7 +340,7 @@ def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Tuned:
     if repair.channel != "specific_force":
         should, reading = should - should.mean(axis=0), reading - reading.mean(axis=0)
     squares = np.array([(should**2).sum(), (reading**2).sum()])
-    if squares.min() < _TINY:
+    if squares.min() < TINY:
         return repair, ()
     size = float(np.sqrt(squares[0] / squares[1]))
     # Noise on one side makes its size too large, by no more than the correlation tells.
@@ -346,7 +356,7 @@ def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Tuned:
 
 def _correlation(should: Array, reading: Array) -> float:
     both = float((should * reading).sum())
-    return float(np.clip(abs(both) / np.sqrt((should**2).sum() * (reading**2).sum() + _TINY), 0.1, 1.0))
+    return float(np.clip(abs(both) / np.sqrt((should**2).sum() * (reading**2).sum() + TINY), 0.1, 1.0))
 
 
 def _with_turn(repair: ChannelRepair, check: PairCheck) -> _Tuned:
@@ -365,11 +375,6 @@ def _with_delay(repair: ChannelRepair, check: PairCheck) -> _Tuned:
     return (replace(repair, delay_s=repair.delay_s + late) if check.pair.exact else repair), ()
 
 
-def _joined(words: Sequence[str]) -> str:
-    *most, last = dict.fromkeys(words)
-    return f"{', '.join(most)} and {last}" if most else last
-
-
 def _told(
     repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str], checks: Sequence[PairCheck]
 ) -> tuple[ChannelRepair, ...]:
@@ -378,7 +383,7 @@ def _told(
     clock = [f"is {way} by {abs(1000 * repair.delay_s):.0f} ms"] if repair.delay_s else []
     who = f"the {NAMES[repair.channel]}" if not others else "the world of velocity and position"
     finding = Finding(
-        f"{who} {_joined([*what, *clock])}, judged by the {_joined(witnesses)}",
+        f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}",
         f"mend the log, or {KEYS[repair.channel]}",
         (NAMES[repair.channel], *witnesses),
         contradiction=bool(what),
@@ -394,7 +399,7 @@ def _left_out(channel: str, witnesses: Sequence[str]) -> ChannelRepair:
         "specific_force": "the force comes from other channels, if there are any",
     }[channel]
     finding = Finding(
-        f"the {NAMES[channel]} contradicts the {_joined(witnesses)}, and neither unit, gravity, axes nor delay "
+        f"the {NAMES[channel]} contradicts the {joined(witnesses)}, and neither unit, gravity, axes nor delay "
         "explains it",
         f"check {KEYS[channel]}",
         (NAMES[channel], *witnesses),

@@ -10,29 +10,27 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
-from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.consistency.findings import Finding, joined
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.weak_form.resampling import blocks_of
+from cpfls_cli.weak_form.resampling import BLOCK_S, blocks_of
 from cpfls_cli.weak_form.windows import Windows
 
-_SCALE_OFF = 0.2
-_GRAVITY_OFF_M_S2 = 3.0
-# Model and vehicle may differ by a missing effect; only what no effect does counts against the thrust.
-_THRUST_OFF = 1.0
+# Filters and drag make a fifth; a third of gravity is neither a bias nor a tilt of a sensor.
+_SCALE_OFF, _GRAVITY_OFF_M_S2 = 0.2, 3.0
 # From here on a delay costs more force than noise does, and a turn more than the mounting of a sensor.
 _DELAY_OFF_S = 0.005
 TURNED_RAD = np.radians(3.0)
 # A jackknife over few blocks has heavy tails.
 _SIGMAS = 6.0
-_BLOCK_S = 4.0
 ANOTHER_NORTH = np.radians(20.0)
 """Turn about the vertical from which on a world has another north; 23 real flights are turned by 4 degrees at most."""
 
-_TOGETHER = 0.5
-_ALIKE = 1.05
+# Share of what moves in both that agreement asks for, and the ratio within which scales of axes are one.
+_TOGETHER, _ALIKE = 0.5, 1.05
 _LENGTHS = {"mm": 0.001, "cm": 0.01, "ft": 0.3048}
 """Metres of units of length that a position is logged in."""
-_TINY = 1e-100
+TINY = 1e-100
+"""Square of what does not move."""
 
 
 class ChannelMatch(NamedTuple):
@@ -198,7 +196,7 @@ def _checked(pair: _Pair, flights: Sequence[Signals], windows: Windows) -> PairC
         return None
     first, second, change = (np.concatenate(part) for part in zip(*(row for _, row in rows), strict=True))
     index = np.repeat(np.arange(len(rows)), [len(row[0]) for _, row in rows])
-    block = blocks_of(index, np.concatenate([windows.centres(signals.time) for signals, _ in rows]), _BLOCK_S)
+    block = blocks_of(index, np.concatenate([windows.centres(signals.time) for signals, _ in rows]), BLOCK_S)
     a, b, slope = (part - part.mean(axis=0) for part in (first, second, change))
     matches = tuple(_matches(pair.words, a, b, slope, second.mean(axis=0) - first.mean(axis=0)))
     delay = _ratio(((a - b) * slope).sum(axis=1), (slope**2).sum(axis=1), block)
@@ -252,11 +250,11 @@ def _in_body(name: str, signals: Signals, windows: Windows) -> tuple[Array, Arra
 
 def _matches(name: str, a: Array, b: Array, slope: Array, offset: Array) -> Iterator[ChannelMatch]:
     shared, first, second = ((x * y).sum(axis=0) for x, y in ((a, b), (a, a), (b, b)))
-    moves = (first > _TINY) & (second > _TINY)
+    moves = (first > TINY) & (second > TINY)
     # Noise on either side pulls one regression down and the other up; their geometric mean lies between.
     scale = np.sign(shared) * np.sqrt(np.divide(second, first, out=np.zeros(3), where=moves))
     r2 = np.divide(shared**2, first * second, out=np.zeros(3), where=moves)
-    delay = ((a - b) * slope).sum(axis=0) / np.maximum((slope**2).sum(axis=0), _TINY)
+    delay = ((a - b) * slope).sum(axis=0) / np.maximum((slope**2).sum(axis=0), TINY)
     for i, axis in enumerate(AXES):
         yield ChannelMatch(name, axis, float(scale[i]), float(r2[i]), float(delay[i]), float(offset[i]))
 
@@ -277,7 +275,8 @@ def _problems(
     if frames:
         yield from frames
         return
-    allowed = _SCALE_OFF if pair.exact else _THRUST_OFF
+    # Model and vehicle may differ by a missing effect; only what no effect does counts against the thrust.
+    allowed = _SCALE_OFF if pair.exact else TWICE - 1
     off = [each for each in matches if each.r2 > SAME**2 and _scale_off(each, allowed)]
     scales = [each.scale for each in off]
     if off and 0 < max(scales) < _ALIKE * min(scales):
@@ -299,11 +298,9 @@ def _problems(
 
 
 def _of_scale(pair: _Pair, axes: Sequence[str], scale: float) -> Finding:
-    *most, last = axes
-    along = f"{', '.join(most)} and {last}" if most else last
     unit = next((unit for unit, metres in _LENGTHS.items() if 1 / _ALIKE < scale / metres < _ALIKE), "")
     asked = f": is the position in {unit}" if unit and pair.first == "position" else ""
-    what = f"the scales of {pair.words} along {along} differ by a factor of {scale:#.3g}{asked}"
+    what = f"the scales of {pair.words} along {joined(axes)} differ by a factor of {scale:#.3g}{asked}"
     return Finding(what, pair.remedy, pair.channels, scale, contradiction=not 1 / TWICE < scale < TWICE)
 
 

@@ -11,6 +11,18 @@ from tests.builders.vehicle_search import left_out
 
 NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.02, "position": 0.005, "rotor_speed": 1.0}
 SEARCH = {"search_windows": 20, "folds": 2, "generations": 0, "population": 2, "horizon_s": 0.2}
+LEARNED = {
+    "consequents": "seesaw",
+    "products": "additive",
+    "membership_functions": 3,
+    "base": "rigid-body",
+    "population": 4,
+    "generations": 1,
+    "subpopulations": 1,
+    "local_search": {"enabled": False},
+    "training_share": 0.6,
+    "validation": {"structures": False, "draws": 20, "windows": 20, "horizon_samples": 20},
+}
 UPSIDE_DOWN = "the vehicle hangs upside down on average"
 TRIED = ("linear_damping",)
 
@@ -70,6 +82,7 @@ def config_of(folder):
         "vehicle": vehicle,
         "import": {"time_column": "t", "signals": signals, "torque_source": "rotor-speed"},
         "gap": {"shifts": 39},
+        "identification": LEARNED,
         "playback": {**SEARCH, "leave_out": left_out(TRIED)},
     }
     path = folder / "quad.yaml"

@@ -74,12 +74,31 @@ def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
     assert wrong.words in summary["contradictions"][0]
 
 
-def test_replay_and_predict_say_it_first(logs, tmp_path):
+def test_replay_says_it_first(logs, tmp_path):
     wrong = WRONG["ENU declared NED"]
     config, (first, _) = logs(wrong.sign)
     replayed = run("replay", config, "vehicle", first, "-o", tmp_path / "r.h5", "--every", "50", *asked(wrong))
     assert replayed.exit_code == 0, replayed.stderr
     assert replayed.stdout.startswith(f"REPLAY: {SAID}{first.name}: by its attitude {wrong.words}")
+
+
+def test_a_model_identified_in_it_is_not_to_be_used_and_predict_says_it_first(logs, tmp_path):
+    wrong = WRONG["gyroscope mirrored about x"]
+    flights = {}
+    for name, sign in (("wrong", wrong.sign), ("right", (1.0, 1.0, 1.0))):
+        config, (first, _) = logs(sign)
+        flight, model = tmp_path / f"{name}.h5", tmp_path / f"{name}-model.h5"
+        assert run("import", config, first, "-o", flight).exit_code == 0
+        verdict = told("identify", config, flight, "-o", model)["verdict"]
+        predicted = told("predict", config, model, flight, "-o", tmp_path / f"{name}-prediction.h5")
+        flights[name] = (verdict, predicted["contradictions"])
+    verdict, contradictions = flights["wrong"]
+    assert verdict["label"] == "do-not-use"
+    assert verdict["reasons"][0]["text"].startswith("the log contradicts itself: wrong.h5: about body x (roll)")
+    assert wrong.words in contradictions[0]
+    verdict, contradictions = flights["right"]
+    assert not any("contradicts" in reason["text"] for reason in verdict["reasons"])
+    assert contradictions == []
 
 
 def test_the_right_log_keeps_its_verdicts(logs, tmp_path):

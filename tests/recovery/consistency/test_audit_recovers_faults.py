@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.consistency.audit import audit
+from cpfls_cli.consistency.sensors import sensors_of
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight, faulty_flights
 
@@ -43,11 +44,16 @@ def _own(faults, name):
     return truth(faults)[start : start + 3 if start < 12 else 13]
 
 
+def fit_of(flights, through=WINDOWS):
+    return sensors_of(flights, through).gyroscope.fit
+
+
 def test_all_faults_at_once_come_back_within_a_few_standard_errors():
-    found = audit(faulty_flights(np.random.default_rng(2), ALL, level=LEVELS["mid"]), WINDOWS)
-    assert len(found.named) == 4
-    apart = np.abs(found.gyro.value - truth(ALL))
-    assert np.all(apart < 4 * found.gyro.error + found.gyro.pull)
+    made = faulty_flights(np.random.default_rng(2), ALL, level=LEVELS["mid"])
+    assert len(audit(made, WINDOWS).named) == 4
+    fit = fit_of(made)
+    apart = np.abs(fit.value - truth(ALL))
+    assert np.all(apart < 4 * fit.error + fit.pull)
     assert np.all(apart[:3] < 0.0005)
     assert np.all(apart[3:12] < 0.0015)
     assert apart[12] < 0.0002
@@ -55,7 +61,7 @@ def test_all_faults_at_once_come_back_within_a_few_standard_errors():
 
 def test_without_noise_the_faults_are_exact_at_any_tilt():
     made = faulty_flights(np.random.default_rng(3), ALL, amplitude=(1.0, 0.4, 2.0))
-    value = audit(made, WINDOWS).gyro.value
+    value = fit_of(made).value
     np.testing.assert_allclose(value, truth(ALL), atol=2e-5)
 
 
@@ -65,7 +71,7 @@ def test_nothing_wrong_names_nothing(level, coloured):
     for seed in range(5):
         made = faulty_flights(np.random.default_rng(seed), Faults(), level=LEVELS[level], coloured=coloured)
         found = audit(made, WINDOWS)
-        assert (names(found), found.warnings) == (set(), ())
+        assert (names(found), found.warnings, found.contradictions) == (set(), (), ())
 
 
 @pytest.mark.parametrize("faults", [Faults(), Faults(scale=np.full(3, 0.05), misalignment=np.full(3, 0.05))])
@@ -104,7 +110,7 @@ def test_biases_that_differ_between_flights_are_mentioned():
     rng = np.random.default_rng(8)
     made = [faulty_flight(rng, Faults(bias=np.array([0, b, 0])), level=LEVELS["mid"]) for b in (0.0, 0.01, 0.02)]
     found = audit(made, WINDOWS)
-    np.testing.assert_allclose(found.gyro.flight_bias[:, 1], [-0.01, 0.0, 0.01], atol=0.0008)
+    np.testing.assert_allclose(fit_of(made).flight_bias[:, 1], [-0.01, 0.0, 0.01], atol=0.0008)
     assert any("differs between flights" in note for note in found.notes)
 
 
@@ -113,4 +119,4 @@ def test_other_sampling_rates(period):
     made = faulty_flights(np.random.default_rng(9), Faults(delay=0.012), level=LEVELS["mid"], period=period)
     found = audit(made, windows(period, 0.4, 0.5))
     assert names(found) == {"channel_delay"}
-    assert found.gyro.value[12] == pytest.approx(0.012, abs=0.0005)
+    assert fit_of(made, windows(period, 0.4, 0.5)).value[12] == pytest.approx(0.012, abs=0.0005)
