@@ -137,9 +137,7 @@ def refine(problem: Problem, genes: IntArray, products: Products, evaluations: i
     for _ in range(evaluations - 1):
         linear = linear or problem.linearised(best)
         weights = best.genes / LARGEST_GENE
-        low = _KEPT * weights
-        step = damped_step(*linear, damping, low - weights, 1.0 - weights)
-        tried = encode(np.clip(weights + step, low, 1.0))
+        tried = encode(stepped(weights, *linear, damping))
         if np.array_equal(tried, best.genes):
             break
         found = problem.solver.products(decode(structure, tried.astype(float)))
@@ -158,6 +156,13 @@ def _changed(before: Point, after: Point, normal: Array, gradient: Array) -> flo
     promised = -float(2.0 * gradient @ step + step @ normal @ step)
     came = before.square - after.square
     return _LOWER if came > _TRUSTED * promised else _RAISE if came < _DISTRUSTED * promised else 1.0
+
+
+def stepped(weights: Array, normal: Array, gradient: Array, damping: float) -> Array:
+    """Take a damped step of weights, shape (genes,), on [0, 1], as is what they become; see `damped_step`."""
+    low = _KEPT * weights
+    step = damped_step(normal, gradient, damping, low - weights, 1.0 - weights)
+    return np.clip(weights + step, low, 1.0)
 
 
 @dataclass(frozen=True)
