@@ -7,10 +7,16 @@ from pathlib import Path
 
 from cpfls_cli.artifacts.job import Job, check_outputs, take_inputs
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.errors import InputError
+from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.consistency.findings import contradictions
+from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.proposal import KnownLog, known_log, propose
+from cpfls_cli.flights.imported import imported
+from cpfls_cli.flights.recordings import check_flight, read_import
 from cpfls_cli.logs.formats import log_contents
-from cpfls_cli.pages.proposal import Stated, answer, config_text, summary
+from cpfls_cli.pages.proposal import Stated, answer, asked_keys, config_text, summary
+from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.report.content import Text
 from cpfls_cli.report.outcome import Outcome
 
 
@@ -38,9 +44,33 @@ def run(job: Job, logs: Sequence[Path], stated: Stated) -> Outcome:
         job.progress(number, len(logs), log.name)
         known.append(_known(log))
     proposal = propose(known, stated.mass_kg, stated.arm_m)
+    text, output = config_text(proposal, stated), str(job.output)
+    wrong = _contradictions(text, logs[0], whole=not asked_keys(proposal, stated))
     if not job.dry_run:
-        write_text(job.output, config_text(proposal, stated))
-    return Outcome(summary(proposal, stated, str(job.output)), tuple(answer(proposal, stated, str(job.output))))
+        write_text(job.output, text)
+    said = (Text(contradicted(each), "warning") for each in wrong)
+    told = summary(proposal, stated, output) | {"contradictions": list(wrong)}
+    return Outcome(told, (*said, *answer(proposal, stated, output)))
+
+
+def _contradictions(text: str, log: Path, *, whole: bool) -> tuple[str, ...]:
+    """Read the leading log by the config that is proposed, and say what of it contradicts itself then.
+
+    Parameters
+    ----------
+    whole : bool
+        Whether the config states its vehicle; else motion alone is held against motion.
+    """
+    data = parse_config(text, "the config that is proposed")
+    if not whole:
+        data = {"import": data["import"] | {"torque_source": None}}
+    try:
+        study = validate(data, "the config that is proposed")
+        flight = read_import(log.name, [imported(log, study)], study)
+    except CpflsError:
+        # What does not import is for the person who fills it in; the import says why.
+        return ()
+    return contradictions(finding.of(log.name) for finding in check_flight(flight, study, driven=whole))
 
 
 def _known(log: Path) -> KnownLog:

@@ -6,6 +6,7 @@ import pytest
 
 from cpfls_cli.artifacts.store import read_record
 from cpfls_cli.artifacts.vehicle_model import VehicleRecord
+from cpfls_cli.commands.init import _contradictions as of_proposal
 from tests.builders.command_line import run, undrawn
 from tests.builders.wrong_logs import WRONG, config_of, log_of
 
@@ -109,3 +110,11 @@ def test_the_right_log_keeps_its_verdicts(logs, tmp_path):
     assert (found["verdict"], found["contradictions"]) == ("good-for-simulation", [])
     replayed = told("replay", config, "vehicle", first, "-o", tmp_path / "replay.h5", "--every", "50")
     assert replayed["contradictions"] == []
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_init_reads_the_log_by_what_it_proposes(logs, whole):
+    mirrored, right = WRONG["gyroscope mirrored about x"].sign, (1.0, 1.0, 1.0)
+    for sign, said in ((mirrored, 1), (right, 0)):
+        config, (first, _) = logs(sign)
+        assert len(of_proposal(config.read_text(), first, whole=whole)) == said
