@@ -13,6 +13,7 @@ from cpfls_cli.lag import Numbers, delayed, lagged
 Hold = Literal["linear", "previous"]
 
 _SHORTEST_S = 1e-5
+"""Lag below which a held speed jumps: a hundredth of the shortest sample."""
 
 
 @dataclass(frozen=True, kw_only=True)

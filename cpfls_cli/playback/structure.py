@@ -26,8 +26,13 @@ from cpfls_cli.rounding import ascending, at_most, less, smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _SEARCH_STEPS, _SEARCH_TOLERANCE = 12, 1e-3
+"""Of the fits that structures are compared by: a tenth of what is worth a name is close enough."""
+
 _STEPS, _TOLERANCE = 60, 3e-5
+"""Of the fit that is kept."""
+
 _FEWEST_BLOCKS = 8
+"""Pieces of the flights kept aside whose errors are compared: fewer say little of their scatter."""
 _UNSEEN = 3.0
 """How many times as fast about an axis a part turns, at least, that is nothing like the others."""
 
@@ -38,6 +43,7 @@ _VISIBLE_OF_STAYS = 0.002
 """Most that is asked of a name, as a share of the error of "rate stays"."""
 
 _HALF = 2**15
+"""Of a gene, from which on a block is in."""
 
 
 class Rules(NamedTuple):

@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.inertia import beyond_any_body
-from cpfls_cli.playback.fit import AnyLayout, Fitted, Uncertainty, uncertainty
+from cpfls_cli.playback.fit import BLOCKS, AnyLayout, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointLayout
 from cpfls_cli.playback.model import VehicleModel, wrench_of
@@ -31,7 +31,10 @@ _OF_TURNING = ("inertia.", "products.", "drag_factor")
 """Numbers that are known only as far as the torques are that turn the vehicle."""
 
 _AT_BOUND = 1e-6
+"""Natural sizes from a bound up to which a number lies on it: the fit puts it there to rounding."""
+
 _STEP = 1e-5
+"""Of central differences, in natural sizes."""
 
 
 class FoundNumber(NamedTuple):
@@ -224,9 +227,6 @@ def carrying_weight(
     return replace(vehicle, rotors=rotors, unknown=unknown), () if sensed is None else (sensed,)
 
 
-_FORCE_BLOCKS = 30
-
-
 def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> FoundNumber | None:
     """Regress mass times specific force along z on the squared speeds, with an interval from blocks left out."""
     products, squares = [], []
@@ -235,7 +235,7 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
             return None
         lift = (flight.speed**2).sum(axis=1)
         force = vehicle.mass_kg * flight.specific_force[:, 2]
-        count = max(2, _FORCE_BLOCKS // len(flights))
+        count = max(2, BLOCKS // len(flights))
         products += [part.sum() for part in np.array_split(lift * force, count)]
         squares += [part.sum() for part in np.array_split(lift**2, count)]
     above, below = np.array(products), np.array(squares)
