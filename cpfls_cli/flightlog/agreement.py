@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import permutations, product
 from typing import Final
@@ -44,6 +45,9 @@ class AxisFit:
         The same of the next best axes.
     as_named : float
         The same of the axes in their order, with a plus.
+    along : tuple of float
+        Correlation with the reference along each of its axes, in that order and with those signs; nan where one of the
+        two does not move.
     """
 
     order: tuple[int, int, int]
@@ -52,6 +56,7 @@ class AxisFit:
     explained: float
     runner_up: float
     as_named: float
+    along: tuple[float, float, float]
 
     @property
     def is_as_named(self) -> bool:
@@ -88,7 +93,7 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
     power = float((reference**2).sum())
     total = float((measured**2).sum())
     if power == 0.0 or total == 0.0:
-        return AxisFit((0, 1, 2), (1.0, 1.0, 1.0), float("nan"), 0.0, 0.0, 0.0)
+        return AxisFit((0, 1, 2), (1.0, 1.0, 1.0), float("nan"), 0.0, 0.0, 0.0, (float("nan"),) * 3)
     together = {
         (order, sign): sum(sign[axis] * cross[order[axis], axis] for axis in range(3)) for order, sign in _SIGNED_AXES
     }
@@ -104,6 +109,8 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
     # Noise in the reference makes the regression's gain small, that of the spreads does not.
     gain = float(np.sqrt(total / power)) if explained[best] > 0.2 else together[best] / power
     order, sign = best
+    sizes = np.sqrt((reference**2).sum(axis=0) * (measured**2).sum(axis=0)[list(order)])
+    along = [float(sign[i] * cross[order[i], i] / sizes[i]) if sizes[i] > 0 else float("nan") for i in range(3)]
     return AxisFit(
         (order[0], order[1], order[2]),
         (sign[0], sign[1], sign[2]),
@@ -111,6 +118,7 @@ def fit_axes(reference: Array, measured: Array) -> AxisFit:
         float(explained[best]),
         float(runner_up),
         float(explained[named]),
+        (along[0], along[1], along[2]),
     )
 
 
@@ -163,33 +171,32 @@ def fit_rates(rotation: Rotation, measured: Array, rate_hz: float) -> AxisFit | 
 
 
 @dataclass(frozen=True)
-class TiltFit:
-    """How the acceleration over ground follows the tilt of a body.
+class LeanFit:
+    """How the acceleration over ground follows the lean of a body.
 
     Attributes
     ----------
-    body : {"FLU", "FRD"}
-        Whether the body's third axis points up or down.
-    order : tuple of int
-        Which column of the position is the first and the second axis of the attitude's world.
-    sign : tuple of float
-        Of those columns and of the third.
+    shares : mapping from (order, sign) to float
+        Share of the acceleration that the lean explains, if these columns of the position with these signs are the
+        first two axes of the attitude's world, and the thrust points along the body's third axis.
+    rises : float
+        1 where the position's third column grows with the lift, -1 where it falls, 0 where that cannot be told.
     gain : float
-        Acceleration over what the tilt makes of gravity, 1 where the units agree.
-    explained, runner_up : float
-        Share of the acceleration that the tilt explains, and that of the next best frames.
+        Acceleration over what the lean makes of gravity, 1 where the units agree.
     """
 
-    body: str
-    order: tuple[int, int]
-    sign: tuple[float, float, float]
+    shares: Mapping[tuple[tuple[int, int], tuple[float, float]], float]
+    rises: float
     gain: float
-    explained: float
-    runner_up: float
+
+    @property
+    def explained(self) -> float:
+        """The largest of the shares."""
+        return max(self.shares.values())
 
 
-def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Array | None = None) -> TiltFit:
-    """Find out from tilt and acceleration whether body z points up or down, and how the world's axes lie.
+def fit_lean(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Array | None = None) -> LeanFit:
+    """Hold the acceleration over ground against the lean of a body in every order and with every sign of the columns.
 
     A multirotor accelerates where its thrust leans: over the ground by ``g b_xy / b_z`` with the direction b of thrust
     in the world, which is the body's third axis where that points up and its opposite where it points down.
@@ -199,8 +206,7 @@ def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Arra
     acceleration : array, shape (time, 3)
         Second derivative of the position, in any unit.
     lift : array, shape (time,), or None
-        What grows with the thrust: with it the position's third axis is known to point up or down, and a body that
-        looks like another one in a world that is turned round is told from that.
+        What grows with the thrust.
     """
     axis = rotation.as_matrix()[:, :, 2]
     upright = np.where(np.abs(axis[:, 2:]) < 0.2, 0.2, axis[:, 2:])
@@ -209,40 +215,23 @@ def fit_tilt(rotation: Rotation, acceleration: Array, rate_hz: float, lift: Arra
     lean, ground = lean - lean.mean(axis=0), ground - ground.mean(axis=0)
     power, total = float((lean**2).sum()), float((ground**2).sum())
     cross = ground.T @ lean
-    results = {}
-    for body, up in (("FLU", 1.0), ("FRD", -1.0)):
-        for order in ((0, 1), (1, 0)):
-            for sign in product((1.0, -1.0), repeat=2):
-                handed = sign[0] * sign[1] * (1.0 if order == (0, 1) else -1.0)
-                together = up * sum(sign[i] * cross[order[i], i] for i in range(2))
-                results[(body, order, (*sign, handed))] = together
-    rises = 0.0 if lift is None else _rises(axis[:, 2], acceleration[:, 2], lift * np.abs(axis[:, 2]), rate_hz)
-    if rises:
-        # The attitude's third axis of the world points up where that of the body does, as the vehicle is level.
-        results = {key: own for key, own in results.items() if rises * key[2][2] == (1.0 if key[0] == "FLU" else -1.0)}
-    scale = power * total
-    explained = {key: (max(value, 0.0) ** 2 / scale if scale else 0.0) for key, value in results.items()}
-    # A turn of the world by half a turn looks like the other body frame: of the two the one as named is taken.
-    best = max(explained, key=lambda key: (round(explained[key], 2), key[1] == (0, 1), sum(key[2][:2])))
-    others = [value for key, value in explained.items() if explained[key] < explained[best] - 1e-9]
-    body, order, sign = best
-    return TiltFit(
-        body,
-        (order[0], order[1]),
-        (sign[0], sign[1], sign[2]),
-        float(np.sqrt(total / power)) if power else float("nan"),
-        float(explained[best]),
-        float(max(others, default=0.0)),
-    )
+    shares = {}
+    for order in ((0, 1), (1, 0)):
+        for first, second in product((1.0, -1.0), repeat=2):
+            together = first * cross[order[0], 0] + second * cross[order[1], 1]
+            share = max(float(together), 0.0) ** 2 / (power * total) if power * total else 0.0
+            shares[(order, (first, second))] = share
+    rises = 0.0 if lift is None else _rises(acceleration[:, 2], lift * np.abs(axis[:, 2]), rate_hz)
+    return LeanFit(shares, rises, float(np.sqrt(total / power)) if power else float("nan"))
 
 
-def _rises(upright: Array, vertical: Array, lift: Array, rate_hz: float) -> float:
-    """Tell whether what the position's third axis shows grows (1) or falls (-1) with the lift; 0 if neither."""
+def _rises(vertical: Array, lift: Array, rate_hz: float) -> float:
+    """Tell whether a vertical acceleration grows (1) or falls (-1) with the lift; 0 if neither."""
     own, other = (slow(values[:, None], rate_hz)[:, 0] for values in (vertical, lift))
     if own.std() == 0 or other.std() == 0:
         return 0.0
     together = float(np.corrcoef(own, other)[0, 1])
-    return float(np.sign(together) * np.sign(np.median(upright))) if abs(together) > _RISES else 0.0
+    return float(np.sign(together)) if abs(together) > _RISES else 0.0
 
 
 def second_derivative(values: Array, rate_hz: float) -> Array:

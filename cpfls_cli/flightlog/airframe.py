@@ -33,6 +33,9 @@ _TURNS = ("roll", "pitch", "yaw")
 _LEAST_EXPLAINED = 0.05
 _LEAST_OF_BOTH = 0.2
 _LEAST_TIMES = 1.3
+_LEAST_OF_MEAN = 0.2
+"""How much a rotor by itself has to push as the layout has it, as a part of what they do on the mean."""
+
 _PREFER_X = 1.3
 """Few vehicles are a plus: one has to explain that much more than an X."""
 
@@ -80,6 +83,11 @@ class Airframe:
     reason: str
     sure: str
     moment_ratio_m: float | None = None
+
+    @property
+    def is_guess(self) -> bool:
+        """Whether other places, or other ways to turn, are not ruled out."""
+        return self.sure == "guess"
 
     def with_arm(self, arm_m: float) -> Airframe:
         """Give the same rotors at a distance from the middle; the mean distance where they differ."""
@@ -272,10 +280,11 @@ def airframe_from_motion(body_rate: Array, speed: Array, rate_hz: float, is_comm
     moved = [lagged(squared, rate_hz * lag).start for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
     moved += [] if is_command else [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]
     tried = [_shares(acceleration, rate, low_pass(own, rate_hz, cutoff, 2)) for own in moved]
-    shares = max(tried, key=lambda found: max(sum(share) for _, share in found))
+    shares, weights = max(tried, key=lambda found: max(sum(share) for _, share in found[0]))
     layout, explained, clear = _chosen(shares, ("X", "plus"))
     if not clear:
         layout, explained, clear = _chosen(shares, ("X",))
+    clear = clear and _push_alike(layout, weights)
     if sum(explained[:2]) < 2 * _LEAST_EXPLAINED:
         return None
     words = ", ".join(f"{100 * share:.0f} % of {axis}" for share, axis in zip(explained, _TURNS, strict=True))
@@ -296,8 +305,34 @@ def _chosen(
     return layout, explained, clear
 
 
-def _shares(acceleration: Array, rate: Array, squared: Array) -> list[tuple[_Layout, tuple[float, float, float]]]:
-    """Tell of every layout which share of the angular acceleration about each axis it explains."""
+def _push_alike(layout: _Layout, weights: Array) -> bool:
+    """Tell whether every rotor by itself pushes about every axis as the layout has it.
+
+    Columns that are of other moments than those beside them, or of something else than these rotors, may explain a
+    part of the motion in some layout; but then single ones push the wrong way.
+    """
+    alike = _weights(layout) * weights
+    least = _LEAST_OF_MEAN * np.abs(alike).mean(axis=1, keepdims=True)
+    return bool((alike > least)[_weights(layout) != 0].all())
+
+
+def _weights(layout: _Layout) -> Array:
+    """Give what each rotor does about roll, pitch and yaw, array, shape (axis, rotor)."""
+    places = np.array([rotor.direction for rotor in layout.rotors])
+    return np.array([places[:, 1], -places[:, 0], [-float(rotor.spin) for rotor in layout.rotors]])
+
+
+def _shares(
+    acceleration: Array, rate: Array, squared: Array
+) -> tuple[list[tuple[_Layout, tuple[float, float, float]]], Array]:
+    """Tell of every layout which share of the angular acceleration about each axis it explains.
+
+    Returns
+    -------
+    shares : list of (layout, tuple of float)
+    weights : array, shape (axis, rotor)
+        With which each rotor pushes, where no layout ties them together.
+    """
     edge = max(1, len(rate) // 50)
     inner = slice(edge, len(rate) - edge)
     # What turning itself does to the acceleration, and a constant torque, are not the work of the rotors.
@@ -306,14 +341,12 @@ def _shares(acceleration: Array, rate: Array, squared: Array) -> list[tuple[_Lay
     together, own, total = rotors.T @ wanted, rotors.T @ rotors, (wanted**2).sum(axis=0)
     results = []
     for layout in _layouts():
-        places = np.array([rotor.direction for rotor in layout.rotors])
-        weights = (places[:, 1], -places[:, 0], -np.array([float(rotor.spin) for rotor in layout.rotors]))
         shares = []
-        for axis, weight in enumerate(weights):
+        for axis, weight in enumerate(_weights(layout)):
             along, power = float(weight @ together[:, axis]), float(weight @ own @ weight) * float(total[axis])
             shares.append(along**2 / power if along > 0 and power > 0 else 0.0)
         results.append((layout, (shares[0], shares[1], shares[2])))
-    return results
+    return results, np.asarray(np.linalg.lstsq(own, together, rcond=None)[0].T, dtype=float)
 
 
 def thrust_number(mass_kg: float, arm_m: float, speed: Array) -> float:

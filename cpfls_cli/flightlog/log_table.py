@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final, get_args
@@ -17,7 +18,20 @@ from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.units import KNOWN_UNITS, UnitName
 
-_TIME_NAMES = ("t", "time", "time_s", "timestamp", "time_us", "timeus", "time_ms", "stamp", "tick", "seconds", "sec")
+_TIME_NAMES = (
+    "t",
+    "time",
+    "time_s",
+    "timestamp",
+    "time_us",
+    "timeus",
+    "time_ms",
+    "stamp",
+    "tick",
+    "seconds",
+    "sec",
+    "t_s",
+)
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")
 _STEPS_S = (2e-4, 0.5)
@@ -42,7 +56,9 @@ class LogTable:
             raise InputError(
                 f"holds only {max(map(len, topics[''].values()), default=0)} samples, too few for a flight"
             )
-        self.time_column, self.time_unit = _flat_time(topics[""], units) if self.flat else ("", "s")
+        self.time_column, self.time_unit, self.time_doubt = (
+            _flat_time(topics[""], units) if self.flat else ("", "s", None)
+        )
         self.grid = np.empty(0)
 
     def parts(self, column: str) -> tuple[str, str]:
@@ -96,8 +112,8 @@ class LogTable:
         return 1 / float(np.median(np.diff(time))) if len(time) > 2 else 0.0
 
 
-def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str]:
-    """Find the column of stamps: it never falls, and its name or its steps say what it counts.
+def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str, str | None]:
+    """Find the column of stamps: it never falls, and its name or its steps say what it counts; and any doubt of that.
 
     Raises
     ------
@@ -111,18 +127,27 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
             break
         step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
         if name in units:
-            return name, "s"
-        stated = [unit for unit in ("ns", "us", "ms") if name.lower().endswith(unit)]
+            return name, "s", None
+        ending = re.search(r"(?:[_ \[(]|time)([num]?s)[\])]?$", name.lower())
+        stated = [ending[1]] if ending else []
         fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
         if stated or fitting:
-            return name, (stated or fitting)[0]
+            unit = (stated or fitting)[0]
+            return name, unit, _doubt_of_time(name, unit, fitting, step)
     clock = nameless_clock(fields)
     if clock is not None:
-        return clock, "s"
+        return clock, "s", None
     raise InputError(
         "no column of time stamps is recognised: one that rises from row to row and is called t, time or timestamp;"
         " rename it, or write the config by hand (`cpfls config` prints every key)"
     )
+
+
+def _doubt_of_time(name: str, unit: str, fitting: Sequence[str], step: float) -> str | None:
+    """Say what speaks against the unit of stamps; None where nothing does."""
+    if fitting and unit not in fitting:
+        return f"{name} is said to be in {unit}, and its steps of {step:.3g} are those of a flight in {fitting[0]}"
+    return f"{name} rises by 1 from row to row, so it may count rows: is import.time_unit right?" if step == 1 else None
 
 
 def _time_rank(name: str) -> int:

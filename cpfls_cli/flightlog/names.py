@@ -1,16 +1,79 @@
-"""What the names of a log's columns say: columns that belong together, what they may hold, in which unit."""
+"""What the names of a log's columns say: columns that belong together, what they may hold, in which unit.
+
+Three tables say it: `KNOWN`, what kinds of logs call their columns; `MEANINGS`, the words for each signal; and
+`SPELLINGS`, the ways to write a unit into a name. A new log usually takes one row more.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from math import tau
+from typing import Final, Literal, NamedTuple
 
-from cpfls_cli.flightlog.settings import SignalName
-from cpfls_cli.units import UnitName
+from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL, SignalName
+from cpfls_cli.units import KNOWN_UNITS, UnitName
 
 Kind = Literal["xyz", "wxyz", "angles", "numbers", "one"]
+
+
+def _each(words: str) -> frozenset[str]:
+    return frozenset(words.split())
+
+
+class Spelling(NamedTuple):
+    """A unit, the factor that makes it of what is written, and how names write it."""
+
+    unit: UnitName
+    scale: float
+    written: str
+
+
+SPELLINGS: Final = (
+    # "_" and "per" are read as "/", and words in full as their symbols.
+    Spelling("rad/s", 1.0, "rad/s rads radps rads-1"),
+    Spelling("rad/s", 1e-3, "mrad/s mrads mradps"),
+    Spelling("deg/s", 1.0, "deg/s degs degps dps degs-1"),
+    Spelling("deg/s", 1e-3, "mdeg/s mdps"),
+    Spelling("rpm", 1.0, "rpm"),
+    Spelling("rpm", 1e3, "krpm"),
+    Spelling("rad/s", tau, "hz rps rev/s"),
+    Spelling("rad", 1.0, "rad"),
+    Spelling("rad", 1e-3, "mrad"),
+    Spelling("deg", 1.0, "deg"),
+    Spelling("deg", 1e-2, "cdeg centideg"),
+    Spelling("m/s^2", 1.0, "m/s2 m/s/s mps2 ms2 ms-2"),
+    Spelling("g", 1.0, "g"),
+    Spelling("g", 1e-3, "mg"),
+    Spelling("m/s", 1.0, "m/s mps ms-1"),
+    Spelling("mm/s", 1.0, "mm/s mmps"),
+    Spelling("m/s", 1e-2, "cm/s cmps"),
+    Spelling("m/s", 1 / 3.6, "km/h kmh kph"),
+    Spelling("m", 1.0, "m"),
+    Spelling("mm", 1.0, "mm"),
+    Spelling("m", 1e-2, "cm"),
+    Spelling("m", 0.3048, "ft feet"),
+    Spelling("N m", 1.0, "nm n/m"),
+    Spelling("N mm", 1.0, "nmm n/mm"),
+    Spelling("N", 1.0, "n"),
+    Spelling("V", 1.0, "v"),
+    Spelling("V", 1e-3, "mv"),
+    Spelling("1", 1e-2, "pct percent %"),
+    Spelling("us", 1.0, "us usec"),
+)
+_WRITTEN: Final = {text: own for own in SPELLINGS for text in own.written.split()}
+_IN_FULL: Final = {"radians?": "rad", "degrees?": "deg", "met(er|re)s?": "m", "sec(onds?)?": "s", "volts?": "v"}
+_A_WORD: Final = _each("rad rads deg degs dps rpm mm g radps degps mps rads-1")
+"""Spellings that state a unit wherever they stand as a word of a name."""
+
+_IN_RADIANS: Final[Mapping[str, tuple[SignalName, ...]]] = {
+    # An angular frequency by its letter.
+    "w": ("body_rate",),
+    "om": ("body_rate", "rotor_speed", "rotor_command"),
+    "omega": ("body_rate", "rotor_speed", "rotor_command"),
+    "omcmd": ("rotor_command",),
+}
 
 
 @dataclass(frozen=True)
@@ -32,20 +95,37 @@ class ColumnGroup:
     columns: tuple[str, ...]
 
     @property
-    def topic(self) -> str:
-        """What stands before the first dot; empty where the columns are of no topic."""
-        return self.columns[0].partition(".")[0] if "." in self.columns[0] else ""
-
-    @property
-    def unit(self) -> str:
-        """Unit at the end of the name, such as ``rad_s``; empty where there is none."""
-        return next((ending for ending in _UNITS_BY_ENDING if self.pattern.endswith(f"_{ending}")), "")
+    def ending(self) -> str:
+        """The unit at the end of the name or in brackets, as it is written; empty where there is none."""
+        before, star, after = self.pattern.partition("*")
+        bracket = re.search(r"[\[(]([^\[\]()*]*[A-Za-z%][^\[\]()*]*)[\])]$", after if star else before)
+        if bracket:
+            return bracket[0] if _symbols(bracket[1]) in _WRITTEN else ""
+        name = after if any(letter.isalnum() for letter in after) else before.rstrip("[(")
+        # The axis stands before what follows the star, and a letter that stands before the star may be a name.
+        starts = [found.start() for found in re.finditer(r"[_ ]|(?<=[a-z])(?=[A-Z])|^", name)]
+        for start in starts if name is after else starts[1:]:
+            text = name[start:].strip("_ ")
+            if _symbols(text) in _WRITTEN and (name is after or len(text) > 1):
+                return name[start:]
+        return ""
 
     @property
     def words(self) -> tuple[str, ...]:
         """Words of the pattern in lower case, without numbers and without the unit at its end."""
-        named = self.pattern.removesuffix(f"_{self.unit}") if self.unit else self.pattern
-        return tuple(word for word in _words(named) if not word.isdecimal())
+        before, _, after = self.pattern.rpartition(self.ending) if self.ending else (self.pattern, "", "")
+        parts = re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+", f"{before} {after}".replace("*", " "))
+        return tuple(part.lower() for part in parts if not part.isdecimal())
+
+
+def _symbols(text: str) -> str:
+    """Write a unit as `SPELLINGS` do, such as rad/s for rad_per_sec."""
+    text = re.sub(r"([a-z]{2})([A-Z])", r"\1_\2", text.strip("[]()_ ")).lower().replace("²", "2")
+    parts = re.split(r"[/_ .·^]+|(?<=[a-z])per(?=[a-z])", text)
+    for full, symbol in _IN_FULL.items():
+        parts = [symbol if re.fullmatch(full, part) else part for part in parts]
+    joined = "/".join(part for part in parts if part not in ("", "per"))
+    return joined.replace("s/2", "s2").replace("s/-", "s-")
 
 
 @dataclass(frozen=True)
@@ -81,24 +161,19 @@ class Named:
 BY_HAND: Final = "rename them as many logs do (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
 """What to do where names do not tell what columns hold."""
 
-_ANGLES: Final = (
-    ("roll", "pitch", "yaw"),
-    ("phi", "theta", "psi"),
-    ("Roll", "Pitch", "Yaw"),
-    ("R", "P", "Y"),
-    ("p", "q", "r"),
+_FAMILIES: Final[tuple[tuple[Kind, tuple[str, ...]], ...]] = (
+    ("wxyz", ("w", "x", "y", "z")),
+    ("wxyz", ("W", "X", "Y", "Z")),
+    ("xyz", ("x", "y", "z")),
+    ("xyz", ("X", "Y", "Z")),
+    ("xyz", ("N", "E", "D")),
+    ("angles", ("roll", "pitch", "yaw")),
+    ("angles", ("phi", "theta", "psi")),
+    ("angles", ("Roll", "Pitch", "Yaw")),
+    ("angles", ("R", "P", "Y")),
+    ("angles", ("p", "q", "r")),
 )
-_AXES: Final = (("x", "y", "z"), ("X", "Y", "Z"), ("N", "E", "D"))
-_QUATERNIONS: Final = (("w", "x", "y", "z"), ("W", "X", "Y", "Z"))
 _SHORTEST_NUMBERED, _LONGEST_NUMBERED = 3, 16
-_UNITS_BY_ENDING: Final[Mapping[str, Mapping[SignalName, UnitName]]] = {
-    "rad_s": {"body_rate": "rad/s", "rotor_speed": "rad/s", "rotor_command": "rad/s"},
-    "deg_s": {"body_rate": "deg/s"},
-    "m_s2": {"acceleration": "m/s^2"},
-    "m_s": {"velocity": "m/s"},
-    "m": {"position": "m"},
-}
-"""Units as keys of a config end in them, and the signals that have them."""
 
 
 def column_groups(names: Mapping[str, object] | tuple[str, ...]) -> tuple[ColumnGroup, ...]:
@@ -106,22 +181,11 @@ def column_groups(names: Mapping[str, object] | tuple[str, ...]) -> tuple[Column
     known = dict.fromkeys(names)
     # roll, pitch, yaw and p, q, r have one pattern, a star alone, and are two groups.
     found: dict[tuple[str, Kind, tuple[str, ...]], ColumnGroup] = {}
-    for group in (*_of_axes(known), *_numbered(known)):
+    of_axes = (group for name in known for kind, axes in _FAMILIES for group in _from_first(name, known, kind, axes))
+    for group in (*of_axes, *_numbered(known)):
         found.setdefault((group.pattern, group.kind, group.columns), group)
     single = tuple(ColumnGroup(name, "one", (name,)) for name in known)
     return (*found.values(), *single)
-
-
-def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
-    families: tuple[tuple[Kind, tuple[tuple[str, ...], ...]], ...] = (
-        ("wxyz", _QUATERNIONS),
-        ("xyz", _AXES),
-        ("angles", _ANGLES),
-    )
-    for name in names:
-        for kind, family in families:
-            for axes in family:
-                yield from _from_first(name, names, kind, axes)
 
 
 def _from_first(name: str, names: Mapping[str, None], kind: Kind, axes: tuple[str, ...]) -> Iterator[ColumnGroup]:
@@ -156,13 +220,7 @@ def _numbered(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             yield ColumnGroup(pattern, "numbers", tuple(columns[number] for number in numbers))
 
 
-def _words(name: str) -> list[str]:
-    parts = re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+", name.replace("*", " "))
-    return [part.lower() for part in parts]
-
-
-@dataclass(frozen=True)
-class _Known:
+class Known(NamedTuple):
     """Columns that a kind of log is known for, in the order in which they are preferred."""
 
     system: str
@@ -176,149 +234,122 @@ class _Known:
 
 _PX4, _ARDUPILOT, _BETAFLIGHT, _CRAZYFLIE = "PX4", "ArduPilot", "Betaflight", "Crazyflie"
 _KIN: Final = {_ARDUPILOT: ("Ardu",), _BETAFLIGHT: ("INAV", "Cleanflight", "EmuFlight")}
-_KNOWN: Final = (
-    _Known(_PX4, "quaternion", "vehicle_attitude.q[*]", "1", "FRD"),
-    _Known(_PX4, "body_rate", "vehicle_angular_velocity.xyz[*]", "rad/s", "FRD"),
-    _Known(_PX4, "body_rate", "sensor_combined.gyro_rad[*]", "rad/s", "FRD"),
-    _Known(_PX4, "body_rate", "vehicle_attitude.*speed", "rad/s", "FRD"),
-    _Known(_PX4, "acceleration", "sensor_combined.accelerometer_m_s2[*]", "m/s^2", "FRD"),
-    _Known(_PX4, "acceleration", "vehicle_acceleration.xyz[*]", "m/s^2", "FRD"),
-    _Known(_PX4, "position", "vehicle_local_position.*", "m", "NED"),
-    _Known(_PX4, "velocity", "vehicle_local_position.v*", "m/s", "NED"),
-    _Known(_PX4, "rotor_speed", "esc_status.esc[*].esc_rpm", "rpm"),
-    _Known(_PX4, "rotor_command", "actuator_motors.control[*]", "1"),
-    _Known(_PX4, "rotor_command", "actuator_outputs.output[*]", None),
-    _Known(_PX4, "voltage", "battery_status.voltage_v", "V"),
-    _Known(_ARDUPILOT, "attitude", "ATT.*", "deg", "FRD"),
-    _Known(_ARDUPILOT, "body_rate", "IMU.Gyr*", "rad/s", "FRD"),
-    _Known(_ARDUPILOT, "body_rate", "RATE.*", "deg/s", "FRD"),
-    _Known(_ARDUPILOT, "acceleration", "IMU.Acc*", "m/s^2", "FRD"),
-    _Known(_ARDUPILOT, "position", "XKF1.P*", "m", "NED"),
-    _Known(_ARDUPILOT, "position", "NKF1.P*", "m", "NED"),
-    _Known(_ARDUPILOT, "velocity", "XKF1.V*", "m/s", "NED"),
-    _Known(_ARDUPILOT, "velocity", "NKF1.V*", "m/s", "NED"),
-    _Known(_ARDUPILOT, "rotor_command", "RCOU.C*", None),
-    _Known(_ARDUPILOT, "rotor_speed", "ESC[*].RPM", "rpm"),
-    _Known(_ARDUPILOT, "voltage", "BAT.Volt", "V"),
-    _Known(_BETAFLIGHT, "body_rate", "gyroADC[*]", "deg/s", "FLU"),
-    _Known(_BETAFLIGHT, "acceleration", "accSmooth[*]", None, "FLU"),
-    _Known(_BETAFLIGHT, "rotor_command", "motor[*]", None),
-    _Known(_BETAFLIGHT, "rotor_speed", "rpm[*]", "rpm"),
-    _Known(_BETAFLIGHT, "rotor_speed", "eRPM[*]", None),
-    _Known(_BETAFLIGHT, "voltage", "vbatLatest", "V"),
-    _Known(_CRAZYFLIE, "quaternion", "stateEstimate.q*", "1", "FLU"),
-    _Known(_CRAZYFLIE, "attitude", "stabilizer.*", "deg", "FLU"),
-    _Known(_CRAZYFLIE, "attitude", "stateEstimate.*", "deg", "FLU"),
-    _Known(_CRAZYFLIE, "body_rate", "gyro.*", "deg/s", "FLU"),
+KNOWN: Final = (
+    Known(_PX4, "quaternion", "vehicle_attitude.q[*]", "1", "FRD"),
+    Known(_PX4, "body_rate", "vehicle_angular_velocity.xyz[*]", "rad/s", "FRD"),
+    Known(_PX4, "body_rate", "sensor_combined.gyro_rad[*]", "rad/s", "FRD"),
+    Known(_PX4, "body_rate", "vehicle_attitude.*speed", "rad/s", "FRD"),
+    Known(_PX4, "acceleration", "sensor_combined.accelerometer_m_s2[*]", "m/s^2", "FRD"),
+    Known(_PX4, "acceleration", "vehicle_acceleration.xyz[*]", "m/s^2", "FRD"),
+    Known(_PX4, "position", "vehicle_local_position.*", "m", "NED"),
+    Known(_PX4, "velocity", "vehicle_local_position.v*", "m/s", "NED"),
+    Known(_PX4, "rotor_speed", "esc_status.esc[*].esc_rpm", "rpm"),
+    Known(_PX4, "rotor_command", "actuator_motors.control[*]", "1"),
+    Known(_PX4, "rotor_command", "actuator_outputs.output[*]", None),
+    Known(_PX4, "voltage", "battery_status.voltage_v", "V"),
+    Known(_ARDUPILOT, "attitude", "ATT.*", "deg", "FRD"),
+    Known(_ARDUPILOT, "body_rate", "IMU.Gyr*", "rad/s", "FRD"),
+    Known(_ARDUPILOT, "body_rate", "RATE.*", "deg/s", "FRD"),
+    Known(_ARDUPILOT, "acceleration", "IMU.Acc*", "m/s^2", "FRD"),
+    Known(_ARDUPILOT, "position", "XKF1.P*", "m", "NED"),
+    Known(_ARDUPILOT, "position", "NKF1.P*", "m", "NED"),
+    Known(_ARDUPILOT, "velocity", "XKF1.V*", "m/s", "NED"),
+    Known(_ARDUPILOT, "velocity", "NKF1.V*", "m/s", "NED"),
+    Known(_ARDUPILOT, "rotor_command", "RCOU.C*", None),
+    Known(_ARDUPILOT, "rotor_speed", "ESC[*].RPM", "rpm"),
+    Known(_ARDUPILOT, "voltage", "BAT.Volt", "V"),
+    Known(_BETAFLIGHT, "body_rate", "gyroADC[*]", "deg/s", "FLU"),
+    Known(_BETAFLIGHT, "acceleration", "accSmooth[*]", None, "FLU"),
+    Known(_BETAFLIGHT, "rotor_command", "motor[*]", None),
+    Known(_BETAFLIGHT, "rotor_speed", "rpm[*]", "rpm"),
+    Known(_BETAFLIGHT, "rotor_speed", "eRPM[*]", None),
+    Known(_BETAFLIGHT, "voltage", "vbatLatest", "V"),
+    Known(_CRAZYFLIE, "quaternion", "stateEstimate.q*", "1", "FLU"),
+    Known(_CRAZYFLIE, "attitude", "stabilizer.*", "deg", "FLU"),
+    Known(_CRAZYFLIE, "attitude", "stateEstimate.*", "deg", "FLU"),
+    Known(_CRAZYFLIE, "body_rate", "gyro.*", "deg/s", "FLU"),
     # The controller takes a pitch for positive with the nose up: r_pitch = -gyro.y in the firmware.
-    _Known(_CRAZYFLIE, "body_rate", "controller.r_*", None, "FLU", sign=(1.0, -1.0, 1.0)),
-    _Known(_CRAZYFLIE, "acceleration", "acc.*", "g", "FLU"),
-    _Known(_CRAZYFLIE, "acceleration", "stateEstimate.a*", "g", "ENU"),
-    _Known(_CRAZYFLIE, "position", "stateEstimate.*", "m", "ENU"),
-    _Known(_CRAZYFLIE, "velocity", "stateEstimate.v*", "m/s", "ENU"),
+    Known(_CRAZYFLIE, "body_rate", "controller.r_*", None, "FLU", sign=(1.0, -1.0, 1.0)),
+    Known(_CRAZYFLIE, "acceleration", "acc.*", "g", "FLU"),
+    Known(_CRAZYFLIE, "acceleration", "stateEstimate.a*", "g", "ENU"),
+    Known(_CRAZYFLIE, "position", "stateEstimate.*", "m", "ENU"),
+    Known(_CRAZYFLIE, "velocity", "stateEstimate.v*", "m/s", "ENU"),
     # The compressed state counts in thousandths.
-    _Known(_CRAZYFLIE, "position", "stateEstimateZ.*", "mm", "ENU"),
-    _Known(_CRAZYFLIE, "velocity", "stateEstimateZ.v*", "mm/s", "ENU"),
-    _Known(_CRAZYFLIE, "rotor_speed", "rpm.m*", "rpm"),
+    Known(_CRAZYFLIE, "position", "stateEstimateZ.*", "mm", "ENU"),
+    Known(_CRAZYFLIE, "velocity", "stateEstimateZ.v*", "mm/s", "ENU"),
+    Known(_CRAZYFLIE, "rotor_speed", "rpm.m*", "rpm"),
     # The pwm columns are these after the firmware's compensation of the battery.
-    _Known(_CRAZYFLIE, "rotor_command", "motor.m*", "1", scale=1 / 65536),
-    _Known(_CRAZYFLIE, "rotor_command", "pwm.m*_pwm", "1", scale=1 / 65536),
-    _Known(_CRAZYFLIE, "voltage", "pm.vbat", "V"),
-    _Known(_CRAZYFLIE, "voltage", "pm.vbatMV", "V", scale=1e-3),
+    Known(_CRAZYFLIE, "rotor_command", "motor.m*", "1", scale=1 / 65536),
+    Known(_CRAZYFLIE, "rotor_command", "pwm.m*_pwm", "1", scale=1 / 65536),
+    Known(_CRAZYFLIE, "voltage", "pm.vbat", "V"),
+    Known(_CRAZYFLIE, "voltage", "pm.vbatMV", "V", scale=1e-3),
 )
-_SUFFICIENT_COLUMNS: Final = {"quaternion": {4}, "thrust": {1}, "voltage": {1}}
-_ROTOR_SIGNALS = ("rotor_speed", "rotor_command")
-_FEWEST_ROTORS = 3
-_AXES_OF_A_BODY = 3
-_BY_WORDS = 100.0
-_OF_OTHER_INSTANCE = 50.0
-_WORDS: Final = {
-    "position": {
-        "pos",
+
+
+class Meaning(NamedTuple):
+    """What words of a name mean a signal.
+
+    Attributes
+    ----------
+    words : str
+        One of them has to stand in the name.
+    kinds, number : str, int
+        How its columns are told apart, and how many there are; of rotors at least.
+    last : int
+        Only so many words at the end of the name count; 0: all of them.
+    never : str
+        Words that rule it out, beside those of `NOT_MEASURED`.
+    """
+
+    signal: SignalName
+    words: str
+    kinds: str
+    number: int
+    last: int = 0
+    never: str = ""
+
+
+_RATE_WORDS: Final = "gyro gyr gyroscope gyros omega om w rate rates angular angvel pqr"
+MEANINGS: Final = (
+    Meaning(
         "position",
-        "p",
-        "translation",
-        "point",
-        "poses",
-        "pose",
-        "mocap",
-        "local",
-        "state",
-        "estimate",
-        "v",
-    },
-    "velocity": {"vel", "velocity", "v", "linear", "twist"},
-    "acceleration": {"acc", "accel", "accelerometer", "acceleration", "a", "sf", "f", "imu"},
-    "body_rate": {"gyro", "gyr", "gyroscope", "gyros", "omega", "om", "w", "rate", "rates", "angular", "angvel", "pqr"},
-    "body_torque": {"torque", "tau", "moment"},
-    "attitude": {"rpy", "euler", "attitude", "att", "angle", "angles", "ypr"},
-    "quaternion": {"q", "quat", "quaternion", "orientation", "att", "attitude", "pose"},
-    "rotor_speed": {"rpm", "erpm", "rads", "rotor", "om", "omega", "speed", "w"},
-    "rotor_command": {"motor", "m", "cmd", "command", "pwm", "u", "control", "output", "throttle", "omcmd", "esc"},
-    "thrust": {"thrust", "lift"},
-    "voltage": {"voltage", "vbat", "volt", "vbatt", "battery", "batt"},
+        "pos position p translation point poses pose mocap local state estimate v",
+        "xyz",
+        3,
+        never="vel velocity linear twist acc accel accelerometer acceleration a sf f imu torque tau moment rpy euler"
+        " attitude att angle angles ypr q quat quaternion orientation rpm erpm rads rotor speed motor m cmd command"
+        " pwm u control output throttle omcmd esc thrust lift voltage vbat volt vbatt battery batt home global"
+        f" {_RATE_WORDS}",
+    ),
+    Meaning("velocity", "vel velocity v linear twist", "xyz numbers", 3, 2, "angular acc acceleration a"),
+    Meaning("acceleration", "acc accel accelerometer acceleration a sf f", "xyz numbers", 3, 2, "angular"),
+    Meaning("body_rate", _RATE_WORDS, "xyz angles numbers", 3),
+    Meaning("body_torque", "torque tau moment", "xyz angles numbers", 3),
+    Meaning("attitude", "rpy euler attitude att angle angles ypr", "xyz angles numbers", 3),
+    Meaning("quaternion", "q quat quaternion orientation att attitude pose", "wxyz", 4),
+    Meaning("quaternion", "q quat quaternion orientation", "numbers", 4, 1),
+    Meaning("rotor_speed", "", "numbers", 3),
+    Meaning("rotor_command", "", "numbers", 3),
+    Meaning("thrust", "thrust lift", "one", 1),
+    Meaning("voltage", "voltage vbat volt vbatt battery batt", "one", 1),
+)
+_ROTOR_SIGNALS: Final = ("rotor_speed", "rotor_command")
+_FAST: Final = _each("rpm erpm rads rotor om omega speed speeds velocities angular")
+ASKED: Final = _each("cmd command commands pwm u control output throttle omcmd ref des d r")
+NOT_MEASURED: Final = _each(
+    "des desired d sp setpoint ref reference target goal r cmd command ctrltarget controller cov covariance var"
+    " variance bias noise std err error integral reset delta innov innovation offset mag magnetometer rc gps status"
+    " temperature current thrust thrusts jerk snap stamp timestamp counter padding derivative test ratio ratios clip"
+)
+"""Words of what is wished, estimated of a sensor or something else; a name with one of them is no measurement."""
+
+_SECOND_HAND: Final = _each("raw groundtruth mocap poses estimator filtered filt unfilt backup")
+_ALLOWED: Final = {
+    "thrust": frozenset({"thrust"}),
+    **dict.fromkeys(_ROTOR_SIGNALS, _each("cmd command status r ref des d")),
 }
-_FAST: Final = frozenset({"rpm", "erpm", "rads", "rotor", "om", "omega", "speed", "speeds", "velocities", "angular"})
-_ASKED: Final = frozenset(
-    {"cmd", "command", "commands", "pwm", "u", "control", "output", "throttle", "omcmd", "ref", "des", "d", "r"}
-)
-_NOT_MEASURED: Final = frozenset(
-    [
-        "des",
-        "desired",
-        "d",
-        "sp",
-        "setpoint",
-        "ref",
-        "reference",
-        "target",
-        "goal",
-        "r",
-        "cmd",
-        "command",
-        "ctrltarget",
-        "controller",
-        "cov",
-        "covariance",
-        "var",
-        "variance",
-        "bias",
-        "noise",
-        "std",
-        "err",
-        "error",
-        "integral",
-        "reset",
-        "delta",
-        "innov",
-        "innovation",
-        "offset",
-        "mag",
-        "magnetometer",
-        "rc",
-        "gps",
-        "status",
-        "temperature",
-        "current",
-        "thrust",
-        "thrusts",
-        "jerk",
-        "snap",
-        "stamp",
-        "timestamp",
-        "counter",
-        "padding",
-        "derivative",
-        "test",
-        "ratio",
-        "ratios",
-        "clip",
-    ]
-)
-_SECOND_HAND: Final = frozenset(
-    {"raw", "groundtruth", "mocap", "poses", "estimator", "filtered", "filt", "unfilt", "backup"}
-)
-_ALLOWED_OF_ROTORS: Final = frozenset({"cmd", "command", "status", "r", "ref", "des", "d"})
+_BY_WORDS, _OF_OTHER_INSTANCE = 100.0, 50.0
+_AXES_OF_A_BODY = 3
 
 
 def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Named, ...]:
@@ -345,110 +376,78 @@ def _is_of(system: str, known: str) -> bool:
 
 
 def _known(group: ColumnGroup, system: str) -> Iterator[Named]:
-    for rank, known in enumerate(_KNOWN):
+    for rank, known in enumerate(KNOWN):
         of_other = system and not _is_of(system, known.system)
         angles = known.signal != "attitude" or group.kind == "angles"
         # On its card a Crazyflie puts the name of an event before that of a variable.
         patterns = (group.pattern, group.pattern.partition(".")[2] if system.startswith(_CRAZYFLIE) else "")
-        if not of_other and angles and known.pattern in patterns and _suits(known.signal, group):
+        suits = any(own.signal == known.signal and _suits(own, group) for own in MEANINGS)
+        if not of_other and angles and known.pattern in patterns and suits:
             yield Named(
                 known.signal, group, float(rank), known.unit, known.scale, known.frame, known.system, known.sign
             )
 
 
-def _suits(signal: SignalName, group: ColumnGroup) -> bool:
-    if signal in _ROTOR_SIGNALS:
-        return group.kind == "numbers" and len(group.columns) >= _FEWEST_ROTORS
-    if signal == "quaternion":
-        return group.kind == "wxyz" or (group.kind == "numbers" and len(group.columns) == 4)
-    if signal in ("voltage", "thrust"):
-        return group.kind == "one"
-    if signal in ("position", "velocity", "acceleration"):
-        return group.kind in ("xyz", "numbers") and len(group.columns) == 3
-    return group.kind in ("xyz", "angles", "numbers") and len(group.columns) == 3
+def _suits(meaning: Meaning, group: ColumnGroup) -> bool:
+    count = len(group.columns)
+    enough = count >= meaning.number if meaning.signal in _ROTOR_SIGNALS else count == meaning.number
+    return enough and group.kind in meaning.kinds.split()
 
 
 def _by_words(group: ColumnGroup) -> Iterator[Named]:
-    """List what the words of a name suggest; words that speak of no measurement rule it out."""
-    words = list(group.words)
+    """List what the words of a name and a unit in it suggest; words that speak of no measurement rule it out."""
+    words = group.words
     rank = _BY_WORDS + len(words) + 10 * sum(word in _SECOND_HAND for word in words)
     rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
-    for signal, meant in _WORDS.items():
-        name: SignalName = signal  # type: ignore[assignment]
-        if re.search(r"[a-z]2($|_)", group.pattern.replace("*", "")) and signal in _ROTOR_SIGNALS:
-            # A square.
+    for meaning in MEANINGS:
+        signal = meaning.signal
+        squared = bool(re.search(r"[a-z]2($|_)", group.pattern.replace("*", ""))) or bool({"squared", "sq"} & {*words})
+        if (squared and signal in _ROTOR_SIGNALS) or not _suits(meaning, group):
             continue
-        allowed = frozenset({"thrust"}) if signal == "thrust" else frozenset()
-        excluded = _NOT_MEASURED - allowed - (_ALLOWED_OF_ROTORS if signal in _ROTOR_SIGNALS else frozenset())
-        ending = _UNITS_BY_ENDING.get(group.unit)
-        if not _suits(name, group) or excluded & set(words) or (ending is not None and name not in ending):
+        stated = stated_unit(group, signal)
+        of_other = group.ending and stated is None and (len(group.ending.strip("_ ")) > 1 or group.ending == "_m")
+        if of_other or (NOT_MEASURED - _ALLOWED.get(signal, frozenset())) & {*words}:
             continue
-        if _means(name, group, words, meant):
-            yield Named(name, group, rank, _unit(name, words) if ending is None else ending[name])
+        if _means(meaning, group, words):
+            unit, scale = stated or _usual_unit(signal, words)
+            yield Named(signal, group, rank, unit, scale)
 
 
-def _means(signal: SignalName, group: ColumnGroup, words: list[str], meant: set[str]) -> bool:
-    if signal == "position":
-        return _means_position(group, words, meant)
-    if signal == "attitude" and group.kind == "angles":
-        return not set(words) & (_WORDS["body_rate"] | _WORDS["body_torque"] | {"speed"})
-    if signal == "body_rate" and group.kind == "angles":
-        return bool(set(words) & (meant | {"speed"})) or _axes_of(group) == ("p", "q", "r")
-    if signal in _ROTOR_SIGNALS:
-        return _means_rotors(signal, group, words)
-    if signal == "quaternion" and group.kind == "numbers":
-        return words[-1:] in (["q"], ["quat"], ["quaternion"], ["orientation"])
-    if signal == "acceleration":
-        return words[-1:] != [] and bool(set(words[-2:]) & meant - {"imu"}) and not set(words) & {"angular"}
-    if signal == "velocity":
-        return bool(set(words[-2:]) & meant) and not set(words) & {"angular", "acc", "acceleration", "a"}
-    return bool(set(words) & meant)
+def stated_unit(group: ColumnGroup, signal: SignalName) -> tuple[UnitName, float] | None:
+    """Give the unit that a name states for a signal, at its end or as a word, and the factor that makes it."""
+    words = (_symbols(word) for word in group.words if word in _A_WORD)
+    for text in (_symbols(group.ending), *words):
+        for own in (_WRITTEN.get(text), _WRITTEN.get(f"{text}/s")):
+            # Of a rate "deg" is deg/s.
+            if own is not None and KNOWN_UNITS[own.unit].si in UNITS_OF_SIGNAL[signal]:
+                return own.unit, own.scale
+    return None
 
 
-def _axes_of(group: ColumnGroup) -> tuple[str, ...]:
-    return tuple(column.removesuffix(f"_{group.unit}") for column in group.columns)
+def _usual_unit(signal: SignalName, words: tuple[str, ...]) -> tuple[UnitName | None, float]:
+    if any(signal in _IN_RADIANS.get(word, ()) for word in words):
+        return "rad/s", 1.0
+    return ("1" if signal == "quaternion" else None), 1.0
 
 
-def _means_position(group: ColumnGroup, words: list[str], meant: set[str]) -> bool:
-    """Tell a position by its name, or by axes that stand alone beside words of nothing else."""
-    others = set().union(*(_WORDS[name] for name in _WORDS if name != "position")) - meant
-    alone = re.search(r"(^|[^A-Za-z])\*($|[^A-Za-z])", group.pattern) is not None
-    return group.kind == "xyz" and alone and not set(words) & (others | {"home", "global"})
-
-
-def _means_rotors(signal: SignalName, group: ColumnGroup, words: list[str]) -> bool:
-    """Tell speeds from commands: what is asked for is none that was measured, and a motor alone is driven."""
-    if {"squared", "sq"} & set(words):
+def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool:
+    """Tell whether words mean a signal; positions, rotors and angles have ways of their own."""
+    own, signal = {*words}, meaning.signal
+    # A name that ends in the unit of a rate or of a speed is one.
+    ending = _WRITTEN.get(_symbols(group.ending))
+    ends_in_speed = ending is not None and KNOWN_UNITS[ending.unit].si == "rad/s"
+    if own & set(meaning.never.split()):
         return False
-    asked = bool(set(words) & _ASKED)
-    # Three of the letter w are the axes of a gyroscope.
-    fast = bool(set(words) & _FAST) or (words == ["w"] and len(group.columns) > _AXES_OF_A_BODY)
-    if signal == "rotor_speed":
-        return fast and not asked
-    motors = words == ["m"] or bool({"motor", "motors"} & set(words))
-    return asked or (motors and not fast)
-
-
-_UNITS_BY_WORD: Final = {
-    "deg": {"attitude": "deg", "body_rate": "deg/s"},
-    "degs": {"attitude": "deg", "body_rate": "deg/s"},
-    "dps": {"body_rate": "deg/s"},
-    "rad": {"attitude": "rad", "body_rate": "rad/s", "rotor_speed": "rad/s", "rotor_command": "rad/s"},
-    "rads": {"body_rate": "rad/s", "rotor_speed": "rad/s", "rotor_command": "rad/s"},
-    "rpm": {"rotor_speed": "rpm", "rotor_command": "rpm"},
-    "mm": {"position": "mm", "velocity": "mm/s"},
-    "g": {"acceleration": "g"},
-    # An angular frequency by its letter.
-    "w": {"body_rate": "rad/s"},
-    "om": {"rotor_speed": "rad/s", "body_rate": "rad/s", "rotor_command": "rad/s"},
-    "omcmd": {"rotor_command": "rad/s"},
-    "omega": {"rotor_speed": "rad/s", "body_rate": "rad/s", "rotor_command": "rad/s"},
-}
-
-
-def _unit(signal: SignalName, words: list[str]) -> UnitName | None:
-    for word in words:
-        unit = _UNITS_BY_WORD.get(word, {}).get(signal)
-        if unit is not None:
-            return unit  # type: ignore[return-value]
-    return "1" if signal == "quaternion" else None
+    if signal in _ROTOR_SIGNALS:
+        # Three columns of the letter w, or in the unit of a rate, are the axes of a gyroscope.
+        many = len(group.columns) > _AXES_OF_A_BODY
+        fast = bool(own & _FAST) or (many and (words == ("w",) or ends_in_speed))
+        motors = words == ("m",) or bool({"motor", "motors"} & own)
+        return (fast and not own & ASKED) if signal == "rotor_speed" else bool(own & ASKED) or (motors and not fast)
+    if signal == "position":
+        return re.search(r"(^|[^A-Za-z])\*($|[^A-Za-z])", group.pattern) is not None
+    if group.kind == "angles" and signal in ("attitude", "body_rate"):
+        pqr = group.columns[0].removesuffix(group.ending) == "p"
+        turns = pqr or ends_in_speed or bool(own & {*_RATE_WORDS.split(), "speed"})
+        return turns if signal == "body_rate" else not turns and not own & {"torque", "tau", "moment"}
+    return bool({*words[-meaning.last :]} & set(meaning.words.split()))

@@ -28,6 +28,7 @@ _WAY: Final = {1: "counter-clockwise", -1: "clockwise", 0: "?"}
 _LEAST_GAP_S, _SLOWEST_VOLTAGE_S = 0.1, 0.5
 _ROOM = 1.2
 _PROPELLERS = (0.003, 0.2)
+DECIDES_ROTORS: Final = "a livelier log beside this one, or a look at the vehicle, decides"
 _MULTIROTORS: Final = (2, 13, 14, 15, 29)
 """MAV_TYPE: quadrotor, hexarotor, octorotor, tricopter, dodecarotor."""
 
@@ -339,7 +340,7 @@ def _airframe(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
         return taken, []
     says = f"{best.airframe.reason}: {', '.join(f'{r.name} {_WAY[r.spin]}' for r in best.airframe.rotors)}"
     if taken is None:
-        return best.airframe, [f"where the rotors are and how they turn is a guess from {says}"]
+        return best.airframe, [f"where the rotors are and how they turn is a guess from {says}; {DECIDES_ROTORS}"]
     orders = [[(rotor.name, rotor.spin) for rotor in found.rotors] for found in (taken, best.airframe)]
     differ = best.clear and orders[0] != orders[1] and all(rotor.name for rotor in taken.rotors)
     return taken, [f"the rotors are taken as in {taken.reason}, and others are told by {says}"] if differ else []

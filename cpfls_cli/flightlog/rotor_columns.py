@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from math import inf
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.airframe import Parameters
-from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.recognised import Sure
+from cpfls_cli.flightlog.names import ASKED, Named
+from cpfls_cli.flightlog.recognised import Choice, Guess, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
-from cpfls_cli.units import UnitName
+from cpfls_cli.units import SPEED_UNITS, UnitName
 
 _FEWEST = 3
 _MUCH_FASTER = 2.0
@@ -24,7 +25,52 @@ _SAME = 0.02
 """Part of the largest one's spread below which an output is not connected to a motor."""
 
 
-@dataclass(frozen=True, kw_only=True)
+class Range(NamedTuple):
+    """Numbers of a command that is no speed by its name, and what they are taken for: a share of the largest.
+
+    Attributes
+    ----------
+    low, high_from, high : float
+        No number is below the first or above the last; the largest lies above the second.
+    tells : {"always", "of commands", "never"}
+        Whether the range alone tells it: of commands it does where the name is that of one.
+    rivals : tuple of Rival
+        Other readings of such numbers, beside speeds.
+    """
+
+    low: float
+    high_from: float
+    high: float
+    scale: float
+    offset: float
+    words: str
+    tells: Literal["always", "of commands", "never"]
+    rivals: tuple[Rival, ...] = ()
+
+
+_OLD_PX4 = Rival("scale: 0.00114286, offset: -1.22857", "where the range is 1075 to 1950, as PX4 once had it")
+RANGES: Final = (
+    Range(-1.05, -inf, 1.05, 1.0, 0.0, "shares of the largest", "always"),
+    Range(0.0, -inf, 101.0, 0.01, 0.0, "per cent", "of commands"),
+    Range(800.0, -inf, 2300.0, 1e-3, -1.0, "pulses of 1000 to 2000 us", "never", (_OLD_PX4,)),
+    Range(0.0, 32768.0, 65536.0, 1 / 65536, 0.0, "16 bits", "of commands"),
+    Range(0.0, 2300.0, 32768.0, 1 / 65536, 0.0, "16 bits", "never"),
+    Range(0.0, -inf, 2048.0, 1 / 2000, -48 / 2000, "48 to 2047 of DShot", "never"),
+)
+
+
+class _Unit(NamedTuple):
+    """The unit of columns with scale and offset, and what tells it."""
+
+    unit: UnitName
+    scale: float
+    offset: float
+    reason: str
+    sure: Sure
+    rivals: tuple[Rival, ...] = ()
+
+
+@dataclass(frozen=True)
 class RotorGuess:
     """A signal of the rotors.
 
@@ -32,17 +78,16 @@ class RotorGuess:
     ----------
     kind : str
         Kind of log that is known for such columns; empty where none is.
-    rivals : tuple of (str, str)
-        What would stand in the config, and why it is not ruled out.
     """
 
-    signal: Literal["rotor_speed", "rotor_command"]
-    columns: SignalMap
-    reason: str
-    sure: Sure
+    guess: Guess
     rate_hz: float
     kind: str
-    rivals: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def columns(self) -> SignalMap:
+        """Columns, unit, scale and offset."""
+        return self.guess.columns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,17 +97,14 @@ class RotorColumns:
     Attributes
     ----------
     speed, command : RotorGuess or None
-    command_is : {"speed", "thrust"}
-        What a command of unit 1 is a share of.
+    command_is : Choice or None
+        What a command of unit 1 is a share of; None without one.
     left_out, warnings : tuple of str
     """
 
     speed: RotorGuess | None
     command: RotorGuess | None
-    command_is: str = "speed"
-    command_reason: str = ""
-    command_sure: Sure = "guess"
-    command_rivals: tuple[tuple[str, str], ...] = ()
+    command_is: Choice | None
     left_out: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -81,8 +123,12 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
     parameters : mapping
         Of the autopilot, or of a header.
     """
-    speed = next((g for f in _in_preference(found["rotor_speed"]) if (g := _speed(f, parameters)) is not None), None)
-    command = next((g for f in found["rotor_command"] if (g := _command(f, parameters)) is not None), None)
+    # Electric speeds, whose pole pairs have to be known, come behind mechanical ones.
+    speeds = sorted(found["rotor_speed"], key=lambda entry: _is_electric(entry[0]))
+    speed, command = (
+        next((guess for own in candidates if (guess := _guess(own, parameters)) is not None), None)
+        for candidates in (speeds, found["rotor_command"])
+    )
     left_out = []
     if speed is not None and command is not None:
         counts = [len(guess.columns.columns) for guess in (speed, command)]
@@ -103,22 +149,51 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
         for guess in (speed, command)
         if guess is not None and guess.rate_hz < _SLOW_HZ
     ]
-    meaning, reason, sure, rivals = _meaning(command, parameters, system)
+    shares = command is not None and command.columns.unit == "1"
     return RotorColumns(
         speed=speed,
         command=command,
-        command_is=meaning,
-        command_reason=reason,
-        command_sure=sure,
-        command_rivals=rivals,
+        command_is=_meaning(command, parameters, system) if command is not None and shares else None,
         left_out=tuple(left_out),
         warnings=tuple(warnings),
     )
 
 
-def _in_preference(found: Sequence[Found]) -> list[Found]:
-    """Put electric speeds, whose pole pairs have to be known, behind mechanical ones."""
-    return sorted(found, key=lambda entry: "erpm" in entry[0].group.pattern.lower())
+def _is_electric(named: Named) -> bool:
+    return "erpm" in named.group.pattern.lower()
+
+
+def _guess(found: Found, parameters: Parameters) -> RotorGuess | None:
+    """Take columns that are connected in the unit that is stated or fits; None where none does."""
+    named, time, values = found
+    chosen = _connected(named, values, parameters)
+    if len(chosen) < _FEWEST:
+        return None
+    columns, values = tuple(named.group.columns[index] for index in chosen), values[:, chosen]
+    is_speed = named.signal == "rotor_speed"
+    taken = _speed_unit(named, values, parameters) if is_speed else _command_unit(named, values, parameters)
+    if taken is None:
+        return None
+    sure, rivals = taken.sure, taken.rivals
+    if len(chosen) == _FEWEST < len(named.group.columns):
+        every = ", ".join(named.group.columns)
+        left = ", ".join(column for column in named.group.columns if column not in columns)
+        sure, rivals = "guess", (*rivals, Rival(f"columns: [{every}]", f"if {left}, which never changes, is a rotor's"))
+    sign = tuple(float(value) for value in np.where(np.median(values, axis=0) < 0, -1.0, 1.0))
+    guess = Guess(
+        signal=named.signal,
+        columns=SignalMap(
+            columns=columns,
+            unit=taken.unit,
+            scale=taken.scale,
+            offset=taken.offset,
+            sign=sign if is_speed and min(sign) < 0 else None,
+        ),
+        reason=taken.reason,
+        sure=sure,
+        rivals=rivals,
+    )
+    return RotorGuess(guess, 1 / float(np.median(np.diff(time))), named.known)
 
 
 def _connected(named: Named, values: Array, parameters: Parameters) -> list[int]:
@@ -139,107 +214,55 @@ def _connected(named: Named, values: Array, parameters: Parameters) -> list[int]
     return [index for index, own in enumerate(spread) if own > _SAME * float(spread.max()) > 0]
 
 
-def _speed(found: Found, parameters: Parameters) -> RotorGuess | None:
-    named, time, values = found
-    chosen = _connected(named, values, parameters)
-    if len(chosen) < _FEWEST:
-        return None
-    columns, values = tuple(named.group.columns[index] for index in chosen), values[:, chosen]
-    level = float(np.median(np.abs(values)[np.abs(values) > 0.3 * float(np.abs(values).max())]))
-    sign = tuple(float(value) for value in np.where(np.median(values, axis=0) < 0, -1.0, 1.0))
-    unit, scale, reason, sure, rivals = _speed_unit(named, level, parameters)
-    return RotorGuess(
-        signal="rotor_speed",
-        columns=SignalMap(columns=columns, unit=unit, scale=scale, sign=None if min(sign) > 0 else sign),
-        reason=reason,
-        sure=sure,
-        rate_hz=1 / float(np.median(np.diff(time))),
-        kind=named.known,
-        rivals=rivals,
-    )
-
-
-Unit = tuple[UnitName, float, str, Sure, tuple[tuple[str, str], ...]]
-
-
-def _speed_unit(named: Named, level: float, parameters: Parameters) -> Unit:
+def _speed_unit(named: Named, values: Array, parameters: Parameters) -> _Unit:
+    size = np.abs(values)
+    level = float(np.median(size[size > 0.3 * float(size.max())]))
     called = f"called {named.group.pattern}, {level:.4g} in flight"
-    if "erpm" in named.group.pattern.lower():
+    if _is_electric(named):
         factor = 100.0 if named.known == "Betaflight" else 1.0
         poles = float(parameters.get("motor_poles", 0) or 0)
         if poles:
-            pairs = poles / 2
-            return (
-                "rpm",
-                factor / pairs,
-                f"{called}: electric, over motor_poles {poles:.0f} / 2 of the header",
-                "named",
-                (),
-            )
-        rivals = ((f"scale: {factor / 6:.6g}", "six pole pairs; the log does not say how many the motors have"),)
-        return (
-            "rpm",
-            factor / _USUAL_POLE_PAIRS,
-            f"{called}: electric, over 7 pole pairs, a usual number",
-            "guess",
-            rivals,
-        )
+            reason = f"{called}: electric, over motor_poles {poles:.0f} / 2 of the header"
+            return _Unit("rpm", factor / (poles / 2), 0.0, reason, "named")
+        rival = Rival(f"scale: {factor / 6:.6g}", "six pole pairs; the log does not say how many the motors have")
+        reason = f"{called}: electric, over 7 pole pairs, a usual number"
+        return _Unit("rpm", factor / _USUAL_POLE_PAIRS, 0.0, reason, "guess", (rival,))
     if named.unit is not None:
-        return named.unit, named.scale, f"{called}: {named.unit} by its name", "named", ()
+        return _Unit(named.unit, named.scale, 0.0, f"{called}: {named.unit} by its name", "named")
     if level > _RPM_FROM:
-        return "rpm", 1.0, f"{called}: faster than rotors turn in rad/s", "data", ()
-    return "rad/s", 1.0, f"{called}", "guess", (("unit: rpm", f"a level of {level:.4g} is possible in both"),)
+        return _Unit("rpm", 1.0, 0.0, f"{called}: faster than rotors turn in rad/s", "data")
+    rival = Rival("unit: rpm", f"a level of {level:.4g} is possible in both")
+    return _Unit("rad/s", 1.0, 0.0, called, "guess", (rival,))
 
 
-def _command(found: Found, parameters: Parameters) -> RotorGuess | None:
-    named, time, values = found
-    chosen = _connected(named, values, parameters)
-    if len(chosen) < _FEWEST:
-        return None
-    columns, values = tuple(named.group.columns[index] for index in chosen), values[:, chosen]
-    taken = _command_unit(named, values, parameters)
-    if taken is None:
-        return None
-    unit, scale, offset, reason, sure, rivals = taken
-    return RotorGuess(
-        signal="rotor_command",
-        columns=SignalMap(columns=columns, unit=unit, scale=scale, offset=offset),
-        reason=reason,
-        sure=sure,
-        rate_hz=1 / float(np.median(np.diff(time))),
-        kind=named.known,
-        rivals=rivals,
-    )
-
-
-Command = tuple[UnitName, float, float, str, Sure, tuple[tuple[str, str], ...]]
-_SPEED_WORDS: Final = {"om", "omega", "omcmd", "rpm", "rads", "speed", "rad"}
-
-
-def _command_unit(named: Named, values: Array, parameters: Parameters) -> Command | None:
+def _command_unit(named: Named, values: Array, parameters: Parameters) -> _Unit | None:
+    """Tell the unit of commands: parameters and the name first, then the first of `RANGES` that holds the numbers."""
     low, high = float(values.min()), float(np.quantile(values, 0.999))
     called = f"called {named.group.pattern}, up to {high:.4g}"
     stated = _stated_range(named, parameters)
     if stated is not None:
         begin, end, where = stated
-        return "1", 1 / (end - begin), -begin / (end - begin), f"{called}: {begin:g} to {end:g} by {where}", "named", ()
+        reason = f"{called}: {begin:g} to {end:g} by {where}"
+        return _Unit("1", 1 / (end - begin), -begin / (end - begin), reason, "named")
     if named.known == "Crazyflie":
-        return "1", named.scale, 0.0, f"{called}: 16 bits, as a Crazyflie has them", "named", ()
-    if set(named.group.words) & _SPEED_WORDS:
-        unit: UnitName = named.unit if named.unit in ("rpm", "rad/s") else "rpm" if high > _RPM_FROM else "rad/s"
-        rivals = () if named.unit or unit == "rpm" else (("unit: rpm", "its size is possible in both"),)
-        return unit, 1.0, 0.0, f"{called}: a speed that is asked for", "named" if not rivals else "guess", rivals
-    if high <= 1.05 and low >= -1.05:
-        return "1", 1.0, 0.0, f"{called}: shares of the largest", "data", ()
-    if low >= 0 and high <= 101:
-        return "1", 0.01, 0.0, f"{called}: per cent", "data", ()
-    if low >= 800 and high <= 2300:
-        rivals = (("scale: 0.00114286, offset: -1.22857", "where the range is 1075 to 1950, as PX4 once had it"),)
-        return "1", 1e-3, -1.0, f"{called}: pulses of 1000 to 2000 us", "guess", rivals
-    if low >= 0 and high <= 65536 and high > 2300:
-        return "1", 1 / 65536, 0.0, f"{called}: 16 bits", "data", ()
-    if low >= 0 and high <= 2048:
-        return "1", 1 / 2000, -48 / 2000, f"{called}: 48 to 2047 of DShot", "guess", ()
+        return _Unit("1", named.scale, 0.0, f"{called}: 16 bits, as a Crazyflie has them", "named")
+    words = {*named.group.words}
+    if named.unit in SPEED_UNITS or words & {"om", "omega", "omcmd", "rpm", "rads", "speed", "rad"}:
+        unit = named.unit or ("rpm" if high > _RPM_FROM else "rad/s")
+        rivals = () if named.unit or unit == "rpm" else (Rival("unit: rpm", "its size is possible in both"),)
+        reason = f"{called}: a speed that is asked for"
+        return _Unit(unit, named.scale, 0.0, reason, "guess" if rivals else "named", rivals)
+    if named.unit == "1" and named.scale != 1.0:
+        return _Unit("1", named.scale, 0.0, f"{called}: per cent by its name", "named")
+    for own in RANGES:
+        if low >= own.low and own.high_from < high <= own.high:
+            told = own.tells == "always" or (own.tells == "of commands" and bool(words & ASKED))
+            if told or named.unit == "us" or "pwm" in words:
+                return _Unit(
+                    "1", own.scale, own.offset, f"{called}: {own.words}", "data" if told else "guess", own.rivals
+                )
+            speeds = (Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm"))
+            return _Unit("1", own.scale, own.offset, f"{called}: {own.words}", "guess", (*own.rivals, *speeds))
     return None
 
 
@@ -261,27 +284,28 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
     return None
 
 
-def _meaning(
-    command: RotorGuess | None, parameters: Parameters, system: str
-) -> tuple[str, str, Sure, tuple[tuple[str, str], ...]]:
+def _meaning(command: RotorGuess, parameters: Parameters, system: str) -> Choice:
     """Tell whether a command is a share of thrust or of speed."""
-    if command is None:
-        return "speed", "", "guess", ()
+
+    def choose(value: str, reason: str, *rivals: Rival, sure: Sure = "named") -> Choice:
+        return Choice("rotor_command_is", value, reason, sure, rivals)
+
     if command.kind == "Crazyflie":
         if "motor.m" in command.columns.columns[0]:
-            older = (("rotor_command_is: speed", "before 2022 the firmware logged what the motors got"),)
-            return "thrust", "motor.m* of a Crazyflie are thrusts, before the battery is compensated", "named", older
-        return "speed", "pwm.* of a Crazyflie is what the motors get", "named", ()
+            older = Rival("rotor_command_is: speed", "before 2022 the firmware logged what the motors got")
+            return choose("thrust", "motor.m* of a Crazyflie are thrusts, before the battery is compensated", older)
+        return choose("speed", "pwm.* of a Crazyflie is what the motors get")
     factor = parameters.get("THR_MDL_FAC")
     if factor is not None:
         value = float(factor)
         if value >= 0.9:
-            return "thrust", f"THR_MDL_FAC is {value:g}: the autopilot makes commands shares of thrust", "named", ()
+            return choose("thrust", f"THR_MDL_FAC is {value:g}: the autopilot makes commands shares of thrust")
         if value <= 0.1:
-            return "speed", f"THR_MDL_FAC is {value:g}: the autopilot hands commands on as they are", "named", ()
-        rival = (("rotor_command_is: thrust", f"THR_MDL_FAC is {value:g}, which lies between the two"),)
-        return "speed", f"THR_MDL_FAC is {value:g}, between speed (0) and thrust (1)", "guess", rival
+            return choose("speed", f"THR_MDL_FAC is {value:g}: the autopilot hands commands on as they are")
+        rival = Rival("rotor_command_is: thrust", f"THR_MDL_FAC is {value:g}, which lies between the two")
+        return choose("speed", f"THR_MDL_FAC is {value:g}, between speed (0) and thrust (1)", rival, sure="guess")
     if "MOT_THST_EXPO" in parameters or system.startswith("Ardu"):
-        return "speed", "RCOU is what the motors get, behind the autopilot's own thrust curve", "named", ()
-    rival = (("rotor_command_is: thrust", "the log does not say which"),)
-    return "speed", f"taken as most motor controllers have it{f' ({system})' if system else ''}", "guess", rival
+        return choose("speed", "RCOU is what the motors get, behind the autopilot's own thrust curve")
+    rival = Rival("rotor_command_is: thrust", "the log does not say which")
+    reason = f"taken as most motor controllers have it{f' ({system})' if system else ''}"
+    return choose("speed", reason, rival, sure="guess")

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from cpfls_cli.config.load import ASK
 from cpfls_cli.flightlog.airframe import Airframe, RotorPlace
-from cpfls_cli.flightlog.proposal import Proposal
+from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal
 from cpfls_cli.flightlog.recognised import Choice, Guess, Rival
 from cpfls_cli.flightlog.settings import ColumnMap
 from cpfls_cli.report.content import Block, Cell, Table, Text
@@ -47,9 +47,9 @@ def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
     if not proposal.rotors:
         keys.append("vehicle.rotors")
     for index in range(proposal.rotors):
-        if airframe is None or not airframe.in_metres:
+        if airframe is None or airframe.is_guess or not airframe.in_metres:
             keys.append(f"vehicle.rotors.{index}.position_m")
-        if airframe is None or airframe.rotors[index].spin == 0:
+        if airframe is None or airframe.is_guess or airframe.rotors[index].spin == 0:
             keys.append(f"vehicle.rotors.{index}.spin")
     return tuple(keys)
 
@@ -115,7 +115,7 @@ def _rotors_in_words(proposal: Proposal) -> str:
         f"{index} {rotor.name or 'at its place'} {_turning(rotor)}".replace("  ", " ")
         for index, rotor in enumerate(proposal.airframe.rotors, start=1)
     )
-    return f"rotors: {places} ({proposal.airframe.reason})"
+    return f"rotors{', a guess' if proposal.airframe.is_guess else ''}: {places} ({proposal.airframe.reason})"
 
 
 def _turning(rotor: RotorPlace) -> str:
@@ -224,7 +224,10 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
             2,
         )
     else:
-        yield from _comment(f"Told by {airframe.reason}.", 2)
+        if airframe.is_guess:
+            yield from _comment(f"Not known. A guess from {airframe.reason}; {DECIDES_ROTORS}.", 2)
+        else:
+            yield from _comment(f"Told by {airframe.reason}.", 2)
         if airframe.moment_ratio_m:
             yield from _comment(
                 f"The parameters state a drag factor of {number(airframe.moment_ratio_m, 3)} m times the thrust factor;"
@@ -249,10 +252,12 @@ def _rotors(proposal: Proposal, stated: Stated) -> Iterator[str]:
 
 
 def _rotor(rotor: RotorPlace | None, airframe: Airframe | None) -> str:
+    is_guess = airframe is not None and airframe.is_guess
     position = None if rotor is None else _position(rotor, airframe)
     spin = ASK if rotor is None or rotor.spin == 0 else str(rotor.spin)
     entry = (
-        f"    - {{position_m: {ASK if position is None else _flow(position)}, spin: {spin},"
+        f"    - {{position_m: {ASK if position is None or is_guess else _flow(position)},"
+        f" spin: {ASK if is_guess else spin},"
         f" thrust_factor_n_s2: {NOT_KNOWN['thrust']}, drag_factor_n_m_s2: {NOT_KNOWN['drag']}}}"
     )
     if rotor is None:
@@ -261,6 +266,10 @@ def _rotor(rotor: RotorPlace | None, airframe: Airframe | None) -> str:
     if position is None:
         x, y = (f"{value:.3g} a" if value else "0.0" for value in rotor.direction)
         where = f"{where}: [{x}, {y}, 0.0]"
+    elif is_guess:
+        where = f"{where}: {_flow(position)}"
+    if is_guess:
+        where = f"perhaps {where}, spin {spin}"
     return f"{entry}  # {where}" if where else entry
 
 

@@ -18,10 +18,10 @@ FLIP = np.diag([1.0, -1.0, -1.0])
 NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
 
-def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0):
+def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0, angle=0.25, highest_hz=1.5, climb=0.6):
     """A flight in FLU and ENU with all that a log can hold, SI units; noise as multiples of a usual one.
 
-    With `push`, m/s^2, it flies a circle that takes as much.
+    With `push`, m/s^2, it flies a circle that takes as much; it leans by `angle`, rad, and climbs with `climb`, m/s^2.
     """
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1 / rate_hz)
@@ -30,7 +30,9 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0):
         parts = zip(rng.uniform(lowest, highest, 6), rng.uniform(0, 2 * np.pi, 6), rng.uniform(0.3, 1, 6), strict=True)
         return size * sum(a * np.sin(2 * np.pi * f * time + p) for f, p, a in parts) / 2
 
-    angles = np.column_stack([wave(0.25, 0.2, 1.5), wave(0.25, 0.2, 1.5), wave(0.8, 0.05, 0.6)])
+    angles = np.column_stack(
+        [wave(angle, 0.2, highest_hz), wave(angle, 0.2, highest_hz), wave(3.2 * angle, 0.05, 0.4 * highest_hz)]
+    )
     rotation = Rotation.from_euler("ZYX", angles[:, ::-1])
     if push:
         # Leaning to the middle of a circle, heading ahead.
@@ -42,7 +44,7 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0):
     turning = 2 * (Rotation.from_quat(rotation.as_quat()).inv().as_quat())
     rate = _product(turning, steps)
     up = rotation.as_matrix()[:, :, 2]
-    lift = (GRAVITY + wave(0.6, 0.2, 0.8)) / up[:, 2]
+    lift = (GRAVITY + wave(climb, 0.2, 0.8 * highest_hz / 1.5)) / up[:, 2]
     acceleration = lift[:, None] * up - [0.0, 0.0, GRAVITY]
     acceleration -= acceleration.mean(axis=0)
     velocity = cumulative_trapezoid(acceleration, time, axis=0, initial=0)

@@ -1,0 +1,252 @@
+"""`init` is never sure of what it cannot know: names that lie, columns that are odd, and what nothing decides."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cpfls_cli.flightlog.airframe import airframe_from_motion
+from cpfls_cli.flightlog.proposal import known_log, propose
+from tests.builders.unknown_logs import FLIP, GRAVITY, HUBS, NED, flat_log, flight, named, quaternion
+
+GYRO, ACC = ("gyro_x", "gyro_y", "gyro_z"), ("acc_x", "acc_y", "acc_z")
+PLACE, SPEED, Q = ("x", "y", "z"), ("vx", "vy", "vz"), ("qw", "qx", "qy", "qz")
+ANGLES = ("roll", "pitch", "yaw")
+RPM = 60 / (2 * np.pi)
+NAMES = {(1, -1): "front right", (-1, 1): "rear left", (1, 1): "front left", (-1, -1): "rear right"}
+OWN = flight()
+UP_DOWN = np.array([1.0, 1.0, -1.0])
+
+
+def proposed(**changed):
+    log = flat_log(OWN, **changed)
+    return propose([known_log("log", log.topics, log.units, log.parameters, log.system)], None, None)
+
+
+def choices(proposal):
+    return {choice.key: (choice.value, choice.sure) for choice in proposal.choices}
+
+
+def signal(proposal, name):
+    return next(guess for guess in proposal.signals if guess.signal == name)
+
+
+def assert_the_rest_is_as_named(proposal, *odd):
+    """Everything but what is odd keeps its columns, its signs and FLU in ENU, and the rotors their corners."""
+    assert choices(proposal)["body_frame"] == ("FLU", "data")
+    assert choices(proposal)["world_frame"] == ("ENU", "data")
+    for guess in proposal.signals:
+        if guess.signal not in odd:
+            assert guess.columns.sign is None, guess
+    assert [(rotor.name, rotor.spin) for rotor in proposal.airframe.rotors] == [
+        (NAMES[hub[:2]], hub[2]) for hub in HUBS
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changed", "odd", "sign", "said"),
+    [
+        ({"position": named(OWN.position * UP_DOWN, *PLACE)}, "position", UP_DOWN, "*: z runs against all others"),
+        ({"position": named(OWN.position * [-1, 1, 1], *PLACE)}, "position", [-1, 1, 1], "*: x runs against"),
+        ({"velocity": named(OWN.velocity * UP_DOWN, *SPEED)}, "velocity", UP_DOWN, "v*: vz runs against all others"),
+        ({"rate": named(OWN.rate * [1, -1, 1], *GYRO)}, "body_rate", [1, -1, 1], "gyro_*: gyro_y runs against"),
+        ({"attitude": named(OWN.angles * [-1, 1, 1], *ANGLES)}, "attitude", [-1, 1, 1], ""),
+    ],
+)
+def test_one_column_against_all_others_is_the_odd_one_and_said(changed, odd, sign, said):
+    proposal = proposed(**changed)
+    assert_the_rest_is_as_named(proposal, odd)
+    assert signal(proposal, odd).columns.sign == tuple(sign)
+    assert any(said in warning for warning in proposal.warnings) or not said
+
+
+def test_a_gyroscope_in_frd_does_not_turn_the_vehicle():
+    proposal = proposed(rate=named(OWN.rate @ FLIP, *GYRO))
+    assert_the_rest_is_as_named(proposal, "body_rate")
+    assert signal(proposal, "body_rate").columns.sign == (1.0, -1.0, -1.0)
+
+
+def test_an_altitude_in_a_log_of_frd_and_ned_turns_nothing():
+    turned = Rotation.from_matrix(NED @ OWN.rotation.as_matrix() @ FLIP)
+    proposal = proposed(
+        attitude=named(quaternion(turned), *Q),
+        rate=named(OWN.rate @ FLIP, *GYRO),
+        force=named(OWN.specific_force @ FLIP, *ACC),
+        position=named(OWN.position @ NED.T * UP_DOWN, *PLACE),
+        velocity=named(OWN.velocity @ NED.T, *SPEED),
+    )
+    assert choices(proposal)["body_frame"] == ("FRD", "data")
+    assert choices(proposal)["world_frame"] == ("NED", "data")
+    assert signal(proposal, "position").columns.sign == tuple(UP_DOWN)
+    assert signal(proposal, "velocity").columns.sign is None
+
+
+def test_without_an_accelerometer_an_odd_altitude_and_a_turned_log_are_both_possible():
+    proposal = proposed(position=named(OWN.position * UP_DOWN, *PLACE), velocity=None, force=None)
+    assert choices(proposal)["body_frame"] == ("FLU", "guess")
+    (rival,) = next(choice for choice in proposal.choices if choice.key == "body_frame").rivals
+    assert rival.text == "body_frame: FRD"
+    assert "a flight of which one lean, turn or climb is known" in rival.reason
+    # Left is right in the other reading, so the rotors are asked for.
+    assert proposal.airframe.is_guess
+
+
+@pytest.mark.parametrize(
+    ("columns", "held"),
+    [
+        ([1, 2, 3, 0], "qz, qw, qx, qy"),
+        ([0, 1, 3, 2], "qw, qx, qz, qy"),
+        ([0, 2, 1, 3], "qw, qy, qx, qz"),
+        ([0, 3, 2, 1], "qw, qz, qy, qx"),
+    ],
+)
+def test_a_quaternion_whose_names_and_columns_disagree_is_put_in_order_and_said(columns, held):
+    proposal = proposed(attitude=named(quaternion(OWN.rotation)[:, columns], *Q))
+    assert_the_rest_is_as_named(proposal)
+    assert ", ".join(signal(proposal, "quaternion").columns.columns) == held
+    assert f"log: {held} are taken for w, x, y, z: so the log agrees with itself, and as named it does not" in (
+        proposal.warnings
+    )
+
+
+def test_a_quaternion_that_needs_much_explaining_is_a_guess_and_so_is_all_that_hangs_on_it():
+    proposal = proposed(attitude=named(quaternion(OWN.rotation)[:, [2, 3, 0, 1]], *Q))
+    assert {signal(proposal, name).sure for name in ("quaternion", "body_rate")} == {"guess"}
+    assert choices(proposal)["body_frame"][1] == "guess"
+    assert proposal.airframe.is_guess
+
+
+@pytest.mark.parametrize(
+    ("ending", "unit", "scale", "factor"),
+    [
+        ("_rad_s", "rad/s", 1.0, 1.0),
+        ("_radps", "rad/s", 1.0, 1.0),
+        ("[rad/s]", "rad/s", 1.0, 1.0),
+        (" (rad/s)", "rad/s", 1.0, 1.0),
+        ("_rad_per_s", "rad/s", 1.0, 1.0),
+        ("RadPerSec", "rad/s", 1.0, 1.0),
+        ("_krpm", "rpm", 1e3, RPM / 1e3),
+        ("_hz", "rad/s", 2 * np.pi, 1 / (2 * np.pi)),
+        ("_deg_s", "deg/s", 1.0, np.degrees(1.0)),
+    ],
+)
+def test_a_unit_in_a_name_tells_more_than_a_range(ending, unit, scale, factor):
+    names = [f"m{number}{ending}" for number in range(1, 5)]
+    guess = signal(proposed(speed=named(OWN.speed * factor, *names)), "rotor_speed")
+    assert (guess.columns.unit, guess.columns.scale, guess.sure) == (unit, pytest.approx(scale), "named")
+
+
+@pytest.mark.parametrize(
+    ("name", "part", "columns", "unit", "scale"),
+    [
+        ("body_rate", "rate", [f"{axis}_mdps" for axis in GYRO], "deg/s", 1e-3),
+        ("acceleration", "force", [f"{axis}[m/s^2]" for axis in ACC], "m/s^2", 1.0),
+        ("acceleration", "force", [f"{axis}_mg" for axis in ACC], "g", 1e-3),
+        ("position", "position", [f"pos_{axis}_cm" for axis in "xyz"], "m", 1e-2),
+        ("velocity", "velocity", [f"v{axis}_mm_s" for axis in "xyz"], "mm/s", 1.0),
+        ("attitude", "attitude", [f"{axis}_mrad" for axis in ANGLES], "rad", 1e-3),
+    ],
+)
+def test_a_unit_is_read_however_it_is_written(name, part, columns, unit, scale):
+    values = {"rate": OWN.rate * np.degrees(1.0), "force": OWN.specific_force, "position": OWN.position}
+    values |= {"velocity": OWN.velocity, "attitude": OWN.angles}
+    if unit == "g":
+        values["force"] = OWN.specific_force / GRAVITY
+    factor = 1e3 if unit == "mm/s" else 1 / scale
+    proposal = proposed(**{part: named(values[part] * factor, *columns)})
+    assert (signal(proposal, name).columns.unit, signal(proposal, name).columns.scale) == (unit, pytest.approx(scale))
+    assert proposal.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "changed", "unit", "said"),
+    [
+        (
+            "attitude",
+            {"attitude": named(np.degrees(OWN.angles), "roll_rad", "pitch_rad", "yaw_rad")},
+            "deg",
+            "said to be in rad; its size says deg",
+        ),
+        (
+            "position",
+            {"position": named(1e3 * OWN.position, "pos_x_m", "pos_y_m", "pos_z_m")},
+            "mm",
+            "said to be in m; by tilt and gravity it is in mm",
+        ),
+        (
+            "acceleration",
+            {"force": named(OWN.specific_force / GRAVITY, "acc_x_m_s2", "acc_y_m_s2", "acc_z_m_s2")},
+            "g",
+            "said to be in m/s^2; its size says g",
+        ),
+    ],
+)
+def test_a_unit_that_is_stated_wrong_is_told_by_the_motion_and_said(name, changed, unit, said):
+    proposal = proposed(**changed)
+    assert signal(proposal, name).columns.unit == unit
+    assert any(said in warning for warning in proposal.warnings)
+
+
+@pytest.mark.parametrize("names", ["m", "motor", "u"])
+def test_numbers_that_may_be_speeds_are_no_sure_command(names):
+    guess = signal(proposed(speed=named(OWN.speed * RPM, *(f"{names}{n}" for n in range(1, 5)))), "rotor_command")
+    assert guess.sure == "guess"
+    assert [rival.text for rival in guess.rivals] == ["unit: rad/s", "unit: rpm"]
+
+
+def test_gravity_that_points_the_wrong_way_is_a_guess_with_its_rivals():
+    guess = signal(proposed(force=named(OWN.specific_force * UP_DOWN, *ACC)), "acceleration")
+    assert guess.sure == "guess"
+    assert [rival.text for rival in guess.rivals] == ["sign: [1, -1, -1]", "sign: [1, 1, -1]"]
+
+
+def test_an_accelerometer_alone_may_log_gravity():
+    proposal = proposed(attitude=None, position=None, velocity=None, force=named(OWN.specific_force @ FLIP, *ACC))
+    assert choices(proposal)["body_frame"] == ("FRD", "guess")
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ([0, 1, 1], "gyro_y and gyro_z hold the same numbers"),
+        ([0, 1, 3], "gyro_z never changes"),
+    ],
+)
+def test_a_column_that_is_another_one_or_nothing_makes_a_guess(columns, said):
+    rate = np.column_stack([OWN.rate, np.zeros(len(OWN.time))])[:, columns]
+    proposal = proposed(rate=named(rate, *GYRO))
+    assert signal(proposal, "body_rate").sure == "guess"
+    assert any(said in warning for warning in proposal.warnings)
+
+
+def test_a_gyroscope_of_another_flight_is_a_guess():
+    proposal = proposed(rate=named(flight(seed=9).rate, *GYRO))
+    assert signal(proposal, "body_rate").sure == "guess"
+    assert any("the derivative of the attitude explains only" in warning for warning in proposal.warnings)
+
+
+def test_three_of_four_rotors_are_a_guess():
+    speed = OWN.speed.copy()
+    speed[:, 3] = 570.0
+    guess = signal(proposed(speed=named(speed * RPM, "rpm1", "rpm2", "rpm3", "rpm4")), "rotor_speed")
+    assert (guess.sure, guess.rivals[0].text) == ("guess", "columns: [rpm1, rpm2, rpm3, rpm4]")
+
+
+@pytest.mark.parametrize(
+    ("stamps", "said"),
+    [
+        (np.arange(len(OWN.time)) * 1.0, "t rises by 1 from row to row"),
+        (1e4 * OWN.time, "which no unit makes: is the unit of the stamps right?"),
+    ],
+)
+def test_stamps_that_count_something_else_are_doubted(stamps, said):
+    assert any(said in warning for warning in proposed(t={"t": stamps}).warnings)
+
+
+def test_a_layout_in_which_single_rotors_push_the_wrong_way_is_no_known_one():
+    """Columns of rotors that are apart in time explain a part of a lively flight in a layout that is none."""
+    lively = flight(angle=0.05, highest_hz=4.0, climb=2.0)
+    apart = [np.column_stack([np.roll(lively.speed[:, rotor], step * rotor) for rotor in range(4)]) for step in (0, 5)]
+    together, late = (airframe_from_motion(lively.rate, speed, 100.0, False) for speed in apart)
+    assert together.clear
+    assert max(late.explained[:2]) > 0.3
+    assert not late.clear
